@@ -1,0 +1,46 @@
+# Two commands do everything on a fresh machine: `make demo` and `make test`.
+PYTHON ?= python3
+VENV := .venv
+DEV := .venv-dev
+RUNTIME_STAMP := $(VENV)/.runtime-installed
+DEV_STAMP := $(DEV)/.dev-installed
+SOURCES := camkit runtime export models_def tests tools
+
+.PHONY: demo test test-slow check format docs clean
+
+demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
+	$(VENV)/bin/python tools/demo.py --out-dir out
+
+test: check  ## set-up with everything, gate, tests with branch coverage
+	$(DEV)/bin/python -m coverage erase
+	$(DEV)/bin/python -m coverage run -m pytest -q
+	$(DEV)/bin/python -m coverage combine -q
+	$(DEV)/bin/python tools/coverage_gate.py
+
+test-slow: $(DEV_STAMP)  ## also the tests that take minutes
+	$(DEV)/bin/python -m pytest -q -m slow --timeout=3600
+
+check: $(DEV_STAMP)  ## format, lint, types, layers, spelling
+	$(DEV)/bin/ruff format --check $(SOURCES)
+	$(DEV)/bin/ruff check $(SOURCES)
+	$(DEV)/bin/mypy
+	$(DEV)/bin/lint-imports
+	$(DEV)/bin/codespell $(SOURCES) docs README.md CHANGELOG.md CONTRIBUTING.md
+
+format: $(DEV_STAMP)
+	$(DEV)/bin/ruff format $(SOURCES)
+	$(DEV)/bin/ruff check --fix $(SOURCES)
+
+$(RUNTIME_STAMP): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+$(DEV_STAMP): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(DEV)
+	$(DEV)/bin/python -m pip install -q --disable-pip-version-check torch==2.13.0
+	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	touch $@
+
+clean:
+	rm -rf out build dist .coverage* .mypy_cache .ruff_cache .pytest_cache

@@ -1,0 +1,61 @@
+"""camkit: computational cameras from design to daily use.
+
+The public face, free of torch and loaded only when touched:
+
+    camkit.load(bundle)            a live Pipeline from a bundle's name or path
+    camkit.process(files, ...)     captures in, pictures and sidecars out
+    camkit.Pipeline                the type that `load` returns
+    camkit.CamkitError, ...        the error tree of camkit.errors
+
+The folders, in the order in which data passes through them: `models_def` (design time: optics,
+sensors, networks, training), `export` (bundle out), `bundle` (the file both sides agree on),
+`runtime` (use time), `report` and `cli` (for people).
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from camkit.errors import (
+        BundleError,
+        CamkitError,
+        ContractError,
+        DecodeError,
+        ParityError,
+        UnsupportedError,
+    )
+    from camkit.runtime.batch import FileResult, process
+    from camkit.runtime.pipeline import Pipeline, load
+
+__all__ = [
+    "BundleError",
+    "CamkitError",
+    "ContractError",
+    "DecodeError",
+    "FileResult",
+    "ParityError",
+    "Pipeline",
+    "UnsupportedError",
+    "__version__",
+    "load",
+    "process",
+]
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "load": "camkit.runtime.pipeline",
+    "Pipeline": "camkit.runtime.pipeline",
+    "process": "camkit.runtime.batch",
+    "FileResult": "camkit.runtime.batch",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module 'camkit' has no attribute {name!r}")
+    return getattr(import_module(_HOMES.get(name, "camkit.errors")), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,96 @@
+"""What was measured at export: facts about each network, and the card of the camera."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from camkit.bundle.camera import Entry, NonNegative, Positive
+
+Count = Annotated[int, Field(ge=0)]
+
+
+class HaloError(Entry):
+    """What a halo costs: the difference of tiled and whole picture.
+
+    Attributes:
+        max_abs: Largest |difference| in the network's own (stabilised) units.
+        psnr_db: PSNR of tiled against whole; None where they are equal.
+    """
+
+    halo_px: Count
+    max_abs: NonNegative
+    psnr_db: float | None
+
+
+class NetworkFacts(Entry):
+    """One size of network: its member, and facts measured at export and verified by the check.
+
+    Attributes:
+        member: Name of the fp32 ONNX in the bundle.
+        fp16_member: Name of the fp16 ONNX, present only if its range is proven.
+        input_name: Name of the input, (1, input_channels, H, W) float32.
+        output_name: Name of the output, (1, output_channels, H, W) float32.
+        receptive_field_radius_px: By the walk through the graph.
+        receptive_field_probe_px: By perturbing pixels; the reach is the larger of the two.
+        stride_px: H and W must be multiples of it.
+        global_operators: Nodes that see the whole picture (none may be tiled exactly).
+        halo_error: Error over halo, by increasing halo.
+        max_activation: Largest |activation| of all nodes over the golden cases.
+        node_activation: The same per node.
+        fp16_headroom: Factor by which HDR input may exceed the golden cases.
+        fp16_safe: Whether max_activation * fp16_headroom stays below 65504 / 4.
+        mac_per_pixel: Multiplications per output pixel.
+        bytes_per_pixel: Peak of live activations in fp32 per output pixel.
+        parity_max_abs: Largest |torch - ONNX| on golden and random input.
+        parameters: Number of weights.
+    """
+
+    member: str
+    fp16_member: str | None = None
+    input_name: str = "input"
+    input_channels: Annotated[int, Field(gt=0, le=1024)] = 6
+    output_name: str = "output"
+    output_channels: Annotated[int, Field(gt=0, le=1024)] = 3
+    receptive_field_radius_px: Count
+    receptive_field_probe_px: Count
+    stride_px: Annotated[int, Field(gt=0, le=4096)]
+    global_operators: tuple[str, ...] = ()
+    halo_error: tuple[HaloError, ...] = ()
+    max_activation: NonNegative
+    node_activation: dict[str, NonNegative] = Field(default_factory=dict)
+    fp16_headroom: Positive = 4.0
+    fp16_safe: bool
+    mac_per_pixel: NonNegative
+    bytes_per_pixel: NonNegative
+    parity_max_abs: NonNegative
+    parameters: Count
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.fp16_member is not None and not self.fp16_safe:
+            raise ValueError("an fp16 member needs fp16_safe, that is a proven range")
+        halos = [entry.halo_px for entry in self.halo_error]
+        if halos != sorted(set(halos)):
+            raise ValueError(f"halo_error must come by increasing halo; got {halos}")
+        return self
+
+    @property
+    def reach_px(self) -> int:
+        """The halo that exact tiling needs: the larger of walk and probe."""
+        return max(self.receptive_field_radius_px, self.receptive_field_probe_px)
+
+
+class CardRow(Entry):
+    """One measured number, and the command that measures it again."""
+
+    what: str
+    value: float
+    unit: str
+    command: str
+
+
+class Card(Entry):
+    """Measured accuracy and speed."""
+
+    accuracy: tuple[CardRow, ...] = ()
+    speed: tuple[CardRow, ...] = ()

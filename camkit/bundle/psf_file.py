@@ -1,0 +1,136 @@
+"""The frozen PSF as safetensors: to bytes and back, with every refusal of a damaged file.
+
+The file holds seven tensors and no metadata, so that the same PSF always gives the same bytes:
+`kernels` (float32) and, as float64, `field_heights_mm`, `depths_mm`, `wavelengths_um`,
+`pixel_pitch_um` (1,), `distortion_coefficients` (3, 4), `distortion_radius_mm` (1,) and
+`relative_illumination`.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.errors import BundleError, ContractError
+
+_AXES: Final = ("field_heights_mm", "depths_mm", "wavelengths_um", "relative_illumination")
+_SCALARS: Final = ("pixel_pitch_um", "distortion_radius_mm")
+_TENSORS: Final = frozenset({"kernels", "distortion_coefficients", *_AXES, *_SCALARS})
+
+
+def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
+    """Decode safetensors bytes to arrays that nobody can write to.
+
+    Args:
+        data: A whole safetensors file.
+        what: Its name in the error message.
+
+    Raises:
+        BundleError: If the bytes are not a sound safetensors file of numpy types.
+    """
+    try:
+        tensors = load(data)
+    except (SafetensorError, KeyError, TypeError, ValueError, OverflowError) as error:
+        raise BundleError(
+            f"{what} is not a sound safetensors file ({error}); export it again"
+        ) from error
+    for array in tensors.values():
+        array.flags.writeable = False
+    return tensors
+
+
+def psf_to_bytes(psf: FrozenPsf) -> bytes:
+    """Encode a frozen PSF as safetensors; the same PSF always gives the same bytes."""
+    tensors: dict[str, NDArray[Any]] = {
+        "kernels": np.ascontiguousarray(psf.kernels),
+        "field_heights_mm": np.asarray(psf.field_heights_mm, dtype=np.float64),
+        "depths_mm": np.asarray(psf.depths_mm, dtype=np.float64),
+        "wavelengths_um": np.asarray(psf.wavelengths_um, dtype=np.float64),
+        "pixel_pitch_um": np.array([psf.pixel_pitch_um], dtype=np.float64),
+        "distortion_coefficients": np.ascontiguousarray(
+            psf.distortion.coefficients, dtype=np.float64
+        ),
+        "distortion_radius_mm": np.array([psf.distortion.radius_mm], dtype=np.float64),
+        "relative_illumination": np.asarray(psf.relative_illumination, dtype=np.float64),
+    }
+    return save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+
+
+def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
+    """Decode a frozen PSF and check it.
+
+    Args:
+        data: A whole safetensors file as written by `psf_to_bytes`.
+        what: Its name in the error message.
+
+    Returns:
+        The PSF, its arrays read-only.
+
+    Raises:
+        BundleError: If the file is damaged, a tensor is missing or has the wrong type or shape,
+            or the PSF is not one: NaN, negative or unnormalised kernels, axes out of order.
+    """
+    tensors = read_tensors(data, what=what)
+    _check_tensors(tensors, what)
+    try:
+        return FrozenPsf(
+            kernels=tensors["kernels"],
+            field_heights_mm=tensors["field_heights_mm"],
+            depths_mm=tensors["depths_mm"],
+            wavelengths_um=tensors["wavelengths_um"],
+            pixel_pitch_um=float(tensors["pixel_pitch_um"][0]),
+            distortion=RadialDistortion(
+                coefficients=tensors["distortion_coefficients"],
+                radius_mm=float(tensors["distortion_radius_mm"][0]),
+            ),
+            relative_illumination=tensors["relative_illumination"],
+        )
+    except ContractError as error:
+        raise BundleError(f"{what} is refused: {error}") from error
+
+
+def _check_tensors(tensors: Mapping[str, NDArray[Any]], what: str) -> None:
+    if tensors.keys() != _TENSORS:
+        missing = ", ".join(sorted(_TENSORS - tensors.keys())) or "none"
+        extra = ", ".join(sorted(tensors.keys() - _TENSORS)) or "none"
+        raise BundleError(
+            f"{what} must hold the {len(_TENSORS)} tensors of a frozen PSF; "
+            f"missing: {missing}; unknown: {extra}. Freeze the PSF again"
+        )
+    kernels = tensors["kernels"]
+    if kernels.dtype != np.float32 or kernels.ndim != 5 or kernels.size == 0:
+        raise BundleError(
+            f"{what}: kernels must be float32 (field, depth, wavelength, h, w), not empty; "
+            f"got {kernels.dtype} {kernels.shape}"
+        )
+    shapes = {"distortion_coefficients": (3, 4)} | dict.fromkeys(_SCALARS, (1,))
+    for name in sorted(_TENSORS - {"kernels"}):
+        array = tensors[name]
+        wanted = shapes.get(name, (array.size,))
+        if array.dtype != np.float64 or array.shape != wanted:
+            raise BundleError(
+                f"{what}: {name} must be float64 of shape {wanted}; got {array.dtype} {array.shape}"
+            )
+
+
+def write_psf(path: Path, psf: FrozenPsf) -> None:
+    """Write a frozen PSF to a safetensors file, replacing one that is there."""
+    Path(path).write_bytes(psf_to_bytes(psf))
+
+
+def read_psf(path: Path) -> FrozenPsf:
+    """Read a frozen PSF from a safetensors file.
+
+    Raises:
+        BundleError: If the file is missing, damaged or not a PSF.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise BundleError(f"cannot read the PSF {path}: {error.strerror}") from error
+    return psf_from_bytes(data, what=str(path))

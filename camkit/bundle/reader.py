@@ -1,0 +1,246 @@
+"""Opening a bundle: container, manifest, hashes and PSF checked before anything is used.
+
+    find_bundle(name or path) -> open_bundle(path) -> Bundle
+
+Graphs are not looked at here: `camkit.runtime.graph.check_graph` does that before a session is
+made, since `onnx` belongs to the runtime.
+"""
+
+import difflib
+import hashlib
+import importlib.resources
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from camkit.bundle.container import (
+    MAX_BUNDLE_BYTES,
+    Container,
+    container_from_bytes,
+    read_container,
+)
+from camkit.bundle.manifest import Manifest, NetworkFacts, read_manifest
+from camkit.bundle.psf_file import psf_from_bytes
+from camkit.contracts import FrozenPsf
+from camkit.errors import BundleError
+
+SUFFIX: Final = ".camkit"
+MANIFEST: Final = "manifest.json"
+PSF: Final = "psf.safetensors"
+STRESS_PSF: Final = "stress_psf.safetensors"
+GOLDEN: Final = "golden.safetensors"
+PRESCRIPTION: Final = "prescription.toml"
+CARD: Final = "card.md"
+PREVIEW: Final = "preview.png"
+
+_MAX_MANIFEST_BYTES: Final = 2**20
+_PSF_STAGES: Final = ("wiener", "illumination", "undistort")
+_PITCH_RTOL: Final = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bundle:
+    """A bundle that passed every check of its container. Immutable; threads may share it.
+
+    Attributes:
+        path: Where it was read.
+        manifest: What it says about itself.
+    """
+
+    path: Path
+    manifest: Manifest
+    _container: Container = field(repr=False)
+    _psf: FrozenPsf | None = field(repr=False)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the whole file."""
+        return self._container.sha256
+
+    @property
+    def psf(self) -> FrozenPsf:
+        """The frozen PSF.
+
+        Raises:
+            BundleError: If this bundle has none (its stages need none).
+        """
+        if self._psf is None:
+            raise BundleError(f"{self.path.name} has no {PSF}")
+        return self._psf
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The members, without the manifest."""
+        return tuple(self.manifest.members)
+
+    def member(self, name: str) -> bytes:
+        """Give the bytes of one member, whose hash was checked at opening.
+
+        Raises:
+            BundleError: If there is no such member.
+        """
+        return self._container.read(name)
+
+    def network_facts(self, size: str) -> NetworkFacts:
+        """Give the facts about one size of network ("S", "M" or "L").
+
+        Raises:
+            BundleError: If the bundle has no network of that size.
+        """
+        for name, facts in self.manifest.networks.items():
+            if name == size:
+                return facts
+        have = ", ".join(self.manifest.networks) or "none"
+        raise BundleError(f"{self.path.name} has no network of size {size!r}; it has: {have}")
+
+    def network_bytes(self, size: str, *, fp16: bool = False) -> bytes:
+        """Give the ONNX of one size.
+
+        Raises:
+            BundleError: If the bundle has no network of that size, or none in fp16.
+        """
+        facts = self.network_facts(size)
+        if not fp16:
+            return self.member(facts.member)
+        if facts.fp16_member is None:
+            raise BundleError(f"{self.path.name}: size {size} has no fp16 network; use fp32")
+        return self.member(facts.fp16_member)
+
+    def stress_psf(self) -> FrozenPsf | None:
+        """Give the kernels off the design point, None if the bundle has none.
+
+        Raises:
+            BundleError: If they are damaged or no PSF.
+        """
+        if STRESS_PSF not in self.manifest.members:
+            return None
+        return psf_from_bytes(self.member(STRESS_PSF), what=STRESS_PSF)
+
+
+def open_bundle(path: Path | str, *, max_bytes: int = MAX_BUNDLE_BYTES) -> Bundle:
+    """Read a bundle in place and check it; nothing is written to disk.
+
+    Args:
+        path: The .camkit file.
+        max_bytes: Cap on the file and on what it unpacks to.
+
+    Raises:
+        BundleError: For every reason in container.py, manifest.py and psf_file.py; if manifest
+            and members disagree in name, size or hash; if a stage lacks its member; if PSF and
+            camera disagree in pixel pitch.
+    """
+    return _check_bundle(read_container(Path(path), max_bytes=max_bytes), Path(path))
+
+
+def bundle_from_bytes(data: bytes, *, path: Path, max_bytes: int = MAX_BUNDLE_BYTES) -> Bundle:
+    """Check a bundle that is in memory; `path` is only its name. See `open_bundle`."""
+    return _check_bundle(container_from_bytes(data, what=str(path), max_bytes=max_bytes), path)
+
+
+def _check_bundle(container: Container, path: Path) -> Bundle:
+    manifest = read_container_manifest(container)
+    for name, member in manifest.members.items():
+        _check_member(container, name, member.size, member.sha256)
+    psf = None
+    if PSF in manifest.members:
+        psf = psf_from_bytes(container.read(PSF))
+        _check_pitch(psf, manifest)
+    return Bundle(path=path, manifest=manifest, _container=container, _psf=psf)
+
+
+def read_container_manifest(container: Container) -> Manifest:
+    """Read the manifest of a container and hold it against the names of the members.
+
+    Raises:
+        BundleError: If there is no manifest, it is refused, a member is in one of the two only,
+            or a stage or network names a member that is not there.
+    """
+    if MANIFEST not in container.sizes:
+        raise BundleError(f"the zip has no {MANIFEST}, so it is not a bundle")
+    if container.sizes[MANIFEST] > _MAX_MANIFEST_BYTES:
+        raise BundleError(f"{MANIFEST} is larger than {_MAX_MANIFEST_BYTES} bytes; refused")
+    manifest = read_manifest(container.read(MANIFEST))
+    _check_names(manifest, container.sizes)
+    _check_references(manifest)
+    return manifest
+
+
+def _check_names(manifest: Manifest, sizes: Mapping[str, int]) -> None:
+    if MANIFEST in manifest.members:
+        raise BundleError(f"{MANIFEST} lists itself as a member; a hash cannot hold itself")
+    if unlisted := sizes.keys() - manifest.members.keys() - {MANIFEST}:
+        raise BundleError(f"members not in the manifest: {', '.join(sorted(unlisted))}; refused")
+    if absent := manifest.members.keys() - sizes.keys():
+        raise BundleError(
+            f"the manifest lists members that are not there: {', '.join(sorted(absent))}"
+        )
+
+
+def _check_references(manifest: Manifest) -> None:
+    needed = {}
+    for size, facts in manifest.networks.items():
+        needed[facts.member] = f"network {size}"
+        if facts.fp16_member is not None:
+            needed[facts.fp16_member] = f"network {size} in fp16"
+    for stage in manifest.stages:
+        if stage.type in _PSF_STAGES:
+            needed[PSF] = f"stage {stage.type}"
+    if manifest.golden:
+        needed[GOLDEN] = "the golden cases"
+    for name, user in needed.items():
+        if name not in manifest.members:
+            raise BundleError(f"{user} needs the member {name}, which the bundle does not have")
+
+
+def _check_member(container: Container, name: str, size: int, sha256: str) -> None:
+    data = container.read(name)
+    if len(data) != size:
+        raise BundleError(
+            f"member {name} has {len(data)} bytes, the manifest says {size}; fetch the bundle again"
+        )
+    got = hashlib.sha256(data).hexdigest()
+    if got != sha256:
+        raise BundleError(
+            f"member {name} has the hash {got[:16]}..., the manifest says {sha256[:16]}...; "
+            "fetch the bundle again"
+        )
+
+
+def _check_pitch(psf: FrozenPsf, manifest: Manifest) -> None:
+    pitch_um = manifest.camera.pixel_pitch_um
+    if abs(psf.pixel_pitch_um - pitch_um) > _PITCH_RTOL * pitch_um:
+        raise BundleError(
+            f"{PSF} is sampled at {psf.pixel_pitch_um} um, the camera has {pitch_um} um pixels; "
+            "freeze the PSF at the pitch of the sensor"
+        )
+
+
+def built_in_bundles() -> dict[str, Path]:
+    """Give the bundles that come with camkit, name -> path."""
+    folder = Path(str(importlib.resources.files("camkit.bundles")))
+    return {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
+
+
+def find_bundle(name_or_path: str | Path) -> Path:
+    """Give the path of a bundle: a file, or the name of a built-in one.
+
+    Raises:
+        BundleError: If there is neither; near names are suggested.
+    """
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    text = str(name_or_path)
+    if path.suffix == SUFFIX or path.name != text:
+        raise BundleError(f"there is no bundle file {text}")
+    known = built_in_bundles()
+    if text in known:
+        return known[text]
+    near = difflib.get_close_matches(text, known, n=3)
+    hint = (
+        f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known) or 'none'}"
+    )
+    raise BundleError(
+        f"no built-in bundle is called {text!r}; {hint} A path to a .camkit file will do"
+    )

@@ -1,0 +1,84 @@
+"""Writing a bundle: hashes filled in, read back, put in place by one rename.
+
+The same content gives the same bytes: names sorted, time stamps fixed, one compressor setting.
+"""
+
+import hashlib
+import io
+import os
+import stat
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from camkit.bundle.container import MAX_RATIO
+from camkit.bundle.manifest import Manifest, Member, manifest_to_bytes
+from camkit.bundle.reader import MANIFEST, Bundle, bundle_from_bytes
+
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+_DEFLATE_LEVEL: Final = 9
+
+
+def bundle_to_bytes(manifest: Manifest, members: Mapping[str, bytes]) -> bytes:
+    """Pack a bundle; the manifest's own list of members is replaced by what is given.
+
+    Args:
+        manifest: Everything but the members.
+        members: Name -> content, without the manifest.
+    """
+    facts = {
+        name: Member(sha256=hashlib.sha256(data).hexdigest(), size=len(data))
+        for name, data in sorted(members.items())
+    }
+    full = manifest.model_copy(update={"members": facts})
+    contents = {MANIFEST: manifest_to_bytes(full)} | dict(sorted(members.items()))
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, data in contents.items():
+            _write_member(archive, name, data)
+    return buffer.getvalue()
+
+
+def _write_member(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
+    info = zipfile.ZipInfo(name, _EPOCH)
+    info.create_system = 3
+    info.external_attr = (stat.S_IFREG | 0o644) << 16
+    packed = len(zlib.compress(data, _DEFLATE_LEVEL))
+    # Near-empty members (kernels with wide zero borders) would pass the ratio that readers
+    # refuse; those, and what does not shrink, are stored.
+    shrinks = packed < len(data) and len(data) < MAX_RATIO * packed // 2
+    info.compress_type = zipfile.ZIP_DEFLATED if shrinks else zipfile.ZIP_STORED
+    archive.writestr(info, data, compresslevel=_DEFLATE_LEVEL)
+
+
+def write_bundle(path: Path, manifest: Manifest, members: Mapping[str, bytes]) -> Bundle:
+    """Write a bundle and give it as a reader sees it.
+
+    The file appears under its name complete or not at all.
+
+    Args:
+        path: The .camkit file, replaced if it is there.
+        manifest: Everything but the members (its `members` are ignored).
+        members: Name -> content, without the manifest.
+
+    Raises:
+        BundleError: If a reader would refuse the result; nothing is written then.
+    """
+    path = Path(path)
+    data = bundle_to_bytes(manifest, members)
+    bundle = bundle_from_bytes(data, path=path)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    return bundle

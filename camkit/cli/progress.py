@@ -1,0 +1,78 @@
+"""Progress for people on stderr, and only on a terminal; results on stdout."""
+
+import json
+import sys
+import threading
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+    from camkit.runtime.development import FileResult
+
+
+class TileProgress:
+    """One bar per running file; safe to call from the working threads."""
+
+    def __init__(self, files: int) -> None:
+        self._files = files
+        self._lock = threading.Lock()
+        self._bars: dict[Path, TaskID] = {}
+        self._live = None
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self._live = Progress(console=Console(stderr=True), transient=True)
+
+    def __enter__(self) -> Self:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def tile(self, file: Path, done: int, total: int) -> None:
+        """Show that `done` of `total` tiles of a file are finished."""
+        if self._live is None:
+            return
+        with self._lock:
+            if file not in self._bars:
+                self._bars[file] = self._live.add_task(file.name, total=total)
+            self._live.update(self._bars[file], completed=done)
+
+    def result(self, result: "FileResult", *, as_json: bool) -> None:
+        """Print one file's result: JSON or a line on stdout, failures on stderr."""
+        with self._lock:
+            bar = self._bars.pop(result.input, None)
+            if self._live is not None and bar is not None:
+                self._live.remove_task(bar)
+            if as_json:
+                typer.echo(json.dumps(result.to_json()))
+            elif result.status == "failed":
+                typer.echo(f"{result.input}: failed: {result.error}", err=True)
+            else:
+                _print_result(result)
+
+
+def _print_result(result: "FileResult") -> None:
+    total = sum(result.seconds.values())
+    head = f"{result.input} -> {result.output}"
+    if result.status == "skipped":
+        typer.echo(f"{head}: done before, skipped")
+        return
+    stages = ", ".join(f"{name} {value:.2f}" for name, value in result.seconds.items())
+    typer.echo(f"{head}: {total:.2f} s ({stages}), peak {result.peak_rss_mb:.0f} MB")
+    for warning in result.warnings:
+        typer.echo(f"  note: {warning}", err=True)

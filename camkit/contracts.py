@@ -1,0 +1,153 @@
+"""What design time and use time agree on: CFA, noise, frozen PSF, radial distortion.
+
+Signals are linear with 1.0 = white level (after black subtraction). Arrays are [y, x], pixel
+centres at integers. Sensor positions are in millimetres from the optical axis, +x to the right
+and +y down the rows; the axis lies at the picture centre ((w - 1) / 2, (h - 1) / 2) of the full
+sensor.
+"""
+
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.errors import ContractError
+
+CfaPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+CFA_PATTERNS: Final[tuple[CfaPattern, ...]] = get_args(CfaPattern)
+
+FloatArray = NDArray[np.float32]
+
+PSF_SUM_TOLERANCE: Final = 1e-4
+
+
+def cfa_channels(cfa: CfaPattern) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Give the colour index (0 R, 1 G, 2 B) at each position of the 2x2 cell.
+
+    Args:
+        cfa: Letters in reading order of the cell whose corner is pixel (0, 0).
+    """
+    if cfa not in CFA_PATTERNS:
+        raise ContractError(f"CFA must be one of {', '.join(CFA_PATTERNS)}; got {cfa!r}")
+    index = ["RGB".index(letter) for letter in cfa]
+    return (index[0], index[1]), (index[2], index[3])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseModel:
+    """Signal-dependent noise of a linear signal: variance = shot * signal + read_variance.
+
+    Attributes:
+        shot: Variance per unit of signal, one per colour (R, G, B).
+        read_variance: Variance at zero signal, one per colour.
+    References: Foi et al. 2008; DNG specification 1.7, NoiseProfile.
+    """
+
+    shot: tuple[float, float, float]
+    read_variance: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        values = np.array([self.shot, self.read_variance], dtype=np.float64)
+        if values.shape != (2, 3) or not np.isfinite(values).all() or (values < 0).any():
+            raise ContractError(
+                f"noise needs 3 finite values >= 0 each; got {self.shot}, {self.read_variance}"
+            )
+
+    def with_gains(self, gains: tuple[float, float, float]) -> "NoiseModel":
+        """Give the noise of the signal after multiplication by one gain per colour."""
+        r, g, b = gains
+        sr, sg, sb = self.shot
+        vr, vg, vb = self.read_variance
+        return NoiseModel(
+            shot=(sr * r, sg * g, sb * b),
+            read_variance=(vr * r * r, vg * g * g, vb * b * b),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RadialDistortion:
+    """Radial distortion per colour: r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6).
+
+    Attributes:
+        coefficients: (3, 4) float64, rows R, G, B; xi * (1, k1, k2, k3), for radii in units of
+            `radius_mm`. r is the ideal (undistorted) radius, r_d the radius on the sensor.
+        radius_mm: The unit of r and r_d: half the diagonal of the sensor.
+    References: Sun 2021, eq. (6.10) and (6.11).
+    """
+
+    coefficients: NDArray[np.float64]
+    radius_mm: float
+
+    def __post_init__(self) -> None:
+        if self.coefficients.shape != (3, 4) or not np.isfinite(self.coefficients).all():
+            raise ContractError(
+                f"distortion needs finite (3, 4) coefficients; got {self.coefficients.shape}"
+            )
+        if not (np.isfinite(self.radius_mm) and self.radius_mm > 0):
+            raise ContractError(f"distortion radius_mm must be > 0; got {self.radius_mm}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrozenPsf:
+    """The PSF of a camera, frozen on a grid of field heights, depths and wavelengths.
+
+    Attributes:
+        kernels: (field, depth, wavelength, h, w) float32, >= 0, each sums to 1. As they fall on
+            the sensor (scatter, not flipped), h and w odd, the centre pixel on the chief ray of
+            the reference wavelength (so lateral colour lies in the kernels), for image points
+            along +y of the sensor; other azimuths are obtained by turning.
+        field_heights_mm: (field,) float64, increasing from 0: distance of the chief ray from the
+            axis on the sensor.
+        depths_mm: (depth,) float64, object distances, increasing; inf is allowed.
+        wavelengths_um: (wavelength,) float64, increasing.
+        pixel_pitch_um: Pitch of the kernel samples, equal to that of the sensor.
+        distortion: Radial distortion per colour.
+        relative_illumination: (field,) float64 > 0, 1 on the axis.
+    """
+
+    kernels: FloatArray
+    field_heights_mm: NDArray[np.float64]
+    depths_mm: NDArray[np.float64]
+    wavelengths_um: NDArray[np.float64]
+    pixel_pitch_um: float
+    distortion: RadialDistortion
+    relative_illumination: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        self._check_kernels()
+        self._check_axes()
+
+    def _check_kernels(self) -> None:
+        if self.kernels.ndim != 5 or self.kernels.dtype != np.float32:
+            raise ContractError(
+                "kernels must be float32 (field, depth, wavelength, h, w); "
+                f"got {self.kernels.dtype} {self.kernels.shape}"
+            )
+        if not np.isfinite(self.kernels).all():
+            raise ContractError("kernels hold NaN or inf; freeze the PSF again")
+        if (self.kernels < 0).any():
+            raise ContractError("kernels hold negative values; freeze the PSF again")
+        sums = self.kernels.sum(axis=(-2, -1), dtype=np.float64)
+        if np.abs(sums - 1).max(initial=0) > PSF_SUM_TOLERANCE:
+            raise ContractError(
+                f"every kernel must sum to 1; sums run {sums.min():.6f} to {sums.max():.6f}"
+            )
+        if self.kernels.shape[-1] % 2 == 0 or self.kernels.shape[-2] % 2 == 0:
+            raise ContractError(f"kernel sides must be odd; got {self.kernels.shape[-2:]}")
+
+    def _check_axes(self) -> None:
+        axes = (self.field_heights_mm, self.depths_mm, self.wavelengths_um)
+        if tuple(a.size for a in axes) != self.kernels.shape[:3]:
+            raise ContractError(
+                f"axes have {[a.size for a in axes]} samples, kernels {self.kernels.shape[:3]}"
+            )
+        if any((np.diff(a) <= 0).any() or np.isnan(a).any() for a in axes):
+            raise ContractError("field heights, depths and wavelengths must increase")
+        if self.field_heights_mm[0] != 0:
+            raise ContractError(f"the first field must be 0; got {self.field_heights_mm[0]}")
+        light = self.relative_illumination
+        if light.shape != self.field_heights_mm.shape or not ((light > 0) & np.isfinite(light)).all():
+            raise ContractError("relative illumination needs one finite value > 0 per field")
+        if not (np.isfinite(self.pixel_pitch_um) and self.pixel_pitch_um > 0):
+            raise ContractError(f"pixel_pitch_um must be > 0; got {self.pixel_pitch_um}")

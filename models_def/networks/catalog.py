@@ -1,0 +1,54 @@
+"""The names under which recipes and checkpoints know the networks."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any, Final
+
+from torch import nn
+
+from camkit.errors import ContractError
+from camkit.models_def.networks.lean_unet import LEAN_L, LEAN_M, LEAN_S, LeanConfig, LeanUnet
+from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
+
+
+def _lean(base: LeanConfig, **config: Any) -> nn.Module:
+    return LeanUnet(replace(base, **config))
+
+
+def _trimmed(**config: Any) -> nn.Module:
+    return TrimmedUnet(TrimmedConfig(**config))
+
+
+_BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
+    "lean_s": partial(_lean, LEAN_S),
+    "lean_m": partial(_lean, LEAN_M),
+    "lean_l": partial(_lean, LEAN_L),
+    "trimmed_unet": _trimmed,
+}
+
+NETWORK_NAMES: Final = tuple(_BUILDERS)
+
+
+def build_network(name: str, **config: Any) -> nn.Module:
+    """Build an untrained network.
+
+    Args:
+        name: One of `NETWORK_NAMES`.
+        config: Fields of the network's config that differ from its defaults, as a recipe has them
+            (lists are taken for tuples).
+
+    Returns:
+        A network with the attributes `in_channels` and `stride_px`; weights are drawn from torch's
+        global generator.
+
+    Raises:
+        ContractError: If the name or a field is unknown or a value is out of range.
+    """
+    if name not in _BUILDERS:
+        raise ContractError(f"network must be one of {', '.join(NETWORK_NAMES)}; got {name!r}")
+    frozen = {k: tuple(v) if isinstance(v, list) else v for k, v in config.items()}
+    try:
+        return _BUILDERS[name](**frozen)
+    except TypeError as error:
+        raise ContractError(f"network {name} does not take this configuration: {error}") from error

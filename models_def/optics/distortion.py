@@ -1,0 +1,69 @@
+"""Radial distortion of a lens as the polynomial of eq. (6.10), fitted to traced chief rays."""
+
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from camkit.contracts import RadialDistortion
+from camkit.errors import ContractError
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.spot import slopes_for_heights
+
+FIT_POINTS: Final = 16
+_POWERS: Final = np.array([1, 3, 5, 7])
+
+
+def fit_distortion(
+    ideal: NDArray[np.float64], distorted: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Fit xi (1, k1, k2, k3) of r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6) by least squares.
+
+    Args:
+        ideal: (point,), undistorted radii in units of half the diagonal.
+        distorted: (point,), radii on the sensor in the same units.
+
+    Returns:
+        (4,) coefficients of r, r^3, r^5, r^7.
+
+    Raises:
+        ContractError: If there are fewer points than coefficients.
+
+    References: Sun 2021, eq. (6.11).
+    """
+    if ideal.shape != distorted.shape or ideal.ndim != 1 or ideal.size < len(_POWERS):
+        raise ContractError(
+            f"need at least 4 point pairs; got shapes {ideal.shape} and {distorted.shape}"
+        )
+    solution, *_ = np.linalg.lstsq(ideal[:, None] ** _POWERS, distorted, rcond=None)
+    return np.asarray(solution, dtype=np.float64)
+
+
+def ideal_heights(lens: Lens, heights_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give EFL tan(field angle) in mm of the fields that land at sensor heights."""
+    slopes = slopes_for_heights(lens, torch.from_numpy(heights_mm))
+    return paraxial_data(lens).efl_mm * slopes.numpy()
+
+
+def trace_distortion(lens: Lens, radius_mm: float) -> RadialDistortion:
+    """Fit the distortion of the reference wavelength over the whole sensor.
+
+    All three rows are equal: lateral colour lies in the kernels, which are centred on the chief
+    ray of the reference wavelength.
+
+    Args:
+        lens: The prescription.
+        radius_mm: Half the diagonal of the sensor.
+    """
+    heights_mm = np.linspace(radius_mm / FIT_POINTS, radius_mm, FIT_POINTS)
+    ideal_mm = ideal_heights(lens, heights_mm)
+    row = fit_distortion(ideal_mm / radius_mm, heights_mm / radius_mm)
+    return RadialDistortion(coefficients=np.tile(row, (3, 1)), radius_mm=radius_mm)
+
+
+def distortion_share(lens: Lens, heights_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the distortion h / (EFL tan(field angle)) - 1 at sensor heights > 0."""
+    share: NDArray[np.float64] = heights_mm / ideal_heights(lens, heights_mm) - 1
+    return share

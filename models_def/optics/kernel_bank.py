@@ -1,0 +1,159 @@
+"""Kernels per colour for training: the nominal lens and fabricated copies of it."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.models_def.optics.prescription import FabricationErrors, Lens, perturb
+from camkit.models_def.optics.psf import trace_psf
+from camkit.models_def.optics.pupil import with_fixed_stop
+
+GAUSS_FWHM: Final = 2 * math.sqrt(2 * math.log(2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelResponse:
+    """What share of a colour's light has which wavelength (for a flat spectrum).
+
+    Attributes:
+        wavelengths_um: (wavelength,), increasing.
+        response: (3, wavelength), rows R, G, B, each sums to 1.
+        source: Where it comes from.
+    """
+
+    wavelengths_um: NDArray[np.float64]
+    response: NDArray[np.float64]
+    source: str
+
+    def __post_init__(self) -> None:
+        if self.response.shape != (3, self.wavelengths_um.size):
+            raise ContractError(
+                f"response must be (3, {self.wavelengths_um.size}); got {self.response.shape}"
+            )
+        if (self.response < 0).any() or np.abs(self.response.sum(1) - 1).max() > 1e-6:
+            raise ContractError("each colour's response must be >= 0 and sum to 1")
+
+
+def gaussian_response(
+    wavelengths_um: NDArray[np.float64],
+    *,
+    centres_um: tuple[float, float, float] = (0.600, 0.540, 0.460),
+    fwhm_um: float = 0.090,
+) -> ChannelResponse:
+    """Give Gaussian colour channels on a wavelength grid: camkit's own model camera."""
+    sigma = fwhm_um / GAUSS_FWHM
+    away = wavelengths_um[None] - np.array(centres_um)[:, None]
+    response = np.exp(-0.5 * (away / sigma) ** 2)
+    return ChannelResponse(
+        wavelengths_um=wavelengths_um,
+        response=response / response.sum(1, keepdims=True),
+        source=f"model: Gaussians at {centres_um} um, FWHM {fwhm_um} um",
+    )
+
+
+def wavelength_grid(count: int, low_um: float = 0.42, high_um: float = 0.68) -> NDArray[np.float64]:
+    """Give evenly spaced wavelengths."""
+    return np.linspace(low_um, high_um, count)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KernelBank:
+    """Kernels of several copies of a lens.
+
+    Attributes:
+        kernels: (copy, field, 3, h, w) float32, each sums to 1; copy 0 is the nominal lens. As
+            they fall on the sensor for points along +y, centred on the copy's own chief ray of
+            the reference wavelength.
+        field_heights_mm: (field,).
+        pixel_pitch_um: Of the kernel samples.
+        energy_kept: Least share of light inside the window, over everything.
+    """
+
+    kernels: FloatArray
+    field_heights_mm: NDArray[np.float64]
+    pixel_pitch_um: float
+    energy_kept: float
+
+
+def fabricated_copies(
+    lens: Lens, count: int, seed: int, errors: FabricationErrors | None = None
+) -> tuple[Lens, ...]:
+    """Give the nominal lens and `count` - 1 fabricated copies.
+
+    Args:
+        lens: Nominal.
+        count: At least 1.
+        seed: Copy i is drawn from (seed, i), whatever the count.
+        errors: The tolerances by default.
+    """
+    nominal = with_fixed_stop(lens)
+    widths = errors or FabricationErrors()
+    draws = (np.random.default_rng((seed, i)) for i in range(1, count))
+    return (nominal, *(perturb(nominal, widths, rng) for rng in draws))
+
+
+def colour_kernels(
+    lens: Lens,
+    response: ChannelResponse,
+    heights_mm: NDArray[np.float64],
+    *,
+    size_px: int,
+    pitch_um: float,
+    rays: int,
+) -> tuple[FloatArray, float]:
+    """Give kernels (field, 3, size, size) float32 and the least energy kept of a colour."""
+    with torch.no_grad():
+        traced = trace_psf(
+            lens,
+            torch.from_numpy(heights_mm),
+            torch.from_numpy(response.wavelengths_um),
+            size_px,
+            pitch_um,
+            rays=rays,
+        )
+        # light that fell outside counts: a wavelength weighs what it puts into the window
+        share = torch.from_numpy(response.response)[None] * traced.energy_kept[:, None]
+        kept = share.sum(-1)
+        kernels = torch.einsum("fcw,fwij->fcij", share / kept[..., None], traced.kernels)
+    return kernels.to(torch.float32).numpy(), float(kept.min())
+
+
+def kernel_bank(
+    lens: Lens,
+    response: ChannelResponse,
+    *,
+    copies: int,
+    seed: int,
+    heights_mm: NDArray[np.float64],
+    size_px: int,
+    pitch_um: float,
+    rays: int = 4096,
+) -> KernelBank:
+    """Trace the nominal lens and fabricated copies at the same sensor heights.
+
+    Args:
+        lens: Nominal.
+        response: Colours over a (dense) wavelength grid.
+        copies: Lenses in all, the nominal one included.
+        seed: Of the fabrication errors.
+        heights_mm: (field,) from 0 to the corner of the sensor.
+        size_px: Odd kernel side.
+        pitch_um: Sensor pitch.
+        rays: In half the pupil.
+    """
+    built = [
+        colour_kernels(copy, response, heights_mm, size_px=size_px, pitch_um=pitch_um, rays=rays)
+        for copy in fabricated_copies(lens, copies, seed)
+    ]
+    return KernelBank(
+        kernels=np.stack([kernels for kernels, _ in built]),
+        field_heights_mm=heights_mm,
+        pixel_pitch_um=pitch_um,
+        energy_kept=min(kept for _, kept in built),
+    )

@@ -1,0 +1,140 @@
+"""Exact paraxial data: EFL, BFL, pupils, focus (the r^2 aspheric term included)."""
+
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paraxial:
+    """First-order data at one wavelength, lengths in mm.
+
+    Attributes:
+        efl_mm: Effective focal length.
+        bfl_mm: From the last vertex to the focal point.
+        ffl_mm: From the first vertex to the front focal point.
+        entrance_pupil_mm: Its position from the first vertex.
+        entrance_pupil_diameter_mm: Its diameter.
+        exit_pupil_mm: Its position from the last vertex.
+        exit_pupil_diameter_mm: Its diameter.
+        stop_semi_diameter_mm: Paraxial marginal height at the stop.
+    """
+
+    efl_mm: float
+    bfl_mm: float
+    ffl_mm: float
+    entrance_pupil_mm: float
+    entrance_pupil_diameter_mm: float
+    exit_pupil_mm: float
+    exit_pupil_diameter_mm: float
+    stop_semi_diameter_mm: float
+
+    @property
+    def f_number(self) -> float:
+        """EFL / entrance pupil diameter."""
+        return self.efl_mm / self.entrance_pupil_diameter_mm
+
+
+def vertex_curvature(tensors: SurfaceTensors) -> Tensor:
+    """Give (surface, ...) vertex curvatures: c + 2 a_2."""
+    if tensors.even_asphere.shape[1] == 0:
+        return tensors.curvature_per_mm
+    return tensors.curvature_per_mm + 2 * tensors.even_asphere[:, 0]
+
+
+def trace_paraxial(
+    tensors: SurfaceTensors, height: Tensor, slope: Tensor, surfaces: range
+) -> tuple[Tensor, Tensor]:
+    """Trace y, u (slope dy/dz) through surfaces; y is given on the last one, u after it.
+
+    n' u' = n u - y c (n' - n), and y + t u between surfaces.
+    """
+    curvature = vertex_curvature(tensors)
+    for i in surfaces:
+        before, after = tensors.index[i], tensors.index[i + 1]
+        slope = (before * slope - height * curvature[i] * (after - before)) / after
+        if i != surfaces[-1]:
+            height = height + tensors.thickness_mm[i] * slope
+    return height, slope
+
+
+def focal_lengths(tensors: SurfaceTensors) -> tuple[Tensor, Tensor]:
+    """Give EFL and BFL in mm, differentiable, with the batch shape of the tensors."""
+    one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])
+    surfaces = range(len(tensors.aspheric))
+    height, slope = trace_paraxial(tensors, one, torch.zeros_like(one), surfaces)
+    return -1 / slope, -height / slope
+
+
+def _reversed(tensors: SurfaceTensors) -> SurfaceTensors:
+    gaps = tensors.thickness_mm.flip(0)
+    return replace(
+        tensors,
+        curvature_per_mm=-tensors.curvature_per_mm.flip(0),
+        even_asphere=-tensors.even_asphere.flip(0),
+        thickness_mm=torch.cat([gaps[1:], gaps[:1]]),
+        index=tensors.index.flip(0),
+        aspheric=tensors.aspheric[::-1],
+    )
+
+
+def _image_of_stop(tensors: SurfaceTensors, stop: int) -> tuple[float, float]:
+    """Give position (after the last vertex) and magnification of the stop seen from behind."""
+    count = len(tensors.aspheric)
+    if stop == count - 1:
+        return 0.0, 1.0
+    zero, one = torch.zeros((), dtype=torch.float64), torch.ones((), dtype=torch.float64)
+    rest = range(stop + 1, count)
+    gap = tensors.thickness_mm[stop]
+    height, slope = trace_paraxial(tensors, gap * one, one, rest)
+    position = -height / slope
+    # a ray that leaves the edge of the stop parallel to the axis meets the pupil edge
+    edge, lean = trace_paraxial(tensors, one, zero, rest)
+    return float(position), float(edge + position * lean)
+
+
+def paraxial_data(lens: Lens, wavelength_um: float | None = None) -> Paraxial:
+    """Compute the first-order data of a lens (object at infinity).
+
+    Args:
+        lens: The prescription.
+        wavelength_um: The reference wavelength by default.
+    """
+    wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
+    tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
+    back = _reversed(tensors)
+    efl, bfl = (float(v) for v in focal_lengths(tensors))
+    ffl = -float(focal_lengths(back)[1])
+    # a stop at a surface: rays in front of it see it through the surfaces before it only
+    front_position, front_scale = _image_of_stop(back, len(tensors.aspheric) - 1 - lens.stop)
+    exit_position, exit_scale = _image_of_stop(tensors, lens.stop)
+    stop_mm = _stop_semi_diameter(lens, efl, front_scale)
+    return Paraxial(
+        efl_mm=efl,
+        bfl_mm=bfl,
+        ffl_mm=ffl,
+        entrance_pupil_mm=-front_position,
+        entrance_pupil_diameter_mm=2 * stop_mm * abs(front_scale),
+        exit_pupil_mm=exit_position,
+        exit_pupil_diameter_mm=2 * stop_mm * abs(exit_scale),
+        stop_semi_diameter_mm=stop_mm,
+    )
+
+
+def _stop_semi_diameter(lens: Lens, efl_mm: float, pupil_scale: float) -> float:
+    if lens.aperture_kind == "stop_semi_diameter_mm":
+        return lens.aperture_value
+    diameter_mm = lens.aperture_value
+    if lens.aperture_kind == "f_number":
+        diameter_mm = abs(efl_mm) / lens.aperture_value
+    return diameter_mm / 2 / abs(pupil_scale)
+
+
+def with_paraxial_focus(lens: Lens) -> Lens:
+    """Give the lens with its sensor at the paraxial focus of the reference wavelength."""
+    last = replace(lens.surfaces[-1], thickness_mm=paraxial_data(lens).bfl_mm)
+    return replace(lens, surfaces=(*lens.surfaces[:-1], last))

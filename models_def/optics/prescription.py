@@ -1,0 +1,319 @@
+"""Lens prescriptions: frozen dataclasses, TOML files, fabrication errors.
+
+Lengths in mm. +z along the light; radius > 0 when the centre of curvature lies towards +z.
+Thickness and glass are those after a surface; the last thickness leads to the sensor.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.glass import find_glass
+from camkit.units import to_degrees, to_radians
+
+ApertureKind = Literal["f_number", "entrance_pupil_diameter_mm", "stop_semi_diameter_mm"]
+APERTURE_KINDS: Final[tuple[ApertureKind, ...]] = get_args(ApertureKind)
+
+_SURFACE_KEYS: Final = {
+    "radius_mm",
+    "thickness_mm",
+    "glass",
+    "semi_diameter_mm",
+    "conic",
+    "even_asphere",
+}
+_LENS_KEYS: Final = {
+    "name",
+    "note",
+    "stop",
+    "object_distance_mm",
+    "field_angles_deg",
+    "wavelengths_um",
+    "reference_wavelength_um",
+    "surface",
+    *APERTURE_KINDS,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surface:
+    """One surface and the medium after it.
+
+    Attributes:
+        curvature_per_mm: 1 / radius; 0 is a plane.
+        thickness_mm: Distance along the axis to the next surface or the sensor.
+        glass: Strict name of the medium after the surface ("air" or see `glass`).
+        semi_diameter_mm: Rays further out are vignetted; inf for no limit.
+        conic: 0 sphere, -1 paraboloid.
+        even_asphere: Coefficients of r^2, r^4, r^6, ... (mm^-1, mm^-3, ...).
+        index_offset: Added to the index after the surface (fabrication error).
+    References: Sun 2021, eq. (2.2).
+    """
+
+    curvature_per_mm: float
+    thickness_mm: float
+    glass: str = "air"
+    semi_diameter_mm: float = math.inf
+    conic: float = 0.0
+    even_asphere: tuple[float, ...] = ()
+    index_offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        find_glass(self.glass)
+        numbers = (self.curvature_per_mm, self.thickness_mm, self.conic, self.index_offset)
+        if not all(map(math.isfinite, (*numbers, *self.even_asphere))):
+            raise ContractError(f"a surface needs finite numbers; got {self}")
+        if not self.semi_diameter_mm > 0:
+            raise ContractError(f"semi_diameter_mm must be > 0; got {self.semi_diameter_mm}")
+
+    @property
+    def radius_mm(self) -> float:
+        """Radius of curvature; inf for a plane."""
+        return 1 / self.curvature_per_mm if self.curvature_per_mm else math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lens:
+    """A rotationally symmetric lens in front of a sensor.
+
+    Attributes:
+        name: For people.
+        surfaces: In the order of the light.
+        stop: Index of the surface that is the aperture stop.
+        aperture_kind: What `aperture_value` is.
+        aperture_value: F-number (EFL / entrance pupil diameter) or a length in mm.
+        object_distance_mm: From the first vertex, positive; inf for a distant scene.
+        field_angles_rad: Fields of interest, increasing from the axis.
+        wavelengths_um: Wavelengths of interest, increasing.
+        reference_wavelength_um: Defines the chief ray, the EFL and the focus.
+        note: For people: where the design comes from.
+    """
+
+    name: str
+    surfaces: tuple[Surface, ...]
+    stop: int
+    aperture_kind: ApertureKind
+    aperture_value: float
+    object_distance_mm: float = math.inf
+    field_angles_rad: tuple[float, ...] = (0.0,)
+    wavelengths_um: tuple[float, ...] = (0.55,)
+    reference_wavelength_um: float = 0.55
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.surfaces:
+            raise ContractError("a lens needs at least one surface; got none")
+        if not 0 <= self.stop < len(self.surfaces):
+            raise ContractError(f"stop must be 0..{len(self.surfaces) - 1}; got {self.stop}")
+        if self.aperture_kind not in APERTURE_KINDS:
+            raise ContractError(f"aperture must be one of {APERTURE_KINDS}; got {self.aperture_kind}")
+        if not (math.isfinite(self.aperture_value) and self.aperture_value > 0):
+            raise ContractError(f"{self.aperture_kind} must be > 0; got {self.aperture_value}")
+        if not self.object_distance_mm > 0:
+            raise ContractError(f"object_distance_mm must be > 0; got {self.object_distance_mm}")
+        if not all(0 <= a < math.pi / 2 for a in self.field_angles_rad):
+            raise ContractError("field angles must lie in 0..90 degrees")
+        waves = (*self.wavelengths_um, self.reference_wavelength_um)
+        if not all(0.2 < w < 20 for w in waves):
+            raise ContractError(f"wavelengths must lie in 0.2..20 um; got {waves}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FabricationErrors:
+    """Half-widths of uniform errors of a fabricated copy.
+
+    Attributes:
+        radius_relative: Of every curved surface.
+        thickness_mm: Of every gap and element, the last one (focus) excepted.
+        index: Of every glass.
+        focus_mm: Of the distance to the sensor.
+    """
+
+    radius_relative: float = 0.002
+    thickness_mm: float = 0.03
+    index: float = 0.0005
+    focus_mm: float = 0.02
+
+
+def with_focus_shift(lens: Lens, shift_mm: float) -> Lens:
+    """Give the lens with its sensor moved away from it by `shift_mm`."""
+    last = lens.surfaces[-1]
+    moved = replace(last, thickness_mm=last.thickness_mm + shift_mm)
+    return replace(lens, surfaces=(*lens.surfaces[:-1], moved))
+
+
+def perturb(lens: Lens, errors: FabricationErrors, rng: np.random.Generator) -> Lens:
+    """Give a fabricated copy of a lens: every number off by a uniform error.
+
+    An element keeps one index throughout. Lenses given by f-number should first be fixed by
+    `pupil.with_fixed_stop`, or the stop follows the focal length.
+
+    Args:
+        lens: The nominal lens.
+        errors: Half-widths.
+        rng: Draws, in a fixed order of surfaces.
+    """
+    copies: list[Surface] = []
+    for i, surface in enumerate(lens.surfaces):
+        radius, thickness, index = rng.uniform(-1, 1, 3)
+        last = i == len(lens.surfaces) - 1
+        width_mm = errors.focus_mm if last else errors.thickness_mm
+        # a glass ends at the next surface, so one offset per surface is one per element
+        offset = 0.0 if surface.glass == "air" else float(index) * errors.index
+        copies.append(
+            replace(
+                surface,
+                curvature_per_mm=surface.curvature_per_mm
+                / (1 + float(radius) * errors.radius_relative),
+                thickness_mm=surface.thickness_mm + float(thickness) * width_mm,
+                index_offset=surface.index_offset + offset,
+            )
+        )
+    return replace(lens, surfaces=tuple(copies))
+
+
+def read_prescription(path: Path) -> Lens:
+    """Read a lens from a TOML file.
+
+    Raises:
+        ContractError: If the file is not TOML, or a key is unknown, missing or of a wrong type.
+    """
+    return parse_prescription(path.read_text(encoding="utf-8"))
+
+
+def parse_prescription(text: str) -> Lens:
+    """Read a lens from TOML text; see `read_prescription`."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ContractError(f"a prescription must be TOML; {error}") from error
+    _check_keys(table, allowed=_LENS_KEYS, needed={"name", "stop", "surface"}, where="the lens")
+    kinds = [kind for kind in APERTURE_KINDS if kind in table]
+    if len(kinds) != 1:
+        raise ContractError(f"give exactly one of {', '.join(APERTURE_KINDS)}; got {kinds}")
+    stop = table["stop"]
+    if not isinstance(stop, int) or isinstance(stop, bool):
+        raise ContractError(f"stop must be the index of a surface (from 0); got {stop!r}")
+    optional: dict[str, Any] = {}
+    if "field_angles_deg" in table:
+        angles = _numbers(table["field_angles_deg"], "field_angles_deg")
+        optional["field_angles_rad"] = tuple(map(to_radians, angles))
+    if "wavelengths_um" in table:
+        optional["wavelengths_um"] = _numbers(table["wavelengths_um"], "wavelengths_um")
+    for key in ("object_distance_mm", "reference_wavelength_um"):
+        if key in table:
+            optional[key] = _number(table[key], key)
+    return Lens(
+        name=_text(table["name"], "name"),
+        note=_text(table.get("note", ""), "note"),
+        surfaces=_parse_surfaces(table["surface"]),
+        stop=stop,
+        aperture_kind=kinds[0],
+        aperture_value=_number(table[kinds[0]], kinds[0]),
+        **optional,
+    )
+
+
+def write_prescription(lens: Lens, path: Path) -> None:
+    """Write a lens as TOML that `read_prescription` gives back to the last bit.
+
+    Raises:
+        ContractError: If the lens is a fabricated copy (index offsets are not written).
+    """
+    path.write_text(format_prescription(lens), encoding="utf-8")
+
+
+def format_prescription(lens: Lens) -> str:
+    """Give the TOML text of a lens; see `write_prescription`."""
+    if any(surface.index_offset for surface in lens.surfaces):
+        raise ContractError("a prescription holds no index offsets; write the nominal lens")
+    angles = ", ".join(repr(round(to_degrees(a), 12)) for a in lens.field_angles_rad)
+    lines = [
+        f"name = {_quote(lens.name)}",
+        f"note = {_quote(lens.note)}",
+        f"{lens.aperture_kind} = {lens.aperture_value!r}",
+        f"stop = {lens.stop}",
+        f"object_distance_mm = {lens.object_distance_mm!r}",
+        f"field_angles_deg = [{angles}]",
+        f"wavelengths_um = [{', '.join(map(repr, lens.wavelengths_um))}]",
+        f"reference_wavelength_um = {lens.reference_wavelength_um!r}",
+    ]
+    for surface in lens.surfaces:
+        lines += ["", "[[surface]]", *_surface_lines(surface)]
+    return "\n".join(lines) + "\n"
+
+
+def _surface_lines(surface: Surface) -> list[str]:
+    lines = [
+        f"radius_mm = {surface.radius_mm!r}",
+        f"thickness_mm = {surface.thickness_mm!r}",
+        f"glass = {_quote(surface.glass)}",
+        f"semi_diameter_mm = {surface.semi_diameter_mm!r}",
+    ]
+    if surface.conic:
+        lines.append(f"conic = {surface.conic!r}")
+    if surface.even_asphere:
+        lines.append(f"even_asphere = [{', '.join(map(repr, surface.even_asphere))}]")
+    return lines
+
+
+def _quote(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+def _parse_surfaces(tables: object) -> tuple[Surface, ...]:
+    if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
+        raise ContractError("surfaces must be written as [[surface]] tables")
+    return tuple(_parse_surface(table, i) for i, table in enumerate(tables))
+
+
+def _parse_surface(table: Mapping[str, Any], number: int) -> Surface:
+    where = f"surface {number}"
+    _check_keys(table, allowed=_SURFACE_KEYS, needed={"radius_mm", "thickness_mm"}, where=where)
+    radius_mm = _number(table["radius_mm"], f"{where}: radius_mm")
+    if radius_mm == 0 or math.isnan(radius_mm):
+        raise ContractError(f"{where}: radius_mm must not be 0 (a plane is inf)")
+    return Surface(
+        curvature_per_mm=1 / radius_mm,
+        thickness_mm=_number(table["thickness_mm"], f"{where}: thickness_mm"),
+        glass=_text(table.get("glass", "air"), f"{where}: glass"),
+        semi_diameter_mm=_number(table.get("semi_diameter_mm", math.inf), f"{where}: semi_diameter_mm"),
+        conic=_number(table.get("conic", 0.0), f"{where}: conic"),
+        even_asphere=_numbers(table.get("even_asphere", []), f"{where}: even_asphere"),
+    )
+
+
+def _check_keys(
+    table: Mapping[str, Any], *, allowed: set[str], needed: set[str], where: str
+) -> None:
+    unknown, missing = sorted(set(table) - allowed), sorted(needed - set(table))
+    if unknown or missing:
+        raise ContractError(
+            f"{where}: unknown keys {unknown}, missing keys {missing}; "
+            f"known are {', '.join(sorted(allowed))}"
+        )
+
+
+def _number(value: object, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ContractError(f"{where} must be a number; got {value!r}")
+    return float(value)
+
+
+def _numbers(value: object, where: str) -> tuple[float, ...]:
+    if not isinstance(value, list):
+        raise ContractError(f"{where} must be a list of numbers; got {value!r}")
+    return tuple(_number(v, where) for v in value)
+
+
+def _text(value: object, where: str) -> str:
+    if not isinstance(value, str):
+        raise ContractError(f"{where} must be text; got {value!r}")
+    return value

@@ -1,0 +1,200 @@
+"""Which rays: pupil samples, launching, aiming.
+
+Definition used for every PSF, spot and relative illumination of camkit ("aimed"): each ray
+passes the stop surface at its own sample point; samples have equal areas of the stop, and a
+ray's weight is the area of the beam in the entrance plane (the vertex plane of the first
+surface) that belongs to it. This is what a real stop does, so vignetting and pupil aberration
+come out right. The other definition ("paraxial") spreads rays evenly over the paraxial entrance
+pupil; it exists to compare with other programs.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, refract, trace
+
+PupilDefinition = Literal["aimed", "paraxial"]
+
+AIM_STEPS: Final = 8
+AIM_TOLERANCE_MM: Final = 1e-8
+_DIFFERENCE_MM: Final = 1e-5
+_GOLDEN_ANGLE_RAD: Final = math.pi * (3 - math.sqrt(5))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PupilSamples:
+    """Points of the unit disc with equal areas; x, y are (rays,) float64."""
+
+    x: Tensor
+    y: Tensor
+
+
+def half_disc(rays: int) -> PupilSamples:
+    """Give stratified points of the half disc x > 0, each with the same area.
+
+    Points lie on the Fibonacci spiral, folded at x = 0: no random draw, no rows.
+    """
+    if rays < 1:
+        raise ContractError(f"a pupil needs at least one ray; got {rays}")
+    number = torch.arange(rays, dtype=torch.float64)
+    radius = torch.sqrt((number + 0.5) / rays)
+    angle = number * _GOLDEN_ANGLE_RAD
+    return PupilSamples(x=torch.abs(radius * torch.cos(angle)), y=radius * torch.sin(angle))
+
+
+def hexapolar(rings: int) -> PupilSamples:
+    """Give a centre point and rings of 6, 12, ... points (the sampling of other programs)."""
+    xs, ys = [0.0], [0.0]
+    for ring in range(1, rings + 1):
+        for i in range(6 * ring):
+            angle = 2 * math.pi * i / (6 * ring)
+            xs.append(ring / rings * math.cos(angle))
+            ys.append(ring / rings * math.sin(angle))
+    return PupilSamples(
+        x=torch.tensor(xs, dtype=torch.float64), y=torch.tensor(ys, dtype=torch.float64)
+    )
+
+
+def with_fixed_stop(lens: Lens) -> Lens:
+    """Give the lens with its aperture stated as the stop's size, as metal keeps it."""
+    stop_mm = paraxial_data(lens).stop_semi_diameter_mm
+    return replace(lens, aperture_kind="stop_semi_diameter_mm", aperture_value=stop_mm)
+
+
+def launch(x: Tensor, y: Tensor, slope: Tensor, object_distance_mm: float) -> Rays:
+    """Start rays at points of the vertex plane of the first surface.
+
+    Args:
+        x: Points in mm; broadcasts with y and slope.
+        y: Points in mm.
+        slope: tan of the field angle: the object point lies in the direction (0, -slope, -1)
+            seen from the first vertex, its image at +y.
+        object_distance_mm: From the first vertex; inf for parallel rays.
+    """
+    x, y, slope = torch.broadcast_tensors(x, y, slope)
+    if math.isinf(object_distance_mm):
+        dx, dy = torch.zeros_like(x), slope
+    else:
+        dx, dy = x / object_distance_mm, y / object_distance_mm + slope
+    n = 1 / torch.sqrt(1 + dx**2 + dy**2)
+    return Rays(
+        x=x,
+        y=y,
+        z=torch.zeros_like(x),
+        l=dx * n,
+        m=dy * n,
+        n=n,
+        fate=torch.zeros(x.shape, dtype=torch.int8),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aim:
+    """Where to launch rays so that they pass wanted points of the stop.
+
+    Attributes:
+        x: Launch points in mm in the vertex plane of the first surface.
+        y: The same.
+        weight: Beam area per stop area; 0 where no launch point was found.
+    """
+
+    x: Tensor
+    y: Tensor
+    weight: Tensor
+
+
+def aim(
+    tensors: SurfaceTensors, stop: int, target: PupilSamples, slope: Tensor, distance_mm: float
+) -> Aim:
+    """Find launch points by Newton's method, without gradient.
+
+    Args:
+        tensors: The lens at the wavelength of the rays.
+        stop: Index of the stop surface.
+        target: Wanted points on the stop in mm; broadcasts with slope.
+        slope: tan of the field angle.
+        distance_mm: Object distance, inf allowed.
+    """
+    wanted_x, wanted_y, slope = torch.broadcast_tensors(target.x, target.y, slope)
+    if stop == 0 and not bool(tensors.curvature_per_mm[0].any()) and not tensors.aspheric[0]:
+        return Aim(x=wanted_x, y=wanted_y, weight=torch.ones_like(wanted_x))
+    open_tensors = replace(
+        tensors, semi_diameter_mm=torch.full_like(tensors.semi_diameter_mm, math.inf)
+    )
+    with torch.no_grad():
+        return _newton_aim(open_tensors, stop, (wanted_x, wanted_y), slope, distance_mm)
+
+
+def _newton_aim(
+    tensors: SurfaceTensors,
+    stop: int,
+    wanted: tuple[Tensor, Tensor],
+    slope: Tensor,
+    distance_mm: float,
+) -> Aim:
+    def at_stop(x: Tensor, y: Tensor) -> Rays:
+        rays = launch(x, y, slope, distance_mm)
+        rays = trace(tensors, rays, surfaces=range(stop))
+        return refract(tensors, rays, stop)
+
+    x = torch.zeros_like(wanted[0] + tensors.index[0])
+    y = torch.zeros_like(x)
+    step, found = _DIFFERENCE_MM, torch.zeros_like(x, dtype=torch.bool)
+    determinant = torch.ones_like(x)
+    for _ in range(AIM_STEPS):
+        here, right, down = at_stop(x, y), at_stop(x + step, y), at_stop(x, y + step)
+        xx, yx = (right.x - here.x) / step, (right.y - here.y) / step
+        xy, yy = (down.x - here.x) / step, (down.y - here.y) / step
+        alive = here.valid & right.valid & down.valid
+        product = xx * yy - xy * yx
+        good = alive & (torch.abs(product) > 1e-9)
+        determinant = torch.where(good, product, 1.0)
+        ex, ey = wanted[0] - here.x, wanted[1] - here.y
+        found = good & (ex**2 + ey**2 < AIM_TOLERANCE_MM**2)
+        # a dead probe ray steps back to the axis, from where it may try again
+        x = torch.where(good, x + (yy * ex - xy * ey) / determinant, 0.5 * x)
+        y = torch.where(good, y + (xx * ey - yx * ex) / determinant, 0.5 * y)
+    return Aim(x=x, y=y, weight=torch.where(found, 1 / torch.abs(determinant), 0.0))
+
+
+def pupil_rays(
+    lens: Lens,
+    tensors: SurfaceTensors,
+    samples: PupilSamples,
+    slope: Tensor,
+    *,
+    definition: PupilDefinition = "aimed",
+) -> tuple[Rays, Tensor]:
+    """Give launched rays and their weights.
+
+    Args:
+        lens: The prescription (stop, aperture, object distance).
+        tensors: Its tensors; batch dimensions broadcast with slope, the last being rays.
+        samples: Of the unit disc, (rays,).
+        slope: tan of the field angle, (..., 1).
+        definition: See the module.
+
+    Returns:
+        Rays (..., rays) at the first vertex plane, and weights of the same shape; rays that
+        cannot be aimed have weight 0 and fate MISSED.
+    """
+    data = paraxial_data(lens)
+    if definition == "paraxial":
+        radius = data.entrance_pupil_diameter_mm / 2
+        x = samples.x * radius + torch.zeros_like(slope)
+        y = samples.y * radius - data.entrance_pupil_mm * slope
+        rays = launch(x, y, slope, lens.object_distance_mm)
+        return rays, torch.ones_like(rays.x)
+    radius = data.stop_semi_diameter_mm
+    target = PupilSamples(x=samples.x * radius, y=samples.y * radius)
+    aimed = aim(tensors, lens.stop, target, slope, lens.object_distance_mm)
+    rays = launch(aimed.x, aimed.y, slope, lens.object_distance_mm)
+    lost = torch.where(aimed.weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
+    return replace(rays, fate=lost), aimed.weight

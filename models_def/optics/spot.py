@@ -1,0 +1,152 @@
+"""Where rays land on the sensor: chief rays, field slopes for sensor heights, spots, light."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.pupil import (
+    PupilDefinition,
+    PupilSamples,
+    half_disc,
+    pupil_rays,
+)
+from camkit.models_def.optics.trace import surface_tensors, trace
+
+_SLOPE_STEPS: Final = 12
+_SLOPE_TOLERANCE_MM: Final = 1e-9
+_SLOPE_DIFFERENCE: Final = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spots:
+    """Rays on the sensor.
+
+    Attributes:
+        x_mm: (field, wavelength, rays), 0 is the meridional plane.
+        y_mm: (field, wavelength, rays), on the sensor; the image of a field lies at +y.
+        weight: (field, wavelength, rays), 0 for rays that were lost.
+        chief_y_mm: (field,), chief ray of the reference wavelength.
+        fate: (field, wavelength, rays) int8, see `trace.Fate`.
+    """
+
+    x_mm: Tensor
+    y_mm: Tensor
+    weight: Tensor
+    chief_y_mm: Tensor
+    fate: Tensor
+
+
+def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None) -> Tensor:
+    """Give the heights (field,) in mm at which chief rays of field slopes meet the sensor.
+
+    The chief ray passes the centre of the stop.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+        wavelength_um: The reference wavelength by default.
+
+    Raises:
+        ContractError: If a chief ray is lost.
+    """
+    wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
+    tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
+    centre = PupilSamples(
+        x=torch.zeros(1, dtype=torch.float64), y=torch.zeros(1, dtype=torch.float64)
+    )
+    rays, _ = pupil_rays(lens, tensors, centre, slopes[:, None])
+    landed = trace(tensors, rays)
+    if not bool(landed.valid.all()):
+        lost = slopes[~landed.valid[:, 0]].tolist()
+        raise ContractError(f"the chief ray is lost at field slopes {lost}; use smaller fields")
+    return landed.y[:, 0]
+
+
+def slopes_for_heights(lens: Lens, heights_mm: Tensor) -> Tensor:
+    """Find the field slopes (field,) whose reference chief ray lands at given heights.
+
+    Newton's method from the paraxial slope, without gradient.
+
+    Raises:
+        ContractError: If a height cannot be reached.
+    """
+    with torch.no_grad():
+        step = torch.full((1,), _SLOPE_DIFFERENCE, dtype=torch.float64)
+        scale = chief_heights(lens, step)[0] / _SLOPE_DIFFERENCE
+        slopes = heights_mm.to(torch.float64) / scale
+        for _ in range(_SLOPE_STEPS):
+            both = chief_heights(lens, torch.cat([slopes, slopes + _SLOPE_DIFFERENCE]))
+            here, ahead = both.chunk(2)
+            missed_by = heights_mm - here
+            if bool((torch.abs(missed_by) < _SLOPE_TOLERANCE_MM).all()):
+                return slopes
+            slopes = slopes + missed_by * _SLOPE_DIFFERENCE / (ahead - here)
+    raise ContractError(f"no field reaches the sensor heights {heights_mm.tolist()} mm")
+
+
+def trace_spots(
+    lens: Lens,
+    slopes: Tensor,
+    wavelengths_um: Tensor,
+    samples: PupilSamples,
+    *,
+    definition: PupilDefinition = "aimed",
+) -> Spots:
+    """Trace the pupil at every field and wavelength.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+        wavelengths_um: (wavelength,).
+        samples: Of the unit disc, (rays,).
+        definition: See `pupil`.
+    """
+    tensors = surface_tensors(lens, wavelengths_um[:, None])
+    slope = slopes[:, None, None].expand(-1, len(wavelengths_um), 1)
+    rays, weight = pupil_rays(lens, tensors, samples, slope, definition=definition)
+    landed = trace(tensors, rays)
+    return Spots(
+        x_mm=landed.x,
+        y_mm=landed.y,
+        weight=torch.where(landed.valid, weight, 0.0),
+        chief_y_mm=chief_heights(lens, slopes),
+        fate=landed.fate,
+    )
+
+
+def rms_radius(spots: Spots) -> Tensor:
+    """Give the RMS spot radius (field, wavelength) in mm about the centroid."""
+    total = spots.weight.sum(-1, keepdim=True).clamp_min(1e-12)
+    share = spots.weight / total
+    dx = spots.x_mm - (share * spots.x_mm).sum(-1, keepdim=True)
+    dy = spots.y_mm - (share * spots.y_mm).sum(-1, keepdim=True)
+    return torch.sqrt((share * (dx**2 + dy**2)).sum(-1))
+
+
+def relative_illumination(lens: Lens, heights_mm: Tensor, rays: int = 2048) -> Tensor:
+    """Give the light (field,) of a uniform scene at sensor heights, 1 on the axis.
+
+    A distant scene of radiance L sends L * A cos(angle) dOmega through a beam of area A in the
+    entrance plane; dOmega falls on h dh dphi of the sensor. So
+    E(h) ~ A(angle) cos(angle) sin(angle) d(angle) / (h dh): vignetting, pupil aberration and
+    distortion included; for A constant and h = f tan(angle) it is the cos^4 law. Losses of
+    coating and bulk are not counted.
+    """
+    with torch.no_grad():
+        heights = heights_mm.to(torch.float64)
+        # the axis has no ring of its own: a height near it stands for it
+        near = heights.clamp_min(1e-3)
+        near = torch.cat([torch.full((1,), 1e-3, dtype=torch.float64), near])
+        slopes = slopes_for_heights(lens, near)
+        wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+        spots = trace_spots(lens, slopes, wave, half_disc(rays))
+        area = spots.weight.sum((-2, -1))
+        angle = torch.atan(slopes)
+        ahead = chief_heights(lens, torch.tan(angle + 1e-6))
+        behind = chief_heights(lens, torch.tan(angle - 1e-6))
+        light = area * torch.cos(angle) * torch.sin(angle) * 2e-6 / (near * (ahead - behind))
+    return light[1:] / light[0]

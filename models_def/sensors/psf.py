@@ -1,0 +1,169 @@
+"""The PSF of a field position, in torch: colours weighted, heights blended, turned to the azimuth.
+
+Twin of `camkit.runtime.psf`; `tests/parity` holds the two together.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.contracts import FrozenPsf
+from camkit.errors import ContractError
+
+PAD_PX = 2
+
+
+def wavelength_weights(
+    psf_wavelengths_um: NDArray[np.float64],
+    wavelengths_um: NDArray[np.float64],
+    response: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Integrate the response of the colours against the PSF's wavelength samples.
+
+    The PSF is taken as linear between its wavelengths and constant beyond them, the response as
+    linear between its own and zero beyond them; the integral of their product is then exact.
+
+    Args:
+        psf_wavelengths_um: (wavelength,), increasing.
+        wavelengths_um: (n,), increasing.
+        response: (3, n) >= 0.
+
+    Returns:
+        (3, wavelength) weights; each row sums to 1.
+
+    Raises:
+        ContractError: If shapes disagree or a colour has no response.
+    """
+    if response.shape != (3, wavelengths_um.size):
+        raise ContractError(f"response must be (3, {wavelengths_um.size}); got {response.shape}")
+    unit = np.eye(psf_wavelengths_um.size)
+
+    def product(at_um: NDArray[np.float64]) -> NDArray[np.float64]:
+        sensed = np.stack([np.interp(at_um, wavelengths_um, row) for row in response])
+        hats = np.stack([np.interp(at_um, psf_wavelengths_um, row) for row in unit])
+        return sensed[:, None, :] * hats[None, :, :]
+
+    if wavelengths_um.size == 1:
+        weights = product(wavelengths_um)[..., 0]
+    else:
+        knots = np.union1d(psf_wavelengths_um, wavelengths_um)
+        knots = knots[(knots >= wavelengths_um[0]) & (knots <= wavelengths_um[-1])]
+        low, high = knots[:-1], knots[1:]
+        simpson = product(low) + 4 * product((low + high) / 2) + product(high)
+        weights = (simpson * ((high - low) / 6)).sum(axis=-1)
+    sums = weights.sum(axis=1, keepdims=True)
+    if not (sums > 0).all():
+        raise ContractError(f"every colour needs a response > 0; sums are {sums.ravel()}")
+    return np.asarray(weights / sums, dtype=np.float64)
+
+
+def color_kernels(
+    psf: FrozenPsf,
+    wavelengths_um: NDArray[np.float64],
+    response: NDArray[np.float64],
+    *,
+    depth_index: int = 0,
+) -> Tensor:
+    """Weight the wavelength kernels into one kernel per field and colour.
+
+    A lens of revolution is symmetric about the meridional plane, so the kernels are made
+    symmetric about their middle column, which also takes half of the noise of the tracing.
+
+    Args:
+        psf: The frozen PSF.
+        wavelengths_um: (n,) grid of the response.
+        response: (3, n) response of R, G, B.
+        depth_index: Which depth of the PSF.
+
+    Returns:
+        (field, 3, h, w) float32; each kernel sums to 1.
+
+    Raises:
+        ContractError: If the depth does not exist or the response does not fit.
+    """
+    if not 0 <= depth_index < psf.depths_mm.size:
+        raise ContractError(
+            f"depth_index must be in 0..{psf.depths_mm.size - 1}; got {depth_index}"
+        )
+    weights = torch.from_numpy(wavelength_weights(psf.wavelengths_um, wavelengths_um, response))
+    kernels = torch.from_numpy(psf.kernels[:, depth_index].astype(np.float64))
+    mixed = torch.einsum("cl,flhw->fchw", weights, kernels)
+    mixed = 0.5 * (mixed + mixed.flip(-1))
+    return (mixed / mixed.sum(dim=(-2, -1), keepdim=True)).to(torch.float32)
+
+
+def kernel_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Tensor) -> Tensor:
+    """Give the kernels of image points, turned so that their radial direction points outward.
+
+    Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
+    zero outside, negatives cut, normalised. On the axis nothing is turned.
+
+    Args:
+        kernels: (field, 3, h, w) float32, stored for points along +y (down the rows).
+        field_heights_mm: (field,) float64, increasing from 0.
+        x_mm: (b,) positions from the axis, to the right.
+        y_mm: (b,) positions from the axis, down the rows.
+
+    Returns:
+        (b, 3, h, w) float32, each kernel sums to 1.
+
+    References: Keys 1981, cubic convolution with a = -1/2.
+    """
+    x, y = x_mm.to(torch.float64), y_mm.to(torch.float64)
+    height = torch.hypot(x, y)
+    blended = _blend(kernels, field_heights_mm.to(torch.float64), height)
+    on_axis = height == 0
+    safe = torch.where(on_axis, torch.ones_like(height), height)
+    out_x = torch.where(on_axis, torch.zeros_like(height), x.abs() / safe)
+    out_y = torch.where(on_axis, torch.ones_like(height), y.abs() / safe)
+    turned = _turn(blended, out_x, out_y).clamp(min=0)
+    # Float64 sums: a sum in another order must not move the result.
+    turned = turned / turned.sum(dim=(-2, -1), keepdim=True, dtype=torch.float64)
+    turned = torch.where((x < 0)[:, None, None, None], turned.flip(-1), turned)
+    turned = torch.where((y < 0)[:, None, None, None], turned.flip(-2), turned)
+    return turned.to(torch.float32)
+
+
+def _blend(kernels: Tensor, heights: Tensor, height: Tensor) -> Tensor:
+    """Interpolate (field, 3, h, w) linearly in height to (b, 3, h, w)."""
+    if heights.numel() == 1:
+        return kernels.expand(height.numel(), -1, -1, -1)
+    low = (torch.searchsorted(heights, height, right=True) - 1).clamp(0, heights.numel() - 2)
+    share = ((height - heights[low]) / (heights[low + 1] - heights[low])).clamp(0, 1)
+    share = share.to(kernels.dtype)[:, None, None, None]
+    return (1 - share) * kernels[low] + share * kernels[low + 1]
+
+
+def _turn(kernels: Tensor, out_x: Tensor, out_y: Tensor) -> Tensor:
+    """Turn (b, 3, h, w) kernels so that their +y points along (out_x, out_y)."""
+    b, c, h, w = kernels.shape
+    dy = torch.arange(h, dtype=torch.float64, device=kernels.device)[:, None] - h // 2
+    dx = torch.arange(w, dtype=torch.float64, device=kernels.device)[None, :] - w // 2
+    out_x, out_y = out_x[:, None, None], out_y[:, None, None]
+    rows = dx * out_x + dy * out_y + h // 2
+    cols = dx * out_y - dy * out_x + w // 2
+    row0, col0 = rows.floor(), cols.floor()
+    row_weights = _catmull_rom(rows - row0)
+    col_weights = _catmull_rom(cols - col0)
+    padded = torch.nn.functional.pad(kernels, (PAD_PX,) * 4).reshape(b, c, -1)
+    turned = torch.zeros_like(kernels)
+    for i in range(4):
+        row = (row0.long() + (i - 1 + PAD_PX)).clamp(0, h + 2 * PAD_PX - 1)
+        for j in range(4):
+            col = (col0.long() + (j - 1 + PAD_PX)).clamp(0, w + 2 * PAD_PX - 1)
+            index = (row * (w + 2 * PAD_PX) + col).reshape(b, 1, -1).expand(-1, c, -1)
+            weight = (row_weights[i] * col_weights[j]).to(kernels.dtype)[:, None]
+            turned += weight * padded.gather(2, index).reshape(b, c, h, w)
+    return turned
+
+
+def _catmull_rom(t: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Give the weights of the samples -1, 0, 1, 2 for a position t in 0..1."""
+    t2, t3 = t * t, t * t * t
+    return (
+        0.5 * (2 * t2 - t3 - t),
+        0.5 * (3 * t3 - 5 * t2 + 2),
+        0.5 * (4 * t2 - 3 * t3 + t),
+        0.5 * (t3 - t2),
+    )

@@ -1,0 +1,93 @@
+"""The Wiener filter of one block, in torch: patches with one local kernel each, for training.
+
+Twin of the block filter of `camkit.runtime.wiener`; `tests/parity` holds the two together. A
+patch is one periodic block: cut about 80 px from each side of the result, as the bank does.
+"""
+
+import torch
+from torch import Tensor
+
+from camkit.bundle.stages import Wiener
+
+# Tuned on development pictures with the PSF of the first camera; export writes them down.
+PRIOR_SCALE = 1e-3
+PRIOR_EXPONENT = 2.5
+CORNER_FREQUENCY = 1 / 512
+LEAST_NSR = 1e-6
+CLIPPED_REACH_PX = 2
+
+
+def to_otf(kernels: Tensor, size: tuple[int, int]) -> Tensor:
+    """Transform (b, 3, kh, kw) kernels to the OTF of a periodic (h, w) block.
+
+    Returns:
+        (b, 3, h, w // 2 + 1) complex; the kernel's centre is the origin.
+    """
+    kh, kw = kernels.shape[-2:]
+    h, w = size
+    padded = torch.nn.functional.pad(kernels, (0, w - kw, 0, h - kh))
+    origin_first: Tensor = torch.roll(padded, (-(kh // 2), -(kw // 2)), dims=(-2, -1))
+    otf: Tensor = torch.fft.rfft2(origin_first)
+    return otf
+
+
+def wiener_restore(
+    patches: Tensor,
+    kernels: Tensor,
+    shot: Tensor,
+    read_variance: Tensor,
+    settings: Wiener,
+    saturated: Tensor | None = None,
+) -> Tensor:
+    """Deconvolve patches, each a periodic block, with conj(H) / (|H|^2 + NSR).
+
+    Args:
+        patches: (b, 3, h, w), linear, white balanced; sides at least those of the kernels.
+        kernels: (b, 3, kh, kw), odd sides, each sums to 1.
+        shot: (b, 3) or (3,), noise after white balance.
+        read_variance: Same shape as shot.
+        settings: Prior and clip iterations; block and overlap are not used here.
+        saturated: (b, 1 or 3, h, w), true where the sensor clipped; those pixels, and the two
+            beside them that the demosaic reaches, count as unknown.
+
+    Returns:
+        (b, 3, h, w).
+
+    References: Sun 2021, eq. (2.9); van der Schaaf and van Hateren 1996 (natural-image prior).
+    """
+    size = (patches.shape[-2], patches.shape[-1])
+    otf = to_otf(kernels, size)
+    gain = otf.conj() / (otf.abs().square() + _nsr(patches, shot, read_variance, settings))
+    restored = _filter(patches, gain)
+    if saturated is None or settings.clip_iterations == 0 or not bool(saturated.any()):
+        return restored
+    side = 2 * CLIPPED_REACH_PX + 1
+    unknown = torch.nn.functional.max_pool2d(
+        saturated.to(patches.dtype), side, stride=1, padding=CLIPPED_REACH_PX
+    ).bool()
+    for _ in range(settings.clip_iterations):
+        expected = torch.maximum(patches, _filter(restored.clamp(min=0), otf))
+        restored = _filter(torch.where(unknown, expected, patches), gain)
+    return restored
+
+
+def _filter(patches: Tensor, transfer: Tensor) -> Tensor:
+    size = (patches.shape[-2], patches.shape[-1])
+    filtered: Tensor = torch.fft.irfft2(torch.fft.rfft2(patches) * transfer, s=size)
+    return filtered
+
+
+def _nsr(patches: Tensor, shot: Tensor, read_variance: Tensor, settings: Wiener) -> Tensor:
+    """Give noise over signal power, (b, 3, h, w // 2 + 1); 0 at zero frequency."""
+    h, w = patches.shape[-2:]
+    level = patches.mean(dim=(-2, -1)).clamp(min=0)
+    variance = shot * level + read_variance
+    # A block darker than its read noise is taken to hold that much signal.
+    power = torch.maximum(level * level, read_variance).clamp(min=1e-12)
+    ratio = (variance / (settings.prior_scale * power))[..., None, None]
+    fy = torch.fft.fftfreq(h, dtype=torch.float64, device=patches.device)[:, None]
+    fx = torch.fft.rfftfreq(w, dtype=torch.float64, device=patches.device)[None, :]
+    rise: Tensor = (fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (settings.prior_exponent / 2)
+    nsr: Tensor = (ratio * rise.to(patches.dtype)).clamp(min=LEAST_NSR)
+    nsr[..., 0, 0] = 0
+    return nsr

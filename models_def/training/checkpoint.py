@@ -1,0 +1,97 @@
+"""Checkpoints: everything a run needs to go on, and everything an export needs to know.
+
+Plain numbers, strings and tensors only, so that torch's weights-only reader takes them; a file
+is complete or absent (written beside, then renamed).
+"""
+
+import pickle
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Final
+
+import torch
+from torch import Tensor, nn
+
+from camkit.errors import ContractError
+from camkit.models_def.networks.catalog import build_network
+
+FORMAT: Final = 1
+
+State = dict[str, Tensor]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checkpoint:
+    """One moment of a training run.
+
+    Attributes:
+        recipe_toml: The recipe as text.
+        size: Which of its networks.
+        network: Name of the network in the catalogue.
+        config: What of its config differs from the defaults.
+        bank_digest: sha256 of the kernels trained with.
+        training_data: What the weights were trained on, for the card.
+        step: Steps done.
+        elapsed_s: Wall time so far.
+        cpu_s: CPU time so far, workers included.
+        valid_db: Last validation PSNR of the average, None before the first.
+        weights: The weights that are being trained.
+        average: Their average, which is validated and exported.
+        optimizer: State of AdamW.
+    """
+
+    recipe_toml: str
+    size: str
+    network: str
+    config: dict[str, Any]
+    bank_digest: str
+    training_data: str
+    step: int
+    elapsed_s: float
+    cpu_s: float
+    valid_db: float | None
+    weights: State
+    average: State
+    optimizer: dict[str, Any]
+
+
+def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint; an interrupted write leaves the old file."""
+    part = path.with_name(path.name + ".part")
+    table = {f.name: getattr(checkpoint, f.name) for f in fields(checkpoint)}
+    torch.save({"format": FORMAT} | table, part)
+    part.replace(path)
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Read a checkpoint without running any code from it.
+
+    Raises:
+        ContractError: If it is missing, no checkpoint, or of another format.
+    """
+    try:
+        table = torch.load(path, map_location="cpu", weights_only=True)
+    except OSError as error:
+        raise ContractError(f"cannot read checkpoint {path}: {error.strerror}") from error
+    except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
+        raise ContractError(f"{path} is no checkpoint of camkit: {error}") from error
+    if not isinstance(table, dict) or table.pop("format", None) != FORMAT:
+        raise ContractError(f"{path} is no checkpoint of format {FORMAT}; train again")
+    missing = {f.name for f in fields(Checkpoint)} ^ set(table)
+    if missing:
+        raise ContractError(f"checkpoint {path} has wrong entries: {', '.join(sorted(missing))}")
+    return Checkpoint(**table)
+
+
+def load_network(checkpoint: Checkpoint) -> nn.Module:
+    """Build the network with the averaged weights, ready to export.
+
+    Raises:
+        ContractError: If the weights do not fit the network.
+    """
+    network = build_network(checkpoint.network, **checkpoint.config)
+    try:
+        network.load_state_dict(checkpoint.average)
+    except RuntimeError as error:
+        raise ContractError(f"the weights do not fit {checkpoint.network}: {error}") from error
+    return network.eval()

@@ -1,0 +1,45 @@
+"""What weights were trained on, in words, for the card of a bundle."""
+
+import re
+from collections import Counter
+from pathlib import Path
+
+from camkit.models_def.training.pictures import list_pictures
+from camkit.models_def.training.recipe import Recipe
+
+ROW = re.compile(r"^\| `(?P<file>[^`]+)` \|(?P<rest>.*)\|$")
+LICENCE_COLUMN = 2
+
+
+def describe_data(recipe: Recipe, pictures: Path | None) -> str:
+    """Name the training data: folder, number and licences of pictures, procedural share.
+
+    Licences are read from the table of the folder's README.md (columns file, title, author,
+    licence), where there is one.
+    """
+    scenes = f"{recipe.data.procedural_scenes} procedural scenes (camkit.scenes)"
+    if pictures is None:
+        return f"{scenes} only; no photographs"
+    files = list_pictures(pictures)
+    share = 100 * recipe.data.picture_share
+    licences = _licences(pictures / "README.md", {p.name for p in files})
+    stated = ", ".join(f"{name}: {count}" for name, count in sorted(licences.items()))
+    return (
+        f"{len(files)} photographs of {pictures.name} ({share:.0f} % of the samples; "
+        f"licences {stated or 'not stated'}) and {scenes}"
+    )
+
+
+def _licences(readme: Path, names: set[str]) -> Counter[str]:
+    """Count the licences of the named files, without their remarks in brackets."""
+    found: Counter[str] = Counter()
+    if not readme.is_file():
+        return found
+    for line in readme.read_text(encoding="utf-8").splitlines():
+        row = ROW.match(line.strip())
+        if row is None or row["file"] not in names:
+            continue
+        cells = [cell.strip() for cell in row["rest"].split("|")]
+        if len(cells) > LICENCE_COLUMN:
+            found[cells[LICENCE_COLUMN].split(" (")[0]] += 1
+    return found

@@ -1,0 +1,85 @@
+"""The kernels of a recipe's lens: fabricated copies traced densely, the design beside them."""
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.kernel_bank import ChannelResponse, kernel_bank
+from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.spot import relative_illumination
+from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
+from camkit.models_def.training.recipe import Recipe
+from camkit.models_def.training.samples import corner_height_mm
+
+PRESCRIPTIONS: Final = Path(__file__).resolve().parents[1] / "prescriptions"
+WAVELENGTHS: Final = 27
+LEAST_ENERGY: Final = 0.97
+
+
+def build_lens_bank(recipe: Recipe, cache_folder: Path | None = None) -> PsfBank:
+    """Trace the lens of a recipe, or read what an earlier call traced.
+
+    Args:
+        recipe: Its `lens` names the prescription and says how many copies and fields.
+        cache_folder: Where traced banks are kept; None keeps none.
+
+    Raises:
+        ContractError: If the prescription is missing or its light does not fit the kernels.
+    """
+    path = PRESCRIPTIONS / f"{recipe.lens.prescription}.toml"
+    if cache_folder is None:
+        return _trace(recipe, path)
+    content = [path.read_text(encoding="utf-8"), json.dumps(asdict(recipe.lens))]
+    content.append(recipe.camera.model_dump_json())
+    name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
+    cached = cache_folder / f"bank-{name}.npz"
+    if not cached.exists():
+        cache_folder.mkdir(parents=True, exist_ok=True)
+        write_bank(cached, _trace(recipe, path))
+    return read_bank(cached)
+
+
+def _trace(recipe: Recipe, path: Path) -> PsfBank:
+    lens = read_prescription(path)
+    plan = recipe.lens
+    heights = np.linspace(0.0, corner_height_mm(recipe), plan.fields)
+    bank = kernel_bank(
+        lens,
+        _response(recipe),
+        copies=plan.copies + 2,
+        seed=plan.seed,
+        heights_mm=heights,
+        size_px=plan.kernel_px,
+        pitch_um=recipe.camera.pixel_pitch_um,
+        rays=plan.rays,
+    )
+    if bank.energy_kept < LEAST_ENERGY:
+        raise ContractError(
+            f"kernels of {plan.kernel_px} px hold {bank.energy_kept:.3f} of the light, less than "
+            f"{LEAST_ENERGY}; raise lens.kernel_px"
+        )
+    return PsfBank(
+        copies=bank.kernels[1:],
+        copy_heights_mm=heights,
+        frozen=bank.kernels[0],
+        frozen_heights_mm=heights,
+        relative_illumination=relative_illumination(lens, torch.from_numpy(heights)).numpy(),
+    )
+
+
+def _response(recipe: Recipe) -> ChannelResponse:
+    """Resample the camera's response so finely that lateral colour leaves no steps."""
+    wavelengths_um, response = recipe.camera.channel_response.to_arrays()
+    dense = np.linspace(wavelengths_um[0], wavelengths_um[-1], WAVELENGTHS)
+    sampled = np.stack([np.interp(dense, wavelengths_um, row) for row in response])
+    return ChannelResponse(
+        wavelengths_um=dense,
+        response=sampled / sampled.sum(axis=1, keepdims=True),
+        source=recipe.camera.channel_response.source,
+    )

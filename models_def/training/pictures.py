@@ -1,0 +1,140 @@
+"""Where sharp training crops come from: a folder of pictures and procedural scenes.
+
+Pictures are decoded once and held as 8-bit sRGB, scenes as float16; a crop is decoded to linear
+Rec.709 when it is cut.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.colorimetry import decode_srgb
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError, DecodeError
+from camkit.scenes import procedural_scene
+
+PICTURE_ENDINGS: Final = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
+SCENE_SEED: Final = 7_000_000
+CANDIDATES: Final = 2
+SRGB_TABLE: Final[FloatArray] = decode_srgb(np.arange(256, dtype=np.float32) / 255)
+
+Generator = np.random.Generator
+
+
+def list_pictures(folder: Path | None) -> tuple[Path, ...]:
+    """Give the pictures of a folder by name; none without a folder.
+
+    Raises:
+        ContractError: If a folder is named that is not there or holds no picture.
+    """
+    if folder is None:
+        return ()
+    if not folder.is_dir():
+        raise ContractError(f"the picture folder {folder} is not there")
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURE_ENDINGS)
+    if not found:
+        raise ContractError(
+            f"{folder} holds no picture with an ending of {', '.join(PICTURE_ENDINGS)}"
+        )
+    return tuple(found)
+
+
+def read_picture(path: Path) -> NDArray[np.uint8]:
+    """Read an 8-bit sRGB picture as (h, w, 3), R first.
+
+    Raises:
+        DecodeError: If it cannot be decoded.
+    """
+    data = np.fromfile(path, dtype=np.uint8)
+    decoded = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    if decoded is None:
+        raise DecodeError(f"{path.name} cannot be decoded as a picture")
+    return np.ascontiguousarray(decoded[..., ::-1], dtype=np.uint8)
+
+
+def to_linear(picture: NDArray[np.uint8]) -> FloatArray:
+    """Give (3, h, w) float32 linear Rec.709 from (h, w, 3) 8-bit sRGB."""
+    return np.ascontiguousarray(SRGB_TABLE[picture].transpose(2, 0, 1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneSource:
+    """Draws sharp crops.
+
+    Attributes:
+        pictures: Files to cut from; may be empty.
+        picture_share: Probability of a picture rather than a procedural scene.
+        scenes: Number of different procedural scenes.
+        scene_px: Their side.
+    """
+
+    pictures: Sequence[Path]
+    picture_share: float
+    scenes: int
+    scene_px: int
+    _held: dict[int, NDArray[Any]]
+
+    def draw_crop(self, rng: Generator, side_px: int) -> FloatArray:
+        """Cut a random crop, the livelier of two candidates of one picture.
+
+        Returns:
+            (3, side_px, side_px) float32 linear Rec.709; a smaller picture is mirrored outwards.
+        """
+        picture = self._draw_picture(rng)
+        crops = [_cut(rng, picture, side_px) for _ in range(CANDIDATES)]
+        best = max(crops, key=_liveliness)
+        if best.dtype == np.uint8:
+            return to_linear(best)
+        return np.ascontiguousarray(best.transpose(2, 0, 1), dtype=np.float32)
+
+    def _draw_picture(self, rng: Generator) -> NDArray[Any]:
+        """Give (h, w, 3) uint8 sRGB of a picture or float16 linear of a scene."""
+        from_file = bool(self.pictures) and rng.random() < self.picture_share
+        if from_file:
+            key = int(rng.integers(len(self.pictures)))
+            if key not in self._held:
+                self._held[key] = read_picture(self.pictures[key])
+            return self._held[key]
+        number = int(rng.integers(self.scenes))
+        key = -1 - number
+        if key not in self._held:
+            scene = procedural_scene(SCENE_SEED + number, self.scene_px, self.scene_px)
+            self._held[key] = scene.transpose(1, 2, 0).astype(np.float16)
+        return self._held[key]
+
+
+def open_source(
+    folder: Path | None, *, picture_share: float, scenes: int, scene_px: int
+) -> SceneSource:
+    """Open a source of crops; without a folder it is procedural only."""
+    return SceneSource(
+        pictures=list_pictures(folder),
+        picture_share=picture_share,
+        scenes=scenes,
+        scene_px=scene_px,
+        _held={},
+    )
+
+
+def _cut(rng: Generator, picture: NDArray[Any], side_px: int) -> NDArray[Any]:
+    height, width, _ = picture.shape
+    missing = (max(0, side_px - height), max(0, side_px - width), 0)
+    if any(missing):
+        before = [(m // 2, m - m // 2) for m in missing]
+        picture = np.pad(picture, before, mode="symmetric")
+        height, width, _ = picture.shape
+    y = int(rng.integers(height - side_px + 1))
+    x = int(rng.integers(width - side_px + 1))
+    return picture[y : y + side_px, x : x + side_px]
+
+
+def _liveliness(crop: NDArray[Any]) -> float:
+    """Rate a crop by the mean step between neighbours of its centre, in its own encoding."""
+    quarter = crop.shape[0] // 4
+    green = crop[quarter : -quarter or None : 2, quarter : -quarter or None, 1].astype(np.float32)
+    return float(np.abs(np.diff(np.sqrt(green), axis=1)).mean())

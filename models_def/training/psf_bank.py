@@ -1,0 +1,136 @@
+"""The PSFs that training samples are made with: fabricated copies, and the frozen one beside them.
+
+A capture is blurred by the kernels of a copy, as a lens from the line would; the Wiener filter in
+front of the network knows the frozen kernels only.
+"""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.models_def.sensors.psf import kernel_at
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PsfBank:
+    """Kernels of the colours for image points along +y; others by turning.
+
+    Attributes:
+        copies: (copy, field, 3, h, w) float32, each sums to 1; the last copy is for validation.
+        copy_heights_mm: (field,) float64, increasing from 0.
+        frozen: (field, 3, h, w) float32, what the bundle will hold.
+        frozen_heights_mm: (field,) float64, increasing from 0.
+        relative_illumination: (field,) float64 at `frozen_heights_mm`.
+    """
+
+    copies: FloatArray
+    copy_heights_mm: NDArray[np.float64]
+    frozen: FloatArray
+    frozen_heights_mm: NDArray[np.float64]
+    relative_illumination: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if self.copies.ndim != 5 or self.copies.shape[0] < 2:
+            raise ContractError(
+                "copies must be (copy >= 2, field, 3, h, w), the last one for validation; "
+                f"got {self.copies.shape}"
+            )
+        if self.frozen.ndim != 4 or self.copies.shape[2] != 3 or self.frozen.shape[1] != 3:
+            raise ContractError(
+                f"kernels need 3 colours; got {self.copies.shape}, {self.frozen.shape}"
+            )
+
+    @property
+    def radius_px(self) -> int:
+        """How far the kernels of the copies reach."""
+        return max(self.copies.shape[-2:]) // 2
+
+    @property
+    def training_copies(self) -> int:
+        """How many copies may be trained on."""
+        return int(self.copies.shape[0]) - 1
+
+    def blur_kernels(self, copy: int, x_mm: float, y_mm: float) -> Tensor:
+        """Give the (1, 3, h, w) kernels of one copy at a sensor position."""
+        return _at(self.copies[copy], self.copy_heights_mm, x_mm, y_mm)
+
+    def frozen_kernels(self, x_mm: float, y_mm: float) -> Tensor:
+        """Give the (1, 3, h, w) frozen kernels at a sensor position."""
+        return _at(self.frozen, self.frozen_heights_mm, x_mm, y_mm)
+
+    def illumination_at(self, height_mm: float) -> float:
+        """Give the relative illumination at a field height."""
+        return float(np.interp(height_mm, self.frozen_heights_mm, self.relative_illumination))
+
+    def digest(self) -> str:
+        """Give the sha256 of all kernels and positions."""
+        total = hashlib.sha256()
+        for name in _ARRAYS:
+            total.update(np.ascontiguousarray(getattr(self, name)).tobytes())
+        return total.hexdigest()
+
+
+_ARRAYS = (
+    "copies",
+    "copy_heights_mm",
+    "frozen",
+    "frozen_heights_mm",
+    "relative_illumination",
+)
+
+
+def write_bank(path: Path, bank: PsfBank) -> None:
+    """Write a bank for another process."""
+    np.savez(path, **{name: getattr(bank, name) for name in _ARRAYS})
+
+
+def read_bank(path: Path) -> PsfBank:
+    """Read what `write_bank` wrote."""
+    with np.load(path, allow_pickle=False) as arrays:
+        return PsfBank(**{name: arrays[name] for name in _ARRAYS})
+
+
+def gaussian_bank(*, sensor_height_mm: float, axis_px: float, corner_px: float) -> PsfBank:
+    """Make a bank without a lens: elliptical Gaussians that grow over the field.
+
+    For trials before a lens exists; the two copies differ by 4 % in width.
+
+    Args:
+        sensor_height_mm: Greatest field height.
+        axis_px: Standard deviation on the axis.
+        corner_px: Radial standard deviation at the corner; across it is half of that.
+    """
+    heights = np.linspace(0.0, sensor_height_mm, 5)
+    reach = int(3 * 1.04 * corner_px) + 2
+    offsets = np.arange(-reach, reach + 1, dtype=np.float64)
+    copies = []
+    for factor in (1.0, 1.04, 0.97):
+        kernels = []
+        for share in heights / sensor_height_mm:
+            along = factor * (axis_px + (corner_px - axis_px) * share)
+            across = factor * (axis_px + (0.5 * corner_px - axis_px) * share)
+            kernel = np.exp(
+                -0.5 * ((offsets[:, None] / along) ** 2 + (offsets[None, :] / across) ** 2)
+            )
+            kernels.append(np.stack([kernel / kernel.sum()] * 3))
+        copies.append(np.stack(kernels))
+    bank = np.stack(copies).astype(np.float32)
+    return PsfBank(
+        copies=bank[1:],
+        copy_heights_mm=heights,
+        frozen=bank[0],
+        frozen_heights_mm=heights,
+        relative_illumination=1 - 0.4 * (heights / sensor_height_mm) ** 2,
+    )
+
+
+def _at(kernels: FloatArray, heights_mm: NDArray[np.float64], x_mm: float, y_mm: float) -> Tensor:
+    place = (torch.tensor([x_mm], dtype=torch.float64), torch.tensor([y_mm], dtype=torch.float64))
+    return kernel_at(torch.from_numpy(kernels), torch.from_numpy(heights_mm), *place)

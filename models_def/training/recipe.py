@@ -1,0 +1,296 @@
+"""Recipes: what a person edits to train the networks of a camera, read from TOML.
+
+Keys are strict: an unknown or missing key, a wrong type or a value out of range is an error that
+names the key.
+"""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ValidationError
+
+from camkit.bundle.camera import Camera
+from camkit.bundle.stages import Wiener
+from camkit.errors import ContractError
+
+LOSSES = ("log_mse", "mse")
+PRECISIONS = ("float32", "bfloat16")
+
+T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LensRecipe:
+    """The lens and how far its copies vary.
+
+    Attributes:
+        prescription: Name of a file in `models_def/prescriptions`, without its ending.
+        copies: Fabricated copies whose PSFs are trained on; one more is kept for validation.
+        fields: Field heights of the kernel bank.
+        kernel_px: Side of its kernels, odd.
+        rays: Rays in half the pupil.
+        seed: Seed of the fabrication errors.
+    """
+
+    prescription: str
+    copies: int = 8
+    fields: int = 25
+    kernel_px: int = 129
+    rays: int = 4096
+    seed: int = 101
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataRecipe:
+    """How training samples are made.
+
+    Attributes:
+        picture_share: Share of samples cut from pictures, the rest is procedural; without a
+            folder of pictures every sample is procedural.
+        procedural_scenes: Different procedural scenes of `scene_px` a side.
+        scene_px: Side of a procedural scene.
+        sample_px: Side of a finished sample; training patches are cut from it.
+        margin_px: Simulated surroundings of a sample that the Wiener filter sees.
+        pool_samples: Samples held on disk at one time.
+        first_samples: Samples that must exist before the first step.
+        steps_per_sample: Training steps after which one more sample replaces the oldest.
+        iso_min: Lowest ISO, drawn log-uniformly.
+        iso_max: Highest ISO.
+        exposure_min_ev: Least exposure relative to the picture as it is.
+        exposure_max_ev: Greatest exposure; above 0 highlights clip.
+        block_jitter_px: How far the block centre whose kernel filters a patch may lie from it.
+        border_share: Share of samples that lie at one or more picture borders.
+        target_max: Targets are clipped at this multiple of the white level.
+    """
+
+    picture_share: float = 0.8
+    procedural_scenes: int = 48
+    scene_px: int = 1024
+    sample_px: int = 256
+    margin_px: int = 72
+    pool_samples: int = 1600
+    first_samples: int = 400
+    steps_per_sample: int = 8
+    iso_min: float = 80.0
+    iso_max: float = 6400.0
+    exposure_min_ev: float = -3.0
+    exposure_max_ev: float = 1.0
+    block_jitter_px: float = 176.0
+    border_share: float = 0.2
+    target_max: float = 4.0
+
+    def __post_init__(self) -> None:
+        _check_share("data.picture_share", self.picture_share)
+        _check_share("data.border_share", self.border_share)
+        if not 0 < self.iso_min <= self.iso_max:
+            raise ContractError(f"data.iso_min must be in (0, iso_max]; got {self.iso_min}")
+        if self.exposure_min_ev > self.exposure_max_ev:
+            raise ContractError("data.exposure_min_ev must not exceed exposure_max_ev")
+        if not 0 < self.first_samples < self.pool_samples:
+            raise ContractError("data.first_samples must lie between 0 and pool_samples")
+        if min(self.sample_px, self.scene_px, self.procedural_scenes, self.steps_per_sample) < 1:
+            raise ContractError("sizes and counts of data must be positive")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScheduleRecipe:
+    """How the network is fitted.
+
+    Attributes:
+        steps: Steps of the whole schedule; `--max-minutes` may end it sooner, decay included.
+        batch: Patches per step.
+        patch_px: Side of a training patch.
+        learning_rate: Peak of AdamW's rate: linear warm-up, then a half cosine.
+        final_rate: Rate at the end, relative to the peak.
+        warmup_steps: Steps of warm-up.
+        weight_decay: AdamW's decay.
+        gradient_clip: Largest norm of the gradient.
+        ema_decay: Decay of the weight average that is validated and exported.
+        loss: log_mse or mse, both in the square-root domain of the signal.
+        precision: bfloat16 multiplies (weights stay float32) or float32.
+        float32_share: Share of the schedule, at its end, computed in float32 anyway.
+        seed: Seed of weights, samples and order.
+    """
+
+    steps: int = 40_000
+    batch: int = 8
+    patch_px: int = 128
+    learning_rate: float = 2e-3
+    final_rate: float = 0.005
+    warmup_steps: int = 200
+    weight_decay: float = 1e-4
+    gradient_clip: float = 1.0
+    ema_decay: float = 0.999
+    loss: str = "log_mse"
+    precision: str = "bfloat16"
+    float32_share: float = 0.05
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if self.loss not in LOSSES:
+            raise ContractError(f"schedule.loss must be one of {LOSSES}; got {self.loss!r}")
+        if self.precision not in PRECISIONS:
+            raise ContractError(
+                f"schedule.precision must be one of {PRECISIONS}; got {self.precision!r}"
+            )
+        _check_share("schedule.float32_share", self.float32_share)
+        _check_share("schedule.ema_decay", self.ema_decay)
+        if min(self.steps, self.batch, self.patch_px) < 1 or self.learning_rate <= 0:
+            raise ContractError("schedule needs positive steps, batch, patch_px, learning_rate")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkRecipe:
+    """One size of network.
+
+    Attributes:
+        network: Name in the catalogue of networks.
+        config: Fields of its config that differ from the defaults.
+        schedule: The schedule, with what this network changes of it.
+    """
+
+    network: str
+    config: Mapping[str, Any] = field(default_factory=dict)
+    schedule: ScheduleRecipe = field(default_factory=ScheduleRecipe)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """A camera and how its networks are trained.
+
+    Attributes:
+        name: Name of the camera and its bundle.
+        object_distance_mm: Distance the lens is focused on; inf is allowed.
+        scale: Divisor of the stabilised planes, see the manifest.
+        wiener: Prior and blocks of the Wiener bank in front of the networks.
+    """
+
+    name: str
+    object_distance_mm: float
+    scale: float
+    camera: Camera
+    wiener: Wiener
+    lens: LensRecipe
+    data: DataRecipe
+    networks: Mapping[str, NetworkRecipe]
+
+    def network(self, size: str) -> NetworkRecipe:
+        """Give the network of a size, or raise ContractError naming the sizes there are."""
+        if size not in self.networks:
+            raise ContractError(
+                f"recipe {self.name} has the sizes {', '.join(self.networks)}; got {size!r}"
+            )
+        return self.networks[size]
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Read and check a recipe.
+
+    Raises:
+        ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ContractError(f"cannot read recipe {path}: {error.strerror}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ContractError(f"recipe {path} is not valid TOML: {error}") from error
+    return to_recipe(table)
+
+
+def to_recipe(table: Mapping[str, Any]) -> Recipe:
+    """Turn a parsed TOML table into a recipe; raises ContractError as `read_recipe` does."""
+    known = {"name", "object_distance_mm", "scale", "camera", "wiener", "lens"}
+    _check_keys("recipe", table, known | {"data", "schedule", "networks"})
+    schedule = _section("schedule", ScheduleRecipe, table.get("schedule", {}))
+    networks = table.get("networks")
+    if not isinstance(networks, Mapping) or not networks:
+        raise ContractError("a recipe needs at least one table [networks.SIZE]")
+    return Recipe(
+        name=_typed("name", table.get("name"), str),
+        object_distance_mm=_typed("object_distance_mm", table.get("object_distance_mm"), float),
+        scale=_typed("scale", table.get("scale", 64.0), float),
+        camera=_model("camera", Camera, table),
+        wiener=_model("wiener", Wiener, table),
+        lens=_section("lens", LensRecipe, table.get("lens", {})),
+        data=_section("data", DataRecipe, table.get("data", {})),
+        networks={size: _network(size, entry, schedule) for size, entry in networks.items()},
+    )
+
+
+def _network(size: str, entry: Mapping[str, Any], schedule: ScheduleRecipe) -> NetworkRecipe:
+    where = f"networks.{size}"
+    _check_keys(where, entry, {"network", "config", "schedule"})
+    changed = asdict(schedule) | dict(entry.get("schedule", {}))
+    return NetworkRecipe(
+        network=_typed(f"{where}.network", entry.get("network"), str),
+        config=dict(entry.get("config", {})),
+        schedule=_section(f"{where}.schedule", ScheduleRecipe, changed),
+    )
+
+
+def samples_digest(recipe: Recipe, seed: int) -> str:
+    """Give a hash of all that decides the training samples, to name their pool by."""
+    content = {
+        "camera": recipe.camera.model_dump(mode="json"),
+        "wiener": recipe.wiener.model_dump(mode="json"),
+        "lens": asdict(recipe.lens),
+        "data": asdict(recipe.data),
+        "scale": recipe.scale,
+        "object_distance_mm": str(recipe.object_distance_mm),
+        "seed": seed,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _model(where: str, kind: type[M], table: Mapping[str, Any]) -> M:
+    """Check a table that is part of the manifest too."""
+    try:
+        return kind.model_validate(table.get(where, {}))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join([where, *(str(part) for part in first["loc"])])
+        raise ContractError(f"{place}: {first['msg']}") from error
+
+
+def _section(where: str, kind: type[T], table: Any) -> T:
+    if not isinstance(table, Mapping):
+        raise ContractError(f"{where} must be a table; got {table!r}")
+    hints = get_type_hints(kind)
+    _check_keys(where, table, set(hints))
+    required = {f.name for f in fields(kind) if _is_required(f)}  # type: ignore[arg-type]
+    missing = required - set(table)
+    if missing:
+        raise ContractError(f"{where} lacks {', '.join(sorted(missing))}")
+    return kind(**{k: _typed(f"{where}.{k}", v, hints[k]) for k, v in table.items()})
+
+
+def _is_required(entry: Any) -> bool:
+    return entry.default is MISSING and entry.default_factory is MISSING
+
+
+def _check_keys(where: str, table: Mapping[str, Any], known: set[str]) -> None:
+    unknown = sorted(set(table) - known)
+    if unknown:
+        raise ContractError(
+            f"{where}: unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}"
+        )
+
+
+def _check_share(where: str, value: float) -> None:
+    if not 0 <= value <= 1:
+        raise ContractError(f"{where} must lie in 0..1; got {value}")
+
+
+def _typed(where: str, value: Any, kind: type[T]) -> T:
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return kind(value)  # type: ignore[call-arg]
+    if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+        raise ContractError(f"{where} must be of type {kind.__name__}; got {value!r}")
+    return value

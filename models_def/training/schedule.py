@@ -1,0 +1,40 @@
+"""Learning rate, weight average and progress of a training run."""
+
+import math
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.training.recipe import ScheduleRecipe
+
+
+def progress_of(step: int, steps: int, elapsed_s: float, budget_s: float | None) -> float:
+    """Give how much of the schedule lies behind, 0..1.
+
+    By steps alone it is exact and repeatable. With a time budget it is whichever of the two is
+    further, so that the decay ends in time on a machine that is slower than hoped.
+    """
+    by_steps = step / steps
+    by_time = 0.0 if budget_s is None else elapsed_s / budget_s
+    return min(1.0, max(by_steps, by_time))
+
+
+def learning_rate(recipe: ScheduleRecipe, step: int, progress: float) -> float:
+    """Give the rate: linear warm-up, then a half cosine over the progress."""
+    warmup = min(1.0, (step + 1) / max(1, recipe.warmup_steps))
+    cosine = 0.5 * (1 + math.cos(math.pi * progress))
+    floor = recipe.final_rate
+    return recipe.learning_rate * warmup * (floor + (1 - floor) * cosine)
+
+
+def ema_decay(recipe: ScheduleRecipe, step: int) -> float:
+    """Give the decay of the weight average; shorter at the start, so that it soon follows."""
+    return min(recipe.ema_decay, (step + 1) / (step + 10))
+
+
+@torch.no_grad()
+def update_average(average: list[Tensor], weights: Iterable[Tensor], decay: float) -> None:
+    """Move the averaged weights towards the current ones, in place."""
+    current = [w.detach() for w in weights]
+    torch._foreach_lerp_(average, current, 1.0 - decay)  # noqa: SLF001  the one batched form

@@ -1,0 +1,251 @@
+"""The trainer: fits one network of a recipe, resumes exactly, ends in time.
+
+pool of samples -> patches of a step -> network -> loss in the square-root domain -> AdamW
+                                                        -> average of the weights -> validation
+"""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from camkit.models_def.training.credits import describe_data
+from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.log import RunLog
+from camkit.models_def.training.pool import SamplePool, open_pool
+from camkit.models_def.training.progress import TrainingBar
+from camkit.models_def.training.psf_bank import PsfBank
+from camkit.models_def.training.recipe import Recipe, read_recipe
+from camkit.models_def.training.schedule import progress_of
+from camkit.models_def.training.validation import (
+    Case,
+    Score,
+    make_cases,
+    score,
+    score_capture,
+    score_wiener,
+)
+
+LOG_STEPS: Final = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainOptions:
+    """What a run is given besides its recipe.
+
+    Attributes:
+        out_dir: Checkpoint, log and sample pool are kept here.
+        size: Which network of the recipe.
+        data_folder: Pictures to train on; None for procedural scenes alone.
+        valid_folder: Pictures to choose by; None for procedural scenes.
+        max_minutes: Wall time after which the schedule, decay included, ends; None for its steps.
+        stop_at_step: Stop there though the schedule goes on, as an interruption would.
+        resume: Go on from the checkpoint in `out_dir`.
+        threads: Threads of torch.
+        workers: Processes that make samples; 0 makes them in this process.
+        device: cpu or cuda.
+        checkpoint_s: Seconds between checkpoints.
+        validate_s: Seconds between validations.
+    """
+
+    out_dir: Path
+    size: str = "M"
+    data_folder: Path | None = None
+    valid_folder: Path | None = None
+    max_minutes: float | None = None
+    stop_at_step: int | None = None
+    resume: bool = False
+    threads: int = 1
+    workers: int = 1
+    device: str = "cpu"
+    checkpoint_s: float = 100.0
+    validate_s: float = 180.0
+
+    def __post_init__(self) -> None:
+        if self.max_minutes is not None and self.max_minutes <= 0:
+            raise ContractError(f"max_minutes must be > 0; got {self.max_minutes}")
+        if self.threads < 1 or self.workers < 0:
+            raise ContractError(
+                f"threads must be >= 1, workers >= 0; got {self.threads}, {self.workers}"
+            )
+        if self.device != "cpu" and not torch.cuda.is_available():
+            raise ContractError(f"device {self.device} is not there; use cpu")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainResult:
+    """How a run ended.
+
+    Attributes:
+        checkpoint: The last checkpoint.
+        log: The log.
+        steps: Steps done, earlier runs included.
+        elapsed_s: Wall time, earlier runs included.
+        cpu_s: CPU time, workers and earlier runs included.
+        capture_db: Validation PSNR of the captures.
+        wiener_db: Of the Wiener bank alone.
+        valid_db: Of the network.
+    """
+
+    checkpoint: Path
+    log: Path
+    steps: int
+    elapsed_s: float
+    cpu_s: float
+    capture_db: float
+    wiener_db: float
+    valid_db: float
+
+
+def train(recipe_path: Path, bank: PsfBank, options: TrainOptions) -> TrainResult:
+    """Train one network of a recipe.
+
+    Args:
+        recipe_path: TOML recipe.
+        bank: Kernels of the lens, see `lens_bank`.
+        options: Where, how long and with what.
+
+    Raises:
+        ContractError: If recipe, options or the checkpoint to resume do not fit.
+    """
+    torch.set_num_threads(options.threads)
+    recipe = read_recipe(recipe_path)
+    options.out_dir.mkdir(parents=True, exist_ok=True)
+    seed = recipe.network(options.size).schedule.seed
+    pool = open_pool(options.out_dir, recipe_path, bank, options.data_folder, seed=seed)
+    with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
+        pool.start_workers(options.workers)
+        cases = make_cases(recipe, bank, options.valid_folder)
+        run = _Run(recipe_path, bank.digest(), cases, options)
+        run.loop(pool, bar)
+        return run.result()
+
+
+class _Run:
+    """A run in time: the loop with its clock, log, validation and checkpoints."""
+
+    def __init__(
+        self, recipe_path: Path, bank_digest: str, cases: list[Case], options: TrainOptions
+    ) -> None:
+        self.options, self.cases, self.bank_digest = options, cases, bank_digest
+        self.toml = recipe_path.read_text(encoding="utf-8")
+        self.recipe: Recipe = read_recipe(recipe_path)
+        self.entry = self.recipe.network(options.size)
+        self.path = options.out_dir / f"{self.recipe.name}_{options.size}.pt"
+        self.fitter = Fitter(self.entry, options.device)
+        self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
+        self.valid: Score | None = None
+        if options.resume:
+            self._restore(read_checkpoint(self.path))
+        until = self.step if options.resume else None
+        self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
+        self.capture = score_capture(cases, self.recipe)
+        self.wiener = score_wiener(cases, self.recipe)
+        self.start_s, self.start_cpu_s = time.perf_counter(), time.process_time()
+
+    def _restore(self, saved: Checkpoint) -> None:
+        known = (self.bank_digest, self.entry.network, dict(self.entry.config))
+        if (saved.bank_digest, saved.network, saved.config) != known:
+            raise ContractError(
+                f"{self.path} was trained with other kernels or another network; "
+                "start without resume"
+            )
+        self.fitter.load(saved.weights, saved.average, saved.optimizer)
+        self.step = saved.step
+        self.elapsed_before_s, self.cpu_before_s = saved.elapsed_s, saved.cpu_s
+
+    def elapsed_s(self) -> float:
+        return self.elapsed_before_s + time.perf_counter() - self.start_s
+
+    def cpu_s(self, pool: SamplePool) -> float:
+        own = time.process_time() - self.start_cpu_s
+        return self.cpu_before_s + own + pool.workers_cpu_s()
+
+    def loop(self, pool: SamplePool, bar: TrainingBar) -> None:
+        """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
+        plan, options = self.entry.schedule, self.options
+        budget_s = None if options.max_minutes is None else 60 * options.max_minutes
+        pool.draw_batch(self.step, 1, plan.patch_px)
+        self.log.write(
+            {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
+            | {"capture_db": self.capture.mean_db, "wiener_db": self.wiener.mean_db}
+        )
+        saved_s = validated_s = self.elapsed_s()
+        losses: list[float] = []
+        while not self._is_over(progress := self._progress(budget_s)):
+            batch = pool.draw_batch(self.step, plan.batch, plan.patch_px)
+            losses.append(self.fitter.fit(batch, self.step, progress))
+            self.step += 1
+            if self.step % LOG_STEPS == 0:
+                self._note(pool, bar, progress, sum(losses) / len(losses))
+                losses.clear()
+            if self.elapsed_s() - validated_s > options.validate_s:
+                self._validate(pool)
+                validated_s = self.elapsed_s()
+            if self.elapsed_s() - saved_s > options.checkpoint_s:
+                self._save(pool)
+                saved_s = self.elapsed_s()
+        self._validate(pool)
+        self._save(pool)
+
+    def _progress(self, budget_s: float | None) -> float:
+        return progress_of(self.step, self.entry.schedule.steps, self.elapsed_s(), budget_s)
+
+    def _is_over(self, progress: float) -> bool:
+        return progress >= 1 or self.step == self.options.stop_at_step
+
+    def _note(self, pool: SamplePool, bar: TrainingBar, progress: float, loss: float) -> None:
+        valid_db = None if self.valid is None else self.valid.mean_db
+        bar.show(progress, self.step, loss, valid_db)
+        clock = {"seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
+        waited = {"waited_s": pool.waited_s, "progress": progress}
+        self.log.write({"step": self.step, "loss": loss} | clock | waited)
+
+    def _validate(self, pool: SamplePool) -> None:
+        self.valid = score(self.cases, self.recipe, self.fitter.restore)
+        entry: dict[str, Any] = {
+            "step": self.step,
+            "seconds": self.elapsed_s(),
+            "cpu_s": self.cpu_s(pool),
+            "valid_db": self.valid.mean_db,
+            "valid_by_iso": {f"{iso:g}": db for iso, db in self.valid.by_iso.items()},
+            "valid_by_field": {f"{f:g}": db for f, db in self.valid.by_field.items()},
+            "capture_db": self.capture.mean_db,
+            "wiener_db": self.wiener.mean_db,
+        }
+        self.log.write(entry)
+
+    def _save(self, pool: SamplePool) -> None:
+        saved = Checkpoint(
+            recipe_toml=self.toml,
+            size=self.options.size,
+            network=self.entry.network,
+            config=dict(self.entry.config),
+            bank_digest=self.bank_digest,
+            training_data=describe_data(self.recipe, self.options.data_folder),
+            step=self.step,
+            elapsed_s=self.elapsed_s(),
+            cpu_s=self.cpu_s(pool),
+            valid_db=None if self.valid is None else self.valid.mean_db,
+            weights=self.fitter.weights(),
+            average=self.fitter.average(),
+            optimizer=self.fitter.optimizer_state(),
+        )
+        write_checkpoint(self.path, saved)
+
+    def result(self) -> TrainResult:
+        saved = read_checkpoint(self.path)
+        return TrainResult(
+            checkpoint=self.path,
+            log=self.path.with_suffix(".jsonl"),
+            steps=saved.step,
+            elapsed_s=saved.elapsed_s,
+            cpu_s=saved.cpu_s,
+            capture_db=self.capture.mean_db,
+            wiener_db=self.wiener.mean_db,
+            valid_db=float(saved.valid_db or 0.0),
+        )

@@ -1,0 +1,153 @@
+"""Validation: fixed captures of pictures that are never trained on, judged on sRGB values."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
+from camkit.contracts import FloatArray
+from camkit.models_def.sensors.stabilise import unstabilise
+from camkit.models_def.training.pictures import SCENE_SEED, list_pictures, read_picture, to_linear
+from camkit.models_def.training.psf_bank import PsfBank
+from camkit.models_def.training.recipe import Recipe
+from camkit.models_def.training.samples import (
+    Exposure,
+    Sample,
+    corner_height_mm,
+    make_sample,
+    scene_side_px,
+)
+from camkit.scenes import procedural_scene
+
+FIELD_SHARES: Final = (0.0, 0.3, 0.55, 0.8, 0.98)
+ISOS: Final = (100.0, 1600.0)
+GOLDEN_ANGLE_RAD: Final = 2.399963
+BLOCK_OFFSET_PX: Final = 90.0
+PROCEDURAL_PICTURES: Final = 8
+SEED: Final = 424242
+
+Restorer = Callable[[Tensor], Tensor]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One capture: its sample, the (3, s, s) sharp sRGB picture, and where it was taken."""
+
+    sample: Sample
+    sharp: FloatArray
+    field_share: float
+    iso: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """Mean PSNR in dB on sRGB values.
+
+    Attributes:
+        mean_db: Over all cases.
+        by_iso: ISO -> dB.
+        by_field: Field height as a share of the corner's -> dB.
+    """
+
+    mean_db: float
+    by_iso: dict[float, float]
+    by_field: dict[float, float]
+
+
+def make_cases(recipe: Recipe, bank: PsfBank, pictures: Path | None) -> list[Case]:
+    """Photograph the middle of each picture at five field heights and two ISOs.
+
+    The lens is the copy that is not trained on; each Wiener block lies off its place as a block
+    of the bank does. Without a folder, procedural scenes are photographed.
+    """
+    side = scene_side_px(recipe, bank)
+    cases = []
+    for number, crop in enumerate(_crops(pictures, side)):
+        for spot, share in enumerate(FIELD_SHARES):
+            for iso in ISOS:
+                rng = np.random.default_rng((SEED, number, spot, int(iso)))
+                exposure = _exposure(recipe, bank, share, iso, number * len(FIELD_SHARES) + spot)
+                sample = make_sample(crop, exposure, recipe, bank, rng)
+                inner = (side - recipe.data.sample_px) // 2
+                sharp = encode_srgb(crop[:, inner : side - inner, inner : side - inner])
+                cases.append(Case(sample=sample, sharp=sharp, field_share=share, iso=iso))
+    return cases
+
+
+def _crops(pictures: Path | None, side: int) -> list[FloatArray]:
+    if pictures is None:
+        seeds = range(SCENE_SEED - PROCEDURAL_PICTURES, SCENE_SEED)
+        return [procedural_scene(seed, side, side) for seed in seeds]
+    return [to_linear(_middle(read_picture(p), side)) for p in list_pictures(pictures)]
+
+
+def _middle(picture: np.ndarray, side: int) -> np.ndarray:  # type: ignore[type-arg]
+    height, width, _ = picture.shape
+    missing = (max(0, side - height), max(0, side - width), 0)
+    picture = np.pad(picture, [(m // 2, m - m // 2) for m in missing], mode="symmetric")
+    top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
+    return picture[top : top + side, left : left + side]
+
+
+def _exposure(recipe: Recipe, bank: PsfBank, share: float, iso: float, turn: int) -> Exposure:
+    height = share * corner_height_mm(recipe)
+    azimuth = turn * GOLDEN_ANGLE_RAD
+    x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
+    offset = BLOCK_OFFSET_PX * recipe.camera.pixel_pitch_um / 1000
+    return Exposure(
+        x_mm=float(x_mm),
+        y_mm=float(y_mm),
+        block_x_mm=float(x_mm + offset * np.cos(3 * azimuth)),
+        block_y_mm=float(y_mm + offset * np.sin(3 * azimuth)),
+        copy=bank.training_copies,
+        iso=iso,
+    )
+
+
+def score(cases: Sequence[Case], recipe: Recipe, restore: Restorer) -> Score:
+    """Judge a restoration.
+
+    Args:
+        cases: From `make_cases`.
+        recipe: Camera and scale.
+        restore: (1, 6, s, s) stabilised planes -> (1, 3, s, s) stabilised.
+    """
+    with torch.no_grad():
+        values = [_psnr(case, recipe, restore(case.sample.planes[None])[0]) for case in cases]
+    by_iso = {iso: _mean(values, [c.iso == iso for c in cases]) for iso in ISOS}
+    by_field = {f: _mean(values, [c.field_share == f for c in cases]) for f in FIELD_SHARES}
+    return Score(mean_db=float(np.mean(values)), by_iso=by_iso, by_field=by_field)
+
+
+def score_capture(cases: Sequence[Case], recipe: Recipe) -> Score:
+    """Judge the capture as it is."""
+    return score(cases, recipe, lambda planes: planes[:, :3])
+
+
+def score_wiener(cases: Sequence[Case], recipe: Recipe) -> Score:
+    """Judge the Wiener bank alone."""
+    return score(cases, recipe, lambda planes: planes[:, 3:])
+
+
+def to_srgb(stable: Tensor, case: Case, recipe: Recipe) -> FloatArray:
+    """Take stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
+    noise = case.sample.noise
+    shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
+    linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
+    matrix, _ = camera_from_rec709(np.array(recipe.camera.color_matrix))
+    linear_rec709 = apply_matrix(np.linalg.inv(matrix), linear.numpy() / case.sample.illumination)
+    return encode_srgb(linear_rec709)
+
+
+def _psnr(case: Case, recipe: Recipe, stable: Tensor) -> float:
+    gap = to_srgb(stable, case, recipe) - case.sharp
+    return float(-10 * np.log10(np.mean(np.square(gap, dtype=np.float64)) + 1e-12))
+
+
+def _mean(values: list[float], chosen: list[bool]) -> float:
+    return float(np.mean([v for v, c in zip(values, chosen, strict=True) if c]))

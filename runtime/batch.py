@@ -1,0 +1,245 @@
+"""Many captures: which files, which bundle for each, where the pictures go, what is done already.
+
+    files -> expand -> plan (bundles, names, clashes: errors before any work) -> run, `jobs` at once
+          -> NAME.ext and NAME.camkit.json, written to .part and renamed
+
+One file's failure never stops the others; `resume` skips only what a sidecar proves done.
+"""
+
+import glob
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, Literal
+
+from camkit.bundle.reader import find_bundle
+from camkit.errors import CamkitError, ContractError
+from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline, load
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.raw import named_bundle
+
+FileProgress = Callable[[Path, int, int], None]
+
+CAPTURE_SUFFIXES: Final = frozenset(
+    ".dng .arw .cr2 .cr3 .crw .nef .nrw .raf .rw2 .orf .pef .srw .kdc .dcr .3fr .iiq .rwl .exr "
+    ".tif .tiff .png".split()
+)
+NO_BUNDLE: Final = "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One input with what was decided for it before any work.
+
+    Attributes:
+        source: The capture.
+        target: The picture to write.
+        bundle: Name or path of the bundle; "none" only develops.
+        refusal: Why the file cannot be done, when that is known beforehand.
+    """
+
+    source: Path
+    target: Path
+    bundle: str
+    refusal: str | None = None
+
+
+def expand(files: Sequence[str | Path]) -> list[Path]:
+    """Give the captures named by files, folders and globs, each once, in the order given.
+
+    A folder stands for the captures directly in it, by name; a glob that matches nothing and a
+    folder without captures stand for nothing; a file that does not exist is kept and fails later.
+    """
+    found: dict[Path, None] = {}
+    for item in files:
+        path = Path(item)
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in CAPTURE_SUFFIXES)
+            found.update(dict.fromkeys(p for p in inside if p.is_file()))
+        elif not path.exists() and glob.has_magic(str(item)):
+            matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))
+            found.update(dict.fromkeys(p for p in matches if p.is_file()))
+        else:
+            found[path] = None
+    return list(found)
+
+
+def plan_tasks(
+    sources: Sequence[Path], *, bundle: str | None, write: WriteOptions
+) -> list[Task]:
+    """Decide bundle and output of every input, and refuse what cannot be before any work.
+
+    Raises:
+        ContractError: If two inputs would give one output, an output exists (and neither resume
+            nor overwrite was asked for), or no input names a bundle.
+        BundleError: If the named bundle is refused.
+    """
+    if bundle is not None and bundle.lower() != NO_BUNDLE:
+        find_bundle(bundle)
+    tasks = [_plan_task(source, bundle, write) for source in sources]
+    _refuse_clashes(tasks)
+    refused = [t for t in tasks if t.refusal is not None]
+    if tasks and bundle is None and len(refused) == len(tasks):
+        names = ", ".join(str(t.source) for t in refused)
+        raise ContractError(
+            f"no file names a bundle ({names}); say --bundle NAME, or --bundle none to develop only"
+        )
+    existing = [t.target for t in tasks if t.target.exists()]
+    if existing and not (write.resume or write.overwrite):
+        listed = ", ".join(map(str, existing[:5]))
+        raise ContractError(
+            f"{len(existing)} output(s) exist ({listed}); say --resume, --overwrite, or another "
+            "--out-dir"
+        )
+    return tasks
+
+
+def _plan_task(source: Path, bundle: str | None, write: WriteOptions) -> Task:
+    target = write.out_dir / f"{source.stem}{write.suffix}"
+    chosen = bundle
+    refusal = None
+    if chosen is None:
+        chosen = named_bundle(source)
+        if chosen is None:
+            refusal = f"{source} names no bundle; say --bundle NAME, or --bundle none"
+    return Task(source=source, target=target, bundle=chosen or NO_BUNDLE, refusal=refusal)
+
+
+def _refuse_clashes(tasks: Sequence[Task]) -> None:
+    owners: dict[Path, Path] = {}
+    for task in tasks:
+        target = task.target.resolve()
+        if target == task.source.resolve():
+            raise ContractError(f"{task.source} would overwrite itself; choose another --out-dir")
+        if target in owners:
+            raise ContractError(
+                f"{owners[target]} and {task.source} would both give {task.target}; "
+                "run them into different folders"
+            )
+        owners[target] = task.source
+
+
+def process(
+    files: Sequence[str | Path] | str | Path,
+    *,
+    bundle: str | Path | None = None,
+    options: Options | None = None,
+    write: WriteOptions | None = None,
+    mosaic: MosaicOptions | None = None,
+    jobs: int = 1,
+    progress: FileProgress | None = None,
+    on_result: Callable[[FileResult], None] | None = None,
+    **choices: object,
+) -> list[FileResult]:
+    """Turn captures into pictures, each with its sidecar.
+
+    Args:
+        files: Captures, folders or globs.
+        bundle: Name or path; None takes the bundle each file names; "none" only develops.
+        options: What changes the pixels. Single fields may also be given by name (size="S").
+        write: Where and how to write. Single fields may also be given by name (out_dir="out").
+        mosaic: How to read headerless mosaics.
+        jobs: Captures at once; the threads are shared among them.
+        progress: Called with (file, done, total) at every tile, from the working thread.
+        on_result: Called with each result as it is ready.
+
+    Returns:
+        One result per input, in their order; failures carry their message.
+
+    Raises:
+        ContractError: For what can be refused before any work (see `plan_tasks`).
+        BundleError: If the named bundle is refused.
+    """
+    options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
+    if jobs < 1:
+        raise ContractError(f"jobs must be >= 1; got {jobs}")
+    listed = [files] if isinstance(files, str | Path) else list(files)
+    tasks = plan_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
+    pipelines = _Pipelines(_shared(options, jobs))
+    write.out_dir.mkdir(parents=True, exist_ok=True)
+
+    def run(task: Task) -> FileResult:
+        result = _run_task(task, pipelines, write, mosaic, progress)
+        if on_result is not None:
+            on_result(result)
+        return result
+
+    if jobs == 1:
+        return [run(task) for task in tasks]
+    with ThreadPoolExecutor(jobs, thread_name_prefix="camkit") as pool:
+        return list(pool.map(run, tasks))
+
+
+def _with_choices(
+    options: Options, write: WriteOptions, choices: dict[str, object]
+) -> tuple[Options, WriteOptions]:
+    names = set(Options.__dataclass_fields__), set(WriteOptions.__dataclass_fields__)
+    unknown = set(choices) - names[0] - names[1]
+    if unknown:
+        raise ContractError(
+            f"unknown option(s) {', '.join(sorted(unknown))}; known are "
+            f"{', '.join(sorted(names[0] | names[1]))}"
+        )
+    if "out_dir" in choices:
+        choices = {**choices, "out_dir": Path(str(choices["out_dir"]))}
+    return (
+        replace(options, **{k: v for k, v in choices.items() if k in names[0]}),  # type: ignore[arg-type]
+        replace(write, **{k: v for k, v in choices.items() if k in names[1]}),  # type: ignore[arg-type]
+    )
+
+
+def _shared(options: Options, jobs: int) -> Options:
+    """Share threads and memory among the jobs, so that together they keep to the caller's."""
+    if jobs == 1:
+        return options
+    from camkit.runtime.engine import available_threads
+
+    threads = max(1, available_threads(options.threads) // jobs)
+    memory = options.max_mem_bytes
+    return replace(
+        options, threads=threads, max_mem_bytes=None if memory is None else memory // jobs
+    )
+
+
+class _Pipelines:
+    """One pipeline per bundle, made when first needed."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self._made: dict[str, Pipeline] = {}
+        self._lock = threading.Lock()
+
+    def get(self, bundle: str) -> Pipeline:
+        with self._lock:
+            if bundle not in self._made:
+                name = None if bundle.lower() == NO_BUNDLE else bundle
+                self._made[bundle] = load(name, options=self._options)
+            return self._made[bundle]
+
+
+def _run_task(
+    task: Task,
+    pipelines: _Pipelines,
+    write: WriteOptions,
+    mosaic: MosaicOptions | None,
+    progress: FileProgress | None,
+) -> FileResult:
+    if task.refusal is not None:
+        return FileResult.failure(task.source, None, task.refusal)
+    named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
+    try:
+        pipeline = pipelines.get(task.bundle)
+        if write.resume and proved_done(task.source, task.target, pipeline, write, mosaic):
+            return FileResult.skip(task.source, task.target, pipeline)
+        tick = None if progress is None else _tick(progress, task.source)
+        return develop_file(task.source, task.target, pipeline, write, mosaic, tick)
+    except (CamkitError, OSError) as error:
+        return FileResult.failure(task.source, named, f"{error}")
+
+
+def _tick(progress: FileProgress, source: Path) -> Callable[[int, int], None]:
+    return lambda done, total: progress(source, done, total)

@@ -1,0 +1,209 @@
+"""A capture: the linear samples of one photograph in sensor orientation, with what is known of it.
+
+The samples stay as the file stores them (24 megapixels of uint16 are 48 MB); rows become float32
+when a stage asks for them.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, NoiseModel
+from camkit.errors import ContractError
+
+Contract = Literal["raw_bayer_v1", "linear_rgb_v1"]
+
+SATURATION_SHARE: Final = 0.99
+"""A sample at this share of the white level is taken as clipped.
+
+Cameras clip a little below or above the stated white level (gain calibration, linearisation
+tables, companding; the spread seen is under one percent). A sharp sample called clipped by
+mistake costs one interpolated highlight, a clipped one called sharp costs a ringing halo.
+"""
+
+_SAMPLE_TYPES: Final = (np.uint8, np.uint16, np.float32)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MosaicOptions:
+    """What a headerless mosaic (single-channel PNG or TIFF) does not say of itself.
+
+    Attributes:
+        cfa: Letters of the 2x2 cell at pixel (0, 0) in reading order.
+        black_level: Stored value without light.
+        white_level: Stored value at saturation.
+    """
+
+    cfa: CfaPattern
+    black_level: float
+    white_level: float
+
+    def __post_init__(self) -> None:
+        if self.cfa not in CFA_PATTERNS:
+            raise ContractError(f"mosaic must be one of {CFA_PATTERNS}; got {self.cfa!r}")
+        if not 0 <= self.black_level < self.white_level < np.inf:
+            raise ContractError(
+                "mosaic levels must be 0 <= black < white; "
+                f"got black {self.black_level}, white {self.white_level}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capture:
+    """One photograph as the sensor saw it.
+
+    Attributes:
+        samples: (h, w) mosaic or (3, h, w) planes; uint8, uint16 or float32, in file units.
+        cfa: Letters of the 2x2 cell at pixel (0, 0); None for planes.
+        black_level: float32 in file units: (2, 2) by position in the cell for a mosaic, (3,) for
+            planes.
+        white_level: Saturation in file units.
+        white_balance: Gains (R, G, B) of the camera's own choice, G = 1; None if not stated.
+        color_matrix: (3, 3) float64, XYZ (D65) to camera; None if not stated.
+        orientation: EXIF orientation 1..8; the samples themselves are never turned.
+        iso: ISO speed; None if not stated.
+        exposure_time_s: Exposure time; None if not stated.
+        noise: Noise of the linear signal (1.0 = white level) before white balance.
+        origin_px: (x, y) of the top-left pixel on the full sensor; None if not stated.
+        sensor_size_px: (w, h) of the full sensor that `origin_px` refers to.
+        pixel_pitch_um: Pixel pitch; None if not stated.
+        bundle_name: The bundle that the file itself names (captures made by camkit).
+        camera: Make and model as people read it; empty if not stated.
+        sha256: Hash of the file; None for arrays.
+        notes: What a person should know of this decode.
+    """
+
+    samples: NDArray[Any]
+    cfa: CfaPattern | None
+    black_level: FloatArray
+    white_level: float
+    white_balance: tuple[float, float, float] | None = None
+    color_matrix: NDArray[np.float64] | None = None
+    orientation: int = 1
+    iso: float | None = None
+    exposure_time_s: float | None = None
+    noise: NoiseModel | None = None
+    origin_px: tuple[int, int] | None = None
+    sensor_size_px: tuple[int, int] | None = None
+    pixel_pitch_um: float | None = None
+    bundle_name: str | None = None
+    camera: str = ""
+    sha256: str | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._check_samples()
+        self._check_levels()
+        self._check_color()
+        if self.orientation not in range(1, 9):
+            raise ContractError(f"orientation must be an EXIF number 1..8; got {self.orientation}")
+
+    def _check_samples(self) -> None:
+        shape = self.samples.shape
+        if self.samples.dtype not in _SAMPLE_TYPES:
+            raise ContractError(
+                f"samples must be uint8, uint16 or float32; got {self.samples.dtype}"
+            )
+        mosaic = self.cfa is not None
+        if self.cfa is not None and self.cfa not in CFA_PATTERNS:
+            raise ContractError(f"CFA must be one of {CFA_PATTERNS}; got {self.cfa!r}")
+        if (len(shape) != 2) if mosaic else (len(shape) != 3 or shape[0] != 3):
+            wanted = "(h, w) for a mosaic" if mosaic else "(3, h, w) for planes (cfa is None)"
+            raise ContractError(f"samples must be {wanted}; got {shape}")
+        if 0 in shape:
+            raise ContractError(f"samples must not be empty; got {shape}")
+
+    def _check_levels(self) -> None:
+        wanted = (3,) if self.cfa is None else (2, 2)
+        black = self.black_level
+        if black.shape != wanted or black.dtype != np.float32 or not np.isfinite(black).all():
+            raise ContractError(
+                f"black level must be finite float32 {wanted}; got {black.dtype} {black.shape}"
+            )
+        if not (np.isfinite(self.white_level) and self.white_level > black.max()):
+            raise ContractError(
+                f"white level must lie above black {black.max():g}; got {self.white_level:g}"
+            )
+
+    def _check_color(self) -> None:
+        gains = self.white_balance
+        if gains is not None and not (
+            len(gains) == 3 and np.isfinite(gains).all() and min(gains) > 0 and gains[1] == 1
+        ):
+            raise ContractError(f"white balance must be 3 gains > 0 with G = 1; got {gains}")
+        matrix = self.color_matrix
+        if matrix is not None and (matrix.shape != (3, 3) or not np.isfinite(matrix).all()):
+            raise ContractError(f"color matrix must be finite (3, 3); got {matrix.shape}")
+
+    @property
+    def contract(self) -> Contract:
+        """Name the input contract of bundles that this capture fulfils."""
+        return "linear_rgb_v1" if self.cfa is None else "raw_bayer_v1"
+
+    @property
+    def height(self) -> int:
+        """Give the number of rows."""
+        return int(self.samples.shape[-2])
+
+    @property
+    def width(self) -> int:
+        """Give the number of columns."""
+        return int(self.samples.shape[-1])
+
+    def linear_rows(self, top: int, bottom: int) -> FloatArray:
+        """Give rows top..bottom as a linear signal: black is 0, white level 1, negatives kept.
+
+        Returns:
+            (bottom - top, w) float32 for a mosaic, (3, bottom - top, w) for planes.
+
+        Raises:
+            ContractError: If the rows lie outside the picture.
+        """
+        self._check_rows(top, bottom)
+        rows = self.samples[..., top:bottom, :].astype(np.float32)
+        black = self._black_rows(top)
+        scale = np.float32(1) / (np.float32(self.white_level) - black)
+        if self.cfa is None or (black == black[0, 0]).all():
+            rows -= black if self.cfa is None else black[0, 0]
+            rows *= scale if self.cfa is None else scale[0, 0]
+            return rows
+        for dy in (0, 1):
+            for dx in (0, 1):
+                rows[dy::2, dx::2] -= black[dy, dx]
+                rows[dy::2, dx::2] *= scale[dy, dx]
+        return rows
+
+    def saturated_rows(self, top: int, bottom: int) -> NDArray[np.bool_]:
+        """Tell which samples of rows top..bottom are clipped (see `SATURATION_SHARE`).
+
+        Float pictures have no white level that clips, so none of their samples is.
+
+        Returns:
+            bool of the shape of `linear_rows`.
+        """
+        self._check_rows(top, bottom)
+        rows = self.samples[..., top:bottom, :]
+        if np.issubdtype(rows.dtype, np.floating):
+            return np.zeros(rows.shape, dtype=bool)
+        black = self._black_rows(top)
+        limit = black + SATURATION_SHARE * (np.float32(self.white_level) - black)
+        if self.cfa is None:
+            return np.asarray(rows >= np.ceil(limit))
+        clipped = np.empty(rows.shape, dtype=bool)
+        for dy in (0, 1):
+            for dx in (0, 1):
+                # an integer limit keeps the comparison in the type of the samples
+                clipped[dy::2, dx::2] = rows[dy::2, dx::2] >= int(np.ceil(limit[dy, dx]))
+        return clipped
+
+    def _black_rows(self, top: int) -> FloatArray:
+        """Give black as (3, 1, 1), or as the (2, 2) cell that starts at row `top`."""
+        if self.cfa is None:
+            return self.black_level[:, None, None]
+        return np.roll(self.black_level, -(top % 2), axis=0)
+
+    def _check_rows(self, top: int, bottom: int) -> None:
+        if not 0 <= top <= bottom <= self.height:
+            raise ContractError(f"rows must lie in 0..{self.height}; got {top}..{bottom}")

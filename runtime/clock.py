@@ -1,0 +1,66 @@
+"""Seconds per stage when stages pull rows from one another: each second counts once."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from camkit.contracts import FloatArray
+from camkit.runtime.rows import RowSource
+
+
+class StageClock:
+    """A stack of running stages; only the innermost one is charged.
+
+    One clock belongs to one capture and one thread.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._running: list[str] = []
+        self._since = 0.0
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Charge the time inside the block to `name`, and no longer to the stage around it."""
+        self._charge()
+        self._running.append(name)
+        try:
+            yield
+        finally:
+            self._charge()
+            self._running.pop()
+
+    def bands(self, name: str, bands: Iterator[FloatArray]) -> Iterator[FloatArray]:
+        """Pass bands on, charging the making of each to `name`."""
+        while True:
+            with self.stage(name):
+                band = next(bands, None)
+            if band is None:
+                return
+            yield band
+
+    def _charge(self) -> None:
+        now = time.perf_counter()
+        if self._running:
+            name = self._running[-1]
+            self.seconds[name] = self.seconds.get(name, 0.0) + now - self._since
+        self._since = now
+
+
+class TimedRows:
+    """A row source whose reading is charged to a stage."""
+
+    def __init__(self, source: RowSource, clock: StageClock, name: str) -> None:
+        self._source = source
+        self._clock = clock
+        self._name = name
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the whole picture."""
+        return self._source.shape
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give rows top..bottom of the source."""
+        with self._clock.stage(self._name):
+            return self._source.read(top, bottom)

@@ -1,0 +1,248 @@
+"""One capture file developed: decode, reconstruct, write, and say what was done in a sidecar."""
+
+import json
+import resource
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal, Self, get_args
+
+from camkit.errors import ContractError
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.output.linear_dng import LinearDngWriter
+from camkit.runtime.output.part_file import atomic_output
+from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
+from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_sidecar
+from camkit.runtime.output.writer import SUFFIXES, open_writer
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.raw import file_sha256, read_capture
+from camkit.runtime.reconstruction import Reconstruction
+
+FileFormat = Literal["exr", "tiff", "png", "dng"]
+Status = Literal["ok", "failed", "skipped"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WriteOptions:
+    """Where and how pictures are written.
+
+    Attributes:
+        out_dir: Folder of pictures and sidecars, made if needed.
+        format: exr, tiff, png or dng.
+        linear: TIFF without the sRGB curve.
+        resume: Skip what a sidecar proves done.
+        overwrite: Replace pictures that exist.
+    """
+
+    out_dir: Path = Path()
+    format: FileFormat = "exr"
+    linear: bool = False
+    resume: bool = False
+    overwrite: bool = False
+
+    def __post_init__(self) -> None:
+        if self.format not in get_args(FileFormat):
+            raise ContractError(
+                f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"
+            )
+        if self.resume and self.overwrite:
+            raise ContractError("resume keeps what is done, overwrite redoes it: choose one")
+
+    @property
+    def suffix(self) -> str:
+        """Give the suffix of the pictures, with its dot."""
+        return "." + SUFFIXES[self.format].lstrip(".")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileResult:
+    """What became of one input.
+
+    Attributes:
+        input: The capture.
+        output: The picture; None when it failed.
+        status: ok, failed or skipped.
+        error: Why it failed.
+        bundle: Name of the bundle in use; None when only developed.
+        size: Size of the network in use.
+        seconds: Seconds per stage.
+        peak_rss_mb: Peak memory of this process so far, and of its largest child.
+        warnings: What the user should know.
+    """
+
+    input: Path
+    output: Path | None
+    status: Status
+    error: str | None = None
+    bundle: str | None = None
+    size: str | None = None
+    seconds: dict[str, float]
+    peak_rss_mb: float
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def failure(cls, source: Path, bundle: str | None, error: str) -> Self:
+        """Give the result of an input that failed."""
+        return cls(
+            input=source,
+            output=None,
+            status="failed",
+            error=error,
+            bundle=bundle,
+            seconds={},
+            peak_rss_mb=peak_rss_mb(),
+        )
+
+    @classmethod
+    def skip(cls, source: Path, target: Path, pipeline: Pipeline) -> Self:
+        """Give the result of an input that was done before."""
+        return cls(
+            input=source,
+            output=target,
+            status="skipped",
+            bundle=_bundle_name(pipeline),
+            size=_size(pipeline),
+            seconds={},
+            peak_rss_mb=peak_rss_mb(),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the result as plain JSON values."""
+        return {
+            **asdict(self),
+            "input": str(self.input),
+            "output": None if self.output is None else str(self.output),
+            "seconds": {name: round(value, 4) for name, value in self.seconds.items()},
+            "peak_rss_mb": round(self.peak_rss_mb, 1),
+            "warnings": list(self.warnings),
+        }
+
+
+def peak_rss_mb() -> float:
+    """Give the peak memory of this process plus that of its largest child so far, in MB."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    kinds = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(resource.getrusage(kind).ru_maxrss for kind in kinds) * unit / 1e6
+
+
+def develop_file(
+    source: Path,
+    target: Path,
+    pipeline: Pipeline,
+    write: WriteOptions,
+    mosaic: MosaicOptions | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> FileResult:
+    """Turn one capture into a picture and a sidecar; either both appear or neither changes.
+
+    Raises:
+        DecodeError: If the capture cannot be read.
+        ContractError: If capture and bundle do not fit each other.
+    """
+    began = time.perf_counter()
+    capture = read_capture(source, mosaic=mosaic)
+    decode_s = time.perf_counter() - began
+    work = pipeline.start(capture, progress=progress)
+    with atomic_output(target) as part:
+        write_s = _write_picture(part, work, write)
+        output_sha256 = file_sha256(part)
+    seconds = {"decode": decode_s, **work.seconds, "write": write_s}
+    result = FileResult(
+        input=source,
+        output=target,
+        status="ok",
+        bundle=_bundle_name(pipeline),
+        size=_size(pipeline),
+        seconds=seconds,
+        peak_rss_mb=peak_rss_mb(),
+        warnings=work.warnings,
+    )
+    record = {
+        **result.to_json(),
+        **_identity(capture.sha256, pipeline, write, mosaic),
+        "output_sha256": output_sha256,
+        "plan": work.plan,
+        "clipped_fraction": work.clipped_fraction,
+        "orientation": capture.orientation,
+        "camera": capture.camera,
+        "iso": capture.iso,
+        "exposure_time_s": capture.exposure_time_s,
+    }
+    write_sidecar(target, record)
+    return result
+
+
+def proved_done(
+    source: Path,
+    target: Path,
+    pipeline: Pipeline,
+    write: WriteOptions,
+    mosaic: MosaicOptions | None,
+) -> bool:
+    """Tell whether a sidecar proves that exactly this work was done and its picture is whole."""
+    if not (source.is_file() and target.is_file() and sidecar_path(target).is_file()):
+        return False
+    record = read_sidecar(target)
+    wanted = _identity(file_sha256(source), pipeline, write, mosaic)
+    if record is None or any(record.get(key) != value for key, value in wanted.items()):
+        return False
+    return record.get("output_sha256") == file_sha256(target)
+
+
+def _identity(
+    input_sha256: str | None,
+    pipeline: Pipeline,
+    write: WriteOptions,
+    mosaic: MosaicOptions | None,
+) -> dict[str, Any]:
+    """Give what decides the bytes of a picture, as plain JSON values."""
+    from camkit import __version__
+
+    free = ("threads", "max_mem_bytes", "tile_px")
+    chosen = {k: v for k, v in asdict(pipeline.options).items() if k not in free}
+    chosen |= {"format": write.format, "linear": write.linear}
+    chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
+    identity = {
+        "camkit": __version__,
+        "input_sha256": input_sha256,
+        "bundle_sha256": None if pipeline.bundle is None else pipeline.bundle.sha256,
+        "options": chosen,
+    }
+    return dict(json.loads(json.dumps(identity)))
+
+
+def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> float:
+    """Stream the bands into the file; return the seconds of the writer alone."""
+    picture = PictureFormat(
+        width=work.capture.width,
+        height=work.capture.height,
+        color=work.color,
+        orientation=1 if write.format == "dng" else work.capture.orientation,
+        tone="linear" if write.linear else "srgb",
+    )
+    seconds = 0.0
+    with _open(path, picture, work, write) as writer:
+        for band in work.bands():
+            began = time.perf_counter()
+            writer.write(band)
+            seconds += time.perf_counter() - began
+        began = time.perf_counter()
+    return seconds + time.perf_counter() - began
+
+
+def _open(
+    path: Path, picture: PictureFormat, work: Reconstruction, write: WriteOptions
+) -> PictureWriter:
+    if write.format == "dng":
+        return LinearDngWriter(path, picture, work.capture, work.white_balance)
+    return open_writer(path, write.format, picture)
+
+
+def _bundle_name(pipeline: Pipeline) -> str | None:
+    return None if pipeline.bundle is None else pipeline.bundle.manifest.name
+
+
+def _size(pipeline: Pipeline) -> str | None:
+    return None if pipeline.engine is None else pipeline.options.size

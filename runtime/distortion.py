@@ -1,0 +1,163 @@
+"""Radial distortion of points: the model, its inverse, its range, its fit.
+
+r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6), r ideal and r_d on the sensor, both in units of
+`RadialDistortion.radius_mm` (Sun 2021, eq. 6.10). Pictures are warped in `warp.py`.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import RadialDistortion
+from camkit.errors import ContractError
+
+FloatGrid = NDArray[np.float64]
+
+TABLE_SAMPLES: Final = 1024
+NEWTON_STEPS: Final = 4
+# A picture is warped a little beyond the farthest pixel, where filters reach over the border.
+RANGE_MARGIN: Final = 1.02
+
+
+def distort_points(
+    points_mm: FloatGrid, distortion: RadialDistortion, *, channel: int = 1
+) -> FloatGrid:
+    """Give where ideal image points fall on the sensor.
+
+    Args:
+        points_mm: (..., 2) x, y from the axis.
+        distortion: The model.
+        channel: Colour, 0 R, 1 G, 2 B.
+
+    References: Sun 2021, eq. (6.10).
+    """
+    square = (points_mm**2).sum(axis=-1, keepdims=True) / distortion.radius_mm**2
+    c0, c1, c2, c3 = distortion.coefficients[channel]
+    return np.asarray(points_mm * (c0 + square * (c1 + square * (c2 + square * c3))))
+
+
+def undistort_points(
+    points_mm: FloatGrid, distortion: RadialDistortion, *, channel: int = 1
+) -> FloatGrid:
+    """Give the ideal image points of points on the sensor: inverse of `distort_points`.
+
+    Newton's method from a table of the forward model; exact to about 1e-9 mm.
+
+    Args:
+        points_mm: (..., 2) x, y from the axis, on the sensor.
+        distortion: The model.
+        channel: Colour, 0 R, 1 G, 2 B.
+
+    Raises:
+        ContractError: If a point lies where the model has no single inverse.
+    """
+    coefficients = distortion.coefficients[channel]
+    radius = np.sqrt((points_mm**2).sum(axis=-1, keepdims=True)) / distortion.radius_mm
+    limit = ideal_limit(coefficients, float(radius.max(initial=0.0)))
+    table = np.linspace(0.0, limit, TABLE_SAMPLES)
+    ideal = np.interp(radius, _distorted_radius(coefficients, table), table)
+    for _ in range(NEWTON_STEPS):
+        ideal -= (_distorted_radius(coefficients, ideal) - radius) / _slope(coefficients, ideal)
+    scale = np.divide(
+        ideal, radius, out=np.full_like(radius, 1 / coefficients[0]), where=radius > 0
+    )
+    return np.asarray(points_mm * scale)
+
+
+def fit_distortion(
+    r_mm: FloatGrid, r_distorted_mm: FloatGrid, radius_mm: float
+) -> RadialDistortion:
+    """Fit the radial model to pairs of radii by linear least squares.
+
+    Args:
+        r_mm: (n,) ideal radii, or (3, n) for one fit per colour; n >= 4.
+        r_distorted_mm: Radii on the sensor, of the same shape.
+        radius_mm: Half the diagonal of the sensor.
+
+    Raises:
+        ContractError: If the shapes disagree or fewer than four different radii are given.
+
+    References: Sun 2021, eq. (6.11).
+    """
+    if r_mm.shape != r_distorted_mm.shape or r_mm.ndim not in {1, 2}:
+        raise ContractError(
+            f"radii must be (n,) or (3, n) pairs; got {r_mm.shape} and {r_distorted_mm.shape}"
+        )
+    pairs = (
+        np.broadcast_to(
+            np.stack([r_mm, r_distorted_mm]).reshape(2, -1, r_mm.shape[-1]), (2, 3, r_mm.shape[-1])
+        )
+        / radius_mm
+    )
+    rows = [_fit_radii(r, r_d) for r, r_d in zip(pairs[0], pairs[1], strict=True)]
+    return RadialDistortion(coefficients=np.stack(rows), radius_mm=radius_mm)
+
+
+def _fit_radii(r: FloatGrid, r_distorted: FloatGrid) -> FloatGrid:
+    if np.unique(r[r > 0]).size < 4:
+        raise ContractError("the fit needs at least four different radii > 0; give more points")
+    powers = np.stack([r, r**3, r**5, r**7], axis=1)
+    return np.asarray(np.linalg.lstsq(powers, r_distorted, rcond=None)[0])
+
+
+def check_distortion(distortion: RadialDistortion, corner_radius_mm: float) -> None:
+    """Refuse a model that folds on the sensor, or over the ideal picture of the same size.
+
+    Raises:
+        ContractError: If r_d does not grow with r out to the corner, in any colour.
+    """
+    corner = corner_radius_mm / distortion.radius_mm * RANGE_MARGIN
+    for coefficients in distortion.coefficients:
+        fold = _fold_radius(coefficients)
+        if fold <= corner:
+            raise ContractError(
+                f"the distortion folds at {fold * distortion.radius_mm:.2f} mm, inside the corner "
+                f"at {corner_radius_mm:.2f} mm; fit it again over the whole sensor"
+            )
+        ideal_limit(coefficients, corner)
+
+
+def ideal_limit(coefficients: FloatGrid, radius: float) -> float:
+    """Give an ideal radius whose image is at or beyond `radius` on the sensor, before any fold.
+
+    Args:
+        coefficients: (4,) of one colour.
+        radius: Radius on the sensor in units of radius_mm.
+
+    Raises:
+        ContractError: If the model folds or ends before it reaches that radius.
+    """
+    fold = _fold_radius(coefficients)
+    limit = max(radius, 1e-6) / coefficients[0] if coefficients[0] > 0 else 0.0
+    for _ in range(32):
+        limit = min(limit, fold)
+        if limit > 0 and _distorted_radius(coefficients, np.asarray(limit)) >= radius:
+            return float(limit)
+        if limit == fold:
+            break
+        limit *= 1.25
+    raise ContractError(
+        f"the distortion has no inverse at {radius:.3f} of the half diagonal (it folds at ideal "
+        f"radius {fold:.3f}); fit it again over the whole sensor"
+    )
+
+
+def _distorted_radius(c: FloatGrid, r: FloatGrid) -> FloatGrid:
+    u = r * r
+    return np.asarray(r * (c[0] + u * (c[1] + u * (c[2] + u * c[3]))))
+
+
+def _slope(c: FloatGrid, r: FloatGrid) -> FloatGrid:
+    u = r * r
+    return np.asarray(c[0] + u * (3 * c[1] + u * (5 * c[2] + u * 7 * c[3])))
+
+
+def _fold_radius(c: FloatGrid) -> float:
+    # r_d stops growing where its slope, a cubic in u = r^2, has its first positive root.
+    if c[0] <= 0:
+        return 0.0
+    roots = np.roots([7 * c[3], 5 * c[2], 3 * c[1], c[0]])
+    real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
+    positive = real[real > 0]
+    return float(np.sqrt(positive.min())) if positive.size else float("inf")

@@ -1,0 +1,216 @@
+"""The only door to onnxruntime: one immutable session per model, safe to call from many threads."""
+
+import logging
+import math
+import os
+import sys
+import threading
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.errors import BundleError, ContractError, UnsupportedError
+
+_IMPORTED_BEFORE = "onnxruntime" in sys.modules and "ORT_DISABLE_TELEMETRY" not in os.environ
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+
+import onnxruntime as ort  # noqa: E402 - telemetry is switched off before the first import
+from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors  # noqa: E402
+
+logger = logging.getLogger(__name__)
+if _IMPORTED_BEFORE:
+    logger.warning(
+        "onnxruntime was imported before camkit, so its telemetry may be on; "
+        "set ORT_DISABLE_TELEMETRY=1 in the environment"
+    )
+
+MINIMUM_VERSION: Final = (1, 24, 1)
+_CREATION: Final = threading.Lock()
+_CGROUP: Final = Path("/sys/fs/cgroup")
+_ORT_ERRORS: Final = (
+    ort_errors.EPFail,
+    ort_errors.Fail,
+    ort_errors.InvalidArgument,
+    ort_errors.InvalidGraph,
+    ort_errors.InvalidProtobuf,
+    ort_errors.NoModel,
+    ort_errors.NoSuchFile,
+    ort_errors.NotImplemented,
+    ort_errors.RuntimeException,
+)
+
+
+def available_threads(requested: int | None = None) -> int:
+    """Give the number of threads to compute with.
+
+    Args:
+        requested: The user's choice, or None for all that the machine grants.
+
+    Returns:
+        min(requested, CPUs this process may run on, CPU quota of its container), at least 1.
+
+    Raises:
+        ContractError: If fewer than one thread is requested.
+    """
+    if requested is not None and requested < 1:
+        raise ContractError(f"threads must be >= 1; got {requested}")
+    affinity = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
+    limits = [affinity, _quota_cpus(_CGROUP), requested]
+    return max(1, min(limit for limit in limits if limit is not None))
+
+
+def _quota_cpus(root: Path) -> int | None:
+    """Read the container's CPU quota (cgroup v2, then v1), rounded up; None if there is none."""
+    for names in (("cpu.max",), ("cpu/cpu.cfs_quota_us", "cpu/cpu.cfs_period_us")):
+        try:
+            words = " ".join((root / name).read_text() for name in names).split()
+            quota, period = int(words[0]), int(words[1])
+        except (OSError, ValueError, IndexError):
+            continue
+        if quota > 0 and period > 0:
+            return math.ceil(quota / period)
+    return None
+
+
+class NetworkEngine:
+    """One network, ready to run: (1, channels, h, w) -> (1, 3, h, w), float32, on the CPU.
+
+    The graph is optimised at level ALL, where every convolution takes the blocked path whose sums
+    do not depend on the window; nothing is cached on disk.
+    """
+
+    def __init__(self, model: bytes, *, threads: int) -> None:
+        """Load a model.
+
+        Args:
+            model: Serialised ONNX model with the weights inside; never a path.
+            threads: Threads per run, from `available_threads`.
+
+        Raises:
+            ContractError: If `model` is not bytes or threads < 1.
+            BundleError: If onnxruntime refuses the model or its inputs and outputs are not those
+                of a network.
+            UnsupportedError: If the installed onnxruntime is too old.
+        """
+        if not isinstance(model, bytes):
+            raise ContractError(f"the model must be given as bytes; got {type(model).__name__}")
+        if threads < 1:
+            raise ContractError(f"threads must be >= 1; got {threads}")
+        _check_version(ort.__version__)
+        with _CREATION:
+            self._session = _create_session(model, threads)
+        self.threads = threads
+        self.channels = _check_contract(self._session)
+
+    def run(self, window: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Run the network on one window; may be called from many threads.
+
+        Args:
+            window: (1, channels, h, w) float32, C-contiguous, h and w multiples of the network's
+                stride.
+            out: (1, 3, h, w) float32, C-contiguous, to be filled; None makes a new one.
+
+        Returns:
+            `out`.
+
+        Raises:
+            ContractError: If shapes or types disagree, or onnxruntime refuses the size.
+        """
+        window = self._checked(window)
+        shape = (1, 3, *window.shape[2:])
+        if out is None:
+            out = np.empty(shape, np.float32)
+        elif out.shape != shape or out.dtype != np.float32 or not out.flags.c_contiguous:
+            raise ContractError(
+                f"out must be C-contiguous float32 {shape}; got {out.dtype} {out.shape}"
+            )
+        binding = self._session.io_binding()
+        binding.bind_cpu_input("input", window)
+        binding.bind_output("output", "cpu", 0, np.float32, shape, out.ctypes.data)
+        try:
+            self._session.run_with_iobinding(binding)
+        except (RuntimeError, *_ORT_ERRORS) as error:
+            raise ContractError(
+                f"the network cannot run on a window of {window.shape}: {error}; "
+                "sides must be multiples of its stride"
+            ) from error
+        return out
+
+    def _checked(self, window: FloatArray) -> FloatArray:
+        if window.ndim != 4 or window.shape[:2] != (1, self.channels) or window.dtype != np.float32:
+            raise ContractError(
+                f"window must be float32 (1, {self.channels}, h, w); "
+                f"got {window.dtype} {window.shape}"
+            )
+        return np.ascontiguousarray(window)
+
+
+def largest_activations(
+    model: bytes, names: Sequence[str], windows: Iterable[FloatArray]
+) -> dict[str, float]:
+    """Measure the largest |value| of tensors inside a network.
+
+    Args:
+        model: A model in which these tensors are outputs (see `graph.with_node_outputs`).
+        names: Tensors to measure.
+        windows: (1, channels, h, w) float32 inputs.
+
+    Returns:
+        Largest |value| by name over all windows; NaN where one occurred.
+
+    Raises:
+        BundleError: If onnxruntime refuses the model.
+    """
+    with _CREATION:
+        session = _create_session(model, available_threads(None))
+    largest = dict.fromkeys(names, 0.0)
+    for window in windows:
+        for name, value in zip(names, session.run(list(names), {"input": window}), strict=True):
+            largest[name] = float(np.maximum(largest[name], np.abs(value).max(initial=0)))
+    return largest
+
+
+def _check_version(version: str) -> None:
+    parts = tuple(int(p) for p in version.split("+", maxsplit=1)[0].split(".")[:3] if p.isdigit())
+    if parts < MINIMUM_VERSION:
+        raise UnsupportedError(
+            f"onnxruntime >= {'.'.join(map(str, MINIMUM_VERSION))} is needed; got {version}: "
+            "older ones read files named inside a model; run 'pip install -U onnxruntime'"
+        )
+
+
+def _create_session(model: bytes, threads: int) -> Any:
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.execution_mode = ort.ExecutionMode.ORT_SEQUENTIAL
+    options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
+    options.enable_mem_pattern = False
+    options.enable_cpu_mem_arena = True
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.log_severity_level = 4  # errors reach the caller as exceptions, not on stderr
+    try:
+        return ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    except _ORT_ERRORS as error:
+        raise BundleError(f"onnxruntime refused the network: {error}; export it again") from error
+
+
+def _check_contract(session: Any) -> int:
+    inputs, outputs = session.get_inputs(), session.get_outputs()
+    names = [v.name for v in inputs], [v.name for v in outputs]
+    types = {v.type for v in (*inputs, *outputs)}
+    if names != (["input"], ["output"]) or types != {"tensor(float)"}:
+        raise BundleError(
+            f'a network has one float "input" and one float "output"; got {names}, {types}'
+        )
+    shape, out_shape = inputs[0].shape, outputs[0].shape
+    if len(shape) != 4 or shape[0] != 1 or not isinstance(shape[1], int) or out_shape[1:2] != [3]:
+        raise BundleError(
+            f"a network maps (1, channels, h, w) to (1, 3, h, w); got {shape} to {out_shape}"
+        )
+    return shape[1]

@@ -1,0 +1,235 @@
+"""The noise of a capture that states none, and the repair of its broken samples.
+
+    blocks of one colour -> level, robust variance of a high-pass -> variance = shot x + read
+
+A sample is broken when it is NaN or inf, or when it alone stands far outside all its same-colour
+neighbours while the other colours around it show nothing: light reaches a sensor through a lens,
+whose blur no single sample escapes.
+"""
+
+import logging
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+import scipy.optimize
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray, NoiseModel
+from camkit.errors import ContractError
+from camkit.runtime.capture import Capture
+
+BoolArray = NDArray[np.bool_]
+
+REPAIR_MARGIN_PX: Final = 2
+"""Rows of context that a band needs above and below for the same repair as the whole."""
+
+_OUTLIER_SPREADS: Final = 8.0
+_OUTLIER_LEAST: Final = 0.02
+_GLOW_SHARE: Final = 0.1
+
+_BLOCK: Final = 16
+_BAND_ROWS: Final = 64
+_MAX_BANDS: Final = 64
+_LEVELS: Final = 12
+_LEAST_BLOCKS: Final = 8
+_MAD_TO_SIGMA: Final = 1.4826
+_HIGH_PASS_POWER: Final = 36.0
+_FLAT_QUANTILE: Final = 0.3
+FALLBACK_NOISE: Final = NoiseModel(shot=(1e-4,) * 3, read_variance=(1e-6,) * 3)
+"""Taken when a picture is too small to measure: about 10,000 electrons at the white level."""
+
+_log = logging.getLogger(__name__)
+
+
+def repair_mosaic(mosaic: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Replace broken samples of a mosaic by the median of their same-colour neighbours.
+
+    Args:
+        mosaic: (h, w) float32, linear, before white balance. A band needs `REPAIR_MARGIN_PX`
+            rows of context; results within the context are not those of the whole.
+
+    Returns:
+        The repaired mosaic (the same array if nothing was broken) and (h, w) bool, true where a
+        sample was replaced.
+
+    Raises:
+        ContractError: If the mosaic is not 2-D.
+    """
+    if mosaic.ndim != 2:
+        raise ContractError(f"a mosaic is (h, w); got {mosaic.shape}")
+    return _repair(mosaic, step=2)
+
+
+def repair_planes(planes: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Replace broken samples of full colour planes by the median of their neighbours.
+
+    Args:
+        planes: (c, h, w) float32, linear; context as for `repair_mosaic`.
+
+    Returns:
+        The repaired planes and (c, h, w) bool, true where a sample was replaced.
+    """
+    pairs = [_repair(plane, step=1) for plane in planes]
+    mask = np.stack([m for _, m in pairs])
+    return (np.stack([p for p, _ in pairs]) if mask.any() else planes), mask
+
+
+def _repair(plane: FloatArray, step: int) -> tuple[FloatArray, BoolArray]:
+    broken = ~np.isfinite(plane)
+    if broken.any():
+        plane = np.where(broken, np.float32(np.nan), plane)
+    padded = _pad(plane, 2)
+    broken |= _outliers(plane, padded, step)
+    if not broken.any():
+        return plane, broken
+    rows, cols = np.nonzero(broken)
+    around = _neighbours(padded, rows, cols, step)
+    repaired = plane.copy()
+    repaired[rows, cols] = _median(around)
+    return repaired, broken
+
+
+def _pad(plane: FloatArray, margin: int) -> FloatArray:
+    """Mirror without repeating the edge, which keeps the CFA phase; a single row is repeated."""
+    rows, cols = (_mirror(n, margin) for n in plane.shape)
+    return plane[rows][:, cols]
+
+
+def _mirror(size: int, margin: int) -> NDArray[np.intp]:
+    period = max(2 * (size - 1), 1)
+    folded = np.arange(-margin, size + margin) % period
+    return np.minimum(folded, period - folded) if size > 1 else np.zeros_like(folded)
+
+
+def _outliers(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
+    """Find samples that stand alone; NaN around a sample hides it."""
+    high = _extreme(padded, step, np.maximum)
+    low = _extreme(padded, step, np.minimum)
+    limit = high - low
+    limit *= _OUTLIER_SPREADS
+    limit += _OUTLIER_LEAST
+    high += limit
+    low -= limit
+    alone = plane > high
+    alone |= plane < low
+    if step == 2 and alone.any():
+        rows, cols = np.nonzero(alone)
+        alone[rows, cols] = ~_glows(padded, rows, cols)
+    return np.asarray(alone)
+
+
+def _extreme(padded: FloatArray, step: int, choose: np.ufunc) -> FloatArray:
+    """Give the largest or smallest of the 8 neighbours at a distance of `step`."""
+    inner = padded[2 - step : padded.shape[0] - 2 + step, :]
+    centre = inner[:, 2:-2]
+    right = inner.shape[1] - 2 + step
+    beside = choose(inner[:, 2 - step : right - 2 * step], inner[:, 2 + step : right])
+    row = choose(beside, centre)
+    result: FloatArray = choose(row[: -2 * step], row[2 * step :])
+    return np.asarray(choose(result, beside[step:-step], out=result))
+
+
+def _glows(padded: FloatArray, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> BoolArray:
+    """Tell where the other colours beside a sample rise with it, as they do for light."""
+
+    def at(dy: int, dx: int) -> FloatArray:
+        return np.asarray(padded[rows + 2 + dy, cols + 2 + dx])
+
+    beside = at(0, -1) + at(0, 1) - 0.5 * (at(-2, -1) + at(-2, 1) + at(2, -1) + at(2, 1))
+    above = at(-1, 0) + at(1, 0) - 0.5 * (at(-1, -2) + at(-1, 2) + at(1, -2) + at(1, 2))
+    same = np.median(_neighbours(padded, rows, cols, 2), axis=0)
+    excess = at(0, 0) - same
+    return np.asarray((beside + above) * np.sign(excess) > _GLOW_SHARE * np.abs(excess))
+
+
+def _neighbours(
+    padded: FloatArray, rows: NDArray[np.intp], cols: NDArray[np.intp], step: int
+) -> FloatArray:
+    """Give (8, n): the neighbours at a distance of `step`."""
+    offsets = [(dy, dx) for dy in (-step, 0, step) for dx in (-step, 0, step) if dy or dx]
+    return np.stack([padded[rows + 2 + dy, cols + 2 + dx] for dy, dx in offsets])
+
+
+def _median(around: FloatArray) -> FloatArray:
+    """Give the median of the valid ones of (8, n); 0 where none is."""
+    valid = np.isfinite(around)
+    count = valid.sum(axis=0)
+    ordered = np.sort(np.where(valid, around, np.inf), axis=0)
+    pick = np.arange(around.shape[1])
+    low, high = ordered[np.maximum(count - 1, 0) // 2, pick], ordered[count // 2 % 8, pick]
+    middle = np.where(
+        count % 2 == 1, low, 0.5 * (np.where(count > 0, low, 0) + np.where(count > 0, high, 0))
+    )
+    return np.where(count > 0, middle, 0).astype(np.float32)
+
+
+def measure_noise(capture: Capture) -> NoiseModel:
+    """Measure the noise of a capture from its flat blocks.
+
+    The three colours of a sensor share one amplifier, so one line is fitted to all of them.
+
+    Args:
+        capture: A mosaic or planes.
+
+    Returns:
+        Noise of the linear signal before white balance; `FALLBACK_NOISE` if the capture holds
+        fewer than a handful of usable blocks.
+
+    References: Foi et al. 2008 (line fit); Immerkaer 1996 (high-pass).
+    """
+    pairs = [_block_statistics(plane) for plane in _sample_planes(capture)]
+    levels = np.concatenate([p[0] for p in pairs]) if pairs else np.zeros(0)
+    variances = np.concatenate([p[1] for p in pairs]) if pairs else np.zeros(0)
+    usable = np.isfinite(levels) & np.isfinite(variances) & (variances > 0)
+    if usable.sum() < _LEAST_BLOCKS:
+        _log.info("the capture is too small to measure its noise: a default is taken")
+        return FALLBACK_NOISE
+    shot, read_variance = _fit_line(levels[usable], variances[usable])
+    return NoiseModel(shot=(shot,) * 3, read_variance=(read_variance,) * 3)
+
+
+def _sample_planes(capture: Capture) -> Iterator[FloatArray]:
+    """Give same-colour planes of bands spread over the picture; clipped samples are NaN."""
+    step = max(_BAND_ROWS, capture.height // _MAX_BANDS // 2 * 2)
+    for top in range(0, capture.height, step):
+        bottom = min(top + _BAND_ROWS, capture.height)
+        rows = capture.linear_rows(top, bottom)
+        rows[capture.saturated_rows(top, bottom)] = np.nan
+        if capture.cfa is None:
+            yield from rows
+        else:
+            yield from (rows[dy::2, dx::2] for dy in (0, 1) for dx in (0, 1))
+
+
+def _block_statistics(plane: FloatArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give level and noise variance of every whole block of a plane."""
+    high, wide = ((n - 2) // _BLOCK * _BLOCK for n in plane.shape)
+    if high <= 0 or wide <= 0:
+        return np.zeros(0), np.zeros(0)
+    across = plane[:, :-2] - 2 * plane[:, 1:-1] + plane[:, 2:]
+    detail = across[:-2] - 2 * across[1:-1] + across[2:]
+
+    def blocks(values: FloatArray) -> FloatArray:
+        tiled = values[:high, :wide].reshape(high // _BLOCK, _BLOCK, wide // _BLOCK, _BLOCK)
+        return tiled.swapaxes(1, 2).reshape(-1, _BLOCK * _BLOCK)
+
+    deviation = _MAD_TO_SIGMA * np.median(np.abs(blocks(detail)), axis=1).astype(np.float64)
+    level = blocks(plane[1:-1, 1:-1]).mean(axis=1, dtype=np.float64)
+    return level, deviation**2 / _HIGH_PASS_POWER
+
+
+def _fit_line(levels: NDArray[np.float64], variances: NDArray[np.float64]) -> tuple[float, float]:
+    """Fit variance = shot * level + read through the flat blocks of every level."""
+    edges = np.unique(np.quantile(levels, np.linspace(0, 1, _LEVELS + 1)))
+    bins = np.clip(np.searchsorted(edges, levels, "right") - 1, 0, max(edges.size - 2, 0))
+    points = [
+        (np.median(levels[bins == b]), np.quantile(variances[bins == b], _FLAT_QUANTILE))
+        for b in np.unique(bins)
+    ]
+    x, y = np.maximum(np.array(points).T, 1e-12)
+    # Relative errors are equal at all levels, hence the division by the variance.
+    design = np.stack([x, np.ones_like(x)], axis=1) / y[:, None]
+    (shot, read_variance), _ = scipy.optimize.nnls(design, np.ones_like(y))
+    # The square root behind the bank needs some shot noise.
+    return max(float(shot), 1e-8), float(read_variance)

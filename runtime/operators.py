@@ -1,0 +1,215 @@
+"""The operators of picture networks: which samples each one reads, and how sizes change.
+
+For one axis an operator is a `Window`: the first and last input sample that a run of output
+samples reads, in integers, so that the phase of the stride is exact:
+
+    operator (kernel k, span = dilation (k - 1))  first read             last read
+    convolution, pooling (stride s, pad p)        first s - p            last s - p + span
+    transposed convolution                        ceil((first + p - span) / s)   (last + p) // s
+    DepthToSpace b, nearest resize by b           first // b             last // b
+    SpaceToDepth b                                first b                last b + b - 1
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.errors import BundleError
+
+ELEMENTWISE: Final = (
+    frozenset({"Add", "Sub", "Mul", "Div", "Max", "Min", "Neg", "Abs", "Sqrt"})
+    | {"Relu", "LeakyRelu", "PRelu", "Elu", "Gelu", "Sigmoid", "HardSigmoid", "HardSwish"}
+    | {"Tanh", "Softplus", "Clip", "Identity", "Cast", "BatchNormalization"}
+)
+"""One sample out from the same sample in; second inputs may be constants per channel."""
+NORMALIZATIONS: Final = frozenset({"InstanceNormalization", "GroupNormalization"})
+REDUCTIONS: Final = frozenset({"ReduceMean", "ReduceSum", "ReduceMax", "ReduceMin"})
+GLOBAL_POOLS: Final = frozenset({"GlobalAveragePool", "GlobalMaxPool"})
+
+_SPATIAL: Final = (2, 3)
+_NDIM: Final = 4
+_MAX_SCALE: Final = 64
+_MAX_KERNEL: Final = 4096
+
+Constants = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """One operator: its type, a name for messages, tensors in and out, attributes."""
+
+    op: str
+    label: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    attributes: Mapping[str, Any]
+
+    def integers(self, name: str, default: list[int]) -> list[int]:
+        """Give an attribute that is a list of integers."""
+        return [int(value) for value in self.attributes.get(name, default)]
+
+    def integer(self, name: str, default: int) -> int:
+        """Give an attribute that is an integer."""
+        return int(self.attributes.get(name, default))
+
+    def text(self, name: str, default: str) -> str:
+        """Give an attribute that is a word."""
+        value = self.attributes.get(name, default)
+        return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """How an operator works along one axis.
+
+    Attributes:
+        stride: Input samples per output sample.
+        size: Samples out for n samples in.
+        reads: First and last input sample read for the first and last output sample.
+    """
+
+    stride: Fraction
+    size: Callable[[int], int]
+    reads: Callable[[int, int], tuple[int, int]]
+
+
+Windows = tuple[Window, Window]
+"""Rows, columns."""
+
+
+def convolution_windows(node: Node, kernel: tuple[int, ...]) -> Windows:
+    """Give the windows of a convolution or pooling, transposed or not.
+
+    Raises:
+        BundleError: If a parameter is out of range, or size or padding depend on the picture
+            (auto_pad, ceil_mode, output_shape).
+    """
+    if node.text("auto_pad", "NOTSET") != "NOTSET":
+        raise BundleError(f"{node.label}: auto_pad is refused; export with explicit pads")
+    if node.integer("ceil_mode", 0) or "output_shape" in node.attributes:
+        raise BundleError(f"{node.label}: ceil_mode and output_shape are refused")
+    strides = node.integers("strides", [1, 1])
+    dilations = node.integers("dilations", [1, 1])
+    pads = node.integers("pads", [0, 0, 0, 0])
+    growth = node.integers("output_padding", [0, 0])
+    if (len(kernel), len(strides), len(dilations), len(pads), len(growth)) != (2, 2, 2, 4, 2):
+        raise BundleError(f"{node.label}: kernel, strides, dilations and pads must be 2-D")
+    values = [*kernel, *strides, *dilations]
+    if min(values) < 1 or min(pads + growth) < 0 or max(values + pads + growth) > _MAX_KERNEL:
+        raise BundleError(f"{node.label}: kernel, strides, dilations or pads out of range")
+    make = _transposed if node.op == "ConvTranspose" else _convolved
+    rows, columns = (
+        make(strides[i], dilations[i] * (kernel[i] - 1), (pads[i], pads[i + 2]), growth[i])
+        for i in range(2)
+    )
+    return rows, columns
+
+
+def _convolved(stride: int, span: int, pads: tuple[int, int], _growth: int) -> Window:
+    return Window(
+        stride=Fraction(stride),
+        size=lambda n: (n + sum(pads) - span - 1) // stride + 1,
+        reads=lambda first, last: (first * stride - pads[0], last * stride - pads[0] + span),
+    )
+
+
+def _transposed(stride: int, span: int, pads: tuple[int, int], growth: int) -> Window:
+    return Window(
+        stride=Fraction(1, stride),
+        size=lambda n: (n - 1) * stride + span + 1 - sum(pads) + growth,
+        reads=lambda first, last: (
+            -((span - first - pads[0]) // stride),
+            (last + pads[0]) // stride,
+        ),
+    )
+
+
+def shuffle_window(block: int) -> Window:
+    """Give the window of DepthToSpace."""
+    return Window(
+        stride=Fraction(1, block),
+        size=lambda n: n * block,
+        reads=lambda first, last: (first // block, last // block),
+    )
+
+
+def unshuffle_window(block: int) -> Window:
+    """Give the window of SpaceToDepth."""
+    return Window(
+        stride=Fraction(block),
+        size=lambda n: n // block,
+        reads=lambda first, last: (first * block, last * block + block - 1),
+    )
+
+
+def resize_windows(node: Node, constants: Constants) -> Windows:
+    """Give the windows of a Resize by constant factors, nearest or linear.
+
+    Raises:
+        BundleError: If its factors are not constant (it then depends on the picture's size), or
+            its mode is not one of those two.
+    """
+    mode = node.text("mode", "nearest")
+    if mode not in ("nearest", "linear") or node.integer("antialias", 0):
+        raise BundleError(f"{node.label}: only plain nearest and linear Resize are admitted")
+    scales = constants.get(node.inputs[2]) if len(node.inputs) > 2 else None
+    if scales is None or scales.shape != (_NDIM,) or any(scales[:2] != 1):
+        raise BundleError(f"{node.label}: Resize needs 4 constant scales, the first two 1")
+    rows, columns = (_resize_window(node, mode, float(scale)) for scale in scales[2:])
+    return rows, columns
+
+
+def _resize_window(node: Node, mode: str, scale: float) -> Window:
+    factor = Fraction(scale).limit_denominator(_MAX_SCALE) if math.isfinite(scale) else Fraction(0)
+    if not Fraction(1, _MAX_SCALE) <= factor <= _MAX_SCALE or float(factor) != scale:
+        raise BundleError(f"{node.label}: Resize by {scale} is refused; use a plain ratio")
+    centre = node.text("coordinate_transformation_mode", "half_pixel")
+    if centre not in ("half_pixel", "pytorch_half_pixel", "asymmetric", "align_corners"):
+        raise BundleError(f"{node.label}: Resize coordinates {centre!r} are refused")
+    offset = Fraction(0) if centre == "asymmetric" else (1 / factor - 1) / 2
+    rounding = node.text("nearest_mode", "round_prefer_floor")
+
+    def reads(first: int, last: int) -> tuple[int, int]:
+        low, high = first / factor + offset, last / factor + offset
+        if mode == "linear" or rounding not in ("floor", "ceil"):
+            # Both neighbours; rounding to the nearer one may go either way.
+            return math.floor(low), math.ceil(high)
+        turn = math.floor if rounding == "floor" else math.ceil
+        return turn(low), turn(high)
+
+    return Window(stride=1 / factor, size=lambda n: math.floor(n * factor), reads=reads)
+
+
+def is_corner_aligned(node: Node) -> bool:
+    """Tell whether a Resize depends on the size of the whole picture."""
+    return node.text("coordinate_transformation_mode", "half_pixel") == "align_corners"
+
+
+def reduces_space(node: Node, constants: Constants) -> bool:
+    """Tell whether a reduction or softmax runs over rows or columns."""
+    if node.op == "Softmax":
+        axes = [node.integer("axis", -1)]
+    elif len(node.inputs) > 1 and node.inputs[1] in constants:
+        axes = [int(axis) for axis in constants[node.inputs[1]].ravel()]
+    else:
+        axes = node.integers("axes", list(range(_NDIM)))
+    return any(axis % _NDIM in _SPATIAL for axis in axes)
+
+
+def check_broadcast(node: Node, constants: Constants) -> None:
+    """Refuse a constant operand that varies over space, since pictures have any size.
+
+    Raises:
+        BundleError: If it does.
+    """
+    for name in node.inputs:
+        shape = np.shape(constants[name]) if name in constants else ()
+        if len(shape) > _NDIM or any(side != 1 for side in shape[-2:]):
+            raise BundleError(
+                f"{node.label}: constant {name!r} of shape {shape} varies over space; refused"
+            )

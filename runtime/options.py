@@ -1,0 +1,91 @@
+"""What a caller may choose about a reconstruction, checked once."""
+
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+from camkit.errors import ContractError
+
+Method = Literal["net", "wiener", "rl", "admm-tv"]
+Mode = Literal["exact", "fast", "whole"]
+OutputColor = Literal["rec709", "acescg", "camera"]
+DemosaicMethod = Literal["fast", "quality"]
+Assumption = Literal["centre", "scale"]
+
+SIZES: Final = ("S", "M", "L")
+DEFAULT_MAX_MEM_BYTES: Final = 1_150_000_000
+LEAST_MAX_MEM_BYTES: Final = 400_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """Everything that changes the pixels or the cost of a reconstruction.
+
+    Attributes:
+        size: Network size held by the bundle: S, M or L.
+        method: The network behind the Wiener bank, or a classical method alone.
+        mode: Tiling: exact (bits of the whole picture), fast (smaller halo), whole (one window).
+        demosaic: fast or quality.
+        color: Colour space of the result.
+        white_balance: Gains (R, G, B), or None for the capture's own.
+        exposure_ev: Factor 2**exposure_ev on the result.
+        vignetting: Divide by the relative illumination.
+        undistort: Undo the radial distortion.
+        assume: What the caller vouches for where the capture's size does not match the sensor.
+        max_mem_bytes: Memory the process may take; None for the default of 1.15 GB.
+        threads: Threads in all; None for those the process may use.
+        tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
+    """
+
+    size: str = "M"
+    method: Method = "net"
+    mode: Mode = "exact"
+    demosaic: DemosaicMethod = "fast"
+    color: OutputColor = "rec709"
+    white_balance: tuple[float, float, float] | None = None
+    exposure_ev: float = 0.0
+    vignetting: bool = True
+    undistort: bool = True
+    assume: Assumption | None = None
+    max_mem_bytes: int | None = None
+    threads: int | None = None
+    tile_px: int | None = None
+
+    def __post_init__(self) -> None:
+        _check_choice("size", self.size, SIZES)
+        _check_choice("method", self.method, get_args(Method))
+        _check_choice("mode", self.mode, get_args(Mode))
+        _check_choice("demosaic", self.demosaic, get_args(DemosaicMethod))
+        _check_choice("color", self.color, get_args(OutputColor))
+        if self.assume is not None:
+            _check_choice("assume", self.assume, get_args(Assumption))
+        if self.white_balance is not None and not all(0 < g < 100 for g in self.white_balance):
+            raise ContractError(f"white balance gains must lie in 0..100; got {self.white_balance}")
+        if not -20 <= self.exposure_ev <= 20:
+            raise ContractError(f"exposure must lie within -20..20 EV; got {self.exposure_ev}")
+        if self.threads is not None and self.threads < 1:
+            raise ContractError(f"threads must be >= 1; got {self.threads}")
+        if self.max_mem_bytes is not None and self.max_mem_bytes < LEAST_MAX_MEM_BYTES:
+            raise ContractError(
+                f"the memory cap must be at least {LEAST_MAX_MEM_BYTES // 10**6} MB; "
+                f"got {self.max_mem_bytes // 10**6} MB"
+            )
+
+
+def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ContractError(f"{name} must be one of {', '.join(choices)}; got {value!r}")
+
+
+def parse_memory(text: str) -> int:
+    """Read a memory size such as 2G, 900M or 1.5GiB as bytes (G = 10^9, GiB = 2^30).
+
+    Raises:
+        ContractError: If the text is no size.
+    """
+    units = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
+    body = text.strip().lower().removesuffix("b")
+    number = body.rstrip("kmgi")
+    try:
+        return int(float(number) * units[body[len(number) :]])
+    except (ValueError, KeyError, OverflowError):
+        raise ContractError(f"expected a memory size such as 2G or 900M; got {text!r}") from None

@@ -1,0 +1,114 @@
+"""OpenEXR, streamed by scanlines: half by default, float as soon as half would overflow."""
+
+import logging
+import struct
+from pathlib import Path
+from typing import Any, Final
+
+import Imath  # type: ignore[import-untyped]
+import numpy as np
+import OpenEXR
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
+
+HALF_MAX: Final = 65504.0
+COPY_ROWS: Final = 256
+# RGB (1, 1, 1) stands for diffuse white, shown at 100 cd/m2 on a reference display (BT.2035).
+WHITE_LUMINANCE: Final = 100.0
+HEADER_BYTES: Final = 65536
+
+_log = logging.getLogger(__name__)
+
+
+class ExrWriter(PictureWriter):
+    """Writes linear RGB with chromaticities and white luminance; PIZ for half, ZIP for float."""
+
+    def __init__(self, path: Path, picture: PictureFormat) -> None:
+        super().__init__(path, picture)
+        self.is_half = True
+        self._stored = 0
+        self._file = self._open()
+
+    def encode(self, band: FloatArray) -> Codes:
+        """Give the band as float16, or as float32 where float16 would overflow."""
+        peak = max(-float(band.min()), float(band.max()))
+        fits = self.is_half and peak <= HALF_MAX
+        return band.astype(np.float16 if fits else np.float32)
+
+    def store(self, rows: Codes) -> None:
+        """Append rows; the first float32 rows turn the file so far into a float file."""
+        if self.is_half and rows.dtype == np.float32:
+            self._promote()
+        samples = rows.astype(np.float16 if self.is_half else np.float32, copy=False)
+        planes = (np.ascontiguousarray(plane) for plane in samples)
+        self._file.writePixels(dict(zip("RGB", planes, strict=True)), rows.shape[1])
+        self._stored += rows.shape[1]
+
+    def finish(self) -> None:
+        """Close the file and put the chromaticities in."""
+        self._file.close()
+        _patch_chromaticities(self.path, self._chromaticities())
+
+    def release(self) -> None:
+        """Let go of the file as it is."""
+        self._file.close()
+
+    def _chromaticities(self) -> tuple[float, ...]:
+        color = self.picture.color
+        return tuple(v for point in (*color.primaries, color.white) for v in point)
+
+    def _open(self) -> Any:
+        header = OpenEXR.Header(*self.picture.file_size)
+        kind = Imath.PixelType.HALF if self.is_half else Imath.PixelType.FLOAT
+        packing = "PIZ_COMPRESSION" if self.is_half else "ZIP_COMPRESSION"
+        header["compression"] = Imath.Compression(getattr(Imath.Compression, packing))
+        header["channels"] = {c: Imath.Channel(Imath.PixelType(kind)) for c in "RGB"}
+        point = Imath.point(0.0, 0.0)
+        header["chromaticities"] = Imath.Chromaticities(point, point, point, point)
+        header["whiteLuminance"] = WHITE_LUMINANCE
+        return OpenEXR.OutputFile(str(self.path), header)
+
+    def _promote(self) -> None:
+        _log.info("%s: values beyond half; written as float", self.path.name)
+        _, height = self.picture.file_size
+        done, width = self._stored, self.picture.file_size[0]
+        filler = np.zeros((COPY_ROWS, width), dtype=np.float16)
+        for top in range(done, height, COPY_ROWS):
+            rows = min(COPY_ROWS, height - top)
+            self._file.writePixels(dict.fromkeys("RGB", filler[:rows]), rows)
+        self._file.close()
+        draft = self.path.with_name(self.path.name + ".half")
+        self.path.replace(draft)
+        self.is_half = False
+        self._stored = 0
+        self._file = self._open()
+        try:
+            self._copy_rows(draft, done)
+        finally:
+            draft.unlink()
+
+    def _copy_rows(self, draft: Path, count: int) -> None:
+        source = OpenEXR.InputFile(str(draft))
+        kind = Imath.PixelType(Imath.PixelType.FLOAT)
+        width = self.picture.file_size[0]
+        for top in range(0, count, COPY_ROWS):
+            bottom = min(top + COPY_ROWS, count)
+            planes = [
+                np.frombuffer(source.channel(c, kind, top, bottom - 1), np.float32) for c in "RGB"
+            ]
+            self.store(np.stack(planes).reshape(3, bottom - top, width))
+        source.close()
+
+
+def _patch_chromaticities(path: Path, values: tuple[float, ...]) -> None:
+    # OpenEXR.OutputFile accepts the attribute but writes eight zeros (3.5.3), and a file without
+    # true chromaticities is taken for Rec.709: the numbers are put in place afterwards.
+    marker = b"chromaticities\0chromaticities\0" + struct.pack("<i", 32)
+    with path.open("r+b") as file:
+        start = file.read(HEADER_BYTES).find(marker)
+        if start < 0:
+            raise ContractError(f"{path.name}: the EXR header has no chromaticities to fill in")
+        file.seek(start + len(marker))
+        file.write(struct.pack("<8f", *values))

@@ -1,0 +1,152 @@
+"""What all picture writers share: the format, and bands that arrive from top to bottom.
+
+A writer codes a band (`encode`) and appends coded rows (`store`); between the two a picture that
+must be turned is held until it is whole.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal, Self, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.color import ColorStage
+
+Tone = Literal["srgb", "linear"]
+Codes = NDArray[Any]
+
+UPRIGHT: Final = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureFormat:
+    """What is written, and what its numbers mean.
+
+    Attributes:
+        width: Columns in sensor orientation.
+        height: Rows in sensor orientation.
+        color: What the numbers mean.
+        orientation: EXIF orientation 1..8; the pixels are turned so that the file needs none.
+        tone: Curve of TIFF and PNG.
+    """
+
+    width: int
+    height: int
+    color: ColorStage
+    orientation: int = UPRIGHT
+    tone: Tone = "srgb"
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise ContractError(f"a picture needs sides >= 1; got {self.width}x{self.height}")
+        if self.orientation not in range(1, 9):
+            raise ContractError(f"EXIF orientation must be 1..8; got {self.orientation}")
+
+    @property
+    def file_size(self) -> tuple[int, int]:
+        """Give (width, height) of the file, after turning."""
+        turned = self.orientation >= 5
+        return (self.height, self.width) if turned else (self.width, self.height)
+
+
+class PictureWriter(ABC):
+    """Takes (3, rows, w) bands in sensor orientation from top to bottom, then is closed.
+
+    As a context it closes the file at the end of the block, or lets go of it after an error.
+    """
+
+    def __init__(self, path: Path, picture: PictureFormat) -> None:
+        self.path = path
+        self.picture = picture
+        self._rows = 0
+        self._held: list[Codes] = []
+
+    @abstractmethod
+    def encode(self, band: FloatArray) -> Codes:
+        """Give the band as the file holds it: (3, rows, w)."""
+
+    @abstractmethod
+    def store(self, rows: Codes) -> None:
+        """Append coded (3, rows, w) in file orientation."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Complete the file; called once, after the last row."""
+
+    @abstractmethod
+    def release(self) -> None:
+        """Let go of the file as it is, after an error."""
+
+    @final
+    def __enter__(self) -> Self:
+        return self
+
+    @final
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self._held.clear()
+            self.release()
+
+    @final
+    def write(self, band: FloatArray) -> None:
+        """Append a band of linear output colour.
+
+        Raises:
+            ContractError: If the band does not fit the picture or holds NaN or inf.
+        """
+        self._check(band)
+        self._rows += band.shape[1]
+        coded = self.encode(band)
+        if self.picture.orientation == UPRIGHT:
+            self.store(coded)
+        else:
+            self._held.append(coded)
+
+    @final
+    def close(self) -> None:
+        """Complete the file.
+
+        Raises:
+            ContractError: If rows are missing.
+        """
+        if self._rows != self.picture.height:
+            raise ContractError(f"{self.picture.height} rows expected; got {self._rows}")
+        if self._held:
+            whole = np.concatenate(self._held, axis=1)
+            self._held.clear()
+            self.store(np.ascontiguousarray(turn(whole, self.picture.orientation)))
+        self.finish()
+
+    def _check(self, band: FloatArray) -> None:
+        width, left = self.picture.width, self.picture.height - self._rows
+        if band.ndim != 3 or (band.shape[0], band.shape[2]) != (3, width) or band.shape[1] > left:
+            raise ContractError(f"a band must be (3, <= {left}, {width}); got {band.shape}")
+        # min and max hand NaN on, so two numbers tell of all pixels.
+        if not (np.isfinite(band.min()) and np.isfinite(band.max())):
+            raise ContractError(
+                f"rows {self._rows}..{self._rows + band.shape[1]} hold NaN or inf; "
+                "the picture is not written"
+            )
+
+
+def turn(planes: Codes, orientation: int) -> Codes:
+    """Turn (c, h, w) as a viewer would for an EXIF orientation.
+
+    Args:
+        planes: Picture as stored by the sensor.
+        orientation: 1..8 (CIPA DC-008, tag 274).
+    """
+    if orientation >= 5:
+        planes = planes.transpose(0, 2, 1)
+    # After the transposition of 5..8, these are the mirrors that remain.
+    if orientation in {2, 3, 6, 7}:
+        planes = planes[..., ::-1]
+    if orientation in {3, 4, 7, 8}:
+        planes = planes[:, ::-1]
+    return planes

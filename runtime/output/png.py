@@ -1,0 +1,75 @@
+"""PNG with an ICC profile, 8 or 16 bits, streamed row by row.
+
+References: W3C PNG specification, third edition: 5 (chunks), 9 (filters), 11.3.3.3 (iCCP).
+"""
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.runtime.color import encode_uint16
+from camkit.runtime.output.icc import icc_profile
+from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
+
+SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
+RGB_COLOR: Final = 2
+UP_FILTER: Final = 2
+# Level 1 with the up filter: a quarter of the time of level 6 for a few percent of size.
+ZLIB_LEVEL: Final = 1
+
+
+class PngWriter(PictureWriter):
+    """Writes RGB of 8 or 16 bits; every row is stored as its difference to the row above."""
+
+    def __init__(self, path: Path, picture: PictureFormat, *, bits: int = 16) -> None:
+        super().__init__(path, picture)
+        self._bits = bits
+        width, height = picture.file_size
+        self._above = np.zeros(width * 3 * bits // 8, dtype=np.uint8)
+        self._packer = zlib.compressobj(ZLIB_LEVEL)
+        self._file = path.open("wb")
+        self._file.write(SIGNATURE)
+        self._chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, RGB_COLOR, 0, 0, 0))
+        profile = icc_profile(picture.color, tone=picture.tone)
+        self._chunk(b"iCCP", b"camkit\0\0" + zlib.compress(profile, 9))
+
+    def encode(self, band: FloatArray) -> Codes:
+        """Give the band as (3, rows, w) codes."""
+        codes = encode_uint16(band, tone=self.picture.tone)
+        return (
+            codes if self._bits == 16 else ((codes.astype(np.uint32) + 128) // 257).astype(np.uint8)
+        )
+
+    def store(self, rows: Codes) -> None:
+        """Append rows, filtered and compressed."""
+        big_endian = np.ascontiguousarray(rows.transpose(1, 2, 0), dtype=f">u{self._bits // 8}")
+        lines: NDArray[np.uint8] = big_endian.view(np.uint8).reshape(rows.shape[1], -1)
+        filtered = np.empty((lines.shape[0], lines.shape[1] + 1), dtype=np.uint8)
+        filtered[:, 0] = UP_FILTER
+        np.subtract(lines[0], self._above, out=filtered[0, 1:])
+        np.subtract(lines[1:], lines[:-1], out=filtered[1:, 1:])
+        self._above = lines[-1].copy()
+        self._data(self._packer.compress(filtered.data))
+
+    def finish(self) -> None:
+        """Write what is left and the end chunk."""
+        self._data(self._packer.flush())
+        self._chunk(b"IEND", b"")
+        self._file.close()
+
+    def release(self) -> None:
+        """Let go of the file as it is."""
+        self._file.close()
+
+    def _data(self, packed: bytes) -> None:
+        if packed:
+            self._chunk(b"IDAT", packed)
+
+    def _chunk(self, name: bytes, content: bytes) -> None:
+        self._file.write(struct.pack(">I", len(content)) + name + content)
+        self._file.write(struct.pack(">I", zlib.crc32(content, zlib.crc32(name))))

@@ -1,0 +1,60 @@
+"""The sidecar `NAME.camkit.json`: what was done to make a picture, and the proof that it is whole."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.errors import ContractError
+from camkit.runtime.output.atomic import atomic_output
+
+SIDECAR_SUFFIX: Final = ".camkit.json"
+SIDECAR_VERSION: Final = 1
+REQUIRED: Final = frozenset(
+    "input input_sha256 output output_sha256 bundle_sha256 options seconds peak_rss_mb "
+    "clipped_fraction plan warnings".split()
+)
+# A sidecar is a few kilobytes; anything larger is not ours.
+MAX_BYTES: Final = 4_000_000
+
+
+def sidecar_path(output: Path) -> Path:
+    """Give the sidecar of a picture: NAME.exr -> NAME.camkit.json."""
+    return output.with_name(output.stem + SIDECAR_SUFFIX)
+
+
+def write_sidecar(output: Path, record: Mapping[str, Any]) -> Path:
+    """Write the sidecar of a picture; complete or not at all.
+
+    Args:
+        output: The picture, already under its real name.
+        record: Plain JSON values, with at least the keys of `REQUIRED`.
+
+    Raises:
+        ContractError: If a key is missing or a value is not JSON (NaN, inf, an object).
+    """
+    missing = sorted(REQUIRED - record.keys())
+    if missing:
+        raise ContractError(f"the sidecar lacks {', '.join(missing)}")
+    try:
+        text = json.dumps({"sidecar_version": SIDECAR_VERSION, **record}, indent=2, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ContractError(f"the sidecar must hold plain JSON values: {error}") from error
+    path = sidecar_path(output)
+    with atomic_output(path) as part:
+        part.write_text(text + "\n", encoding="utf-8")
+    return path
+
+
+def read_sidecar(output: Path) -> dict[str, Any] | None:
+    """Give the record of a picture's sidecar; None if there is none that can be believed."""
+    path = sidecar_path(output)
+    if not path.is_file() or path.stat().st_size > MAX_BYTES:
+        return None
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, ValueError, RecursionError):
+        return None
+    if not isinstance(record, dict) or record.get("sidecar_version") != SIDECAR_VERSION:
+        return None
+    return record if record.keys() >= REQUIRED else None

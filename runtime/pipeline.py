@@ -1,0 +1,217 @@
+"""The pipeline: a bundle and options made ready, then any number of captures.
+
+    load(bundle) -> Pipeline -> process(file) | process_array(array) -> linear Rec.709
+                             -> start(capture) -> Reconstruction: bands for a writer
+
+A `Pipeline` is immutable and may serve many threads at once; each capture gets its own
+`Reconstruction`.
+"""
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.contracts import FloatArray
+from camkit.errors import BundleError, ContractError
+from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.engine import NetworkEngine, available_threads
+from camkit.runtime.graph import check_graph
+from camkit.runtime.options import Options
+from camkit.runtime.raw import read_capture
+from camkit.runtime.reconstruction import Reconstruction
+from camkit.runtime.tiling import Cancel, Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """What became of one capture.
+
+    Attributes:
+        image: (3, h, w) float32, linear, in the colour space asked for (Rec.709 by default), in
+            sensor orientation.
+        orientation: EXIF orientation (1..8) that a viewer should apply.
+        seconds: Seconds per stage.
+        warnings: What the user should know.
+    """
+
+    image: FloatArray
+    orientation: int
+    seconds: dict[str, float]
+    warnings: tuple[str, ...]
+
+
+class Pipeline:
+    """A bundle with options, ready to reconstruct captures; safe to share between threads."""
+
+    def __init__(self, bundle: Bundle | None, options: Options) -> None:
+        self.bundle = bundle
+        self.options = options
+        self.threads = available_threads(options.threads)
+        self.engine = None
+        if bundle is not None and options.method == "net":
+            self.engine = _engine(bundle, options.size, self.threads)
+
+    def start(
+        self,
+        capture: Capture,
+        *,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Reconstruction:
+        """Plan the reconstruction of one capture; its bands do the work.
+
+        Raises:
+            ContractError: If capture and bundle do not fit each other.
+        """
+        return Reconstruction(self, capture, progress=progress, cancel=cancel)
+
+    def process(
+        self,
+        file: str | Path,
+        *,
+        mosaic: MosaicOptions | None = None,
+        out: FloatArray | None = None,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Picture:
+        """Read one capture and reconstruct it.
+
+        Args:
+            file: RAW, DNG, EXR, TIFF or PNG.
+            mosaic: How to read a headerless mosaic.
+            out: (3, h, w) float32 to fill; a new array when None.
+            progress: Called with (tiles done, tiles in all).
+            cancel: Asked at every tile; true raises `Cancelled`.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+            ContractError: If capture and bundle do not fit each other.
+        """
+        began = time.perf_counter()
+        capture = read_capture(Path(file), mosaic=mosaic)
+        decode_s = time.perf_counter() - began
+        work = self.start(capture, progress=progress, cancel=cancel)
+        image = work.fill(out)
+        return Picture(
+            image=image,
+            orientation=capture.orientation,
+            seconds={"decode": decode_s, **work.seconds},
+            warnings=work.warnings,
+        )
+
+    def process_array(
+        self,
+        image: np.ndarray,
+        *,
+        iso: float | None = None,
+        white_balance: tuple[float, float, float] | None = None,
+        origin_px: tuple[int, int] | None = None,
+        out: FloatArray | None = None,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> FloatArray:
+        """Reconstruct a capture that is already in memory.
+
+        Args:
+            image: (h, w) mosaic in DN, in the bundle's CFA and levels, or (3, h, w) linear camera
+                RGB with 1.0 = white level, as the bundle's contract says.
+            iso: For the noise model; None measures the noise.
+            white_balance: Gains (R, G, B); None takes those of the bundle's illuminant.
+            origin_px: (x, y) of the first pixel on the sensor, for a crop; None for a whole frame.
+            out: (3, h, w) float32 to fill; a new array when None.
+            progress: Called with (tiles done, tiles in all).
+            cancel: Asked at every tile; true raises `Cancelled`.
+
+        Returns:
+            (3, h, w) float32, linear, Rec.709 unless the options ask otherwise.
+
+        Raises:
+            ContractError: If shape, type or size do not fit the bundle.
+        """
+        capture = self._capture(image, iso, white_balance, origin_px)
+        return self.start(capture, progress=progress, cancel=cancel).fill(out)
+
+    def _capture(
+        self,
+        image: np.ndarray,
+        iso: float | None,
+        white_balance: tuple[float, float, float] | None,
+        origin_px: tuple[int, int] | None,
+    ) -> Capture:
+        if self.bundle is None:
+            raise ContractError("process_array needs a bundle: it says what the numbers mean")
+        camera = self.bundle.manifest.camera
+        is_mosaic = image.ndim == 2
+        if not is_mosaic and (image.ndim != 3 or image.shape[0] != 3):
+            raise ContractError(f"expected (h, w) or (3, h, w); got {image.shape}")
+        if is_mosaic and self.bundle.manifest.input_contract.name != "raw_bayer_v1":
+            raise ContractError(
+                f"the bundle takes {self.bundle.manifest.input_contract.name}; got an (h, w) mosaic"
+            )
+        if image.dtype not in (np.uint8, np.uint16, np.float32):
+            raise ContractError(f"expected uint8, uint16 or float32 samples; got {image.dtype}")
+        sensor = (camera.width_px, camera.height_px)
+        return Capture(
+            samples=image,
+            cfa=camera.cfa if is_mosaic else None,
+            black_level=(
+                np.full((2, 2), camera.black_level, np.float32)
+                if is_mosaic
+                else np.zeros(3, np.float32)
+            ),
+            white_level=camera.white_level if is_mosaic else 1.0,
+            white_balance=white_balance,
+            color_matrix=np.array(camera.color_matrix, dtype=np.float64),
+            orientation=1,
+            iso=iso,
+            exposure_time_s=None,
+            noise=None,
+            origin_px=origin_px,
+            sensor_size_px=sensor if origin_px is not None else None,
+            pixel_pitch_um=None,
+            bundle_name=self.bundle.manifest.name,
+            camera=self.bundle.manifest.name,
+            sha256=None,
+            notes=(),
+        )
+
+
+def load(
+    bundle: str | Path | None, *, options: Options | None = None, **choices: object
+) -> Pipeline:
+    """Open a bundle and make it ready.
+
+    Args:
+        bundle: Name of a built-in bundle, path of a bundle file, or None to develop only.
+        options: What changes the pixels. Single fields may also be given by name (size="S").
+
+    Raises:
+        BundleError: If the bundle is refused.
+        ContractError: If an option is unknown or the bundle lacks the size.
+    """
+    options = options or Options()
+    unknown = set(choices) - set(Options.__dataclass_fields__)
+    if unknown:
+        raise ContractError(
+            f"unknown option(s) {', '.join(sorted(unknown))}; known are "
+            f"{', '.join(sorted(Options.__dataclass_fields__))}"
+        )
+    chosen = replace(options, **choices)  # type: ignore[arg-type]
+    if bundle is None or str(bundle).lower() == "none":
+        return Pipeline(None, chosen)
+    return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
+
+
+def _engine(bundle: Bundle, size: str, threads: int) -> NetworkEngine:
+    networks = bundle.manifest.networks
+    if size not in networks:
+        raise ContractError(
+            f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(networks))}; "
+            f"asked for {size}"
+        )
+    data = bundle.network_bytes(size)
+    check_graph(data, networks[size])
+    return NetworkEngine(data, threads=threads)

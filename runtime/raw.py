@@ -1,0 +1,254 @@
+"""Read a capture from a file: RAW and DNG in a child process, pictures here.
+
+    read_capture -> PNG, TIFF, EXR by content        -> camkit.runtime.picture
+                 -> everything else, as RAW or DNG   -> child: camkit.runtime.raw_worker
+
+The child is a plain subprocess: a fork of a process with threads hangs in LibRaw's OpenMP, and
+multiprocessing's spawn would run the caller's main script again.
+"""
+
+import hashlib
+import json
+import logging
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import camkit
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime import raw_checks
+from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.raw_tags import sensor_place
+from camkit.runtime.tiff_tags import read_tiff_tags
+
+__all__ = ["Capture", "MosaicOptions", "file_sha256", "is_picture", "named_bundle", "read_capture"]
+
+logger = logging.getLogger(__name__)
+
+DEFAULT_TIMEOUT_S: Final = 60.0
+DEFAULT_MAX_MEMORY_MB: Final = 4096
+MAX_HEADER_BYTES: Final = 1 << 20
+PIPE_BYTES: Final = 1 << 20
+_SET_PIPE_SIZE: Final = 1031  # F_SETPIPE_SZ of Linux; other systems keep their own size
+_PICTURE_MAGIC: Final = (b"\x89PNG\r\n\x1a\n", b"\x76\x2f\x31\x01")
+_PICTURE_SUFFIXES: Final = frozenset({".jpg", ".jpeg", ".hdr", ".png", ".exr"})
+_TIFF_SUFFIXES: Final = frozenset({".tif", ".tiff"})
+_DNG_VERSION: Final = 50706
+_CFA_PHOTOMETRIC: Final = 32803
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Limits:
+    """What the child may use."""
+
+    timeout_s: float
+    max_memory_mb: int
+
+
+def read_capture(
+    path: str | os.PathLike[str],
+    *,
+    isolate: bool = True,
+    timeout_s: float = DEFAULT_TIMEOUT_S,
+    max_memory_mb: int = DEFAULT_MAX_MEMORY_MB,
+    mosaic: MosaicOptions | None = None,
+) -> Capture:
+    """Read a RAW, DNG, EXR, TIFF or PNG file as a capture in sensor orientation.
+
+    Args:
+        path: The file.
+        isolate: Decode RAW in a child process; False for those who embed and accept that a crash
+            in LibRaw is a crash of theirs (time and memory limits then do not apply).
+        timeout_s: Time limit of the child.
+        max_memory_mb: Address-space limit of the child (where the system has one).
+        mosaic: What a headerless single-channel picture does not say of itself.
+
+    Raises:
+        DecodeError: If the file is missing, damaged, or not believable.
+        ContractError: If `mosaic` is given for a RAW file, which says it itself.
+    """
+    file = Path(path)
+    limits = _Limits(timeout_s=timeout_s, max_memory_mb=max_memory_mb)
+    if not (math.isfinite(timeout_s) and timeout_s > 0 and max_memory_mb > 0):
+        raise ContractError(f"limits must be > 0; got {timeout_s} s, {max_memory_mb} MB")
+    try:
+        picture = is_picture(file)
+        if picture:
+            capture = _read_picture(file, mosaic)
+            return replace(capture, sha256=file_sha256(file))
+        if mosaic is not None:
+            raise ContractError(
+                f"mosaic options are for headerless PNG or TIFF; {file.name} needs none, omit them"
+            )
+        if isolate:
+            return _read_isolated(file, limits)
+        from camkit.runtime.raw_worker import decode_raw
+
+        return replace(decode_raw(file), sha256=file_sha256(file))
+    except OSError as error:
+        raise DecodeError(f"cannot read {file}: {error.strerror or error}") from error
+    except DecodeError as error:
+        raise DecodeError(f"{file.name}: {error}") from error
+
+
+def is_picture(path: Path) -> bool:
+    """Tell a picture (PNG, EXR, HDR, JPEG, plain TIFF) from a RAW file by content, then by name.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    with path.open("rb") as file:
+        head = file.read(8)
+    suffix = path.suffix.lower()
+    if any(head.startswith(magic) for magic in _PICTURE_MAGIC) or suffix in _PICTURE_SUFFIXES:
+        return True
+    if suffix not in _TIFF_SUFFIXES:
+        return False
+    tags = read_tiff_tags(path)
+    sensor = (tags.numbers(262) or (0,))[0] == _CFA_PHOTOMETRIC
+    return not sensor and not any(_DNG_VERSION in d for d in tags.directories)
+
+
+def named_bundle(path: str | os.PathLike[str]) -> str | None:
+    """Give the name of the bundle that a capture made by camkit names; None for other files.
+
+    Reads the tags only, so a long list of files can be planned before any is decoded.
+    """
+    try:
+        return sensor_place(read_tiff_tags(Path(path))).bundle_name
+    except OSError:
+        return None  # reading the capture tells what is wrong with the file
+
+
+def file_sha256(path: Path) -> str:
+    """Give the SHA-256 of a file as hexadecimal digits."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _read_picture(path: Path, mosaic: MosaicOptions | None) -> Capture:
+    from camkit.runtime.picture import read_mosaic, read_picture
+
+    return read_picture(path) if mosaic is None else read_mosaic(path, mosaic)
+
+
+def _read_isolated(path: Path, limits: _Limits) -> Capture:
+    """Decode in a child; the hash is computed here while it works."""
+    command = [
+        sys.executable,
+        "-P",  # the folder the user happens to be in must not provide modules
+        "-m",
+        "camkit.runtime.raw_worker",
+        str(path.resolve()),
+        str(limits.max_memory_mb),
+    ]
+    with (
+        tempfile.TemporaryFile() as complaints,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
+            env=_child_environment(),
+        ) as child,
+    ):
+        expired = threading.Event()
+        timer = threading.Timer(limits.timeout_s, _expire, (child, expired))
+        timer.start()
+        try:
+            sha256 = file_sha256(path)
+            capture = _receive(child)
+            if capture is not None and child.wait() == 0:
+                return replace(capture, sha256=sha256)
+        finally:
+            timer.cancel()
+            child.kill()
+        if expired.is_set():
+            raise DecodeError(f"decoding took longer than {limits.timeout_s:g} s and was stopped")
+        raise DecodeError(_death(child.wait(), complaints))
+
+
+def _expire(child: subprocess.Popen[bytes], expired: threading.Event) -> None:
+    expired.set()
+    child.kill()
+
+
+def _death(code: int, complaints: IO[bytes]) -> str:
+    complaints.seek(max(0, complaints.seek(0, os.SEEK_END) - 4096))
+    lines = complaints.read().decode(errors="replace").strip().splitlines()
+    logger.debug("decoder stderr: %s", lines)
+    cause = f"signal {-code}" if code < 0 else f"exit code {code}"
+    last = f" ({lines[-1][:200]})" if lines else ""
+    return f"the decoder died with {cause}{last}; the file is damaged or LibRaw cannot handle it"
+
+
+def _child_environment() -> dict[str, str]:
+    """Let the child find this camkit also when it runs from a checkout that is not installed."""
+    environment = dict(os.environ)
+    root = str(Path(camkit.__file__).resolve().parents[1])
+    if not root.endswith(("site-packages", "dist-packages")):
+        known = environment.get("PYTHONPATH")
+        environment["PYTHONPATH"] = os.pathsep.join([*([known] if known else []), root])
+    return environment
+
+
+def _receive(child: subprocess.Popen[bytes]) -> Capture | None:
+    """Read header and samples from the child; None if it broke off.
+
+    Raises:
+        DecodeError: If the child refused the file, or its answer makes no sense.
+    """
+    pipe = child.stdout
+    if pipe is None:
+        return None
+    _widen(pipe)
+    line = pipe.readline(MAX_HEADER_BYTES)
+    if not line.endswith(b"\n"):
+        return None
+    from camkit.runtime.raw_worker import capture_of
+
+    header = json.loads(line)
+    if "error" in header:
+        raise DecodeError(header["error"])
+    try:
+        samples = _receive_samples(pipe, header)
+        return None if samples is None else capture_of(header, samples)
+    except (ContractError, KeyError, TypeError, ValueError) as error:
+        raise DecodeError(f"the decoder's answer makes no sense: {error}") from error
+
+
+def _receive_samples(pipe: IO[bytes], header: dict[str, Any]) -> NDArray[Any] | None:
+    """Read the samples; None if the pipe ends early."""
+    shape = tuple(int(n) for n in header["shape"])
+    dtype = np.dtype({"uint8": "u1", "uint16": "u2"}[header["dtype"]])
+    if len(shape) not in (2, 3) or min(shape) < 1 or math.prod(shape) > 3 * raw_checks.MAX_PIXELS:
+        raise DecodeError(f"the decoder's answer makes no sense: samples {shape}")
+    repeated = header["planes_sent"] == 1
+    samples = np.empty(shape[1:] if repeated else shape, dtype=dtype)
+    view = samples.reshape(-1).view(np.uint8).data
+    got = 0
+    while got < len(view):
+        count = pipe.readinto(view[got:])  # type: ignore[attr-defined]
+        if not count:
+            return None
+        got += count
+    return np.broadcast_to(samples, shape) if repeated else samples
+
+
+def _widen(pipe: IO[bytes]) -> None:
+    """Ask for a larger pipe, which saves thousands of switches between the two processes."""
+    try:
+        import fcntl
+
+        fcntl.fcntl(pipe.fileno(), _SET_PIPE_SIZE, PIPE_BYTES)
+    except (ImportError, OSError):
+        logger.debug("pipe keeps its default size")

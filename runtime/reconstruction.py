@@ -1,0 +1,352 @@
+"""One capture on its way to a picture: the stages joined, rows pulled through them, times kept.
+
+    capture -> [repair, white balance, demosaic] -> Wiener bank -> stabilise -> network -> back
+            -> divide by relative illumination -> undistort -> camera to output colour
+
+Nothing is computed before the first band is asked for; a `Reconstruction` serves one thread, once.
+"""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from camkit.bundle.manifest import HaloError, Illumination, Network, Undistort, Wiener
+from camkit.bundle.reader import Bundle
+from camkit.contracts import FloatArray, NoiseModel
+from camkit.errors import ContractError
+
+from camkit.runtime.blocks import BlockBank, LocalPsf
+from camkit.runtime.capture import Capture
+from camkit.runtime.clock import StageClock, TimedRows
+from camkit.runtime.color import color_stage, recover_highlights, to_output
+from camkit.runtime.front_rows import FrontRows
+from camkit.runtime.illumination import divide_illumination
+from camkit.runtime.noise import measure_noise
+from camkit.runtime.placement import Placement, place, scale_kernels
+from camkit.runtime.psf import color_kernels
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
+from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
+from camkit.runtime.stabilise import stabilise, unstabilise
+from camkit.runtime.tiling import (
+    Cancel,
+    Progress,
+    TileLimits,
+    TilePlan,
+    infer_bands,
+    plan_windows,
+)
+from camkit.runtime.warp import undistort_bands
+from camkit.runtime.wiener import wiener_filter
+
+if TYPE_CHECKING:
+    from camkit.runtime.pipeline import Pipeline
+
+BAND_ROWS: Final = 128
+FIXED_BYTES: Final = 260_000_000
+"""Interpreter, libraries and what the stages keep besides planes (measured, see docs)."""
+ROW_BYTES_PER_COLUMN: Final = 60_000
+"""Rolling rows of all stages together, per column of the picture (measured, see docs)."""
+
+
+class Reconstruction:
+    """The work on one capture.
+
+    Attributes:
+        capture: What is reconstructed.
+        plan: What was decided, for the sidecar.
+        white_balance: Gains in use.
+    """
+
+    def __init__(
+        self,
+        pipeline: "Pipeline",
+        capture: Capture,
+        *,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> None:
+        self.capture = capture
+        self._pipeline = pipeline
+        self._progress = progress
+        self._cancel = cancel
+        self._clock = StageClock()
+        self._warnings = list(capture.notes)
+        self._front: FrontRows | None = None
+        self.plan: dict[str, Any] = {}
+        self.white_balance = self._choose_white_balance()
+        self.color = color_stage(
+            self._choose_color_matrix(),
+            pipeline.options.color,
+            exposure_ev=pipeline.options.exposure_ev,
+        )
+        self._placement = self._place()
+        self._noise = self._choose_noise()
+        self._tiles = self._plan_tiles()
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (3, h, w) of the picture."""
+        return 3, self.capture.height, self.capture.width
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Give the seconds per stage so far."""
+        return dict(self._clock.seconds)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Give what the user should know; complete once the last band is out."""
+        found = list(self._warnings)
+        if self._front is not None and self._front.repaired:
+            found.append(f"{self._front.repaired} dead or invalid pixels were repaired")
+        return tuple(found)
+
+    @property
+    def clipped_fraction(self) -> float:
+        """Give the share of clipped samples seen so far."""
+        return 0.0 if self._front is None else self._front.clipped_fraction
+
+    def bands(self) -> Iterator[FloatArray]:
+        """Yield finished bands (3, rows, w) of the output colour, from top to bottom."""
+        bundle = self._pipeline.bundle
+        rows = self._front_rows()
+        if bundle is not None:
+            rows = self._restored_rows(bundle, rows)
+        if self.capture.cfa is not None:
+            rows = MappedRows(
+                rows, lambda band, _: recover_highlights(band, self.white_balance), 3
+            )
+        if bundle is not None:
+            rows = self._corrected_rows(bundle, rows)
+        _, height, _ = self.shape
+        for top in range(0, height, BAND_ROWS):
+            band = rows.read(top, min(top + BAND_ROWS, height))
+            with self._clock.stage("color"):
+                band = to_output(band, self.color)
+            yield band
+
+    def fill(self, out: FloatArray | None) -> FloatArray:
+        """Collect all bands in one (3, h, w) array.
+
+        Raises:
+            ContractError: If `out` has another shape or type.
+        """
+        if out is None:
+            out = np.empty(self.shape, dtype=np.float32)
+        if out.shape != self.shape or out.dtype != np.float32:
+            raise ContractError(
+                f"out must be float32 {self.shape}; got {out.dtype} {out.shape}"
+            )
+        top = 0
+        for band in self.bands():
+            out[:, top : top + band.shape[1]] = band
+            top += band.shape[1]
+        return out
+
+    # What is decided beforehand.
+
+    def _choose_white_balance(self) -> tuple[float, float, float]:
+        chosen = self._pipeline.options.white_balance or self.capture.white_balance
+        if chosen is not None:
+            return chosen
+        if self.capture.cfa is None:
+            return (1.0, 1.0, 1.0)
+        bundle = self._pipeline.bundle
+        if bundle is None:
+            self._warnings.append("the file states no white balance: gains of 1 are used")
+            return (1.0, 1.0, 1.0)
+        from camkit.colorimetry import camera_from_rec709
+
+        camera = bundle.manifest.camera
+        self._warnings.append(
+            f"the capture states no white balance: that of {camera.illuminant} is used"
+        )
+        return camera_from_rec709(np.array(camera.color_matrix))[1]
+
+    def _choose_color_matrix(self) -> np.ndarray | None:
+        if self.capture.color_matrix is not None:
+            return self.capture.color_matrix
+        if self.capture.cfa is None:
+            return None
+        if self._pipeline.bundle is not None:
+            return np.array(self._pipeline.bundle.manifest.camera.color_matrix)
+        self._warnings.append("the file states no colour matrix: camera RGB is taken as Rec.709")
+        return None
+
+    def _place(self) -> Placement | None:
+        bundle = self._pipeline.bundle
+        if bundle is None:
+            return None
+        wanted = bundle.manifest.input_contract.name
+        if self.capture.contract != wanted:
+            if (wanted, self.capture.contract) != ("raw_bayer_v1", "linear_rgb_v1"):
+                raise ContractError(
+                    f"bundle {bundle.manifest.name} takes {wanted}, the capture is "
+                    f"{self.capture.contract}; use another bundle or --bundle none"
+                )
+            self._warnings.append("a linear RGB capture in a raw_bayer_v1 bundle: not demosaicked")
+        placement = place(
+            self.capture, bundle.manifest.camera, self._pipeline.options.assume
+        )
+        if placement.note:
+            self._warnings.append(placement.note)
+        return placement
+
+    def _choose_noise(self) -> NoiseModel | None:
+        """Give the noise after white balance: of the file, else the bundle's at its ISO, else measured."""
+        bundle = self._pipeline.bundle
+        if bundle is None:
+            return None
+        if self.capture.noise is not None:
+            source, noise = "file", self.capture.noise
+        elif self.capture.iso is not None:
+            source, noise = "bundle", bundle.manifest.camera.noise_at(self.capture.iso)
+        else:
+            with self._clock.stage("noise"):
+                source, noise = "measured", measure_noise(self.capture)
+        self.plan["noise"] = {
+            "source": source,
+            "shot": noise.shot,
+            "read_variance": noise.read_variance,
+        }
+        return noise.with_gains(self.white_balance)
+
+    def _plan_tiles(self) -> TilePlan | None:
+        engine, bundle = self._pipeline.engine, self._pipeline.bundle
+        if engine is None or bundle is None:
+            return None
+        options = self._pipeline.options
+        facts = bundle.network_facts(options.size)
+        halo = facts.reach_px if options.mode != "fast" else fast_halo_px(facts.halo_error)
+        memory = options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
+        rows = ROW_BYTES_PER_COLUMN * self.capture.width
+        limits = TileLimits(
+            stride_px=facts.stride_px,
+            halo_px=halo,
+            bytes_per_px=facts.bytes_per_pixel,
+            max_bytes=max(memory - FIXED_BYTES - rows - self.capture.samples.nbytes, 1),
+            tile_px=options.tile_px,
+            whole=options.mode == "whole",
+        )
+        plan = plan_windows(self.capture.height, self.capture.width, limits)
+        self.plan["tiles"] = {
+            "mode": options.mode,
+            "halo_px": halo,
+            "windows": plan.window_count,
+            "work_ratio": round(plan.work_ratio, 3),
+        }
+        return plan
+
+    # The stages, each reading rows from the one before it.
+
+    def _front_rows(self) -> RowSource:
+        self._front = FrontRows(
+            self.capture,
+            self.white_balance,
+            method=self._pipeline.options.demosaic,
+            repair=self._pipeline.bundle is not None,
+        )
+        return TimedRows(self._front, self._clock, "demosaic")
+
+    def _restored_rows(self, bundle: Bundle, front: RowSource) -> RowSource:
+        planes = RollingRows(front.shape, _read_bands(front))
+        bank_reader = planes.reader()
+        network_reader = planes.reader() if self._tiles is not None else None
+        bank = self._bank(bundle)
+        if bank is None:
+            return bank_reader
+        method = self._pipeline.options.method
+        restored = self._rolled(
+            "wiener" if method == "net" else method,
+            bank.restore_bands(bank_reader, self.capture.saturated_rows),
+        )
+        if self._tiles is None or network_reader is None:
+            return restored
+        return self._network_rows(bundle, self._tiles, network_reader, restored)
+
+    def _bank(self, bundle: Bundle) -> BlockBank | None:
+        stage = bundle.manifest.stage(Wiener)
+        if stage is None or self._placement is None or self._noise is None:
+            return None
+        psf = bundle.psf
+        kernels = color_kernels(psf, *bundle.manifest.camera.channel_response.to_arrays())
+        local = LocalPsf(
+            kernels=scale_kernels(kernels, self._placement.kernel_scale),
+            field_heights_mm=psf.field_heights_mm,
+            window=self._placement.window,
+        )
+        from camkit.runtime.baselines import classical_filter
+
+        method = self._pipeline.options.method
+        return BlockBank(
+            local,
+            wiener_filter(stage, self._noise)
+            if method in {"net", "wiener"}
+            else classical_filter(method, self._noise),
+            block_px=stage.block_px,
+            overlap_px=stage.overlap_px,
+            threads=self._pipeline.threads,
+        )
+
+    def _network_rows(
+        self, bundle: Bundle, tiles: TilePlan, planes: RowSource, restored: RowSource
+    ) -> RowSource:
+        stage, engine, noise = bundle.manifest.stage(Network), self._pipeline.engine, self._noise
+        if stage is None or engine is None or noise is None:
+            return restored
+        scale = stage.scale
+        source = MappedRows(
+            StackedRows(planes, restored),
+            lambda rows, _: np.concatenate(
+                [stabilise(rows[:3], noise, scale=scale), stabilise(rows[3:], noise, scale=scale)]
+            ),
+            6,
+        )
+        timed = TimedRows(source, self._clock, "stabilise")
+        bands = infer_bands(
+            engine.run, timed, tiles, progress=self._progress, cancel=self._cancel
+        )
+        inferred = self._rolled("network", bands)
+        linear = MappedRows(
+            inferred, lambda rows, _: unstabilise(rows, noise, scale=scale), 3
+        )
+        return TimedRows(linear, self._clock, "stabilise")
+
+    def _corrected_rows(self, bundle: Bundle, rows: RowSource) -> RowSource:
+        if self._placement is None:
+            return rows
+        options, manifest, psf = self._pipeline.options, bundle.manifest, bundle.psf
+        window = self._placement.window
+        if options.vignetting and manifest.stage(Illumination) is not None:
+            rows = TimedRows(
+                MappedRows(
+                    rows, lambda band, top: divide_illumination(band, top, psf, window), 3
+                ),
+                self._clock,
+                "illumination",
+            )
+        if options.undistort and manifest.stage(Undistort) is not None:
+            rows = self._rolled("undistort", undistort_bands(rows, psf.distortion, window))
+        return rows
+
+    def _rolled(self, name: str, bands: Iterator[FloatArray]) -> RowSource:
+        return RollingRows(self.shape, self._clock.bands(name, bands)).reader()
+
+
+def fast_halo_px(curve: tuple[HaloError, ...], least_db: float = 80.0) -> int:
+    """Give the smallest halo of a measured error curve that keeps `least_db`.
+
+    Raises:
+        ContractError: If the bundle carries no curve.
+    """
+    good = [e.halo_px for e in curve if e.psnr_db is None or e.psnr_db >= least_db]
+    if not good:
+        raise ContractError("the bundle has no measured halo for mode fast; use mode exact")
+    return min(good)
+
+
+def _read_bands(source: RowSource) -> Iterator[FloatArray]:
+    _, height, _ = source.shape
+    for top in range(0, height, BAND_ROWS):
+        yield source.read(top, min(top + BAND_ROWS, height))

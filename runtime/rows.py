@@ -1,0 +1,147 @@
+"""Pictures as rows that are made when they are needed, so that no stage holds a whole picture.
+
+Every stage reads rows from a `RowSource` and yields bands of finished rows from top to bottom;
+`RollingRows` turns such bands into a source again and forgets rows that no reader still needs.
+
+    capture -> [bands] -> RollingRows -> reader -> next stage -> [bands] -> ...
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+
+
+class RowSource(Protocol):
+    """A (channel, h, w) picture whose rows can be read from top to bottom."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the whole picture."""
+        ...
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give rows top..bottom as (channel, bottom - top, w) float32.
+
+        Successive calls must not go back above the `top` of an earlier call.
+        """
+        ...
+
+
+class ArrayRows:
+    """A whole picture in memory as a row source."""
+
+    def __init__(self, planes: FloatArray) -> None:
+        if planes.ndim != 3:
+            raise ContractError(f"planes must be (channel, h, w); got {planes.shape}")
+        self._planes = planes
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the whole picture."""
+        c, h, w = self._planes.shape
+        return c, h, w
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give rows top..bottom as a view."""
+        return self._planes[:, top:bottom]
+
+
+class MappedRows:
+    """A row source whose rows are computed from another source by a pointwise function."""
+
+    def __init__(
+        self, source: RowSource, function: Callable[[FloatArray, int], FloatArray], channels: int
+    ) -> None:
+        self._source = source
+        self._function = function
+        self._channels = channels
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the whole picture."""
+        _, h, w = self._source.shape
+        return self._channels, h, w
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give function(rows, top) of the rows top..bottom."""
+        return self._function(self._source.read(top, bottom), top)
+
+
+class StackedRows:
+    """Several sources of one size as one source, channels one after the other."""
+
+    def __init__(self, *sources: RowSource) -> None:
+        if len({s.shape[1:] for s in sources}) != 1:
+            raise ContractError(f"sources differ in size: {[s.shape for s in sources]}")
+        self._sources = sources
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the whole picture."""
+        _, h, w = self._sources[0].shape
+        return sum(s.shape[0] for s in self._sources), h, w
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give the rows of all sources, stacked along the channels."""
+        return np.concatenate([s.read(top, bottom) for s in self._sources])
+
+
+class RollingRows:
+    """Bands that arrive from top to bottom, kept only while a reader still needs them."""
+
+    def __init__(self, shape: tuple[int, int, int], bands: Iterator[FloatArray]) -> None:
+        self.shape = shape
+        self._bands = bands
+        self._kept: list[tuple[int, FloatArray]] = []
+        self._end = 0
+        self._readers: list[RowReader] = []
+
+    def reader(self) -> "RowReader":
+        """Give a new reader; make all readers before the first one reads."""
+        reader = RowReader(self)
+        self._readers.append(reader)
+        return reader
+
+    def _read(self, top: int, bottom: int) -> FloatArray:
+        needed = min(r.top for r in self._readers)
+        self._kept = [(y, b) for y, b in self._kept if y + b.shape[1] > needed]
+        while self._end < bottom:
+            band = next(self._bands, None)
+            if band is None:
+                raise ContractError(f"row {bottom} asked for, but the bands end at {self._end}")
+            if self._end + band.shape[1] > needed:
+                self._kept.append((self._end, band))
+            self._end += band.shape[1]
+        pieces = [b[:, max(top - y, 0) : bottom - y] for y, b in self._kept if y < bottom]
+        pieces = [p for p in pieces if p.shape[1]]
+        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
+
+
+class RowReader:
+    """One reader of `RollingRows`; its `top` never moves back."""
+
+    def __init__(self, rows: RollingRows) -> None:
+        self._rows = rows
+        self.top = 0
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the whole picture."""
+        return self._rows.shape
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give rows top..bottom as (channel, bottom - top, w).
+
+        Raises:
+            ContractError: If the rows lie outside the picture or above an earlier read.
+        """
+        if not 0 <= top < bottom <= self.shape[1]:
+            raise ContractError(f"rows {top}..{bottom} lie outside 0..{self.shape[1]}")
+        if top < self.top:
+            raise ContractError(f"rows are read downwards; got {top} after {self.top}")
+        self.top = top
+        return self._rows._read(top, bottom)  # noqa: SLF001 - reader and rows are one thing

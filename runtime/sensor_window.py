@@ -1,0 +1,76 @@
+"""Where a capture lies on its sensor: pixel positions to millimetres from the optical axis."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.errors import ContractError
+from camkit.units import to_mm
+
+FloatGrid = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorWindow:
+    """A capture as a window on its sensor; the axis is at the centre of the whole sensor.
+
+    Attributes:
+        size_px: (width, height) of the capture.
+        origin_px: (x, y) of its top left pixel on the sensor; may be half-integer.
+        sensor_size_px: (width, height) of the whole sensor.
+        pitch_um: Pixel pitch.
+    """
+
+    size_px: tuple[int, int]
+    origin_px: tuple[float, float]
+    sensor_size_px: tuple[int, int]
+    pitch_um: float
+
+    def __post_init__(self) -> None:
+        if min(self.size_px) < 1 or not (np.isfinite(self.pitch_um) and self.pitch_um > 0):
+            raise ContractError(
+                f"a window needs sides >= 1 and a pitch > 0; got {self.size_px}, {self.pitch_um}"
+            )
+        if not np.isfinite(self.origin_px).all():
+            raise ContractError(f"the origin must be finite; got {self.origin_px}")
+
+    @property
+    def centre_mm(self) -> FloatGrid:
+        """Give (x, y) of the middle of the window from the axis."""
+        width, height = self.size_px
+        return np.array(self.to_mm((width - 1) / 2, (height - 1) / 2), dtype=np.float64)
+
+    @property
+    def corner_radius_mm(self) -> float:
+        """Give the largest distance of a pixel of the window from the axis."""
+        width, height = self.size_px
+        x_mm, y_mm = self.to_mm(np.array([0, width - 1.0]), np.array([0, height - 1.0]))
+        return float(np.hypot(np.abs(x_mm).max(), np.abs(y_mm).max()))
+
+    def to_mm(
+        self, x_px: FloatGrid | float, y_px: FloatGrid | float
+    ) -> tuple[FloatGrid, FloatGrid]:
+        """Give the sensor position of pixel positions of the capture (0, 0 = top left pixel)."""
+        (x0, y0), (width, height) = self.origin_px, self.sensor_size_px
+        pitch_mm = to_mm(self.pitch_um)
+        x_mm = (np.asarray(x_px, dtype=np.float64) + (x0 - (width - 1) / 2)) * pitch_mm
+        y_mm = (np.asarray(y_px, dtype=np.float64) + (y0 - (height - 1) / 2)) * pitch_mm
+        return x_mm, y_mm
+
+    def to_px(self, x_mm: FloatGrid, y_mm: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
+        """Give the pixel position in the capture of sensor positions; inverse of `to_mm`."""
+        (x0, y0), (width, height) = self.origin_px, self.sensor_size_px
+        pitch_mm = to_mm(self.pitch_um)
+        return x_mm / pitch_mm + ((width - 1) / 2 - x0), y_mm / pitch_mm + ((height - 1) / 2 - y0)
+
+
+def centred_origin(
+    size_px: tuple[int, int], sensor_size_px: tuple[int, int], *, multiple: int = 2
+) -> tuple[int, int]:
+    """Give the origin that centres a window on the sensor, rounded down to the CFA cell."""
+    x, y = (
+        max((whole - side) // 2, 0) // multiple * multiple
+        for side, whole in zip(size_px, sensor_size_px, strict=True)
+    )
+    return x, y

@@ -1,0 +1,369 @@
+"""Exact tiling: a network over a picture of any size, window by window, with the same bits.
+
+One axis of a picture of n pixels, padded once at its far side to n' (a multiple of the stride s):
+
+    0            p1                  p2                n'    output borders, all multiples of s
+    |------------|-------------------|-----------------|
+    [== kept ====:.halo.]                                    window 0, at 0
+          [.halo.:======= kept ======:.halo.]                window 1, at p1 - halo
+                              [.halo.:===== kept ======]     window 2, shifted inward to end at n'
+
+All windows of a plan have one size and never reach past the padded picture, so the zeros that the
+network's convolutions see lie at the picture's border only, as in the untiled run; each kept pixel
+is at least `halo` away from every inner window border. With halo >= the network's reach, origins on
+the lattice of its stride and kernels that sum alike wherever a pixel lies, kept pixels equal those
+of the untiled run bit for bit. Nothing is blended.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, Protocol
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.errors import CamkitError, ContractError
+from camkit.runtime.rows import RowSource
+
+DEFAULT_MAX_BYTES: Final = 640 * 2**20
+_FLOAT_BYTES: Final = 4
+_READ_ROWS: Final = 64
+_MOST_COUNTS: Final = 64
+
+Run = Callable[[FloatArray], FloatArray]
+Progress = Callable[[int, int], None]
+
+
+class Flag(Protocol):
+    """Something that can be raised from another thread, like `threading.Event`."""
+
+    def is_set(self) -> bool:
+        """Tell whether it has been raised."""
+        ...
+
+
+Cancel = Callable[[], bool] | Flag
+
+
+class Cancelled(CamkitError):  # noqa: N818 - a wish, not an error
+    """The caller asked to stop; no tile was begun after that."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """One window along one axis, in pixels of the padded picture.
+
+    Attributes:
+        origin_px: First pixel of the window.
+        start_px: First pixel kept.
+        stop_px: One past the last pixel kept.
+    """
+
+    origin_px: int
+    start_px: int
+    stop_px: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TilePlan:
+    """Windows that cover a picture; see the drawing above.
+
+    Attributes:
+        height_px: Rows of the picture.
+        width_px: Columns of the picture.
+        stride_px: Total stride of the network.
+        halo_px: Halo, a multiple of the stride.
+        window_height_px: Rows of every window.
+        window_width_px: Columns of every window.
+        rows: Windows from top to bottom.
+        columns: Windows from left to right.
+    """
+
+    height_px: int
+    width_px: int
+    stride_px: int
+    halo_px: int
+    window_height_px: int
+    window_width_px: int
+    rows: tuple[Span, ...]
+    columns: tuple[Span, ...]
+
+    def __post_init__(self) -> None:
+        _check_axis(self.rows, self.window_height_px, self)
+        _check_axis(self.columns, self.window_width_px, self)
+
+    @property
+    def padded_height_px(self) -> int:
+        """Rows after padding to the stride."""
+        return _ceil_to(self.height_px, self.stride_px)
+
+    @property
+    def padded_width_px(self) -> int:
+        """Columns after padding to the stride."""
+        return _ceil_to(self.width_px, self.stride_px)
+
+    @property
+    def window_count(self) -> int:
+        """How often the network runs."""
+        return len(self.rows) * len(self.columns)
+
+    @property
+    def work_ratio(self) -> float:
+        """Computed pixels over picture pixels."""
+        window = self.window_height_px * self.window_width_px
+        return self.window_count * window / (self.height_px * self.width_px)
+
+    def needed_bytes(self, bytes_per_px: float, channels: int = 6) -> int:
+        """Estimate the memory of a run: window arena, row buffer and one output band."""
+        window = self.window_height_px, self.window_width_px
+        return _needed_bytes(window, self.rows, self.padded_width_px, bytes_per_px, channels)
+
+
+def _needed_bytes(
+    window: tuple[int, int],
+    rows: tuple[Span, ...],
+    width_px: int,
+    bytes_per_px: float,
+    channels: int = 6,
+) -> int:
+    band = max(span.stop_px - span.start_px for span in rows)
+    row_bytes = _FLOAT_BYTES * width_px
+    arena = int(window[0] * window[1] * bytes_per_px)
+    return arena + row_bytes * (channels * window[0] + 3 * band)
+
+
+def _check_axis(spans: tuple[Span, ...], window: int, plan: TilePlan) -> None:
+    lattice = {plan.halo_px, window} | {v for s in spans for v in (s.origin_px, s.start_px)}
+    if any(v % plan.stride_px for v in lattice):
+        raise ContractError(f"halo, window and origins must be multiples of {plan.stride_px}")
+    edges = [(a.stop_px, b.start_px) for a, b in pairwise(spans)]
+    if any(a != b for a, b in edges) or any(s.start_px >= s.stop_px for s in spans):
+        raise ContractError("windows must keep every pixel once, in order")
+
+
+def _ceil_to(value: int, step: int) -> int:
+    return -(-value // step) * step
+
+
+def _axis(size: int, window: int, halo: int) -> tuple[Span, ...]:
+    """Place windows of one size along a padded axis."""
+    if window >= size:
+        return (Span(origin_px=0, start_px=0, stop_px=size),)
+    step = window - 2 * halo
+    count = -(-(size - 2 * halo) // step)
+    origins = [min(i * step, size - window) for i in range(count)]
+    starts = [0, *(origin + halo for origin in origins[1:])]
+    stops = [*starts[1:], size]
+    return tuple(
+        Span(origin_px=o, start_px=a, stop_px=b)
+        for o, a, b in zip(origins, starts, stops, strict=True)
+    )
+
+
+def _equal_window(size: int, count: int, halo: int, stride: int) -> int:
+    """Give the smallest window of which `count` cover a padded axis."""
+    return min(size, _ceil_to(-(-(size + (count - 1) * 2 * halo) // count), stride))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TileLimits:
+    """What a plan must respect.
+
+    Attributes:
+        stride_px: Total stride of the network, >= 1.
+        halo_px: Its reach, or less in fast mode; rounded up to the stride.
+        bytes_per_px: Memory of the network per window pixel, as measured at export.
+        max_bytes: Cap on window arena, row buffer and output band together.
+        tile_px: Force output tiles of this size (tests); None lets the planner choose.
+        whole: One window whatever the size.
+    """
+
+    stride_px: int
+    halo_px: int
+    bytes_per_px: float = 200.0
+    max_bytes: int = DEFAULT_MAX_BYTES
+    tile_px: int | None = None
+    whole: bool = False
+
+    def __post_init__(self) -> None:
+        if self.stride_px < 1 or self.halo_px < 0 or self.bytes_per_px <= 0:
+            raise ContractError(
+                "stride must be >= 1, halo >= 0 and bytes per pixel > 0; got "
+                f"{self.stride_px}, {self.halo_px}, {self.bytes_per_px}"
+            )
+        if self.tile_px is not None and self.tile_px < 1:
+            raise ContractError(f"tile_px must be >= 1; got {self.tile_px}")
+
+
+def plan_windows(height_px: int, width_px: int, limits: TileLimits) -> TilePlan:
+    """Plan the windows of a picture: the least computation that fits in the memory cap.
+
+    Args:
+        height_px: Rows of the picture, >= 1.
+        width_px: Columns of the picture, >= 1.
+        limits: Stride, halo and memory.
+
+    Returns:
+        The plan; it depends on nothing but the arguments.
+
+    Raises:
+        ContractError: If a side is < 1 or the cap is too small for the smallest windows.
+    """
+    if height_px < 1 or width_px < 1:
+        raise ContractError(f"a picture has at least 1x1 pixels; got {width_px}x{height_px}")
+    stride, halo = limits.stride_px, _ceil_to(limits.halo_px, limits.stride_px)
+    size = _ceil_to(height_px, stride), _ceil_to(width_px, stride)
+    if limits.tile_px is not None:
+        tile = _ceil_to(limits.tile_px, stride) + 2 * halo
+        window = min(size[0], tile), min(size[1], tile)
+    else:
+        window = _least_work(size, halo, limits)
+    return TilePlan(
+        height_px=height_px,
+        width_px=width_px,
+        stride_px=stride,
+        halo_px=halo,
+        window_height_px=window[0],
+        window_width_px=window[1],
+        rows=_axis(size[0], window[0], halo),
+        columns=_axis(size[1], window[1], halo),
+    )
+
+
+def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[int, int]:
+    """Give the window of least computation within the cap; of equals, that of least memory."""
+    if limits.whole:
+        heights, widths = {size[0]}, {size[1]}
+    else:
+        heights, widths = (_equal_windows(n, halo, limits.stride_px) for n in size)
+    rows = {h: _axis(size[0], h, halo) for h in heights}
+    columns = {w: len(_axis(size[1], w, halo)) for w in widths}
+    costs = {
+        (h, w): (
+            len(rows[h]) * columns[w] * h * w,
+            _needed_bytes((h, w), rows[h], size[1], limits.bytes_per_px),
+        )
+        for h in rows
+        for w in columns
+    }
+    fitting = [window for window in costs if costs[window][1] <= limits.max_bytes]
+    if not fitting:
+        least = min(memory for _, memory in costs.values())
+        raise ContractError(
+            f"{size[1]}x{size[0]} pixels with a halo of {halo} need at least "
+            f"{least / 2**20:.0f} MiB for one window; got {limits.max_bytes / 2**20:.0f} MiB: "
+            "raise --max-mem"
+        )
+    return min(fitting, key=lambda window: (costs[window], window))
+
+
+def _equal_windows(size: int, halo: int, stride: int) -> set[int]:
+    """Give the window sizes of which 1, 2, 3, ... cover a padded axis."""
+    most = max(1, (size - 2 * halo) // stride)
+    counts = {*range(1, min(most, _MOST_COUNTS) + 1), most}
+    windows = {_equal_window(size, k, halo, stride) for k in counts}
+    return {w for w in windows if w == size or w > 2 * halo}
+
+
+def infer_bands(
+    run: Run,
+    source: RowSource,
+    plan: TilePlan,
+    *,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Iterator[FloatArray]:
+    """Run a network over a picture and yield its rows from top to bottom.
+
+    Args:
+        run: (1, c, h, w) float32 -> (1, 3, h, w) float32, for the plan's window size.
+        source: (c, h, w) picture; each of its rows is read once.
+        plan: From `plan_windows`, for the size of the source.
+        progress: Called as progress(done, total) after each window.
+        cancel: Asked before each window.
+
+    Yields:
+        (3, rows, w) float32 bands, consecutive, together the whole picture.
+
+    Raises:
+        ContractError: If plan and source differ in size, or the network gives NaN or inf.
+        Cancelled: If `cancel` said so.
+    """
+    channels, height, width = source.shape
+    if (height, width) != (plan.height_px, plan.width_px):
+        raise ContractError(
+            f"the plan is for {plan.width_px}x{plan.height_px}, the picture {width}x{height}"
+        )
+    window = np.empty((1, channels, plan.window_height_px, plan.window_width_px), dtype=np.float32)
+    buffer = _RowBuffer(source, plan)
+    done = 0
+    for i, row in enumerate(plan.rows):
+        held = buffer.move_to(row.origin_px)
+        band = np.empty((3, min(row.stop_px, height) - row.start_px, width), np.float32)
+        for j, column in enumerate(plan.columns):
+            if _is_cancelled(cancel):
+                raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
+            left = column.origin_px
+            np.copyto(window[0], held[:, :, left : left + plan.window_width_px])
+            kept = _kept(run(window), row, column, (height, width))
+            if not (np.isfinite(kept.min()) and np.isfinite(kept.max())):
+                raise ContractError(_not_finite_message(i, j, row, column))
+            band[:, :, column.start_px : min(column.stop_px, width)] = kept
+            done += 1
+            if progress is not None:
+                progress(done, plan.window_count)
+        yield band
+
+
+def _kept(output: FloatArray, row: Span, column: Span, size: tuple[int, int]) -> FloatArray:
+    """Crop the pixels that a window contributes; none lies in the padding."""
+    top, left = row.start_px - row.origin_px, column.start_px - column.origin_px
+    bottom = min(row.stop_px, size[0]) - row.origin_px
+    right = min(column.stop_px, size[1]) - column.origin_px
+    return output[0, :, top:bottom, left:right]
+
+
+def _is_cancelled(cancel: Cancel | None) -> bool:
+    if cancel is None:
+        return False
+    return cancel() if callable(cancel) else cancel.is_set()
+
+
+def _not_finite_message(i: int, j: int, row: Span, column: Span) -> str:
+    return (
+        f"the network gave NaN or inf in tile (row {i}, column {j}), pixels x "
+        f"{column.start_px}..{column.stop_px}, y {row.start_px}..{row.stop_px}; "
+        "the input must be finite: repair dead pixels first"
+    )
+
+
+class _RowBuffer:
+    """The padded rows of the current window row; rows are read from the source once."""
+
+    def __init__(self, source: RowSource, plan: TilePlan) -> None:
+        self._source = source
+        self._plan = plan
+        shape = (source.shape[0], plan.window_height_px, plan.padded_width_px)
+        self._rows = np.empty(shape, np.float32)
+        self._top = 0
+        self._end = 0
+
+    def move_to(self, top: int) -> FloatArray:
+        """Give rows top .. top + window height of the padded picture, (c, rows, padded w)."""
+        kept = self._end - top
+        if 0 < kept < self._rows.shape[1]:
+            self._rows[:, :kept] = self._rows[:, top - self._top : self._end - self._top]
+        self._top = top
+        bottom = top + self._rows.shape[1]
+        height, width = self._plan.height_px, self._plan.width_px
+        while self._end < min(bottom, height):
+            stop = min(self._end + _READ_ROWS, bottom, height)
+            target = self._rows[:, self._end - top : stop - top]
+            target[:, :, :width] = self._source.read(self._end, stop)
+            target[:, :, width:] = target[:, :, width - 1 : width]
+            self._end = stop
+        if bottom > self._end:
+            self._rows[:, self._end - top :] = self._rows[:, self._end - top - 1, None]
+            self._end = bottom
+        return self._rows

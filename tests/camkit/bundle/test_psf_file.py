@@ -1,0 +1,143 @@
+"""A frozen PSF survives the file; a damaged file is refused with its reason."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from safetensors.numpy import load, save
+
+from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_psf, write_psf
+from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.errors import BundleError
+from tests.bundle_factory import tiny_psf
+
+Tensors = dict[str, NDArray[Any]]
+
+
+@st.composite
+def psfs(draw: st.DrawFn) -> FrozenPsf:
+    fields, depths, waves = (draw(st.integers(1, 3)) for _ in range(3))
+    h, w = (draw(st.sampled_from([1, 3, 7])) for _ in range(2))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    kernels = rng.uniform(0.1, 1, (fields, depths, waves, h, w)).astype(np.float32)
+    kernels /= kernels.sum(axis=(-2, -1), keepdims=True)
+    near = np.cumsum(rng.uniform(10, 100, depths))
+    return FrozenPsf(
+        kernels=kernels,
+        field_heights_mm=np.arange(fields) * rng.uniform(0.5, 2),
+        depths_mm=np.append(near[:-1], np.inf) if draw(st.booleans()) else near,
+        wavelengths_um=0.4 + 0.1 * np.arange(waves),
+        pixel_pitch_um=float(rng.uniform(1, 10)),
+        distortion=RadialDistortion(
+            coefficients=rng.normal(size=(3, 4)), radius_mm=float(rng.uniform(1, 30))
+        ),
+        relative_illumination=rng.uniform(0.1, 1, fields),
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(psf=psfs())
+def test_psf_comes_back_bit_for_bit(psf: FrozenPsf) -> None:
+    data = psf_to_bytes(psf)
+    back = psf_from_bytes(data)
+    np.testing.assert_array_equal(back.kernels, psf.kernels)
+    np.testing.assert_array_equal(back.field_heights_mm, psf.field_heights_mm)
+    np.testing.assert_array_equal(back.depths_mm, psf.depths_mm)
+    np.testing.assert_array_equal(back.wavelengths_um, psf.wavelengths_um)
+    np.testing.assert_array_equal(back.distortion.coefficients, psf.distortion.coefficients)
+    np.testing.assert_array_equal(back.relative_illumination, psf.relative_illumination)
+    assert back.pixel_pitch_um == psf.pixel_pitch_um
+    assert back.distortion.radius_mm == psf.distortion.radius_mm
+    assert psf_to_bytes(back) == data
+
+
+def test_psf_comes_back_from_disk_and_cannot_be_changed(tmp_path: Path) -> None:
+    path = tmp_path / "psf.safetensors"
+    write_psf(path, tiny_psf())
+    psf = read_psf(path)
+    with pytest.raises(ValueError, match="read-only"):
+        psf.kernels[0] = 0
+
+
+def test_missing_psf_file_is_a_bundle_error(tmp_path: Path) -> None:
+    with pytest.raises(BundleError, match="cannot read the PSF"):
+        read_psf(tmp_path / "none.safetensors")
+
+
+def _set(name: str, index: Any, value: float) -> Callable[[Tensors], None]:
+    def change(tensors: Tensors) -> None:
+        tensors[name] = tensors[name].copy()
+        tensors[name][index] = value
+
+    return change
+
+
+def _scale(tensors: Tensors) -> None:
+    tensors["kernels"] = tensors["kernels"] * np.float32(1.01)
+
+
+def _negative(tensors: Tensors) -> None:
+    kernels = tensors["kernels"].copy()
+    kernels[0, 0, 0, 0, :2] = -0.5, kernels[0, 0, 0, 0, :2].sum() + 0.5
+    tensors["kernels"] = kernels
+
+
+def _retype(name: str, dtype: type[np.generic]) -> Callable[[Tensors], None]:
+    def change(tensors: Tensors) -> None:
+        tensors[name] = tensors[name].astype(dtype)
+
+    return change
+
+
+REFUSALS: dict[str, tuple[Callable[[Tensors], object], str]] = {
+    "NaN": (_set("kernels", (0, 0, 0, 0, 0), np.nan), "NaN or inf"),
+    "inf": (_set("kernels", (0, 0, 0, 0, 0), np.inf), "NaN or inf"),
+    "negative": (_negative, "negative"),
+    "unnormalised": (_scale, "must sum to 1"),
+    "even side": (
+        lambda t: t.update(kernels=np.full((2, 1, 3, 2, 2), 0.25, np.float32)),
+        "must be odd",
+    ),
+    "float64 kernels": (_retype("kernels", np.float64), "must be float32"),
+    "four axes": (lambda t: t.update(kernels=t["kernels"][0]), "must be float32"),
+    "empty kernels": (lambda t: t.update(kernels=t["kernels"][:0]), "not empty"),
+    "missing tensor": (lambda t: t.pop("depths_mm"), "missing: depths_mm"),
+    "unknown tensor": (lambda t: t.update(code=np.ones(1)), "unknown: code"),
+    "float32 axis": (_retype("wavelengths_um", np.float32), "wavelengths_um must be float64"),
+    "axis of other length": (
+        lambda t: t.update(field_heights_mm=np.array([0.0, 0.1, 0.2])),
+        "axes have",
+    ),
+    "axis that falls": (_set("wavelengths_um", 1, 0.1), "must increase"),
+    "first field off the axis": (_set("field_heights_mm", 0, 0.1), "first field must be 0"),
+    "pitch": (_set("pixel_pitch_um", 0, -1.0), "pixel_pitch_um"),
+    "dark corner": (_set("relative_illumination", 1, 0.0), "relative illumination"),
+    "distortion": (_set("distortion_coefficients", (0, 0), np.nan), "distortion"),
+    "distortion radius": (_set("distortion_radius_mm", 0, 0.0), "radius_mm"),
+    "distortion shape": (
+        lambda t: t.update(distortion_coefficients=np.ones((4, 3))),
+        r"shape \(3, 4\)",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), REFUSALS.values(), ids=REFUSALS.keys())
+def test_psf_that_is_none_is_refused(change: Callable[[Tensors], object], message: str) -> None:
+    tensors = load(psf_to_bytes(tiny_psf()))
+    change(tensors)
+    data = save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+    with pytest.raises(BundleError, match=message):
+        psf_from_bytes(data)
+
+
+@settings(max_examples=200, deadline=None)
+@given(cut=st.integers(0, 1300), junk=st.binary(max_size=40))
+def test_truncated_or_padded_file_is_refused(cut: int, junk: bytes) -> None:
+    data = psf_to_bytes(tiny_psf())
+    with pytest.raises(BundleError):
+        psf_from_bytes(data[:cut] + junk)
