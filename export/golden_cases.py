@@ -1,5 +1,6 @@
-"""The golden cases of a bundle: three small captures, what it makes of them, and the truth."""
+"""Small captures of known scenes: the golden cases of a bundle, and probes for measurements."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,96 +11,103 @@ from camkit.bundle.manifest import Camera, GoldenCase
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import FloatArray, FrozenPsf
-from camkit.runtime.options import Options
-from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.golden_run import develop_case
 from camkit.runtime.rows import ArrayRows
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
 from camkit.runtime.warp import undistort_bands
 from camkit.scenes import procedural_scene
 
-CASE_PX: Final = 192
-SCENE_SEED: Final = 20
+Cases = dict[str, tuple[GoldenCase, GoldenArrays]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Recipe:
-    """How one case is photographed: exposure, ISO, and place from axis (0) to corner (1)."""
+class CaseRecipe:
+    """How one case is photographed.
 
+    Attributes:
+        scene_seed: Seed of the procedural scene; the noise takes the same.
+        exposure: Factor on the scene.
+        iso: ISO speed.
+        field: Place on the diagonal, 0 at the axis, 1 in the corner.
+        size_px: Side of the square capture.
+    """
+
+    scene_seed: int
     exposure: float
     iso: float
     field: float
+    size_px: int = 192
 
 
-RECIPES: Final = {
-    "typical": _Recipe(exposure=0.8, iso=100.0, field=0.45),
-    "saturated": _Recipe(exposure=3.0, iso=100.0, field=0.75),
-    "very_dark": _Recipe(exposure=0.02, iso=1600.0, field=0.0),
+GOLDEN_RECIPES: Final = {
+    "typical": CaseRecipe(scene_seed=20, exposure=0.8, iso=100.0, field=0.45),
+    "saturated": CaseRecipe(scene_seed=21, exposure=3.0, iso=100.0, field=0.75),
+    "very_dark": CaseRecipe(scene_seed=22, exposure=0.02, iso=1600.0, field=0.0),
 }
 
 
-def photograph_cases(camera: Camera, psf: FrozenPsf) -> dict[str, tuple[GoldenCase, GoldenArrays]]:
-    """Simulate the captures and their sharp references; outputs are added by `run_cases`."""
-    cases = {}
-    for number, (name, recipe) in enumerate(RECIPES.items()):
-        origin = _origin(camera, recipe.field)
-        scene = procedural_scene(SCENE_SEED + number, CASE_PX, CASE_PX)
-        options = SimulationOptions(
-            iso=recipe.iso, seed=number, origin_px=origin, exposure=recipe.exposure
-        )
-        simulation = simulate(scene, camera, psf, options)
-        case = GoldenCase(
-            name=name,
-            recipe={
-                "scene_seed": SCENE_SEED + number,
-                "noise_seed": number,
-                "exposure": recipe.exposure,
-            },
-            iso=recipe.iso,
-            origin_px=origin,
-            white_balance=simulation.white_balance,
-        )
-        reference = _reference(simulation, camera, psf)
-        cases[name] = case, GoldenArrays(capture=simulation.mosaic, reference=reference)
-    return cases
+def photograph(
+    name: str, recipe: CaseRecipe, camera: Camera, psf: FrozenPsf
+) -> tuple[GoldenCase, np.ndarray, FloatArray]:
+    """Simulate one case.
+
+    Returns:
+        The case, its capture (h, w) uint16, and the sharp scene (3, h, w) float32 in the
+        geometry and colour of the output.
+    """
+    origin = _origin(camera, recipe)
+    scene = procedural_scene(recipe.scene_seed, recipe.size_px, recipe.size_px)
+    options = SimulationOptions(
+        iso=recipe.iso, seed=recipe.scene_seed, origin_px=origin, exposure=recipe.exposure
+    )
+    simulation = simulate(scene, camera, psf, options)
+    case = GoldenCase(
+        name=name,
+        recipe={
+            "scene_seed": recipe.scene_seed,
+            "noise_seed": recipe.scene_seed,
+            "exposure": recipe.exposure,
+        },
+        iso=recipe.iso,
+        origin_px=origin,
+        white_balance=simulation.white_balance,
+    )
+    return case, simulation.mosaic, _reference(simulation, camera, psf)
 
 
-def run_cases(
-    bundle: Bundle, cases: dict[str, tuple[GoldenCase, GoldenArrays]]
+def add_outputs(
+    bundle: Bundle, cases: Cases, windows: Mapping[str, FloatArray]
 ) -> dict[str, GoldenArrays]:
-    """Give the cases with the pipeline's output for every size of the bundle."""
-    pipelines = {
-        size: Pipeline(bundle, Options(size=size, threads=1))
-        for size in bundle.manifest.networks
-    }
-    done = {}
-    for name, (case, arrays) in cases.items():
-        outputs = {
-            size: pipeline.process_array(
-                arrays.capture,
-                iso=case.iso,
-                white_balance=case.white_balance,
-                origin_px=case.origin_px,
-            )
-            for size, pipeline in pipelines.items()
-        }
-        done[name] = GoldenArrays(
-            capture=arrays.capture, reference=arrays.reference, outputs=outputs
+    """Give the cases with the pipeline's output for every size, and what the network was given.
+
+    Args:
+        bundle: The bundle with its networks.
+        cases: Captures and references.
+        windows: (1, 6, h, w) network input per case.
+    """
+    return {
+        name: GoldenArrays(
+            capture=arrays.capture,
+            reference=arrays.reference,
+            outputs={
+                size: develop_case(bundle, case, arrays, size)
+                for size in bundle.manifest.networks
+            },
+            network_input=windows[name][0],
         )
-    return done
+        for name, (case, arrays) in cases.items()
+    }
 
 
-def _origin(camera: Camera, field: float) -> tuple[int, int]:
+def _origin(camera: Camera, recipe: CaseRecipe) -> tuple[int, int]:
     """Place a case on the diagonal, on a whole CFA cell."""
-    spare = np.array([camera.width_px - CASE_PX, camera.height_px - CASE_PX])
-    x, y = (spare * (1 + field) / 2).astype(int) // 2 * 2
+    spare = np.array([camera.width_px, camera.height_px]) - recipe.size_px
+    x, y = (spare * (1 + recipe.field) / 2).astype(int) // 2 * 2
     return int(x), int(y)
 
 
 def _reference(simulation: Simulation, camera: Camera, psf: FrozenPsf) -> FloatArray:
-    """Bring the sharp scene to the geometry and colour of the output."""
     rows = ArrayRows(simulation.clean)
-    ideal = np.concatenate(
-        list(undistort_bands(rows, psf.distortion, simulation.window)), axis=1
-    )
+    ideal = np.concatenate(list(undistort_bands(rows, psf.distortion, simulation.window)), axis=1)
     matrix, _ = camera_from_rec709(np.array(camera.color_matrix))
     return apply_matrix(np.linalg.inv(matrix), ideal)

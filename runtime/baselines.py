@@ -72,14 +72,11 @@ def block_filter(method: str, settings: Wiener, noise: NoiseModel) -> BlockFilte
 def richardson_lucy_filter(noise: NoiseModel, *, iterations: int = RL_ITERATIONS) -> BlockFilter:
     """Give Richardson-Lucy for Poisson noise with read noise as a known background.
 
-    The outermost samples of a block are no data, since light from outside the block fell on them.
-
     Args:
         noise: Noise after white balance.
         iterations: Rounds; each sharpens and raises noise.
 
-    References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background); Bertero and Boccacci
-        2005 (borders).
+    References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background).
     """
     shot = np.maximum(np.array(noise.shot), 1e-12)
     background = (np.array(noise.read_variance) / shot).astype(np.float32)[:, None, None]
@@ -88,8 +85,6 @@ def richardson_lucy_filter(noise: NoiseModel, *, iterations: int = RL_ITERATIONS
         measured = np.maximum(block.samples + background, np.float32(1e-9))
         clipped = None if block.unknown is None else spread_clipped(block.unknown)
         back = np.conj(block.otf)
-        inside = _inside(block)
-        share = np.maximum(apply_transfer(np.broadcast_to(inside, measured.shape), back), 0.05)
         sharp = np.maximum(block.samples, 0.1 * block.samples.mean(axis=(-2, -1), keepdims=True))
         np.maximum(sharp, np.float32(1e-6), out=sharp)
         for _ in range(iterations):
@@ -97,19 +92,10 @@ def richardson_lucy_filter(noise: NoiseModel, *, iterations: int = RL_ITERATIONS
             ratio = measured / np.maximum(expected, np.float32(1e-9))
             if clipped is not None:
                 ratio = np.where(clipped, np.maximum(ratio, 1), ratio)
-            ratio *= inside
-            sharp *= np.maximum(apply_transfer(ratio, back), 0) / share
+            sharp *= np.maximum(apply_transfer(ratio, back), 0)
         return np.asarray(sharp)
 
     return restore
-
-
-def _inside(block: Block) -> FloatArray:
-    """Give 1 where the samples are data, 0 in the ring that foreign light reaches."""
-    size, ring = block.samples.shape[-1], block.guard_px // 2
-    line = np.zeros(size, dtype=np.float32)
-    line[ring : size - ring] = 1
-    return np.asarray(line[:, None] * line)
 
 
 def admm_tv_filter(
@@ -145,7 +131,7 @@ def _admm_tv(block: Block, threshold: FloatArray, rho: FloatArray, iterations: i
     clipped = None if block.unknown is None else spread_clipped(block.unknown)
     back = np.conj(block.otf)
     inverse = 1 / (np.square(np.abs(block.otf)) + rho * _gradient_power(size))
-    data = back * scipy.fft.rfft2(block.samples)
+    data: ComplexArray = back * scipy.fft.rfft2(block.samples)
     sharp = block.samples
     down, across = np.zeros_like(sharp), np.zeros_like(sharp)
     dual_down, dual_across = np.zeros_like(sharp), np.zeros_like(sharp)

@@ -1,8 +1,8 @@
 """Full colour planes from a Bayer mosaic, linear float32 in and out; nothing is clipped.
 
 fast     Malvar, He and Cutler 2004: gradient-corrected linear interpolation with 5x5 kernels.
-quality  Menon, Andriani and Calvagno 2007: green along the better of two directions, decided
-         afterwards from the colour differences; in `camkit.runtime.directional`.
+quality  after Menon, Andriani and Calvagno 2007: green along edges, refined afterwards from the
+         colour differences; in `camkit.runtime.directional`.
 
 Both look at a bounded neighbourhood (`DEMOSAIC_MARGIN_PX`), so rows [t, b) demosaicked with that
 much context equal the same rows of the whole picture bit for bit. At the border the mosaic is

@@ -16,6 +16,9 @@ FloatGrid = NDArray[np.float64]
 
 TABLE_SAMPLES: Final = 1024
 NEWTON_STEPS: Final = 4
+LEAST_SCALE: Final = 1e-3
+# A fold beyond a million half diagonals is none.
+FLAT_ROOT: Final = 1e-12
 # A picture is warped a little beyond the farthest pixel, where filters reach over the border.
 RANGE_MARGIN: Final = 1.02
 
@@ -80,7 +83,8 @@ def fit_distortion(
 
     References: Sun 2021, eq. (6.11).
     """
-    if r_mm.shape != r_distorted_mm.shape or r_mm.ndim not in {1, 2}:
+    is_pair = r_mm.shape == r_distorted_mm.shape
+    if not is_pair or r_mm.shape[:-1] not in {(), (3,)} or r_mm.ndim == 0:
         raise ContractError(
             f"radii must be (n,) or (3, n) pairs; got {r_mm.shape} and {r_distorted_mm.shape}"
         )
@@ -154,10 +158,11 @@ def _slope(c: FloatGrid, r: FloatGrid) -> FloatGrid:
 
 
 def _fold_radius(c: FloatGrid) -> float:
-    # r_d stops growing where its slope, a cubic in u = r^2, has its first positive root.
-    if c[0] <= 0:
+    # r_d stops growing where its slope, a cubic in u = r^2, has its first positive root. Solved
+    # for v = 1 / u, whose highest coefficient is the scale xi and never vanishes.
+    if c[0] < LEAST_SCALE:
         return 0.0
-    roots = np.roots([7 * c[3], 5 * c[2], 3 * c[1], c[0]])
-    real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
-    positive = real[real > 0]
-    return float(np.sqrt(positive.min())) if positive.size else float("inf")
+    roots = np.roots([1.0, 3 * c[1] / c[0], 5 * c[2] / c[0], 7 * c[3] / c[0]])
+    real = roots[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))].real
+    last = float(real.max(initial=0.0))
+    return last**-0.5 if last > FLAT_ROOT else float("inf")

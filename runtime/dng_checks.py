@@ -24,7 +24,7 @@ ROW_PADDING_BYTES: Final = 16
 _BITS, _COMPRESSION, _SAMPLES, _SAMPLE_FORMAT = 258, 259, 277, 339
 _WIDTH, _HEIGHT, _STRIP_BYTES = 256, 257, 279
 _CFA_REPEAT, _LINEARIZATION = 33421, 50712
-_BLACK, _BLACK_DELTAS, _WHITE = 50714, (50715, 50716), 50717
+_BLACK_REPEAT, _BLACK, _BLACK_DELTAS, _WHITE = 50713, 50714, (50715, 50716), 50717
 _WHITE_BALANCES: Final = (50728, 50729)  # AsShotNeutral, AsShotWhiteXY
 
 Directory = Mapping[int, TagValue]
@@ -90,6 +90,8 @@ def _check_strip_bytes(picture: Directory) -> None:
 
 def _check_black(picture: Directory, levels: Levels) -> None:
     stated = _numbers(picture, _BLACK)
+    if not stated and _BLACK_REPEAT in picture:
+        raise DecodeError("the DNG lays out black levels but gives none; its header is damaged")
     if not stated or any(tag in picture for tag in _BLACK_DELTAS):
         return
     found = float(np.mean(levels.black))

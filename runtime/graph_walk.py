@@ -7,7 +7,6 @@ pixels reads are carried from the output to the input in integers.
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import Final
 
 from camkit.errors import BundleError
@@ -16,9 +15,10 @@ from camkit.runtime.operators import (
     GLOBAL_POOLS,
     NORMALIZATIONS,
     REDUCTIONS,
+    Axis,
     Constants,
+    Extent,
     Node,
-    Window,
     Windows,
     check_broadcast,
     convolution_windows,
@@ -35,49 +35,6 @@ _BYTES_PER_VALUE: Final = 4
 _BLOCK_ALIGNMENT: Final = 4
 _SMALL_INPUT: Final = 8
 _LARGE_BLOCK: Final = 16
-_MIN_STEP: Final = Fraction(1, 8)
-_MAX_STEP: Final = 4096
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Axis:
-    """One axis of a tensor: a sample every `step` picture pixels, size / step + extra of them."""
-
-    step: Fraction = Fraction(1)
-    extra: int = 0
-
-    def through(self, window: Window) -> "Axis":
-        """Give this axis behind an operator.
-
-        Raises:
-            BundleError: If the grid becomes absurdly coarse or fine.
-        """
-        step = self.step * window.stride
-        if not _MIN_STEP <= step <= _MAX_STEP:
-            raise BundleError(f"a tensor has a sample every {step} pixels; refused")
-        return Axis(step=step, extra=window.size(self.extra))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extent:
-    """Channels of a tensor and its grid (rows, columns), None once space was reduced away."""
-
-    channels: int
-    axes: tuple[Axis, Axis] | None
-
-    @property
-    def samples_per_pixel(self) -> float:
-        """Values per picture pixel, all channels together."""
-        if self.axes is None:
-            return 0.0
-        return self.channels / float(self.axes[0].step * self.axes[1].step)
-
-    def through(self, channels: int, windows: Windows | None = None) -> "Extent":
-        """Give the extent behind an operator with the given windows."""
-        axes = self.axes
-        if axes is not None and windows is not None:
-            axes = axes[0].through(windows[0]), axes[1].through(windows[1])
-        return Extent(channels=channels, axes=axes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +46,8 @@ class GraphFacts:
             the pixels it keeps, apart from what passes through `global_operators`.
         stride_px: Height and width must be multiples of it.
         global_operators: "name (type)" of nodes that see the whole picture.
-        unblocked: Nodes off onnxruntime's blocked path; tiled results may differ there in bits.
+        unblocked_convolutions: Nodes off onnxruntime's blocked path; bits of tiled and whole
+            may differ there.
         mac_per_pixel: Multiply-accumulates of all convolutions per output pixel.
         bytes_per_pixel: Peak of the live float32 activations per output pixel.
         parameters: Number of constants of floating point.
@@ -102,7 +60,7 @@ class GraphFacts:
     receptive_field_radius_px: int
     stride_px: int
     global_operators: tuple[str, ...]
-    unblocked: tuple[str, ...]
+    unblocked_convolutions: tuple[str, ...]
     mac_per_pixel: float
     bytes_per_pixel: float
     parameters: int
@@ -177,7 +135,7 @@ def walk_graph(
         receptive_field_radius_px=_reach(nodes, walk, ends=(source[0], target[0]), kept=stride),
         stride_px=stride,
         global_operators=tuple(walk.global_operators),
-        unblocked=tuple(walk.unblocked),
+        unblocked_convolutions=tuple(walk.unblocked),
         mac_per_pixel=walk.mac_per_pixel,
         bytes_per_pixel=_peak_bytes(nodes, walk.extents, keep=target[0]),
         parameters=sum(a.size for a in constants.values() if a.dtype.kind == "f"),

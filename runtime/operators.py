@@ -1,4 +1,4 @@
-"""The operators of picture networks: which samples each one reads, and how sizes change.
+"""The operators of picture networks: which samples each one reads, and how grids change.
 
 For one axis an operator is a `Window`: the first and last input sample that a run of output
 samples reads, in integers, so that the phase of the stride is exact:
@@ -35,6 +35,8 @@ _SPATIAL: Final = (2, 3)
 _NDIM: Final = 4
 _MAX_SCALE: Final = 64
 _MAX_KERNEL: Final = 4096
+_MIN_STEP: Final = Fraction(1, 8)
+_MAX_STEP: Final = 4096
 
 Constants = Mapping[str, NDArray[Any]]
 
@@ -80,6 +82,47 @@ class Window:
 
 Windows = tuple[Window, Window]
 """Rows, columns."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """One axis of a tensor: a sample every `step` picture pixels, size / step + extra of them."""
+
+    step: Fraction = Fraction(1)
+    extra: int = 0
+
+    def through(self, window: Window) -> "Axis":
+        """Give this axis behind an operator.
+
+        Raises:
+            BundleError: If the grid becomes absurdly coarse or fine.
+        """
+        step = self.step * window.stride
+        if not _MIN_STEP <= step <= _MAX_STEP:
+            raise BundleError(f"a tensor has a sample every {step} pixels; refused")
+        return Axis(step=step, extra=window.size(self.extra))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extent:
+    """Channels of a tensor and its grid (rows, columns), None once space was reduced away."""
+
+    channels: int
+    axes: tuple[Axis, Axis] | None
+
+    @property
+    def samples_per_pixel(self) -> float:
+        """Values per picture pixel, all channels together."""
+        if self.axes is None:
+            return 0.0
+        return self.channels / float(self.axes[0].step * self.axes[1].step)
+
+    def through(self, channels: int, windows: Windows | None = None) -> "Extent":
+        """Give the extent behind an operator with the given windows."""
+        axes = self.axes
+        if axes is not None and windows is not None:
+            axes = axes[0].through(windows[0]), axes[1].through(windows[1])
+        return Extent(channels=channels, axes=axes)
 
 
 def convolution_windows(node: Node, kernel: tuple[int, ...]) -> Windows:

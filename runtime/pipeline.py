@@ -10,8 +10,10 @@ A `Pipeline` is immutable and may serve many threads at once; each capture gets 
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FloatArray
@@ -104,7 +106,7 @@ class Pipeline:
 
     def process_array(
         self,
-        image: np.ndarray,
+        image: NDArray[Any],
         *,
         iso: float | None = None,
         white_balance: tuple[float, float, float] | None = None,
@@ -131,25 +133,33 @@ class Pipeline:
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
         """
-        capture = self._capture(image, iso, white_balance, origin_px)
+        capture = self.capture_of(
+            image, iso=iso, white_balance=white_balance, origin_px=origin_px
+        )
         return self.start(capture, progress=progress, cancel=cancel).fill(out)
 
-    def _capture(
+    def capture_of(
         self,
-        image: np.ndarray,
+        image: NDArray[Any],
+        *,
         iso: float | None,
         white_balance: tuple[float, float, float] | None,
         origin_px: tuple[int, int] | None,
     ) -> Capture:
+        """Give an array the meaning that the bundle's contract says; see `process_array`.
+
+        Raises:
+            ContractError: If shape, type or size do not fit the bundle.
+        """
         if self.bundle is None:
             raise ContractError("process_array needs a bundle: it says what the numbers mean")
         camera = self.bundle.manifest.camera
         is_mosaic = image.ndim == 2
         if not is_mosaic and (image.ndim != 3 or image.shape[0] != 3):
             raise ContractError(f"expected (h, w) or (3, h, w); got {image.shape}")
-        if is_mosaic and self.bundle.manifest.input_contract.name != "raw_bayer_v1":
+        if is_mosaic and self.bundle.manifest.input_contract != "raw_bayer_v1":
             raise ContractError(
-                f"the bundle takes {self.bundle.manifest.input_contract.name}; got an (h, w) mosaic"
+                f"the bundle takes {self.bundle.manifest.input_contract}; got an (h, w) mosaic"
             )
         if image.dtype not in (np.uint8, np.uint16, np.float32):
             raise ContractError(f"expected uint8, uint16 or float32 samples; got {image.dtype}")

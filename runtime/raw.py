@@ -216,10 +216,10 @@ def _receive(child: subprocess.Popen[bytes]) -> Capture | None:
         return None
     from camkit.runtime.raw_worker import capture_of
 
-    header = json.loads(line)
-    if "error" in header:
-        raise DecodeError(header["error"])
     try:
+        header = json.loads(line)
+        if "error" in header:
+            raise DecodeError(str(header["error"]))
         samples = _receive_samples(pipe, header)
         return None if samples is None else capture_of(header, samples)
     except (ContractError, KeyError, TypeError, ValueError) as error:

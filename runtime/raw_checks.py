@@ -168,7 +168,7 @@ def check_content(samples: Samples, levels: Levels) -> None:
 
 def _check_unread(samples: Samples, levels: Levels) -> None:
     """Look for zeros that LibRaw left where the file ended."""
-    live_rows: NDArray[np.bool_] = samples.reshape(-1, *samples.shape[-2:]).any(axis=(0, 2))
+    live_rows = np.asarray(samples.reshape(-1, *samples.shape[-2:]).any(axis=(0, 2)))
     tail = int(np.argmax(live_rows[::-1]))
     if levels.black.min() > 0:
         share = float(np.mean(samples == 0))

@@ -16,6 +16,7 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 
+from camkit.runtime.baselines import restoration_bank
 from camkit.runtime.blocks import BlockBank, LocalPsf
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock, TimedRows
@@ -37,7 +38,6 @@ from camkit.runtime.tiling import (
     plan_windows,
 )
 from camkit.runtime.warp import undistort_bands
-from camkit.runtime.wiener import wiener_filter
 
 if TYPE_CHECKING:
     from camkit.runtime.pipeline import Pipeline
@@ -178,7 +178,7 @@ class Reconstruction:
         bundle = self._pipeline.bundle
         if bundle is None:
             return None
-        wanted = bundle.manifest.input_contract.name
+        wanted = bundle.manifest.input_contract
         if self.capture.contract != wanted:
             if (wanted, self.capture.contract) != ("raw_bayer_v1", "linear_rgb_v1"):
                 raise ContractError(
@@ -249,21 +249,71 @@ class Reconstruction:
         )
         return TimedRows(self._front, self._clock, "demosaic")
 
+    def network_input(self, scale: float) -> FloatArray:
+        """Give what a network is given for the whole capture, (6, h, w), for export and tests.
+
+        Args:
+            scale: Of the network stage.
+
+        Raises:
+            ContractError: If there is no bundle, or it has no Wiener stage.
+        """
+        bundle = self._pipeline.bundle
+        if bundle is None or bundle.manifest.stage(Wiener) is None:
+            raise ContractError("a network stands behind the Wiener bank of a bundle")
+        _, source = self._bank_rows(bundle, self._front_rows(), scale)
+        return source.read(0, self.capture.height)
+
     def _restored_rows(self, bundle: Bundle, front: RowSource) -> RowSource:
+        engine, stage, noise = self._pipeline.engine, bundle.manifest.stage(Network), self._noise
+        with_network = self._tiles is not None and stage is not None
+        restored, source = self._bank_rows(
+            bundle, front, stage.scale if with_network and stage is not None else None
+        )
+        if self._tiles is None or engine is None or stage is None or noise is None:
+            return restored
+        bands = infer_bands(
+            engine.run,
+            TimedRows(source, self._clock, "stabilise"),
+            self._tiles,
+            progress=self._progress,
+            cancel=self._cancel,
+        )
+        linear = MappedRows(
+            self._rolled("network", bands),
+            lambda rows, _: unstabilise(rows, noise, scale=stage.scale),
+            3,
+        )
+        return TimedRows(linear, self._clock, "stabilise")
+
+    def _bank_rows(
+        self, bundle: Bundle, front: RowSource, scale: float | None
+    ) -> tuple[RowSource, RowSource]:
+        """Give the rows of the bank, and with a scale the stabilised rows (6) for a network.
+
+        Only one of the two may be read.
+        """
+        noise, method = self._noise, self._pipeline.options.method
+        bank = self._bank(bundle)
+        if bank is None or noise is None:
+            return front, front
         planes = RollingRows(front.shape, _read_bands(front))
         bank_reader = planes.reader()
-        network_reader = planes.reader() if self._tiles is not None else None
-        bank = self._bank(bundle)
-        if bank is None:
-            return bank_reader
-        method = self._pipeline.options.method
         restored = self._rolled(
             "wiener" if method == "net" else method,
             bank.restore_bands(bank_reader, self.capture.saturated_rows),
         )
-        if self._tiles is None or network_reader is None:
-            return restored
-        return self._network_rows(bundle, self._tiles, network_reader, restored)
+        if scale is None:
+            return restored, restored
+        both = StackedRows(planes.reader(), restored)
+        source = MappedRows(
+            both,
+            lambda rows, _: np.concatenate(
+                [stabilise(part, noise, scale=scale) for part in (rows[:3], rows[3:])]
+            ),
+            6,
+        )
+        return restored, source
 
     def _bank(self, bundle: Bundle) -> BlockBank | None:
         stage = bundle.manifest.stage(Wiener)
@@ -276,42 +326,14 @@ class Reconstruction:
             field_heights_mm=psf.field_heights_mm,
             window=self._placement.window,
         )
-        from camkit.runtime.baselines import classical_filter
-
         method = self._pipeline.options.method
-        return BlockBank(
+        return restoration_bank(
             local,
-            wiener_filter(stage, self._noise)
-            if method in {"net", "wiener"}
-            else classical_filter(method, self._noise),
-            block_px=stage.block_px,
-            overlap_px=stage.overlap_px,
+            stage,
+            self._noise,
+            method="wiener" if method == "net" else method,
             threads=self._pipeline.threads,
         )
-
-    def _network_rows(
-        self, bundle: Bundle, tiles: TilePlan, planes: RowSource, restored: RowSource
-    ) -> RowSource:
-        stage, engine, noise = bundle.manifest.stage(Network), self._pipeline.engine, self._noise
-        if stage is None or engine is None or noise is None:
-            return restored
-        scale = stage.scale
-        source = MappedRows(
-            StackedRows(planes, restored),
-            lambda rows, _: np.concatenate(
-                [stabilise(rows[:3], noise, scale=scale), stabilise(rows[3:], noise, scale=scale)]
-            ),
-            6,
-        )
-        timed = TimedRows(source, self._clock, "stabilise")
-        bands = infer_bands(
-            engine.run, timed, tiles, progress=self._progress, cancel=self._cancel
-        )
-        inferred = self._rolled("network", bands)
-        linear = MappedRows(
-            inferred, lambda rows, _: unstabilise(rows, noise, scale=scale), 3
-        )
-        return TimedRows(linear, self._clock, "stabilise")
 
     def _corrected_rows(self, bundle: Bundle, rows: RowSource) -> RowSource:
         if self._placement is None:

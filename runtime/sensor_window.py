@@ -1,6 +1,7 @@
 """Where a capture lies on its sensor: pixel positions to millimetres from the optical axis."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from camkit.errors import ContractError
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
+PixelGrid = NDArray[np.floating[Any] | np.integer[Any]] | float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,9 +50,7 @@ class SensorWindow:
         x_mm, y_mm = self.to_mm(np.array([0, width - 1.0]), np.array([0, height - 1.0]))
         return float(np.hypot(np.abs(x_mm).max(), np.abs(y_mm).max()))
 
-    def to_mm(
-        self, x_px: FloatGrid | float, y_px: FloatGrid | float
-    ) -> tuple[FloatGrid, FloatGrid]:
+    def to_mm(self, x_px: PixelGrid, y_px: PixelGrid) -> tuple[FloatGrid, FloatGrid]:
         """Give the sensor position of pixel positions of the capture (0, 0 = top left pixel)."""
         (x0, y0), (width, height) = self.origin_px, self.sensor_size_px
         pitch_mm = to_mm(self.pitch_um)

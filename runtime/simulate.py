@@ -6,6 +6,7 @@ shot and read noise -> saturation -> black level and quantisation.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,9 @@ from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import CfaPattern, FloatArray, FrozenPsf, NoiseModel, cfa_channels
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.illumination import illumination_band
+from camkit.runtime.output.part_file import atomic_output
+from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
+from camkit.runtime.psf import color_kernels, kernel_at
 from camkit.runtime.scatter import KernelLookup, scatter
 from camkit.runtime.sensor_window import SensorWindow, centred_origin
 from camkit.runtime.warp import distort_array
@@ -114,11 +118,38 @@ def simulate(
     )
 
 
+def write_capture(path: Path, simulation: Simulation, camera: Camera, bundle_name: str) -> None:
+    """Write a simulated capture as a DNG that names its bundle and its place on the sensor.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    window = simulation.window
+    x0, y0 = (int(v) for v in window.origin_px)
+    red, green, blue = (1 / gain for gain in simulation.white_balance)
+    tags = DngTags(
+        cfa=camera.cfa,
+        black=round(camera.black_level),
+        white=int(camera.white_level),
+        color_matrix=np.array(camera.color_matrix, dtype=np.float64),
+        as_shot_neutral=(red, green, blue),
+        camera_model=f"camkit {bundle_name}",
+        iso=simulation.iso,
+        noise=camera.noise_at(simulation.iso),
+        description=camkit_description(
+            bundle=bundle_name,
+            origin_px=(x0, y0),
+            sensor_size_px=window.sensor_size_px,
+            pixel_pitch_um=window.pitch_um,
+        ),
+    )
+    with atomic_output(path) as part:
+        write_bayer_dng(part, simulation.mosaic, tags=tags)
+
+
 def kernel_lookup(psf: FrozenPsf, camera: Camera) -> KernelLookup:
     """Give the function from a sensor position (x_mm, y_mm) to the kernels of the colours."""
-    from camkit.runtime.psf import color_kernels, kernel_at
-
-    kernels = color_kernels(psf, camera.channel_response)
+    kernels = color_kernels(psf, *camera.channel_response.to_arrays())
     return lambda x_mm, y_mm: kernel_at(kernels, psf.field_heights_mm, x_mm, y_mm)
 
 

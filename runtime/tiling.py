@@ -115,7 +115,7 @@ class TilePlan:
         return self.window_count * window / (self.height_px * self.width_px)
 
     def needed_bytes(self, bytes_per_px: float, channels: int = 6) -> int:
-        """Estimate the memory of a run: window arena, row buffer and one output band."""
+        """Estimate the memory of a run: one window and its arena, row buffer, one output band."""
         window = self.window_height_px, self.window_width_px
         return _needed_bytes(window, self.rows, self.padded_width_px, bytes_per_px, channels)
 
@@ -129,7 +129,8 @@ def _needed_bytes(
 ) -> int:
     band = max(span.stop_px - span.start_px for span in rows)
     row_bytes = _FLOAT_BYTES * width_px
-    arena = int(window[0] * window[1] * bytes_per_px)
+    ends = _FLOAT_BYTES * (channels + 3)
+    arena = int(window[0] * window[1] * (bytes_per_px + ends))
     return arena + row_bytes * (channels * window[0] + 3 * band)
 
 
@@ -173,15 +174,15 @@ class TileLimits:
     Attributes:
         stride_px: Total stride of the network, >= 1.
         halo_px: Its reach, or less in fast mode; rounded up to the stride.
-        bytes_per_px: Memory of the network per window pixel, as measured at export.
-        max_bytes: Cap on window arena, row buffer and output band together.
+        bytes_per_px: Peak of the network's live activations per window pixel.
+        max_bytes: Cap on one window with its arena, the row buffer and one output band together.
         tile_px: Force output tiles of this size (tests); None lets the planner choose.
         whole: One window whatever the size.
     """
 
     stride_px: int
     halo_px: int
-    bytes_per_px: float = 200.0
+    bytes_per_px: float = 150.0
     max_bytes: int = DEFAULT_MAX_BYTES
     tile_px: int | None = None
     whole: bool = False

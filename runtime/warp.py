@@ -4,7 +4,7 @@ The ideal picture has the size of the capture and is centred on the ideal positi
 capture's centre: nothing moves on a whole sensor, and a crop far off the axis stays in view.
 
 cv2.remap rounds positions to 1/32 px and holds them in 16 bits, so sides end at 32766 px. Maps
-are computed on a 16 px lattice that is fixed to the picture and enlarged linearly, so the bands
+are computed on an 8 px lattice that is fixed to the picture and enlarged linearly, so the bands
 do not depend on their height.
 """
 
@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.distortion import check_distortion, distort_points, undistort_points
-from camkit.runtime.rows import ArrayRows, RowSource
+from camkit.runtime.rows import RowSource
 from camkit.runtime.sensor_window import SensorWindow
 
 FloatGrid = NDArray[np.float64]
 
-LATTICE_PX: Final = 16
+LATTICE_PX: Final = 8
 BAND_ROWS: Final = 256
 LANCZOS_REACH_PX: Final = 4
 MAX_SIDE_PX: Final = 32766
@@ -42,7 +42,7 @@ def undistort_bands(
         source: (3, h, w) picture in sensor geometry, of the size of the window.
         distortion: Radial distortion per colour.
         window: Where the picture lies on the sensor.
-        band_rows: Height of the bands, a multiple of 16; the pixels do not depend on it.
+        band_rows: Height of the bands, a multiple of 8; the pixels do not depend on it.
 
     Yields:
         (3, rows, w) float32 in ideal geometry, from top to bottom.
@@ -142,7 +142,7 @@ class Warp:
         """Give cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
         nodes = self.lattice(channel, top, bottom).astype(np.float32)
         width = self.window.size_px[0] + 2 * self._margin_px
-        # cv2.resize places node i in the middle of its 16 px, as the lattice does.
+        # cv2.resize places node i in the middle of its cell, as the lattice does.
         size = (nodes.shape[1] * LATTICE_PX, nodes.shape[0] * LATTICE_PX)
         dense = cv2.resize(nodes, size, interpolation=cv2.INTER_LINEAR)
         dense = dense[LATTICE_PX : LATTICE_PX + bottom - top, LATTICE_PX : LATTICE_PX + width]

@@ -83,6 +83,10 @@ class Container:
                 if total > cap:
                     raise BundleError(f"member {name} unpacks to more than {cap} bytes; refused")
                 chunks.append(chunk)
+        if total != info.file_size:
+            raise BundleError(
+                f"member {name} unpacks to {total} bytes; the zip says {info.file_size}"
+            )
         return b"".join(chunks)
 
 

@@ -154,7 +154,7 @@ class Manifest(Entry):
     camera: Camera
     object_distance_mm: Positive | None = None
     input_contract: InputContract
-    border: Border = "reflect"
+    border: Border = "edge"
     stages: tuple[Stage, ...]
     networks: dict[NetworkSize, NetworkFacts] = Field(default_factory=dict)
     golden: tuple[GoldenCase, ...] = ()

@@ -223,24 +223,22 @@ def built_in_bundles() -> dict[str, Path]:
 
 
 def find_bundle(name_or_path: str | Path) -> Path:
-    """Give the path of a bundle: a file, or the name of a built-in one.
+    """Give the path of a bundle: the name of a built-in one, or a file.
 
     Raises:
         BundleError: If there is neither; near names are suggested.
     """
-    path = Path(name_or_path)
-    if path.is_file():
-        return path
-    text = str(name_or_path)
-    if path.suffix == SUFFIX or path.name != text:
-        raise BundleError(f"there is no bundle file {text}")
+    path, text = Path(name_or_path), str(name_or_path)
     known = built_in_bundles()
     if text in known:
         return known[text]
+    if path.is_file():
+        return path
+    if path.suffix == SUFFIX or path.name != text:
+        raise BundleError(f"there is no bundle file {text}")
     near = difflib.get_close_matches(text, known, n=3)
-    hint = (
-        f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known) or 'none'}"
-    )
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}."
     raise BundleError(
-        f"no built-in bundle is called {text!r}; {hint} A path to a .camkit file will do"
+        f"no built-in bundle is called {text!r}; {hint if known else 'there is none.'} "
+        "A path to a .camkit file will do"
     )

@@ -19,10 +19,10 @@ def check(
     """Prove a bundle: schema, hashes, graphs, golden cases, tiled = whole, fp16 range."""
     from camkit.bundle.reader import find_bundle
     from camkit.runtime.check import check_bundle
-    from camkit.runtime.golden_run import run_golden
+    from camkit.runtime.golden_run import develop_case
 
     path = Path(bundle) if Path(bundle).exists() else find_bundle(bundle)
-    report = check_bundle(path, level=level, run=run_golden)
+    report = check_bundle(path, level=level, run=develop_case)
     if json_:
         typer.echo(json.dumps(report.to_json()))
     else:

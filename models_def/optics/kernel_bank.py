@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.models_def.optics.prescription import FabricationErrors, Lens, perturb
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import (
+    FabricationErrors,
+    Lens,
+    perturb,
+    with_focus_shift,
+)
 from camkit.models_def.optics.psf import trace_psf
 from camkit.models_def.optics.pupil import with_fixed_stop
 
@@ -84,7 +90,10 @@ class KernelBank:
 def fabricated_copies(
     lens: Lens, count: int, seed: int, errors: FabricationErrors | None = None
 ) -> tuple[Lens, ...]:
-    """Give the nominal lens and `count` - 1 fabricated copies.
+    """Give the nominal lens and `count` - 1 fabricated copies, each focused as it was built.
+
+    A camera is focused when it is assembled: the sensor of a copy keeps the nominal distance
+    from the copy's own paraxial focus, plus the focus error.
 
     Args:
         lens: Nominal.
@@ -94,8 +103,12 @@ def fabricated_copies(
     """
     nominal = with_fixed_stop(lens)
     widths = errors or FabricationErrors()
-    draws = (np.random.default_rng((seed, i)) for i in range(1, count))
-    return (nominal, *(perturb(nominal, widths, rng) for rng in draws))
+    nominal_bfl_mm = paraxial_data(nominal).bfl_mm
+    copies = [nominal]
+    for i in range(1, count):
+        copy = perturb(nominal, widths, np.random.default_rng((seed, i)))
+        copies.append(with_focus_shift(copy, paraxial_data(copy).bfl_mm - nominal_bfl_mm))
+    return tuple(copies)
 
 
 def colour_kernels(

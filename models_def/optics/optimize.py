@@ -259,6 +259,7 @@ def _lens(problem: _Problem, variables: Tensor) -> Lens:
         )
     return Lens(
         name=recipe.name,
+        note=f"found by camkit.models_def.optics.optimize from the recipe of {recipe.name}",
         surfaces=tuple(surfaces),
         stop=0,
         aperture_kind="stop_semi_diameter_mm",

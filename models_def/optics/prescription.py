@@ -251,7 +251,7 @@ def format_prescription(lens: Lens) -> str:
 
 def _surface_lines(surface: Surface) -> list[str]:
     lines = [
-        f"radius_mm = {surface.radius_mm!r}",
+        f"radius_mm = {_radius_text(surface.curvature_per_mm)}",
         f"thickness_mm = {surface.thickness_mm!r}",
         f"glass = {_quote(surface.glass)}",
         f"semi_diameter_mm = {surface.semi_diameter_mm!r}",
@@ -261,6 +261,18 @@ def _surface_lines(surface: Surface) -> list[str]:
     if surface.even_asphere:
         lines.append(f"even_asphere = [{', '.join(map(repr, surface.even_asphere))}]")
     return lines
+
+
+def _radius_text(curvature_per_mm: float) -> str:
+    """Give the shortest radius whose inverse is this curvature."""
+    if not curvature_per_mm:
+        return "inf"
+    radius_mm = 1 / curvature_per_mm
+    for digits in range(4, 18):
+        text = f"{radius_mm:.{digits}g}"
+        if 1 / float(text) == curvature_per_mm:
+            return repr(float(text))
+    return repr(radius_mm)
 
 
 def _quote(text: str) -> str:

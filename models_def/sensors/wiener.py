@@ -10,11 +10,12 @@ from torch import Tensor
 from camkit.bundle.stages import Wiener
 
 # Tuned on development pictures with the PSF of the first camera; export writes them down.
-PRIOR_SCALE = 1e-3
+PRIOR_SCALE = 3e-4
 PRIOR_EXPONENT = 2.5
 CORNER_FREQUENCY = 1 / 512
 LEAST_NSR = 1e-6
 CLIPPED_REACH_PX = 2
+TAPER_SHRINK = 4
 
 
 def to_otf(kernels: Tensor, size: tuple[int, int]) -> Tensor:
@@ -46,7 +47,7 @@ def wiener_restore(
         kernels: (b, 3, kh, kw), odd sides, each sums to 1.
         shot: (b, 3) or (3,), noise after white balance.
         read_variance: Same shape as shot.
-        settings: Prior and clip iterations; block and overlap are not used here.
+        settings: Prior, clip iterations, and the overlap, whose outer quarter is tapered.
         saturated: (b, 1 or 3, h, w), true where the sensor clipped; those pixels, and the two
             beside them that the demosaic reaches, count as unknown.
 
@@ -57,6 +58,7 @@ def wiener_restore(
     """
     size = (patches.shape[-2], patches.shape[-1])
     otf = to_otf(kernels, size)
+    patches = taper_edges(patches, otf, settings.overlap_px // 4)
     gain = otf.conj() / (otf.abs().square() + _nsr(patches, shot, read_variance, settings))
     restored = _filter(patches, gain)
     if saturated is None or settings.clip_iterations == 0 or not bool(saturated.any()):
@@ -69,6 +71,39 @@ def wiener_restore(
         expected = torch.maximum(patches, _filter(restored.clamp(min=0), otf))
         restored = _filter(torch.where(unknown, expected, patches), gain)
     return restored
+
+
+def taper_edges(patches: Tensor, otf: Tensor, ring_px: int) -> Tensor:
+    """Blend the outer ring of patches to their own periodic blur.
+
+    Args:
+        patches: (b, 3, h, w).
+        otf: (b, 3, h, w // 2 + 1) of `to_otf`.
+        ring_px: Width of the ring; 0 leaves the patches as they are.
+
+    References: Reeves 2005 (edge taper as pre-processing).
+    """
+    h, w = patches.shape[-2:]
+    ring = min(ring_px, h // 4, w // 4)
+    if ring == 0:
+        return patches
+    shrink = TAPER_SHRINK if h % TAPER_SHRINK == 0 and w % TAPER_SHRINK == 0 else 1
+    small = torch.nn.functional.avg_pool2d(patches, shrink)
+    m, n = h // shrink, w // shrink
+    low = torch.cat(
+        [otf[..., : m - m // 2, : n // 2 + 1], otf[..., h - m // 2 :, : n // 2 + 1]], dim=-2
+    )
+    blurred = _filter(small, low)
+    blurred = blurred.repeat_interleave(shrink, dim=-2).repeat_interleave(shrink, dim=-1)
+    keep = _taper_line(h, ring, patches)[:, None] * _taper_line(w, ring, patches)
+    return blurred + keep * (patches - blurred)
+
+
+def _taper_line(size: int, ring: int, like: Tensor) -> Tensor:
+    steps = (torch.arange(ring, dtype=torch.float64, device=like.device) + 0.5) / ring
+    rise = torch.sin(torch.pi / 2 * steps).square().to(like.dtype)
+    flat = torch.ones(size - 2 * ring, dtype=like.dtype, device=like.device)
+    return torch.cat([rise, flat, rise.flip(0)])
 
 
 def _filter(patches: Tensor, transfer: Tensor) -> Tensor:

@@ -37,4 +37,4 @@ def ema_decay(recipe: ScheduleRecipe, step: int) -> float:
 def update_average(average: list[Tensor], weights: Iterable[Tensor], decay: float) -> None:
     """Move the averaged weights towards the current ones, in place."""
     current = [w.detach() for w in weights]
-    torch._foreach_lerp_(average, current, 1.0 - decay)  # noqa: SLF001  the one batched form
+    torch._foreach_lerp_(average, current, 1.0 - decay)

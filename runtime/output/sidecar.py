@@ -1,4 +1,4 @@
-"""The sidecar `NAME.camkit.json`: what was done to make a picture, and the proof that it is whole."""
+"""The sidecar `NAME.camkit.json`: what was done to a picture, and proof that it is whole."""
 
 import json
 from collections.abc import Mapping
@@ -6,13 +6,24 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.errors import ContractError
-from camkit.runtime.output.atomic import atomic_output
+from camkit.runtime.output.part_file import atomic_output
 
 SIDECAR_SUFFIX: Final = ".camkit.json"
 SIDECAR_VERSION: Final = 1
 REQUIRED: Final = frozenset(
-    "input input_sha256 output output_sha256 bundle_sha256 options seconds peak_rss_mb "
-    "clipped_fraction plan warnings".split()
+    {
+        "input",
+        "input_sha256",
+        "output",
+        "output_sha256",
+        "bundle_sha256",
+        "options",
+        "plan",
+        "seconds",
+        "peak_rss_mb",
+        "clipped_fraction",
+        "warnings",
+    }
 )
 # A sidecar is a few kilobytes; anything larger is not ours.
 MAX_BYTES: Final = 4_000_000

@@ -1,12 +1,13 @@
 """Opens the writer of a format."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 from camkit.errors import ContractError
 from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
 
 PictureKind = Literal["exr", "tiff", "png"]
+SUFFIXES: Final = {"exr": "exr", "tiff": "tif", "png": "png", "dng": "dng"}
 
 
 def open_writer(path: Path, kind: PictureKind, picture: PictureFormat) -> PictureWriter:

@@ -221,6 +221,137 @@ def test_graph_whose_reach_cannot_be_told_is_refused(model: onnx.ModelProto, mes
         inspect_graph(_bytes(model))
 
 
+def _regrouped(op: str, operands: tuple[list[int], ...], **attributes: object) -> onnx.ModelProto:
+    """Cut three of six channels out of the input and let them be the output."""
+    constants = {f"c{i}": np.array(value, dtype=np.int64) for i, value in enumerate(operands)}
+    outputs = ["output", "rest"] if op == "Split" else ["output"]
+    return make_model([NODE(op, ["input", *constants], outputs, **attributes)], constants)
+
+
+CUTS: dict[str, tuple[onnx.ModelProto, str | None]] = {
+    "slice": (_regrouped("Slice", ([0], [6], [1], [2])), None),
+    "slice from the end": (_regrouped("Slice", ([-3], [99], [-3])), None),
+    "split in halves": (_regrouped("Split", (), axis=1, num_outputs=2), None),
+    "split by sizes": (_regrouped("Split", ([3, 3],), axis=1), None),
+    "slice of other size": (_regrouped("Slice", ([0], [2], [1])), "computes 2"),
+    "empty slice": (_regrouped("Slice", ([4], [4], [1])), "empty"),
+    "slice by 0": (_regrouped("Slice", ([0], [6], [1], [0])), "step 0"),
+    "split of rows": (_regrouped("Split", ([3, 3],), axis=2), "along the channels"),
+    "split of other sizes": (_regrouped("Split", ([3, 4],), axis=1), "do not make 6"),
+}
+
+
+@pytest.mark.parametrize(("model", "message"), CUTS.values(), ids=CUTS.keys())
+def test_channels_are_followed_through_cuts(model: onnx.ModelProto, message: str | None) -> None:
+    if message is None:
+        assert inspect_graph(_bytes(model)).output_channels == 3
+        return
+    with pytest.raises(BundleError, match=message):
+        inspect_graph(_bytes(model))
+
+
+def test_concat_adds_channels_and_keeps_the_longest_reach() -> None:
+    nodes = [
+        NODE("Conv", ["input", "a"], ["near"], pads=[1] * 4),
+        NODE("Conv", ["input", "b"], ["far"], pads=[2] * 4),
+        NODE("Concat", ["near", "far"], ["both"], axis=1),
+        NODE("Conv", ["both", "c"], ["output"], pads=[0] * 4),
+    ]
+    weights = {
+        "a": make_weight(2, 6, 3, 3),
+        "b": make_weight(5, 6, 5, 5),
+        "c": make_weight(3, 7, 1, 1),
+    }
+    assert inspect_graph(_bytes(make_model(nodes, weights))).receptive_field_radius_px == 2
+
+
+OTHERS: dict[str, tuple[list[onnx.NodeProto], dict[str, NDArray[np.generic]], str]] = {
+    "constants alone": (
+        [NODE("Add", ["a", "a"], ["b"]), NODE("Add", ["input", "b"], ["output"])],
+        {"a": np.ones((1, 3, 1, 1), np.float32)},
+        "constants alone",
+    ),
+    "channels that do not go together": (
+        [NODE("Add", ["input", "a"], ["output"])],
+        {"a": np.ones((1, 4, 1, 1), np.float32)},
+        "do not go together",
+    ),
+    "weight computed": (
+        [NODE("Conv", ["input", "input"], ["output"])],
+        {},
+        "input 1 must be a constant",
+    ),
+    "shuffle of odd channels": (
+        [NODE("DepthToSpace", ["input"], ["output"], blocksize=2)],
+        {},
+        "no 2x2 blocks",
+    ),
+    "shuffle by 0": (
+        [NODE("DepthToSpace", ["input"], ["output"], blocksize=0)],
+        {},
+        "blocksize",
+    ),
+    "mean that drops axes": (
+        [NODE("ReduceMean", ["input", "a"], ["output"], keepdims=0)],
+        {"a": np.array([2, 3])},
+        "keep dimensions|not valid",
+    ),
+    "output without space": (
+        [NODE("GlobalMaxPool", ["input"], ["output"])],
+        {},
+        "height and width of the input",
+    ),
+    "pool with indices": (
+        [NODE("MaxPool", ["input"], ["output", "index"], kernel_shape=[1, 1])],
+        {},
+        "indices",
+    ),
+    "one-dimensional kernel": (
+        [NODE("MaxPool", ["input"], ["output"], kernel_shape=[1])],
+        {},
+        "must be 2-D",
+    ),
+    "negative pads": (
+        [NODE("MaxPool", ["input"], ["output"], kernel_shape=[1, 1], pads=[-1] * 4)],
+        {},
+        "out of range",
+    ),
+    "Resize by an odd ratio": (
+        [NODE("Resize", ["input", "", "a"], ["output"], mode="nearest")],
+        {"a": np.array([1, 1, 0.1234567, 2], np.float32)},
+        "plain ratio",
+    ),
+    "Resize for regions": (
+        [
+            NODE(
+                "Resize",
+                ["input", "", "a"],
+                ["output"],
+                coordinate_transformation_mode="half_pixel_symmetric",
+            )
+        ],
+        {"a": np.array([1, 1, 2, 2], np.float32)},
+        "coordinates",
+    ),
+    "output never computed": ([NODE("Relu", ["input"], ["x"])], {}, "never computed|not valid"),
+}
+
+
+@pytest.mark.parametrize(("nodes", "weights", "message"), OTHERS.values(), ids=OTHERS.keys())
+def test_node_that_makes_no_sense_is_refused(
+    nodes: list[onnx.NodeProto], weights: dict[str, NDArray[np.generic]], message: str
+) -> None:
+    with pytest.raises(BundleError, match=message):
+        inspect_graph(_bytes(make_model(nodes, weights, channels=(3, 3))))
+
+
+def test_ceiling_nearest_resize_reads_the_next_sample() -> None:
+    way = {"coordinate_transformation_mode": "asymmetric", "nearest_mode": "ceil"}
+    pool = ("MaxPool", {"kernel_shape": [2, 2], "strides": [2, 2]}, ())
+    model = _chain(pool, ("Resize", {"mode": "nearest", **way}, (ONES[:0], SCALES)))
+    assert inspect_graph(_bytes(model)).receptive_field_radius_px == _probe(model, 2, 32) == 2
+
+
 def test_grids_that_do_not_meet_are_refused() -> None:
     nodes = [
         NODE("Conv", ["input", "w"], ["half"], strides=[2, 2], pads=[1, 1, 1, 1]),
@@ -256,7 +387,7 @@ def test_graph_that_contradicts_the_manifest_is_refused(
 def test_graph_that_agrees_with_the_manifest_is_admitted() -> None:
     found = check_graph(tiny_network(), tiny_facts())
     assert found.receptive_field_radius_px == 3
-    assert found.unblocked == ()
+    assert found.unblocked_convolutions == ()
     assert found.global_operators == ()
 
 
@@ -277,7 +408,7 @@ def test_transposed_convolution_costs_by_its_input_and_is_marked() -> None:
     up = ("ConvTranspose", {"strides": [2, 2]}, (make_weight(3, 3, 2, 2),))
     found = inspect_graph(_bytes(_chain(_conv(3, strides=[2, 2]), up)))
     assert found.mac_per_pixel == (81 + 36) / 4
-    assert found.unblocked == ("ConvTranspose_output",)
+    assert found.unblocked_convolutions == ("ConvTranspose_output",)
 
 
 @pytest.mark.parametrize(
@@ -298,7 +429,7 @@ def test_convolutions_off_the_blocked_path_are_named(
     weight = make_weight(channels, channels // groups, 3, 3)
     node = NODE("Conv", ["input", "w"], ["output"], "conv", pads=[1] * 4, group=groups)
     model = make_model([node], {"w": weight}, channels=(channels, channels))
-    assert inspect_graph(_bytes(model)).unblocked == (() if blocked else ("conv",))
+    assert inspect_graph(_bytes(model)).unblocked_convolutions == (() if blocked else ("conv",))
 
 
 SCALES = np.array([1, 1, 2, 2], np.float32)
@@ -480,3 +611,9 @@ def test_constants_in_nodes_are_understood() -> None:
     graph = parse_graph(_bytes(make_model(nodes, {}, channels=(3, 3))))
     assert [node.op for node in graph.nodes] == ["Mul", "Add"]
     assert graph.constants["b"] == 2.0
+
+
+def test_constant_that_is_no_number_is_refused() -> None:
+    nodes = [NODE("Constant", [], ["a"], value_string="x"), NODE("Relu", ["input"], ["output"])]
+    with pytest.raises(BundleError, match="constants of numbers"):
+        parse_graph(_bytes(make_model(nodes, {}, channels=(3, 3))))

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -52,7 +53,7 @@ def _assert_sound(plan: TilePlan) -> None:
     for spans, window, padded in axes:
         assert spans[0].start_px == 0
         assert spans[-1].stop_px == padded
-        for before, after in zip(spans, spans[1:], strict=False):
+        for before, after in pairwise(spans):
             assert before.stop_px == after.start_px
         for span in spans:
             end = span.origin_px + window
@@ -234,7 +235,7 @@ def test_every_row_is_read_once_from_top_to_bottom_and_no_earlier_than_needed() 
     rest = list(bands)
     assert source.reads[0][0] == 0
     assert source.reads[-1][1] == 333
-    assert all(a[1] == b[0] for a, b in zip(source.reads, source.reads[1:], strict=False))
+    assert all(a[1] == b[0] for a, b in pairwise(source.reads))
     assert len(rest) == len(plan.rows) - 1
 
 

@@ -1,0 +1,228 @@
+"""Checkpoints, frozen PSF and prescription -> one bundle, proved before it is written.
+
+    PSF, camera       -> golden captures                    (golden_cases)
+    a first bundle    -> what a network is given for them
+    checkpoints       -> networks -> ONNX + measured facts  (network_facts)
+    a second bundle   -> its outputs on the golden captures
+    everything        -> card, preview, manifest -> bundle -> `check_bundle`
+"""
+
+import json
+import tempfile
+import tomllib
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.bundle.golden import GoldenArrays, golden_to_bytes
+from camkit.bundle.manifest import (
+    Camera,
+    Color,
+    Demosaic,
+    Illumination,
+    Manifest,
+    Network,
+    Undistort,
+    WhiteBalance,
+)
+from camkit.bundle.psf_file import psf_to_bytes, read_psf
+from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, PSF, STRESS_PSF, Bundle
+from camkit.bundle.writer import write_bundle
+from camkit.contracts import FloatArray, FrozenPsf
+from camkit.errors import ContractError, ParityError
+from camkit.export.card import card_text, preview_png
+from camkit.export.golden_cases import (
+    GOLDEN_RECIPES,
+    CaseRecipe,
+    Cases,
+    add_outputs,
+    photograph,
+)
+from camkit.export.network_facts import MeasuredNetwork, measure_network
+from camkit.models_def.training.checkpoint import Checkpoint, load_network, read_checkpoint
+from camkit.models_def.training.recipe import Recipe, to_recipe
+from camkit.runtime.check import check_bundle
+from camkit.runtime.golden_run import develop_case
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+
+PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
+LICENCE: Final = "CC-BY-4.0"
+PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
+SIZE_ORDER: Final = "SML"
+DEFAULT_SIZE: Final = "M"
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """What goes into a bundle.
+
+    Attributes:
+        checkpoints: One per size, of one recipe.
+        psf: Frozen PSF of `camkit freeze`.
+        stress_psf: Kernels off the design point.
+        prescription: The lens as designed.
+        freeze: Report of `camkit freeze` (JSON), for the manifest.
+        version: Semantic version of the bundle.
+    """
+
+    checkpoints: tuple[Path, ...]
+    psf: Path
+    stress_psf: Path | None = None
+    prescription: Path | None = None
+    freeze: Path | None = None
+    version: str = "0.1.0"
+
+
+def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
+    """Pack and prove a bundle; nothing is written when a proof fails.
+
+    Returns:
+        What was written: sizes of network, bytes, and the lines of the proof.
+
+    Raises:
+        ContractError: If the checkpoints are not of one recipe, or a size comes twice.
+        ParityError: If torch and ONNX, or the bundle and its own golden cases, disagree.
+        BundleError: If the parts contradict each other.
+    """
+    checkpoints = _read_checkpoints(parts.checkpoints)
+    recipe = _recipe(checkpoints)
+    psf = read_psf(parts.psf)
+    members = _members(parts)
+    cases = _golden_cases(recipe.camera, psf)
+    with tempfile.TemporaryDirectory() as folder:
+        bare = write_bundle(
+            Path(folder) / "bare.camkit", _manifest(recipe, parts, checkpoints, {}, {}), members
+        )
+        windows = _network_inputs(bare, cases, recipe.scale)
+        networks = {
+            size: measure_network(size, load_network(checkpoint), windows)
+            for size, checkpoint in checkpoints.items()
+        }
+        for network in networks.values():
+            members |= network.members
+        second = write_bundle(
+            Path(folder) / "second.camkit",
+            _manifest(recipe, parts, checkpoints, networks, {}),
+            members,
+        )
+        golden = add_outputs(second, cases, dict(zip(cases, windows[1:], strict=True)))
+        members[GOLDEN] = golden_to_bytes(golden)
+        members[CARD] = card_text(second, golden).encode()
+        members[PREVIEW] = preview_png(second, golden)
+        manifest = _manifest(recipe, parts, checkpoints, networks, cases)
+        third = Path(folder) / "third.camkit"
+        write_bundle(third, manifest, members)
+        report = check_bundle(third, run=develop_case)
+        if not report.passed:
+            raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
+        out.parent.mkdir(parents=True, exist_ok=True)
+        bundle = write_bundle(out, manifest, members)
+    return {
+        "bundle": str(out),
+        "bytes": out.stat().st_size,
+        "sha256": bundle.sha256,
+        "sizes": ", ".join(networks),
+        **{f"check {i}": line for i, line in enumerate(report.lines())},
+    }
+
+
+def _read_checkpoints(paths: tuple[Path, ...]) -> dict[str, Checkpoint]:
+    found: dict[str, Checkpoint] = {}
+    for path in paths:
+        checkpoint = read_checkpoint(path)
+        size = checkpoint.size
+        if size not in SIZE_ORDER and len(paths) == 1:
+            size = DEFAULT_SIZE
+        if size in found:
+            raise ContractError(f"two checkpoints are of size {size}: keep one")
+        if size not in SIZE_ORDER:
+            raise ContractError(
+                f"{path} is of size {size}; a bundle holds the sizes S, M and L "
+                "(any other network must be alone in its bundle)"
+            )
+        found[size] = checkpoint
+    if not found:
+        raise ContractError("export needs at least one checkpoint")
+    if len({c.recipe_toml for c in found.values()}) > 1:
+        raise ContractError("the checkpoints are of different recipes; train them from one")
+    return dict(sorted(found.items(), key=lambda item: SIZE_ORDER.index(item[0])))
+
+
+def _recipe(checkpoints: dict[str, Checkpoint]) -> Recipe:
+    return to_recipe(tomllib.loads(next(iter(checkpoints.values())).recipe_toml))
+
+
+def _golden_cases(camera: Camera, psf: FrozenPsf) -> Cases:
+    cases: Cases = {}
+    for name, recipe in GOLDEN_RECIPES.items():
+        case, capture, reference = photograph(name, recipe, camera, psf)
+        cases[name] = case, GoldenArrays(capture=capture, reference=reference)
+    return cases
+
+
+def _network_inputs(bare: Bundle, cases: Cases, scale: float) -> list[FloatArray]:
+    """Give (1, 6, h, w) windows as the network sees them: a larger probe first, then the cases."""
+    probe, capture, _ = photograph("probe", PROBE_RECIPE, bare.manifest.camera, bare.psf)
+    captures = [(probe, capture), *((case, arrays.capture) for case, arrays in cases.values())]
+    pipeline = Pipeline(bare, Options(method="wiener", threads=1))
+    windows = []
+    for case, image in captures:
+        work = pipeline.start(
+            pipeline.capture_of(
+                image, iso=case.iso, white_balance=case.white_balance, origin_px=case.origin_px
+            )
+        )
+        windows.append(work.network_input(scale)[None])
+    return windows
+
+
+def _members(parts: Parts) -> dict[str, bytes]:
+    members = {PSF: psf_to_bytes(read_psf(parts.psf))}
+    if parts.stress_psf is not None:
+        members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
+    if parts.prescription is not None:
+        members[PRESCRIPTION] = parts.prescription.read_bytes()
+    return members
+
+
+def _manifest(
+    recipe: Recipe,
+    parts: Parts,
+    checkpoints: dict[str, Checkpoint],
+    networks: dict[str, MeasuredNetwork],
+    cases: Cases,
+) -> Manifest:
+    distance = recipe.object_distance_mm
+    return Manifest(
+        name=recipe.name,
+        version=parts.version,
+        licence=LICENCE,
+        training_data=next(iter(checkpoints.values())).training_data,
+        camera=recipe.camera,
+        object_distance_mm=None if np.isinf(distance) else distance,
+        input_contract="raw_bayer_v1",
+        border="edge",
+        stages=(
+            WhiteBalance(),
+            Demosaic(method="fast"),
+            recipe.wiener,
+            *((Network(scale=recipe.scale),) if networks else ()),
+            Illumination(),
+            Undistort(),
+            Color(),
+        ),
+        networks={size: network.facts for size, network in networks.items()},
+        golden=tuple(case for case, _ in cases.values()),
+        freeze=_freeze_facts(parts),
+        exported_with={name: metadata.version(name) for name in PACKAGES},
+    )
+
+
+def _freeze_facts(parts: Parts) -> dict[str, Any]:
+    if parts.freeze is None:
+        return {}
+    facts = json.loads(parts.freeze.read_text(encoding="utf-8"))
+    return {k: v for k, v in facts.items() if isinstance(v, int | float | str)}

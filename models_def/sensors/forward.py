@@ -1,0 +1,163 @@
+"""The camera in torch, with gradients: blur, illumination, CFA, noise, clipping, quantisation.
+
+    planes -> blur (one kernel) or scatter (blocks) -> times illumination -> expose -> mosaic
+
+Twin of `camkit.runtime.simulate` and `scatter`; `tests/parity` holds the two together. Noise is
+reparametrised: the caller hands in standard normal numbers, so the mosaic is differentiable in
+scene, kernels and gains. Clipping and rounding let gradients through unchanged.
+"""
+
+from dataclasses import dataclass
+from math import cos, pi
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.contracts import CfaPattern, NoiseModel
+from camkit.errors import ContractError
+from camkit.models_def.sensors.demosaic import mosaic
+
+BLOCK_STEP_PX: Final = 256
+# Keeps the slope of the square root finite where a camera without read noise sees no light.
+LEAST_VARIANCE: Final = 1e-12
+
+Span = tuple[int, int, Tensor]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensor:
+    """What the pixels do.
+
+    Attributes:
+        cfa: Mosaic.
+        gains: White balance gains in the planes; the raw signal is the planes over the gains.
+        noise: Noise of the raw signal at the ISO.
+        full_well: Signal at which the pixel is full (1.0 = white level).
+        black_level: DN at no light.
+        white_level: DN at which the converter clips.
+    """
+
+    cfa: CfaPattern
+    gains: tuple[float, float, float]
+    noise: NoiseModel
+    full_well: float
+    black_level: float
+    white_level: float
+
+
+def blur(planes: Tensor, kernels: Tensor) -> Tensor:
+    """Convolve planes with one kernel per colour and keep what has full support.
+
+    Args:
+        planes: (b, 3, h, w).
+        kernels: (b, 3, kh, kw), as they fall on the sensor (scatter, not flipped).
+
+    Returns:
+        (b, 3, h - kh + 1, w - kw + 1).
+
+    Raises:
+        ContractError: If a kernel is larger than the planes.
+    """
+    (h, w), (kh, kw) = planes.shape[-2:], kernels.shape[-2:]
+    if kh > h or kw > w:
+        raise ContractError(f"kernels of {kh}x{kw} px exceed the planes of {h}x{w} px")
+    # A circular product is free of wrapping where the kernel lies wholly inside.
+    spread = torch.fft.irfft2(_spectrum(planes, (h, w)) * _spectrum(kernels, (h, w)), (h, w))
+    return spread[..., kh - 1 :, kw - 1 :]
+
+
+def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) -> Tensor:
+    """Blur one picture whose PSF varies: each block is spread with its own kernels.
+
+    Args:
+        planes: (3, h + 2 m, w + 2 m), m = k // 2: the picture and what lies around it.
+        kernels: (rows, columns, 3, k, k), one set per block; see `block_centres_px`.
+        step_px: Distance of block centres.
+
+    Returns:
+        (3, h, w).
+
+    Raises:
+        ContractError: If the kernels do not match the blocks.
+    """
+    side = kernels.shape[-1]
+    rows, columns = (_spans(n, step_px, planes) for n in planes.shape[-2:])
+    if kernels.shape[:2] != (len(rows), len(columns)):
+        raise ContractError(
+            f"{len(rows)}x{len(columns)} blocks need as many kernels; got {kernels.shape[:2]}"
+        )
+    out = planes.new_zeros(3, planes.shape[-2] + side - 1, planes.shape[-1] + side - 1)
+    for row, (top, bottom, row_weight) in enumerate(rows):
+        for column, (left, right, column_weight) in enumerate(columns):
+            block = planes[:, top:bottom, left:right] * row_weight[:, None] * column_weight
+            size = bottom - top + side - 1, right - left + side - 1
+            product = _spectrum(block, size) * _spectrum(kernels[row, column], size)
+            spread = torch.fft.irfft2(product, size)
+            out[:, top : top + size[0], left : left + size[1]] += spread
+    inner = slice(side - 1, 1 - side if side > 1 else None)
+    return out[:, inner, inner]
+
+
+def block_centres_px(length: int, margin_px: int, *, step_px: int = BLOCK_STEP_PX) -> Tensor:
+    """Give the block centres along one side, in pixels of the picture inside the margin.
+
+    Args:
+        length: Side with margins.
+        margin_px: Width of the margin.
+        step_px: Distance of block centres.
+    """
+    spans = _spans(length, step_px, torch.zeros(1, dtype=torch.float64))
+    return torch.tensor(
+        [(first + last - 1) / 2 - margin_px for first, last, _ in spans], dtype=torch.float64
+    )
+
+
+def expose(planes: Tensor, sensor: Sensor, normal: Tensor | None = None) -> Tensor:
+    """Record white-balanced planes as a raw mosaic.
+
+    Args:
+        planes: (b, 3, h, w) linear, white-balanced, 1.0 = white level of green.
+        sensor: Mosaic, gains, noise and levels.
+        normal: (b, h, w) standard normal numbers, or None for no noise. Photon noise is Gaussian
+            here, which departs from Poisson below some ten electrons.
+
+    Returns:
+        (b, h, w) linear raw signal, 1.0 = white level, in steps of one DN, clipped.
+
+    References: Foi et al. 2008.
+    """
+    signal = mosaic(planes / planes.new_tensor(sensor.gains)[:, None, None], sensor.cfa)
+    if normal is not None:
+        shot, read = sensor.noise.shot[1], sensor.noise.read_variance[1]
+        variance = (shot * signal + read).clamp(min=LEAST_VARIANCE)
+        signal = signal + variance.sqrt() * normal
+    span = sensor.white_level - sensor.black_level
+    levels = sensor.black_level + signal.clamp(max=sensor.full_well) * span
+    recorded = (levels.round().clamp(0, sensor.white_level) - sensor.black_level) / span
+    return signal + (recorded - signal).detach()
+
+
+def _spectrum(planes: Tensor, size: tuple[int, int]) -> Tensor:
+    return torch.fft.rfft2(planes, s=size)
+
+
+def _spans(length: int, step_px: int, like: Tensor) -> list[Span]:
+    # Raised cosines that sum to 1; the outer ones stay at 1 towards the ends.
+    count = max(1, round(length / step_px))
+    pitch = length / count
+    spans = []
+    for index in range(count):
+        weights = [_weight((x + 0.5) / pitch - index - 0.5, index, count) for x in range(length)]
+        used = [x for x, weight in enumerate(weights) if weight > 0]
+        first, last = used[0], used[-1] + 1
+        spans.append((first, last, like.new_tensor(weights[first:last])))
+    return spans
+
+
+def _weight(distance: float, index: int, count: int) -> float:
+    beyond_start = index == 0 and distance < 0
+    beyond_end = index == count - 1 and distance > 0
+    if beyond_start or beyond_end:
+        return 1.0
+    return 0.5 + 0.5 * cos(pi * distance) if abs(distance) < 1 else 0.0

@@ -1,0 +1,181 @@
+"""`camkit check`: a bundle proves what it says about itself, layer by layer.
+
+    schema   the zip and its manifest
+    hash     every member, the PSF
+    graph    every network: operators, shapes, reach, stride, cost
+    golden   the stored cases come out again
+    tiling   tiled == whole, bit for bit; no pixel acts further than the stated reach
+    range    activations stay where they were measured, and in fp16 where that is claimed
+
+A layer whose ground failed is skipped, and says so.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from camkit.bundle.container import read_container
+from camkit.bundle.golden import GoldenArrays
+from camkit.bundle.manifest import GoldenCase, NetworkFacts
+from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
+from camkit.contracts import FloatArray
+from camkit.errors import CamkitError, ContractError
+from camkit.runtime.graph import check_graph
+from camkit.runtime.proofs import prove_golden, prove_range, prove_tiling
+
+LAYERS: Final = ("schema", "hash", "graph", "golden", "tiling", "range")
+Status = Literal["pass", "fail", "skip"]
+GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str], FloatArray]
+"""The whole pipeline on one golden capture: (bundle, case, arrays, size) -> (3, h, w)."""
+
+_GROUND: Final = ("schema", "hash", "graph")
+_COST_RTOL: Final = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layer:
+    """The result of one layer."""
+
+    name: str
+    status: Status
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckReport:
+    """The results of a check, in the order of the layers."""
+
+    path: Path
+    layers: tuple[Layer, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no layer failed."""
+        return all(layer.status != "fail" for layer in self.layers)
+
+    def lines(self) -> list[str]:
+        """Give one line per layer, for people."""
+        return [f"{layer.status:4}  {layer.name:7} {layer.message}" for layer in self.layers]
+
+    def to_json(self) -> dict[str, Any]:
+        """Give plain data, for programs."""
+        return {
+            "bundle": str(self.path),
+            "passed": self.passed,
+            "layers": [
+                {"name": layer.name, "status": layer.status, "message": layer.message}
+                for layer in self.layers
+            ],
+        }
+
+
+def check_bundle(
+    path: Path,
+    level: str = "all",
+    *,
+    run: GoldenRun | None = None,
+    threads: int = 1,
+) -> CheckReport:
+    """Check a bundle.
+
+    Args:
+        path: The .camkit file.
+        level: "all", or one layer, which is checked with those it stands on (schema, hash and
+            graph).
+        run: The pipeline, for the golden layer; without it only stored network inputs and
+            outputs are compared.
+        threads: Threads per run of a network.
+
+    Raises:
+        ContractError: If the level is unknown.
+    """
+    if level not in ("all", *LAYERS):
+        raise ContractError(f"level must be all or one of {', '.join(LAYERS)}; got {level!r}")
+    wanted = LAYERS if level == "all" else _needed(level)
+    proofs: dict[str, Callable[[Bundle], tuple[bool, str]]] = {
+        "hash": _prove_hashes,
+        "graph": _prove_graphs,
+        "golden": lambda bundle: prove_golden(bundle, run=run, threads=threads),
+        "tiling": lambda bundle: prove_tiling(bundle, threads=threads),
+        "range": prove_range,
+    }
+    layers = [_layer("schema", lambda: (True, _describe(Path(path))))]
+    opened: list[Bundle] = []
+    for name in wanted[1:]:
+        failed = [one.name for one in layers if one.status == "fail" and one.name in _GROUND]
+        if failed:
+            layers.append(Layer(name=name, status="skip", message=f"needs {failed[0]}"))
+        else:
+            layers.append(_layer(name, partial(_prove, proofs[name], Path(path), opened)))
+    return CheckReport(path=Path(path), layers=tuple(layers))
+
+
+def _needed(level: str) -> tuple[str, ...]:
+    below = _GROUND[: _GROUND.index(level)] if level in _GROUND else _GROUND
+    return (*below, level)
+
+
+def _prove(
+    proof: Callable[[Bundle], tuple[bool, str]], path: Path, opened: list[Bundle]
+) -> tuple[bool, str]:
+    """Run a proof on the bundle, which is opened once for all of them."""
+    if not opened:
+        opened.append(open_bundle(path))
+    return proof(opened[0])
+
+
+def _layer(name: str, prove: Callable[[], tuple[bool, str]]) -> Layer:
+    try:
+        proved, message = prove()
+    except CamkitError as error:
+        return Layer(name=name, status="fail", message=str(error))
+    return Layer(name=name, status="pass" if proved else "skip", message=message)
+
+
+def _describe(path: Path) -> str:
+    manifest = read_container_manifest(read_container(path))
+    sizes = ", ".join(manifest.networks) or "none"
+    return (
+        f"{manifest.name} {manifest.version}, format {manifest.format_version}, "
+        f"{len(manifest.members)} members, networks {sizes}"
+    )
+
+
+def _prove_hashes(bundle: Bundle) -> tuple[bool, str]:
+    return True, f"{len(bundle.names)} members as stated; bundle sha256 {bundle.sha256[:16]}"
+
+
+def _prove_graphs(bundle: Bundle) -> tuple[bool, str]:
+    networks = bundle.manifest.networks
+    if not networks:
+        return False, "no network"
+    notes = []
+    for size, facts in networks.items():
+        notes.append(f"{size}: {_prove_graph(bundle, size, facts)}")
+    return True, "; ".join(notes)
+
+
+def _prove_graph(bundle: Bundle, size: str, facts: NetworkFacts) -> str:
+    found = check_graph(bundle.network_bytes(size), facts)
+    costs = {
+        "mac_per_pixel": (found.mac_per_pixel, facts.mac_per_pixel),
+        "bytes_per_pixel": (found.bytes_per_pixel, facts.bytes_per_pixel),
+        "parameters": (float(found.parameters), float(facts.parameters)),
+    }
+    for name, (got, said) in costs.items():
+        # More memory than the walk counts may have been measured; less cannot be.
+        if got > said * (1 + _COST_RTOL) or (
+            name != "bytes_per_pixel" and got < said * (1 - _COST_RTOL)
+        ):
+            raise ContractError(f"{facts.member}: {name} is {got:g}, the manifest says {said:g}")
+    if facts.fp16_member is not None:
+        check_graph(bundle.network_bytes(size, fp16=True), facts)
+    text = (
+        f"halo {found.receptive_field_radius_px} px, stride {found.stride_px}, "
+        f"{found.mac_per_pixel / 1000:.3g} kMAC/px"
+    )
+    if found.unblocked_convolutions:
+        text += f", off the blocked path: {', '.join(found.unblocked_convolutions)}"
+    return text

@@ -1,0 +1,120 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageOps
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.color import color_stage
+from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter, turn
+from camkit.runtime.output.writer import open_writer
+
+STAGE = color_stage(None)
+
+
+class Collector(PictureWriter):
+    """Keeps what it is given."""
+
+    def __init__(self, picture: PictureFormat) -> None:
+        super().__init__(Path("nowhere"), picture)
+        self.stored: list[Codes] = []
+        self.finished = self.released = False
+
+    def encode(self, band: FloatArray) -> Codes:
+        return band
+
+    def store(self, rows: Codes) -> None:
+        self.stored.append(rows)
+
+    def finish(self) -> None:
+        self.finished = True
+
+    def release(self) -> None:
+        self.released = True
+
+
+def collector(**changes: object) -> Collector:
+    fields = {"width": 5, "height": 4, "color": STAGE} | changes
+    return Collector(PictureFormat(**fields))  # type: ignore[arg-type]
+
+
+def planes() -> FloatArray:
+    return np.arange(60, dtype=np.float32).reshape(3, 4, 5)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_turning_agrees_with_a_viewer(orientation: int) -> None:
+    pixels = np.random.default_rng(0).integers(0, 255, (4, 5, 3), dtype=np.uint8)
+    image = Image.fromarray(pixels)
+    image.getexif()[274] = orientation
+    shown = np.asarray(ImageOps.exif_transpose(image))
+    np.testing.assert_array_equal(
+        turn(pixels.transpose(2, 0, 1), orientation), shown.transpose(2, 0, 1)
+    )
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_bands_are_turned_as_a_whole(orientation: int) -> None:
+    writer = collector(orientation=orientation)
+    with writer:
+        writer.write(planes()[:, :3])
+        writer.write(planes()[:, 3:])
+    found = np.concatenate(writer.stored, axis=1)
+    np.testing.assert_array_equal(found, turn(planes(), orientation))
+    assert writer.picture.file_size == (found.shape[2], found.shape[1])
+
+
+def test_upright_bands_are_stored_at_once() -> None:
+    writer = collector()
+    writer.write(planes()[:, :2])
+    assert len(writer.stored) == 1
+
+
+def test_missing_rows_are_an_error() -> None:
+    writer = collector()
+    writer.write(planes()[:, :2])
+    with pytest.raises(ContractError, match="4 rows expected; got 2"):
+        writer.close()
+
+
+@pytest.mark.parametrize("shape", [(3, 5, 5), (3, 2, 4), (1, 2, 5), (3, 5)])
+def test_bands_that_do_not_fit_are_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ContractError, match="a band must be"):
+        collector().write(np.zeros(shape, np.float32))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_invalid_numbers_are_refused(value: float) -> None:
+    band = planes()
+    band[2, 3, 4] = value
+    with pytest.raises(ContractError, match=r"rows 0..4 hold NaN or inf"):
+        collector().write(band)
+
+
+def test_error_in_the_block_releases_without_finishing() -> None:
+    writer = collector()
+    with pytest.raises(KeyError), writer:
+        raise KeyError
+    assert writer.released
+    assert not writer.finished
+
+
+@pytest.mark.parametrize("changes", [{"width": 0}, {"height": 0}, {"orientation": 9}])
+def test_impossible_format_is_refused(changes: dict[str, object]) -> None:
+    with pytest.raises(ContractError):
+        collector(**changes)
+
+
+@pytest.mark.parametrize("kind", ["exr", "tiff", "png"])
+def test_every_format_has_a_writer(tmp_path: Path, kind: str) -> None:
+    facts = PictureFormat(width=5, height=4, color=STAGE)
+    with open_writer(tmp_path / "a", kind, facts) as writer:  # type: ignore[arg-type]
+        writer.write(planes() / 60)
+    assert (tmp_path / "a").stat().st_size > 100
+
+
+def test_unknown_format_is_refused(tmp_path: Path) -> None:
+    facts = PictureFormat(width=5, height=4, color=STAGE)
+    with pytest.raises(ContractError, match="exr, tiff or png"):
+        open_writer(tmp_path / "a", "bmp", facts)  # type: ignore[arg-type]

@@ -1,0 +1,328 @@
+import logging
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from camkit.contracts import CFA_PATTERNS
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime import raw, raw_worker
+from camkit.runtime.capture import Capture
+from camkit.runtime.raw import MosaicOptions, file_sha256, is_picture, named_bundle, read_capture
+from tests.data_folder import data_path
+from tests.dng_factory import (
+    MATRIX,
+    NOISE,
+    scene_mosaic,
+    write_monochrome,
+    write_other,
+    write_scene,
+)
+
+CFA_PHOTOMETRIC, LINEAR_RAW = 32803, 34892
+
+# visible height and width, CFA, black, white, white balance, as the table of the data set says
+REAL_FILES = {
+    "sony_a7rm3_crop_DSC2164.ARW": (3464, 5184, "RGGB", 512, 16383, (2.469, 1, 1.527), 3200),
+    "blackmagic_pocket4k.dng": (2176, 4128, "RGGB", 512, 65535, (2.206, 1, 1.887), None),
+    "canon_kissx4_magiclantern_colorchart.dng": (
+        *(1156, 1734, "RGGB", 2056, 15000),
+        *((2.477, 1, 1.694), None),
+    ),
+    "canon_g2_colorchecker_CRW_0304.CRW": (1720, 2312, "RGGB", 32, 1023, (1.628, 1, 1.597), 50),
+    "kodak_dc120_P003917.KDC": (976, 848, "GRBG", 0, 255, None, 160),
+    "canon_eos6d_linear_lossy.dng": (816, 1224, None, 0, 65535, (0.997, 1, 1.001), 1000),
+    "derived_24mp_rggb12.dng": (4000, 6000, "RGGB", 256, 4095, (2.738, 1, 1.369), None),
+}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("raw") / "scene.dng"
+    return path, write_scene(path, black=np.array([[256, 260], [264, 268]]), cfa="GRBG")
+
+
+def test_isolated_and_in_process_decodes_agree(scene):
+    path, mosaic = scene
+    isolated, inside = read_capture(path), read_capture(path, isolate=False)
+    assert np.array_equal(isolated.samples, mosaic)
+    assert np.array_equal(inside.samples, mosaic)
+    assert raw_worker.header_of(isolated) == raw_worker.header_of(inside)
+
+
+def test_everything_written_into_a_camkit_dng_comes_back(scene):
+    capture = read_capture(scene[0], isolate=False)
+    assert capture.cfa == "GRBG"
+    assert capture.black_level.tolist() == [[256, 260], [264, 268]]
+    assert capture.white_level == 4095
+    assert capture.white_balance == pytest.approx((2.0, 1.0, 1.6))
+    assert np.allclose(capture.color_matrix, MATRIX)
+    assert capture.noise == NOISE
+    assert (capture.iso, capture.exposure_time_s) == (400, 0.02)
+    assert (capture.bundle_name, capture.camera) == ("duet", "camkit duet")
+    assert (capture.origin_px, capture.sensor_size_px) == ((3, 4), (6000, 4000))
+    assert capture.pixel_pitch_um == 5.96
+    assert capture.sha256 == file_sha256(scene[0])
+    assert capture.notes == ()
+
+
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
+def test_black_levels_land_on_their_positions_in_every_layout(tmp_path, cfa):
+    black = np.array([[10, 20], [30, 40]])
+    write_scene(tmp_path / "x.dng", cfa=cfa, black=black)
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert (capture.cfa, capture.black_level.tolist()) == (cfa, black.tolist())
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_orientation_is_the_exif_number_and_samples_are_not_turned(tmp_path, orientation):
+    mosaic = write_scene(tmp_path / "x.dng", orientation=orientation)
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert capture.orientation == orientation
+    assert np.array_equal(capture.samples, mosaic)
+
+
+@pytest.mark.parametrize(
+    ("top", "left", "cfa"), [(1, 0, "GBRG"), (0, 1, "GRBG"), (1, 1, "BGGR"), (2, 2, "RGGB")]
+)
+def test_margins_are_cut_and_shift_the_pattern(tmp_path, top, left, cfa):
+    # DNG counts the pattern from the active area, which LibRaw shrinks to even margins: every
+    # layout here puts red at the even positions of the whole sensor
+    mosaic = scene_mosaic(62, 82)
+    extra = [
+        (33421, 3, 2, (2, 2), True),
+        (33422, 1, 4, bytes("RGB".index(letter) for letter in cfa), True),
+        (50713, 3, 2, (2, 2), True),
+        (50714, 4, 4, (10, 20, 30, 40), True),
+        (50717, 4, 1, 4095, True),
+        (50829, 4, 4, (top, left, 62, 82), True),
+    ]
+    write_other(tmp_path / "x.dng", mosaic, CFA_PHOTOMETRIC, extra)
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert np.array_equal(capture.samples, mosaic[top + top % 2 :, left + left % 2 :])
+    assert capture.cfa == "RGGB"
+    if top % 2 == left % 2 == 0:
+        assert capture.black_level.tolist() == [[10, 20], [30, 40]]
+
+
+def test_linear_dng_is_taken_as_planes(tmp_path):
+    planes = np.stack([scene_mosaic(seed=s) for s in range(3)])
+    extra = [(50714, 4, 3, (64, 64, 64), True), (50717, 4, 3, (4095,) * 3, True)]
+    write_other(tmp_path / "x.dng", np.moveaxis(planes, 0, -1), LINEAR_RAW, extra)
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert capture.contract == "linear_rgb_v1"
+    assert np.array_equal(capture.samples, planes)
+    assert capture.black_level.tolist() == [64, 64, 64]
+    assert "already demosaicked" in capture.notes[0]
+
+
+def test_monochrome_sensor_becomes_three_equal_planes(tmp_path):
+    plane = scene_mosaic()
+    write_monochrome(tmp_path / "x.dng", plane)
+    for isolate in (True, False):
+        capture = read_capture(tmp_path / "x.dng", isolate=isolate)
+        assert capture.cfa is None
+        assert np.array_equal(capture.samples, np.stack([plane] * 3))
+        assert capture.linear_rows(0, 2).shape == (3, 2, 80)
+        assert "monochrome" in capture.notes[0]
+
+
+def test_xtrans_mosaic_goes_through_libraws_demosaic_in_camera_space(tmp_path):
+    letters = "GBGGRG RGRBGB GBGGRG GRGGBG BGBRGR GRGGBG".replace(" ", "")
+    colors = np.array(["RGB".index(letter) for letter in letters]).reshape(6, 6)
+    levels = np.array([1000, 2000, 1500])
+    mosaic = levels[np.tile(colors, (87, 88))].astype(np.uint16)
+    mosaic += np.random.default_rng(0).integers(0, 3, mosaic.shape).astype(np.uint16)
+    extra = [
+        (33421, 3, 2, (6, 6), True),
+        (33422, 1, 36, bytes(colors.ravel().tolist()), True),
+        (50714, 4, 1, 256, True),
+        (50717, 4, 1, 4095, True),
+    ]
+    write_other(tmp_path / "x.dng", mosaic, CFA_PHOTOMETRIC, extra)
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert "LibRaw's own demosaic" in " ".join(capture.notes)
+    assert capture.samples.shape == (3, 522, 528)
+    means = capture.linear_rows(0, 522)[:, 12:-12, 12:-12].mean(axis=(1, 2))
+    assert means == pytest.approx((levels + 1 - 256) / (4095 - 256), abs=2e-3)
+
+
+def test_noise_profile_and_white_balance_may_be_missing(tmp_path):
+    write_scene(tmp_path / "x.dng", noise=None, iso=None, exposure_time_s=None, color_matrix=None)
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert (capture.noise, capture.iso, capture.exposure_time_s) == (None, None, None)
+    assert capture.color_matrix is None
+    assert "no colour matrix is known for this camera" in capture.notes
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.99])
+def test_truncated_dng_is_refused(tmp_path, share):
+    path = tmp_path / "x.dng"
+    write_scene(path)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(DecodeError, match=r"x\.dng"):
+        read_capture(path, isolate=False)
+
+
+@settings(
+    max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(flips=st.lists(st.tuples(st.integers(4, 900), st.integers(1, 255)), min_size=1, max_size=12))
+def test_flipped_header_bytes_give_a_refusal_or_a_believable_capture(scene, tmp_path, flips):
+    data = bytearray(scene[0].read_bytes())
+    for position, mask in flips:
+        data[position] ^= mask
+    path = tmp_path / "flipped.dng"
+    path.write_bytes(bytes(data))
+    try:
+        capture = read_capture(path, timeout_s=20)
+    except DecodeError:
+        return
+    assert capture.samples.min() < capture.samples.max()
+    assert capture.white_level > capture.black_level.max()
+
+
+def test_time_limit_stops_the_decoder(scene):
+    start = time.monotonic()
+    with pytest.raises(DecodeError, match=r"longer than 0\.01 s"):
+        read_capture(scene[0], timeout_s=0.01)
+    assert time.monotonic() - start < 5
+
+
+def test_memory_limit_is_a_refusal_not_a_crash(scene):
+    with pytest.raises(DecodeError):
+        read_capture(scene[0], max_memory_mb=8)
+
+
+@pytest.mark.parametrize(
+    ("program", "message"),
+    [
+        ("import os; os.abort()", "signal 6"),
+        ("import sys; sys.stderr.write('lost\\n'); sys.exit(3)", r"exit code 3 \(lost\)"),
+        ("print('{}')", "makes no sense"),
+        ("print('not JSON')", "makes no sense"),
+        ("print('[1]')", "makes no sense"),
+        ("print('x' * 3000000)", "died"),
+        (
+            'print(\'{"shape": [99999, 99999], "dtype": "uint16", "planes_sent": null}\')',
+            "makes no sense",
+        ),
+        ('print(\'{"shape": [9, 9], "dtype": "uint16", "planes_sent": null}\')', "died"),
+    ],
+)
+def test_a_child_that_misbehaves_costs_one_file(scene, monkeypatch, program, message):
+    real = subprocess.Popen
+
+    def broken_child(command, **options):
+        return real([sys.executable, "-I", "-S", "-c", program], **options)
+
+    monkeypatch.setattr(raw.subprocess, "Popen", broken_child)
+    with pytest.raises(DecodeError, match=message):
+        read_capture(scene[0])
+
+
+def test_missing_and_empty_files_are_refused(tmp_path):
+    with pytest.raises(DecodeError, match="cannot read"):
+        read_capture(tmp_path / "none.dng")
+    (tmp_path / "empty.dng").touch()
+    with pytest.raises(DecodeError, match=r"empty\.dng"):
+        read_capture(tmp_path / "empty.dng", isolate=False)
+
+
+def test_mosaic_options_for_a_raw_file_are_refused(scene):
+    with pytest.raises(ContractError, match="headerless"):
+        read_capture(scene[0], mosaic=MosaicOptions(cfa="RGGB", black_level=0, white_level=1))
+
+
+@pytest.mark.parametrize("limits", [{"timeout_s": 0}, {"max_memory_mb": 0}])
+def test_limits_must_be_positive(scene, limits):
+    with pytest.raises(ContractError, match="limits"):
+        read_capture(scene[0], **limits)
+
+
+def test_the_folder_of_the_caller_provides_no_modules(scene, tmp_path, monkeypatch):
+    (tmp_path / "numpy.py").write_text("raise SystemExit(5)")
+    monkeypatch.chdir(tmp_path)
+    assert isinstance(read_capture(scene[0]), Capture)
+
+
+def test_reading_works_in_a_script_without_main_guard(scene, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from camkit.runtime.raw import read_capture\n"
+        f"print(read_capture({str(scene[0])!r}).samples.shape)\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert done.stdout == "(60, 80)\n"
+    assert done.stderr == ""
+
+
+def test_the_bundle_is_named_without_a_decode(scene, tmp_path):
+    assert named_bundle(scene[0]) == "duet"
+    assert named_bundle(tmp_path / "none.dng") is None
+
+
+def test_content_decides_between_raw_and_picture(scene, tmp_path):
+    renamed = tmp_path / "scene.tif"
+    renamed.write_bytes(scene[0].read_bytes())
+    assert not is_picture(renamed)
+    assert not is_picture(scene[0])
+    (tmp_path / "x.dng").write_bytes(b"\x89PNG\r\n\x1a\n")
+    assert is_picture(tmp_path / "x.dng")
+
+
+def test_nothing_is_logged_by_default(scene, caplog):
+    with caplog.at_level(logging.INFO):
+        read_capture(scene[0], isolate=False)
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("name", REAL_FILES)
+def test_real_files_decode_to_what_their_table_says(name):
+    height, width, cfa, black, white, balance, iso = REAL_FILES[name]
+    isolate = name.endswith((".ARW", "24mp_rggb12.dng"))
+    capture = read_capture(data_path("raw") / name, isolate=isolate)
+    assert (capture.height, capture.width, capture.cfa) == (height, width, cfa)
+    assert (capture.black_level == black).all()
+    assert capture.white_level == white
+    if balance is None:
+        assert capture.white_balance is None
+        assert "the file has no valid white balance" in capture.notes
+    else:
+        assert capture.white_balance == pytest.approx(balance, abs=1e-3)
+    assert capture.iso == iso
+    assert (capture.color_matrix is None) == name.endswith("KDC")
+
+
+def test_the_headerless_nokia_mosaic_decodes_with_its_options():
+    path = data_path("raw/nokia_n900_bayer_grbg10.png")
+    options = MosaicOptions(cfa="GRBG", black_level=25, white_level=1023)
+    capture = read_capture(path, mosaic=options)
+    assert (capture.samples.shape, capture.samples.max()) == ((1968, 2592), 959)
+    assert (capture.cfa, capture.white_level) == ("GRBG", 1023)
+    with pytest.raises(DecodeError, match="--mosaic"):
+        read_capture(path)
+
+
+def test_every_corrupt_file_is_refused_within_seconds():
+    for path in sorted(data_path("raw/corrupt").iterdir()):
+        start = time.monotonic()
+        if path.name == "flipdata_kodak_dc120.KDC":
+            notes = " ".join(read_capture(path, isolate=False).notes)
+            assert "247 pixels" in notes
+            continue
+        with pytest.raises(DecodeError):
+            read_capture(path, max_memory_mb=2048, timeout_s=20)
+        assert time.monotonic() - start < 10, path.name
+
+
+def test_the_child_finds_a_checkout_that_is_not_installed(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", "elsewhere")
+    found = raw._child_environment()["PYTHONPATH"].split(os.pathsep)
+    assert found[0] == "elsewhere"
