@@ -24,7 +24,8 @@ if TYPE_CHECKING:
         ParityError,
         UnsupportedError,
     )
-    from camkit.runtime.batch import FileResult, process
+    from camkit.runtime.batch import process
+    from camkit.runtime.development import FileResult
     from camkit.runtime.pipeline import Pipeline, load
 
 __all__ = [
@@ -47,7 +48,7 @@ _HOMES = {
     "load": "camkit.runtime.pipeline",
     "Pipeline": "camkit.runtime.pipeline",
     "process": "camkit.runtime.batch",
-    "FileResult": "camkit.runtime.batch",
+    "FileResult": "camkit.runtime.development",
 }
 
 

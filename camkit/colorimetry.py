@@ -77,6 +77,15 @@ def camera_from_rec709(color_matrix: Matrix) -> tuple[Matrix, tuple[float, float
     return raw / neutral[:, None], (float(gains[0]), 1.0, float(gains[2]))
 
 
+def rec709_from_camera(color_matrix: Matrix) -> Matrix:
+    """Give the (3, 3) matrix from white-balanced camera RGB to linear Rec.709.
+
+    Raises:
+        ContractError: As `camera_from_rec709`, whose inverse this is.
+    """
+    return np.asarray(np.linalg.inv(camera_from_rec709(color_matrix)[0]), dtype=np.float64)
+
+
 def encode_srgb(linear: FloatArray) -> FloatArray:
     """Apply the sRGB curve to a linear signal; clipped to 0..1 first."""
     x = np.clip(linear, 0.0, 1.0)

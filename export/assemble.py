@@ -13,7 +13,7 @@ import tomllib
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from camkit.bundle.manifest import (
     Illumination,
     Manifest,
     Network,
+    NetworkSize,
     Undistort,
     WhiteBalance,
 )
@@ -52,8 +53,8 @@ from camkit.runtime.pipeline import Pipeline
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
-SIZE_ORDER: Final = "SML"
-DEFAULT_SIZE: Final = "M"
+SIZES: Final[tuple[NetworkSize, ...]] = get_args(NetworkSize)
+DEFAULT_SIZE: Final[NetworkSize] = "M"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
@@ -129,18 +130,18 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
     }
 
 
-def _read_checkpoints(paths: tuple[Path, ...]) -> dict[str, Checkpoint]:
-    found: dict[str, Checkpoint] = {}
+def _read_checkpoints(paths: tuple[Path, ...]) -> dict[NetworkSize, Checkpoint]:
+    found: dict[NetworkSize, Checkpoint] = {}
     for path in paths:
         checkpoint = read_checkpoint(path)
-        size = checkpoint.size
-        if size not in SIZE_ORDER and len(paths) == 1:
+        size = next((known for known in SIZES if known == checkpoint.size), None)
+        if size is None and len(paths) == 1:
             size = DEFAULT_SIZE
         if size in found:
             raise ContractError(f"two checkpoints are of size {size}: keep one")
-        if size not in SIZE_ORDER:
+        if size is None:
             raise ContractError(
-                f"{path} is of size {size}; a bundle holds the sizes S, M and L "
+                f"{path} is of size {checkpoint.size}; a bundle holds the sizes S, M and L "
                 "(any other network must be alone in its bundle)"
             )
         found[size] = checkpoint
@@ -148,10 +149,10 @@ def _read_checkpoints(paths: tuple[Path, ...]) -> dict[str, Checkpoint]:
         raise ContractError("export needs at least one checkpoint")
     if len({c.recipe_toml for c in found.values()}) > 1:
         raise ContractError("the checkpoints are of different recipes; train them from one")
-    return dict(sorted(found.items(), key=lambda item: SIZE_ORDER.index(item[0])))
+    return dict(sorted(found.items(), key=lambda item: SIZES.index(item[0])))
 
 
-def _recipe(checkpoints: dict[str, Checkpoint]) -> Recipe:
+def _recipe(checkpoints: dict[NetworkSize, Checkpoint]) -> Recipe:
     return to_recipe(tomllib.loads(next(iter(checkpoints.values())).recipe_toml))
 
 
@@ -191,8 +192,8 @@ def _members(parts: Parts) -> dict[str, bytes]:
 def _manifest(
     recipe: Recipe,
     parts: Parts,
-    checkpoints: dict[str, Checkpoint],
-    networks: dict[str, MeasuredNetwork],
+    checkpoints: dict[NetworkSize, Checkpoint],
+    networks: dict[NetworkSize, MeasuredNetwork],
     cases: Cases,
 ) -> Manifest:
     distance = recipe.object_distance_mm

@@ -9,7 +9,7 @@ import numpy as np
 from camkit.bundle.golden import GoldenArrays
 from camkit.bundle.manifest import Camera, GoldenCase
 from camkit.bundle.reader import Bundle
-from camkit.colorimetry import apply_matrix, camera_from_rec709
+from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.runtime.golden_run import develop_case
 from camkit.runtime.rows import ArrayRows
@@ -109,5 +109,4 @@ def _origin(camera: Camera, recipe: CaseRecipe) -> tuple[int, int]:
 def _reference(simulation: Simulation, camera: Camera, psf: FrozenPsf) -> FloatArray:
     rows = ArrayRows(simulation.clean)
     ideal = np.concatenate(list(undistort_bands(rows, psf.distortion, simulation.window)), axis=1)
-    matrix, _ = camera_from_rec709(np.array(camera.color_matrix))
-    return apply_matrix(np.linalg.inv(matrix), ideal)
+    return apply_matrix(rec709_from_camera(np.array(camera.color_matrix)), ideal)

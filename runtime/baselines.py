@@ -14,15 +14,25 @@ from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import UnsupportedError
 from camkit.runtime.blocks import Block, BlockBank, BlockFilter, ComplexArray, LocalPsf
-from camkit.runtime.wiener import apply_transfer, spread_clipped, wiener_filter
+from camkit.runtime.richardson_lucy import (
+    apply_transfer,
+    background_of,
+    richardson_lucy,
+    spread_clipped,
+)
+from camkit.runtime.wiener import wiener_filter
 
 Method = Literal["wiener", "rl", "admm-tv"]
 
 # Tuned on development pictures behind the first camera, never on test pictures.
-RL_ITERATIONS: Final = 20
-TV_WEIGHT: Final = 0.3
+RL_ROUNDS_PER_SNR: Final = 0.7
+RL_LEAST_ROUNDS: Final = 10
+RL_MOST_ROUNDS: Final = 80
+TV_WEIGHT: Final = 5.0
 TV_STEP: Final = 0.05
-ADMM_ITERATIONS: Final = 40
+ADMM_ITERATIONS: Final = 30
+FILL_ITERATIONS: Final = 6
+LEAST_RHO: Final = np.float32(1e-7)
 
 
 def restoration_bank(
@@ -69,31 +79,24 @@ def block_filter(method: str, settings: Wiener, noise: NoiseModel) -> BlockFilte
     raise UnsupportedError(f"method must be wiener, rl or admm-tv; got {method!r}")
 
 
-def richardson_lucy_filter(noise: NoiseModel, *, iterations: int = RL_ITERATIONS) -> BlockFilter:
-    """Give Richardson-Lucy for Poisson noise with read noise as a known background.
+def richardson_lucy_filter(noise: NoiseModel, *, rounds: int | None = None) -> BlockFilter:
+    """Give Richardson-Lucy as a block filter.
 
     Args:
         noise: Noise after white balance.
-        iterations: Rounds; each sharpens and raises noise.
-
-    References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background).
+        rounds: Each sharpens and raises noise; None lets the signal-to-noise ratio of the block
+            decide.
     """
-    shot = np.maximum(np.array(noise.shot), 1e-12)
-    background = (np.array(noise.read_variance) / shot).astype(np.float32)[:, None, None]
+    background = background_of(noise)
+    shot, read_variance = np.array(noise.shot), np.array(noise.read_variance)
 
     def restore(block: Block) -> FloatArray:
-        measured = np.maximum(block.samples + background, np.float32(1e-9))
+        level = np.maximum(block.samples.mean(axis=(-2, -1), dtype=np.float64), 0)
+        deviation = np.sqrt(np.maximum(shot * level + read_variance, 1e-20))
+        wanted = RL_ROUNDS_PER_SNR * float((level / deviation).mean())
+        count = int(np.clip(wanted, RL_LEAST_ROUNDS, RL_MOST_ROUNDS)) if rounds is None else rounds
         clipped = None if block.unknown is None else spread_clipped(block.unknown)
-        back = np.conj(block.otf)
-        sharp = np.maximum(block.samples, 0.1 * block.samples.mean(axis=(-2, -1), keepdims=True))
-        np.maximum(sharp, np.float32(1e-6), out=sharp)
-        for _ in range(iterations):
-            expected = np.maximum(apply_transfer(sharp, block.otf), 0) + background
-            ratio = measured / np.maximum(expected, np.float32(1e-9))
-            if clipped is not None:
-                ratio = np.where(clipped, np.maximum(ratio, 1), ratio)
-            sharp *= np.maximum(apply_transfer(ratio, back), 0)
-        return np.asarray(sharp)
+        return richardson_lucy(block.samples, block.otf, background, count, clipped)
 
     return restore
 
@@ -113,26 +116,46 @@ def admm_tv_filter(
     References: Sun 2021, eq. (2.11); Wang et al. 2008 (the splitting).
     """
     shot, read_variance = np.array(noise.shot), np.array(noise.read_variance)
+    background = background_of(noise)
 
     def restore(block: Block) -> FloatArray:
-        level = np.maximum(block.samples.mean(axis=(-2, -1), dtype=np.float64), 0)
+        samples = block.samples
+        level = np.maximum(samples.mean(axis=(-2, -1), dtype=np.float64), 0)
         level = np.maximum(level, np.sqrt(read_variance) + 1e-6)
-        beta = weight * (shot * level + read_variance) / level
+        variance = shot * level + read_variance
+        if block.unknown is not None:
+            samples, unexplained = _fill_clipped(block, background)
+            variance = np.maximum(variance, unexplained)
         # Gradients below this share of the level are taken for noise in the first round.
         threshold = (TV_STEP * level).astype(np.float32)[:, None, None]
-        rho = (beta / (TV_STEP * level)).astype(np.float32)[:, None, None]
-        return _admm_tv(block, threshold, np.maximum(rho, np.float32(1e-7)), iterations)
+        rho = (weight * variance / (TV_STEP * level * level)).astype(np.float32)[:, None, None]
+        return _admm_tv(samples, block.otf, threshold, np.maximum(rho, LEAST_RHO), iterations)
 
     return restore
 
 
-def _admm_tv(block: Block, threshold: FloatArray, rho: FloatArray, iterations: int) -> FloatArray:
-    size = block.samples.shape[-1]
-    clipped = None if block.unknown is None else spread_clipped(block.unknown)
-    back = np.conj(block.otf)
-    inverse = 1 / (np.square(np.abs(block.otf)) + rho * _gradient_power(size))
-    data: ComplexArray = back * scipy.fft.rfft2(block.samples)
-    sharp = block.samples
+def _fill_clipped(block: Block, background: FloatArray) -> tuple[FloatArray, NDArray[np.float64]]:
+    """Fill clipped samples with what Richardson-Lucy predicts, and give what it cannot explain."""
+    assert block.unknown is not None
+    clipped = spread_clipped(block.unknown)
+    lights = richardson_lucy(block.samples, block.otf, background, FILL_ITERATIONS, clipped)
+    expected = apply_transfer(lights, block.otf)
+    residual = np.where(clipped, 0, block.samples - expected)
+    filled = np.where(clipped, np.maximum(expected, block.samples), block.samples)
+    return filled, np.square(residual).mean(axis=(-2, -1), dtype=np.float64)
+
+
+def _admm_tv(
+    samples: FloatArray,
+    otf: ComplexArray,
+    threshold: FloatArray,
+    rho: FloatArray,
+    iterations: int,
+) -> FloatArray:
+    size = samples.shape[-1]
+    inverse = 1 / (np.square(np.abs(otf)) + rho * _gradient_power(size))
+    data = np.conj(otf) * scipy.fft.rfft2(samples)
+    sharp = samples
     down, across = np.zeros_like(sharp), np.zeros_like(sharp)
     dual_down, dual_across = np.zeros_like(sharp), np.zeros_like(sharp)
     for _ in range(iterations):
@@ -145,9 +168,6 @@ def _admm_tv(block: Block, threshold: FloatArray, rho: FloatArray, iterations: i
         down, across = keep * dual_down, keep * dual_across
         dual_down -= down
         dual_across -= across
-        if clipped is not None:
-            expected = np.maximum(apply_transfer(sharp, block.otf), block.samples)
-            data = back * scipy.fft.rfft2(np.where(clipped, expected, block.samples))
     return sharp
 
 

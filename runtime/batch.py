@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
-from camkit.bundle.reader import find_bundle
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.options import Options
@@ -76,10 +75,7 @@ def plan_tasks(
     Raises:
         ContractError: If two inputs would give one output, an output exists (and neither resume
             nor overwrite was asked for), or no input names a bundle.
-        BundleError: If the named bundle is refused.
     """
-    if bundle is not None and bundle.lower() != NO_BUNDLE:
-        find_bundle(bundle)
     tasks = [_plan_task(source, bundle, write) for source in sources]
     _refuse_clashes(tasks)
     refused = [t for t in tasks if t.refusal is not None]
@@ -159,7 +155,11 @@ def process(
         raise ContractError(f"jobs must be >= 1; got {jobs}")
     listed = [files] if isinstance(files, str | Path) else list(files)
     tasks = plan_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
+    if write.format == "dng":
+        options = replace(options, color="camera")
     pipelines = _Pipelines(_shared(options, jobs))
+    if bundle is not None and tasks:
+        pipelines.get(str(bundle))
     write.out_dir.mkdir(parents=True, exist_ok=True)
 
     def run(task: Task) -> FileResult:

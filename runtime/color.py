@@ -20,7 +20,7 @@ from camkit.colorimetry import (
     Matrix,
     adapt_white,
     apply_matrix,
-    camera_from_rec709,
+    rec709_from_camera,
     rec709_to_acescg,
     rgb_to_xyz,
 )
@@ -72,7 +72,7 @@ def color_stage(
         raise ContractError(f"colour must be one of {known}; got {output!r}")
     to_rec709 = np.eye(3)
     if color_matrix is not None:
-        to_rec709 = np.asarray(np.linalg.inv(camera_from_rec709(color_matrix)[0]))
+        to_rec709 = rec709_from_camera(color_matrix)
     primaries: Primaries = REC709_PRIMARIES
     white, matrix = D65, to_rec709
     if output == "acescg":
@@ -100,9 +100,9 @@ def recover_highlights(band: FloatArray, clip_levels: tuple[float, float, float]
     """Raise clipped channels so that burnt-out light is neutral, never magenta.
 
     After white balance the channels clip at different levels, so an overexposed white has too
-    little green. A clipped channel is raised to the least of the other channels, where another
-    clipped channel stands for the brightest one: a grey ramp stays grey right up to the last
-    channel that clips, a red lamp stays red, and nothing is ever lowered.
+    little green. A clipped channel is raised to the mean of the other two, where another clipped
+    channel stands for the brightest one: a grey ramp stays grey right up to the last channel
+    that clips, a red lamp stays red, and nothing is ever lowered.
 
     Args:
         band: (3, rows, w) float32, white-balanced camera RGB.
@@ -123,8 +123,8 @@ def recover_highlights(band: FloatArray, clip_levels: tuple[float, float, float]
     assumed = x + clipped * (x.max(axis=0) - x)
     raised = np.empty_like(x)
     for channel in range(3):
-        least = np.minimum(assumed[(channel + 1) % 3], assumed[(channel + 2) % 3])
-        lift = clipped[channel] * (least - x[channel])
+        others = 0.5 * (assumed[(channel + 1) % 3] + assumed[(channel + 2) % 3])
+        lift = clipped[channel] * (others - x[channel])
         raised[channel] = x[channel] + np.maximum(lift, 0.0)
     out = band.copy()
     out[:, near] = raised

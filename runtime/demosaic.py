@@ -37,7 +37,7 @@ DEMOSAIC_MARGIN_PX: Final[dict[DemosaicMethod, int]] = {
     "fast": 2,
     "quality": DIRECTIONAL_MARGIN_PX,
 }
-BAND_ROWS: Final = 64
+BAND_ROWS: Final[dict[DemosaicMethod, int]] = {"fast": 64, "quality": 128}
 
 
 def _kernel(rows: list[list[float]]) -> FloatArray:
@@ -82,19 +82,9 @@ def demosaic(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod = "fast
     """
     if mosaic.ndim != 2 or mosaic.dtype != np.float32 or 0 in mosaic.shape:
         raise ContractError(f"mosaic must be (h, w) float32; got {mosaic.dtype} {mosaic.shape}")
-    if method not in DEMOSAIC_MARGIN_PX:
-        raise ContractError(f"demosaic must be fast or quality; got {method!r}")
     if cfa not in CFA_PATTERNS:
         raise ContractError(f"CFA must be one of {', '.join(CFA_PATTERNS)}; got {cfa!r}")
-    height, width = mosaic.shape
-    margin = DEMOSAIC_MARGIN_PX[method]
-    planes = np.empty((3, height, width), dtype=np.float32)
-    for top in range(0, height, BAND_ROWS):
-        bottom = min(top + BAND_ROWS, height)
-        first, last = max(top - margin, 0), min(bottom + margin, height)
-        band = _demosaic_band(mosaic[first:last], shift_rows(cfa, first), method)
-        planes[:, top:bottom] = band[:, top - first : bottom - first]
-    return planes
+    return _demosaic_range(mosaic, cfa, method, (0, mosaic.shape[0]))
 
 
 def demosaic_rows(
@@ -123,12 +113,12 @@ def demosaic_rows(
         rows = capture.linear_rows(top, bottom)
         rows *= np.array(gains, dtype=np.float32)[:, None, None]
         return rows
-    margin = DEMOSAIC_MARGIN_PX[method]
+    margin = _margin(method)
     first, last = max(top - margin, 0), min(bottom + margin, capture.height)
     mosaic = capture.linear_rows(first, last)
     cfa = shift_rows(capture.cfa, first)
     apply_gains(mosaic, cfa, gains)
-    return demosaic(mosaic, cfa, method)[:, top - first : bottom - first]
+    return _demosaic_range(mosaic, cfa, method, (top - first, bottom - first))
 
 
 def apply_gains(mosaic: FloatArray, cfa: CfaPattern, gains: tuple[float, float, float]) -> None:
@@ -145,6 +135,27 @@ def shift_rows(cfa: CfaPattern, rows: int) -> CfaPattern:
         return cfa
     swapped = cfa[2:] + cfa[:2]
     return next(pattern for pattern in CFA_PATTERNS if pattern == swapped)
+
+
+def _margin(method: DemosaicMethod) -> int:
+    if method not in DEMOSAIC_MARGIN_PX:
+        raise ContractError(f"demosaic must be fast or quality; got {method!r}")
+    return DEMOSAIC_MARGIN_PX[method]
+
+
+def _demosaic_range(
+    mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod, rows: tuple[int, int]
+) -> FloatArray:
+    """Demosaic the given rows in bands that fit into the cache."""
+    height, width = mosaic.shape
+    margin, step = _margin(method), BAND_ROWS[method]
+    planes = np.empty((3, rows[1] - rows[0], width), dtype=np.float32)
+    for top in range(*rows, step):
+        bottom = min(top + step, rows[1])
+        first, last = max(top - margin, 0), min(bottom + margin, height)
+        band = _demosaic_band(mosaic[first:last], shift_rows(cfa, first), method)
+        planes[:, top - rows[0] : bottom - rows[0]] = band[:, top - first : bottom - first]
+    return planes
 
 
 def _demosaic_band(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod) -> FloatArray:

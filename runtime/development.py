@@ -68,7 +68,7 @@ class FileResult:
         bundle: Name of the bundle in use; None when only developed.
         size: Size of the network in use.
         seconds: Seconds per stage.
-        peak_rss_mb: Peak memory of this process so far, and of its largest child.
+        peak_rss_mb: Peak memory of this process so far, its decoding child included.
         warnings: What the user should know.
     """
 
@@ -120,11 +120,26 @@ class FileResult:
         }
 
 
-def peak_rss_mb() -> float:
-    """Give the peak memory of this process plus that of its largest child so far, in MB."""
+def peak_rss_mb(decoded_mb: float = 0.0) -> float:
+    """Give the peak memory of this process, in MB, its decoding child included.
+
+    Args:
+        decoded_mb: What `decode_peak_mb` gave when the child had ended.
+    """
+    return max(_max_rss_mb(resource.RUSAGE_SELF), decoded_mb)
+
+
+def decode_peak_mb() -> float:
+    """Give the most that this process and a decoding child can have held together so far, in MB.
+
+    To be asked when the child has ended: later the parent grows, but the child is gone.
+    """
+    return _max_rss_mb(resource.RUSAGE_SELF) + _max_rss_mb(resource.RUSAGE_CHILDREN)
+
+
+def _max_rss_mb(who: int) -> float:
     unit = 1 if sys.platform == "darwin" else 1024
-    kinds = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    return sum(resource.getrusage(kind).ru_maxrss for kind in kinds) * unit / 1e6
+    return resource.getrusage(who).ru_maxrss * unit / 1e6
 
 
 def develop_file(
@@ -144,6 +159,7 @@ def develop_file(
     began = time.perf_counter()
     capture = read_capture(source, mosaic=mosaic)
     decode_s = time.perf_counter() - began
+    decoded_mb = decode_peak_mb()
     work = pipeline.start(capture, progress=progress)
     with atomic_output(target) as part:
         write_s = _write_picture(part, work, write)
@@ -156,7 +172,7 @@ def develop_file(
         bundle=_bundle_name(pipeline),
         size=_size(pipeline),
         seconds=seconds,
-        peak_rss_mb=peak_rss_mb(),
+        peak_rss_mb=peak_rss_mb(decoded_mb),
         warnings=work.warnings,
     )
     record = {

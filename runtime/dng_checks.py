@@ -40,6 +40,14 @@ def states_white_balance(tags: TiffTags) -> bool:
     return any(tags.numbers(tag) is not None for tag in _WHITE_BALANCES)
 
 
+def is_float(tags: TiffTags) -> bool:
+    """Tell whether the sensor picture of a DNG holds floating-point samples."""
+    return is_dng(tags) and any(
+        _first(directory, _SAMPLE_FORMAT, 1) == 3
+        for directory in sensor_directories(tags.directories)
+    )
+
+
 def check_dng(tags: TiffTags, cfa: CfaPattern | None, levels: Levels) -> None:
     """Compare a decode with the tags of its DNG; other files pass.
 

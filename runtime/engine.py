@@ -77,6 +77,11 @@ def _quota_cpus(root: Path) -> int | None:
     return None
 
 
+def providers() -> tuple[str, ...]:
+    """Name what the installed onnxruntime can compute on, best first."""
+    return tuple(ort.get_available_providers())
+
+
 class NetworkEngine:
     """One network, ready to run: (1, channels, h, w) -> (1, 3, h, w), float32, on the CPU.
 

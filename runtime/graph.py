@@ -193,6 +193,8 @@ def _to_array(tensor: Any) -> NDArray[Any]:
         array: NDArray[Any] = numpy_helper.to_array(tensor)
     except (ValueError, TypeError, KeyError) as error:
         raise BundleError(f"tensor {tensor.name!r} cannot be decoded: {error}") from error
+    if array.dtype.kind not in "fiub":
+        raise BundleError(f"tensor {tensor.name!r} holds {array.dtype}; refused")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise BundleError(f"tensor {tensor.name!r} holds NaN or inf; export the network again")
     return array
@@ -211,7 +213,8 @@ def _channels(value: Any, *, what: str) -> int | None:
     """Check that a tensor is float32 (1, channels, open, open); give its channels."""
     kind = value.type.tensor_type
     if kind.elem_type != onnx.TensorProto.FLOAT:
-        name = onnx.TensorProto.DataType.Name(kind.elem_type) if kind.elem_type else "none"
+        names = {number: name for name, number in onnx.TensorProto.DataType.items()}
+        name = names.get(kind.elem_type, f"type {kind.elem_type}")
         raise BundleError(f"{what} {value.name!r} must be float32; got {name}")
     dims = list(kind.shape.dim)
     if len(dims) != 4:

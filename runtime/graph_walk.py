@@ -89,7 +89,10 @@ class _Walk:
 
     def integers(self, node: Node, index: int) -> list[int]:
         self.constant_shape(node, index)
-        return [int(value) for value in self.constants[node.inputs[index]].ravel()]
+        values = self.constants[node.inputs[index]]
+        if values.dtype.kind not in "iu":
+            raise BundleError(f"{node.label}: input {index} must be integers; got {values.dtype}")
+        return [int(value) for value in values.ravel()]
 
     def pass_through(self, node: Node, channels: int, windows: Windows) -> Extent:
         """Give the extent behind a node with windows, and remember them for the way back."""

@@ -53,11 +53,17 @@ class Node:
 
     def integers(self, name: str, default: list[int]) -> list[int]:
         """Give an attribute that is a list of integers."""
-        return [int(value) for value in self.attributes.get(name, default)]
+        values = self.attributes.get(name, default)
+        if not isinstance(values, list) or not all(isinstance(v, int) for v in values):
+            raise BundleError(f"{self.label}: {name} must be a list of integers; got {values!r}")
+        return values
 
     def integer(self, name: str, default: int) -> int:
         """Give an attribute that is an integer."""
-        return int(self.attributes.get(name, default))
+        value = self.attributes.get(name, default)
+        if not isinstance(value, int):
+            raise BundleError(f"{self.label}: {name} must be an integer; got {value!r}")
+        return value
 
     def text(self, name: str, default: str) -> str:
         """Give an attribute that is a word."""

@@ -23,7 +23,7 @@ from camkit.runtime.engine import NetworkEngine, available_threads
 from camkit.runtime.graph import check_graph
 from camkit.runtime.options import Options
 from camkit.runtime.raw import read_capture
-from camkit.runtime.reconstruction import Reconstruction
+from camkit.runtime.reconstruction import Reconstruction, Setup
 from camkit.runtime.tiling import Cancel, Progress
 
 
@@ -68,7 +68,10 @@ class Pipeline:
         Raises:
             ContractError: If capture and bundle do not fit each other.
         """
-        return Reconstruction(self, capture, progress=progress, cancel=cancel)
+        setup = Setup(
+            bundle=self.bundle, options=self.options, engine=self.engine, threads=self.threads
+        )
+        return Reconstruction(setup, capture, progress=progress, cancel=cancel)
 
     def process(
         self,

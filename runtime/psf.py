@@ -99,7 +99,8 @@ def kernel_at(
     """Give the kernel of an image point, turned so that its radial direction points outward.
 
     Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
-    zero outside, negatives cut, normalised. On the axis nothing is turned.
+    zero outside, negatives cut, normalised. On the axis nothing is turned, and neither is the PSF
+    of a single field: one PSF for all places has no direction.
 
     Args:
         kernels: (field, 3, h, w) float32, stored for points along +y (down the rows), odd sides.
@@ -120,7 +121,7 @@ def kernel_at(
         )
     height_mm = float(np.hypot(x_mm, y_mm))
     kernel = _blend(kernels, field_heights_mm, height_mm)
-    if x_mm != 0.0:
+    if x_mm != 0.0 and field_heights_mm.size > 1:
         kernel = _turn(kernel, abs(x_mm) / height_mm, abs(y_mm) / height_mm)
     np.maximum(kernel, 0, out=kernel)
     # Float64 sums: a sum in another order must not move the result.

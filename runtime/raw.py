@@ -192,8 +192,12 @@ def _death(code: int, complaints: IO[bytes]) -> str:
 
 
 def _child_environment() -> dict[str, str]:
-    """Let the child find this camkit also when it runs from a checkout that is not installed."""
-    environment = dict(os.environ)
+    """Let the child find this camkit also when it runs from a checkout that is not installed.
+
+    Threads reserve address space (stacks, arenas), which on a machine with many cores would fill
+    the memory limit by itself; decoding uses few of them anyway.
+    """
+    environment = {"OMP_NUM_THREADS": "4", **os.environ, "OPENBLAS_NUM_THREADS": "1"}
     root = str(Path(camkit.__file__).resolve().parents[1])
     if not root.endswith(("site-packages", "dist-packages")):
         known = environment.get("PYTHONPATH")

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel
-from camkit.errors import DecodeError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime import dng_checks, raw_checks, raw_tags
 from camkit.runtime.capture import Capture
 from camkit.runtime.tiff_tags import TiffTags, read_tiff_tags
@@ -65,6 +65,8 @@ def _decoded(path: Path) -> Iterator[Capture]:
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         text = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
         raise DecodeError(f"LibRaw cannot decode the file: {text}") from error
+    except (ContractError, ValueError, TypeError, LookupError, OverflowError) as error:
+        raise DecodeError(f"LibRaw's answer makes no sense: {error}") from error
     except MemoryError as error:
         raise DecodeError("decoding needs more memory than allowed; raise max_memory_mb") from error
 
@@ -76,6 +78,8 @@ def _to_capture(raw: Any, tags: TiffTags) -> Capture:
     notes: list[str] = []
     if abs(sizes.pixel_aspect - 1) > 0.01:
         notes.append(f"pixels are not square (aspect {sizes.pixel_aspect:.3f}); shape kept")
+    if dng_checks.is_float(tags):
+        notes.append("floating-point DNG: LibRaw rescales it to 14-bit integers")
     cfa = _cfa(raw)
     # black levels are read before any postprocess, which subtracts and overwrites them
     black, white = _black_level(raw, cfa), float(raw.white_level)

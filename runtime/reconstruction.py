@@ -7,7 +7,8 @@ Nothing is computed before the first band is asked for; a `Reconstruction` serve
 """
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 
@@ -21,12 +22,13 @@ from camkit.runtime.blocks import BlockBank, LocalPsf
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock, TimedRows
 from camkit.runtime.color import color_stage, recover_highlights, to_output
+from camkit.runtime.engine import NetworkEngine
 from camkit.runtime.front_rows import FrontRows
 from camkit.runtime.illumination import divide_illumination
 from camkit.runtime.noise import measure_noise
 from camkit.runtime.placement import Placement, place, scale_kernels
 from camkit.runtime.psf import color_kernels
-from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
 from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
 from camkit.runtime.stabilise import stabilise, unstabilise
 from camkit.runtime.tiling import (
@@ -39,14 +41,28 @@ from camkit.runtime.tiling import (
 )
 from camkit.runtime.warp import undistort_bands
 
-if TYPE_CHECKING:
-    from camkit.runtime.pipeline import Pipeline
-
 BAND_ROWS: Final = 128
 FIXED_BYTES: Final = 260_000_000
 """Interpreter, libraries and what the stages keep besides planes (measured, see docs)."""
 ROW_BYTES_PER_COLUMN: Final = 60_000
 """Rolling rows of all stages together, per column of the picture (measured, see docs)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """What all captures of a pipeline share.
+
+    Attributes:
+        bundle: The camera; None develops only.
+        options: What the caller chose.
+        engine: The network; None for the classical methods.
+        threads: Threads to compute with.
+    """
+
+    bundle: Bundle | None
+    options: Options
+    engine: NetworkEngine | None
+    threads: int
 
 
 class Reconstruction:
@@ -60,14 +76,14 @@ class Reconstruction:
 
     def __init__(
         self,
-        pipeline: "Pipeline",
+        setup: Setup,
         capture: Capture,
         *,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
     ) -> None:
         self.capture = capture
-        self._pipeline = pipeline
+        self._setup = setup
         self._progress = progress
         self._cancel = cancel
         self._clock = StageClock()
@@ -77,8 +93,8 @@ class Reconstruction:
         self.white_balance = self._choose_white_balance()
         self.color = color_stage(
             self._choose_color_matrix(),
-            pipeline.options.color,
-            exposure_ev=pipeline.options.exposure_ev,
+            setup.options.color,
+            exposure_ev=setup.options.exposure_ev,
         )
         self._placement = self._place()
         self._noise = self._choose_noise()
@@ -109,7 +125,7 @@ class Reconstruction:
 
     def bands(self) -> Iterator[FloatArray]:
         """Yield finished bands (3, rows, w) of the output colour, from top to bottom."""
-        bundle = self._pipeline.bundle
+        bundle = self._setup.bundle
         rows = self._front_rows()
         if bundle is not None:
             rows = self._restored_rows(bundle, rows)
@@ -147,12 +163,12 @@ class Reconstruction:
     # What is decided beforehand.
 
     def _choose_white_balance(self) -> tuple[float, float, float]:
-        chosen = self._pipeline.options.white_balance or self.capture.white_balance
+        chosen = self._setup.options.white_balance or self.capture.white_balance
         if chosen is not None:
             return chosen
         if self.capture.cfa is None:
             return (1.0, 1.0, 1.0)
-        bundle = self._pipeline.bundle
+        bundle = self._setup.bundle
         if bundle is None:
             self._warnings.append("the file states no white balance: gains of 1 are used")
             return (1.0, 1.0, 1.0)
@@ -169,13 +185,13 @@ class Reconstruction:
             return self.capture.color_matrix
         if self.capture.cfa is None:
             return None
-        if self._pipeline.bundle is not None:
-            return np.array(self._pipeline.bundle.manifest.camera.color_matrix)
+        if self._setup.bundle is not None:
+            return np.array(self._setup.bundle.manifest.camera.color_matrix)
         self._warnings.append("the file states no colour matrix: camera RGB is taken as Rec.709")
         return None
 
     def _place(self) -> Placement | None:
-        bundle = self._pipeline.bundle
+        bundle = self._setup.bundle
         if bundle is None:
             return None
         wanted = bundle.manifest.input_contract
@@ -187,7 +203,7 @@ class Reconstruction:
                 )
             self._warnings.append("a linear RGB capture in a raw_bayer_v1 bundle: not demosaicked")
         placement = place(
-            self.capture, bundle.manifest.camera, self._pipeline.options.assume
+            self.capture, bundle.manifest.camera, self._setup.options.assume
         )
         if placement.note:
             self._warnings.append(placement.note)
@@ -195,7 +211,7 @@ class Reconstruction:
 
     def _choose_noise(self) -> NoiseModel | None:
         """Give the noise after white balance: of the file, else the bundle's at its ISO, else measured."""
-        bundle = self._pipeline.bundle
+        bundle = self._setup.bundle
         if bundle is None:
             return None
         if self.capture.noise is not None:
@@ -213,10 +229,10 @@ class Reconstruction:
         return noise.with_gains(self.white_balance)
 
     def _plan_tiles(self) -> TilePlan | None:
-        engine, bundle = self._pipeline.engine, self._pipeline.bundle
+        engine, bundle = self._setup.engine, self._setup.bundle
         if engine is None or bundle is None:
             return None
-        options = self._pipeline.options
+        options = self._setup.options
         facts = bundle.network_facts(options.size)
         halo = facts.reach_px if options.mode != "fast" else fast_halo_px(facts.halo_error)
         memory = options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
@@ -244,8 +260,8 @@ class Reconstruction:
         self._front = FrontRows(
             self.capture,
             self.white_balance,
-            method=self._pipeline.options.demosaic,
-            repair=self._pipeline.bundle is not None,
+            method=self._setup.options.demosaic,
+            repair=self._setup.bundle is not None,
         )
         return TimedRows(self._front, self._clock, "demosaic")
 
@@ -258,14 +274,14 @@ class Reconstruction:
         Raises:
             ContractError: If there is no bundle, or it has no Wiener stage.
         """
-        bundle = self._pipeline.bundle
+        bundle = self._setup.bundle
         if bundle is None or bundle.manifest.stage(Wiener) is None:
             raise ContractError("a network stands behind the Wiener bank of a bundle")
         _, source = self._bank_rows(bundle, self._front_rows(), scale)
         return source.read(0, self.capture.height)
 
     def _restored_rows(self, bundle: Bundle, front: RowSource) -> RowSource:
-        engine, stage, noise = self._pipeline.engine, bundle.manifest.stage(Network), self._noise
+        engine, stage, noise = self._setup.engine, bundle.manifest.stage(Network), self._noise
         with_network = self._tiles is not None and stage is not None
         restored, source = self._bank_rows(
             bundle, front, stage.scale if with_network and stage is not None else None
@@ -293,7 +309,7 @@ class Reconstruction:
 
         Only one of the two may be read.
         """
-        noise, method = self._noise, self._pipeline.options.method
+        noise, method = self._noise, self._setup.options.method
         bank = self._bank(bundle)
         if bank is None or noise is None:
             return front, front
@@ -326,19 +342,19 @@ class Reconstruction:
             field_heights_mm=psf.field_heights_mm,
             window=self._placement.window,
         )
-        method = self._pipeline.options.method
+        method = self._setup.options.method
         return restoration_bank(
             local,
             stage,
             self._noise,
             method="wiener" if method == "net" else method,
-            threads=self._pipeline.threads,
+            threads=self._setup.threads,
         )
 
     def _corrected_rows(self, bundle: Bundle, rows: RowSource) -> RowSource:
         if self._placement is None:
             return rows
-        options, manifest, psf = self._pipeline.options, bundle.manifest, bundle.psf
+        options, manifest, psf = self._setup.options, bundle.manifest, bundle.psf
         window = self._placement.window
         if options.vignetting and manifest.stage(Illumination) is not None:
             rows = TimedRows(

@@ -17,8 +17,8 @@ from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import CfaPattern, FloatArray, FrozenPsf, NoiseModel, cfa_channels
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.illumination import illumination_band
-from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
+from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.psf import color_kernels, kernel_at
 from camkit.runtime.scatter import KernelLookup, scatter
 from camkit.runtime.sensor_window import SensorWindow, centred_origin

@@ -296,7 +296,8 @@ def infer_bands(
         raise ContractError(
             f"the plan is for {plan.width_px}x{plan.height_px}, the picture {width}x{height}"
         )
-    window = np.empty((1, channels, plan.window_height_px, plan.window_width_px), dtype=np.float32)
+    shape = (1, channels, plan.window_height_px, plan.window_width_px)
+    window = np.empty(shape, np.float32) if len(plan.columns) > 1 else None
     buffer = _RowBuffer(source, plan)
     done = 0
     for i, row in enumerate(plan.rows):
@@ -305,9 +306,8 @@ def infer_bands(
         for j, column in enumerate(plan.columns):
             if _is_cancelled(cancel):
                 raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
-            left = column.origin_px
-            np.copyto(window[0], held[:, :, left : left + plan.window_width_px])
-            kept = _kept(run(window), row, column, (height, width))
+            filled = _filled(window, held, column.origin_px)
+            kept = _kept(run(filled), row, column, (height, width))
             if not (np.isfinite(kept.min()) and np.isfinite(kept.max())):
                 raise ContractError(_not_finite_message(i, j, row, column))
             band[:, :, column.start_px : min(column.stop_px, width)] = kept
@@ -315,6 +315,14 @@ def infer_bands(
             if progress is not None:
                 progress(done, plan.window_count)
         yield band
+
+
+def _filled(window: FloatArray | None, held: FloatArray, left: int) -> FloatArray:
+    """Copy the columns of a window; a window as wide as the picture is the row buffer itself."""
+    if window is None:
+        return held[None]
+    np.copyto(window[0], held[:, :, left : left + window.shape[3]])
+    return window
 
 
 def _kept(output: FloatArray, row: Span, column: Span, size: tuple[int, int]) -> FloatArray:

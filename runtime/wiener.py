@@ -2,28 +2,36 @@
 
     X = Y conj(H) / (|H|^2 + N / S),  S(f) = prior_scale * level^2 * (f^2 + f0^2)^(-exponent / 2)
 
-Clipped pixels are unknown: they are filled with what the restored block predicts for them.
+Where the sensor clipped, a linear filter would turn the missing light into rings over the whole
+block. There a few rounds of Richardson-Lucy, which take clipped samples as "at least this bright",
+explain the lights first; the Wiener filter gets what they leave unexplained, which counts as noise.
 """
 
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 import scipy.fft
-import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.runtime.blocks import Block, BlockBank, BlockFilter, ComplexArray, LocalPsf
+from camkit.runtime.richardson_lucy import (
+    apply_transfer,
+    background_of,
+    richardson_lucy,
+    spread_clipped,
+)
 
 CORNER_FREQUENCY: Final = 1 / 512
 """f0 in cycles/pixel: below it the prior no longer rises."""
 
-LEAST_NSR: Final = 1e-6
-"""Keeps float32 rounding from being raised where the OTF vanishes."""
+LEAST_POWER: Final = 1e-12
 
-CLIPPED_REACH_PX: Final = 2
-"""How far the demosaic spreads a clipped sample."""
+KERNEL_ERROR: Final = 1e-2
+"""Least NSR where the OTF is far from 1: the real lens differs from the frozen PSF, and what the
+frozen OTF calls almost nothing must not be raised without end."""
 
 
 def wiener_bank(
@@ -50,89 +58,54 @@ def wiener_filter(settings: Wiener, noise: NoiseModel) -> BlockFilter:
     """Give the Wiener filter of one block as a block filter.
 
     Args:
-        settings: Prior and clip iterations.
+        settings: Prior, and rounds of Richardson-Lucy for clipped blocks.
         noise: Noise after white balance.
 
     References: Sun 2021, eq. (2.9); van der Schaaf and van Hateren 1996 (natural-image prior).
     """
-    rise = _prior_rise(settings.block_px, settings.prior_exponent)
+    shot, read_variance = np.array(noise.shot), np.array(noise.read_variance)
+    background = background_of(noise)
 
     def restore(block: Block) -> FloatArray:
-        size_px = block.samples.shape[-1]
-        known = (
-            rise if size_px == settings.block_px else _prior_rise(size_px, settings.prior_exponent)
-        )
-        gain = _gain(block, known, noise_to_signal(block.samples, noise, settings.prior_scale))
+        level = np.maximum(block.samples.mean(axis=(-2, -1), dtype=np.float64), 0)
+        variance = shot * level + read_variance
+        # A block darker than its read noise is taken to hold that much signal.
+        power = np.maximum(np.maximum(level * level, read_variance), LEAST_POWER)
+        rise = _prior_rise(block.samples.shape[-1], settings.prior_exponent)
         if block.unknown is None or settings.clip_iterations == 0:
+            gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
             return apply_transfer(block.samples, gain)
-        return _restore_clipped(
-            block, spread_clipped(block.unknown), gain, settings.clip_iterations
+        unknown = spread_clipped(block.unknown)
+        lights = richardson_lucy(
+            block.samples, block.otf, background, settings.clip_iterations, unknown
         )
+        residual = block.samples - apply_transfer(lights, block.otf)
+        np.copyto(residual, 0, where=unknown)
+        unexplained = np.square(residual).mean(axis=(-2, -1), dtype=np.float64)
+        variance = np.maximum(variance, unexplained)
+        gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
+        return lights + apply_transfer(residual, gain)
 
     return restore
 
 
-def noise_to_signal(samples: FloatArray, noise: NoiseModel, prior_scale: float) -> FloatArray:
-    """Give noise variance / (prior_scale * level^2) per colour at the block's mean level.
-
-    Args:
-        samples: (3, h, w).
-        noise: Noise after white balance.
-        prior_scale: Scale of the prior.
-
-    Returns:
-        (3,) float32.
-    """
-    level = np.maximum(samples.mean(axis=(-2, -1), dtype=np.float64), 0)
-    read_variance = np.array(noise.read_variance)
-    variance = np.array(noise.shot) * level + read_variance
-    # A block darker than its read noise is taken to hold that much signal.
-    power = np.maximum(np.maximum(level * level, read_variance), 1e-12)
-    return np.asarray(variance / (prior_scale * power), dtype=np.float32)
-
-
-def apply_transfer(samples: FloatArray, transfer: ComplexArray) -> FloatArray:
-    """Multiply the spectrum of a periodic (3, h, w) block by a transfer function."""
-    spectrum = scipy.fft.rfft2(samples)
-    spectrum *= transfer
-    return np.asarray(scipy.fft.irfft2(spectrum, s=samples.shape[-2:], overwrite_x=True))
-
-
+@lru_cache(maxsize=4)
 def _prior_rise(block_px: int, exponent: float) -> FloatArray:
     """Give 1 / S(f) for a prior scale and level of one, (b, b // 2 + 1)."""
     fy, fx = scipy.fft.fftfreq(block_px)[:, None], scipy.fft.rfftfreq(block_px)[None, :]
-    rise = (fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (exponent / 2)
-    return np.asarray(rise, dtype=np.float32)
+    rise = ((fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (exponent / 2)).astype(np.float32)
+    rise.flags.writeable = False
+    return np.asarray(rise)
 
 
-def _gain(block: Block, rise: FloatArray, ratio: FloatArray) -> ComplexArray:
-    power = np.square(block.otf.real)
-    power += np.square(block.otf.imag)
-    nsr = ratio[:, None, None] * rise
-    np.maximum(nsr, np.float32(LEAST_NSR), out=nsr)
+def _gain(otf: ComplexArray, rise: FloatArray, ratio: NDArray[np.float64]) -> ComplexArray:
+    """Give conj(H) / (|H|^2 + NSR); `ratio` is NSR per colour where the rise is one."""
+    power = np.square(otf.real)
+    power += np.square(otf.imag)
+    nsr = ratio.astype(np.float32)[:, None, None] * rise
+    np.maximum(nsr, np.float32(KERNEL_ERROR) * (1 - power), out=nsr)
     nsr[:, 0, 0] = 0
     power += nsr
-    gain = np.conj(block.otf)
+    gain = np.conj(otf)
     gain /= power
     return gain
-
-
-def spread_clipped(saturated: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Widen a (c, h, w) mask of clipped samples to all that the demosaic made of them."""
-    side = 2 * CLIPPED_REACH_PX + 1
-    wide = scipy.ndimage.maximum_filter(
-        saturated.astype(np.uint8), size=(1, side, side), mode="constant"
-    )
-    return np.asarray(wide, dtype=np.bool_)
-
-
-def _restore_clipped(
-    block: Block, unknown: NDArray[np.bool_], gain: ComplexArray, iterations: int
-) -> FloatArray:
-    """Deconvolve and fill the clipped samples in turn; a fill never falls below the sample."""
-    restored = apply_transfer(block.samples, gain)
-    for _ in range(iterations):
-        expected = apply_transfer(np.maximum(restored, 0), block.otf)
-        np.maximum(expected, block.samples, out=expected)
-        restored = apply_transfer(np.where(unknown, expected, block.samples), gain)
-    return restored

@@ -1,186 +1,172 @@
-"""Freezing: a lens in front of a camera becomes a `FrozenPsf`, with as few samples as needed.
+"""Freezing a prescription: as few PSF samples and as large blocks as the stated loss allows.
 
-    trace densely -> choose the kernel side -> average over wavelength bands -> FrozenPsf
-    dense PSF against sparse ones (`frozen_loss`) -> FreezeReport
-
-A kernel of the frozen PSF is the average over the triangle of wavelengths that the lookup gives
-to its sample (flat spectrum), not the kernel at one wavelength: lateral colour then smears as in
-the lens and does not fall apart into separate images.
+candidates -> frozen_loss (dB of the Wiener filter alone) -> FrozenPsf -> psf.safetensors,
+FrozenPsf -> block_loss of block grids -> FreezeReport
 """
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Final
 
-import numpy as np
-import torch
-from numpy.typing import NDArray
-from torch import Tensor
-
 from camkit.bundle.camera import Camera
+from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
-from camkit.models_def.optics.distortion import trace_distortion
-from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
-from camkit.models_def.optics.spot import relative_illumination
-from camkit.models_def.sensors.psf import wavelength_weights
-from camkit.units import UM_PER_MM
+from camkit.models_def.optics.frozen import (
+    FreezeGrid,
+    Frozen,
+    freeze,
+    freeze_at,
+    freeze_stress,
+)
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import Lens, read_prescription
+from camkit.models_def.optics.sampling import Bench, Loss, block_loss, frozen_loss, make_bench
+from camkit.models_def.sensors.wiener import PRIOR_EXPONENT, PRIOR_SCALE
 
-FloatGrid = NDArray[np.float64]
+__all__ = [
+    "FreezeGrid",
+    "FreezeReport",
+    "Frozen",
+    "choose_blocks",
+    "choose_samples",
+    "freeze",
+    "freeze_at",
+    "freeze_prescription",
+    "freeze_stress",
+]
 
-STRESS_DEPTHS_MM: Final = (5e3, 1e4, 2e4, 5e4, math.inf)
-STRESS_FIELDS: Final = (0.0, 0.7, 1.0)
-STRESS_WAVELENGTHS: Final = 3
-_BANDS_PER_SAMPLE: Final = 4
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FreezeGrid:
-    """Where a PSF is sampled.
-
-    Attributes:
-        fields: Heights from the axis to the corner, evenly spaced.
-        wavelengths: Evenly spaced over the camera's response.
-        depths_mm: Object distances, increasing.
-        energy: Least share of the light of every colour that the kernels must hold.
-        max_side_px: Largest odd kernel side.
-        rays: In half the pupil, per wavelength traced.
-    """
-
-    fields: int = 13
-    wavelengths: int = 7
-    depths_mm: tuple[float, ...] = (math.inf,)
-    energy: float = 0.995
-    max_side_px: int = 129
-    rays: int = 4096
-
-    def __post_init__(self) -> None:
-        if self.fields < 2 or self.wavelengths < 1 or not self.depths_mm:
-            raise ContractError(f"a PSF needs 2 fields, 1 wavelength and 1 depth; got {self}")
-        if self.max_side_px % 2 == 0 or not 0 < self.energy <= 1:
-            raise ContractError(
-                f"need an odd side and an energy in 0..1; got {self.max_side_px}, {self.energy}"
-            )
+LOSS_LIMIT_DB: Final = 0.05
+FIELD_COUNTS: Final = (7, 9, 11, 13, 17, 21, 25)
+WAVELENGTH_COUNTS: Final = (3, 5, 7, 9, 11, 13)
+BLOCKS: Final = ((768, 160), (512, 160), (384, 160), (512, 192), (384, 192))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Frozen:
-    """A frozen PSF and the light its kernels hold.
+class FreezeReport:
+    """What freezing kept and what it cost; every value goes into the manifest.
 
     Attributes:
-        psf: What the bundle stores.
-        energy_kept: Least share of the light of a colour inside the kernels.
+        fields: Field heights kept.
+        wavelengths: Wavelengths kept.
+        side_px: Kernel side.
+        energy_kept: Least share of a colour's light inside a kernel.
+        loss_db: Mean loss against the PSF traced at the place of use.
+        worst_loss_db: The same at the worst place, copy and ISO.
+        loss_limit_db: What was allowed for the mean.
+        block_px: Chosen block of the Wiener bank.
+        overlap_px: Its overlap.
+        block_loss_db: Mean loss of one kernel per block.
+        efl_mm: Of the lens.
+        corner_illumination: Relative illumination at the corner.
     """
 
-    psf: FrozenPsf
+    fields: int
+    wavelengths: int
+    side_px: int
     energy_kept: float
+    loss_db: float
+    worst_loss_db: float
+    loss_limit_db: float
+    block_px: int
+    overlap_px: int
+    block_loss_db: float
+    efl_mm: float
+    corner_illumination: float
+
+    def to_json(self) -> dict[str, int | float | str]:
+        """Give the report as a flat mapping."""
+        return {k: round(v, 5) if isinstance(v, float) else v for k, v in asdict(self).items()}
 
 
-def corner_height_mm(camera: Camera) -> float:
-    """Give half the diagonal of the sensor, by its outermost pixel edges."""
-    diagonal_px = math.hypot(camera.width_px, camera.height_px)
-    return diagonal_px / 2 * camera.pixel_pitch_um / UM_PER_MM
+def choose_samples(
+    lens: Lens, camera: Camera, bench: Bench, *, limit_db: float = LOSS_LIMIT_DB
+) -> tuple[Frozen, Loss]:
+    """Freeze with the least wavelengths, then the least fields, whose mean loss is allowed.
 
-
-def freeze(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) -> Frozen:
-    """Trace the PSF of a lens on a grid of fields, depths and wavelengths.
-
-    Args:
-        lens: The prescription.
-        camera: Sensor size, pitch and colour response.
-        grid: 13 fields, 7 wavelengths, infinity by default.
+    Wavelengths are chosen with the most fields and half of the allowance.
 
     Raises:
-        ContractError: If the largest side does not hold the wanted light.
+        ContractError: If even the densest grid loses more.
     """
-    chosen = grid or FreezeGrid()
-    heights_mm = np.linspace(0.0, corner_height_mm(camera), chosen.fields)
-    return freeze_at(lens, camera, chosen, heights_mm)
-
-
-def freeze_at(lens: Lens, camera: Camera, grid: FreezeGrid, heights_mm: FloatGrid) -> Frozen:
-    """Trace the PSF at given sensor heights (`grid.fields` is not used)."""
-    response_um, response = camera.channel_response.to_arrays()
-    waves_um = np.linspace(response_um[0], response_um[-1], grid.wavelengths)
-    if grid.wavelengths == 1:
-        waves_um = np.array([lens.reference_wavelength_um])
-    fine_um, bands = _bands(waves_um)
-    traced = [
-        _trace(with_object_distance(lens, depth), camera, grid, (heights_mm, fine_um))
-        for depth in grid.depths_mm
-    ]
-    weights = torch.from_numpy(wavelength_weights(fine_um, response_um, response))
-    side_px, kept = _smallest_side(traced, weights, grid)
-    kernels = torch.stack([_average(t, bands, side_px) for t in traced], dim=1)
-    light = relative_illumination(lens, torch.from_numpy(heights_mm))
-    psf = FrozenPsf(
-        kernels=kernels.to(torch.float32).numpy(),
-        field_heights_mm=heights_mm,
-        depths_mm=np.array(grid.depths_mm, dtype=np.float64),
-        wavelengths_um=waves_um,
-        pixel_pitch_um=camera.pixel_pitch_um,
-        distortion=trace_distortion(lens, corner_height_mm(camera)),
-        relative_illumination=light.numpy() / float(light[0]),
-    )
-    return Frozen(psf=psf, energy_kept=kept)
-
-
-def dense_grid(grid: FreezeGrid) -> FreezeGrid:
-    """Give the grid with twice the field and three times the wavelength density."""
-    return replace(grid, fields=2 * grid.fields - 1, wavelengths=3 * grid.wavelengths - 2)
-
-
-def freeze_stress(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) -> Frozen:
-    """Trace kernels off the design point: object distances at three fields.
-
-    The sensor stays where it is, so a distance d is also a focus error of EFL^2 / d.
-    """
-    base = grid or FreezeGrid()
-    stress = replace(base, depths_mm=STRESS_DEPTHS_MM, wavelengths=STRESS_WAVELENGTHS, energy=0.98)
-    heights_mm = np.array(STRESS_FIELDS) * corner_height_mm(camera)
-    return freeze_at(lens, camera, stress, heights_mm)
-
-
-def _bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
-    """Give fine wavelengths and (sample, fine) weights: triangles around the samples."""
-    count = (waves_um.size - 1) * _BANDS_PER_SAMPLE + 1
-    fine_um = np.linspace(waves_um[0], waves_um[-1], count)
-    triangles = np.stack([np.interp(fine_um, waves_um, unit) for unit in np.eye(waves_um.size)])
-    return fine_um, torch.from_numpy(triangles / triangles.sum(axis=1, keepdims=True))
-
-
-def _trace(lens: Lens, camera: Camera, grid: FreezeGrid, at: tuple[FloatGrid, FloatGrid]) -> TracedPsf:
-    heights_mm, waves_um = (torch.from_numpy(values) for values in at)
-    with torch.no_grad():
-        return trace_psf(
-            lens, heights_mm, waves_um, grid.max_side_px, camera.pixel_pitch_um, rays=grid.rays
-        )
-
-
-def _smallest_side(
-    traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid
-) -> tuple[int, float]:
-    """Give the smallest odd side that holds the wanted light of every colour, and what it holds."""
-    full = torch.stack([t.kernels * t.energy_kept[..., None, None] for t in traced])
-    colours = torch.einsum("cw,dfwij->dfcij", weights, full)
-    kept = 0.0
-    for side_px in range(3, grid.max_side_px + 1, 2):
-        kept = float(_centre(colours, side_px).sum((-2, -1)).min())
-        if kept >= grid.energy:
-            return side_px, kept
+    fields = FIELD_COUNTS[-1]
+    waves = WAVELENGTH_COUNTS[-1]
+    for count in WAVELENGTH_COUNTS:
+        frozen = freeze(lens, camera, FreezeGrid(fields=fields, wavelengths=count))
+        if frozen_loss(frozen.psf, bench).mean_db <= limit_db / 2:
+            waves = count
+            break
+    loss = Loss(mean_db=0.0, worst_db=0.0)
+    for count in FIELD_COUNTS:
+        frozen = freeze(lens, camera, FreezeGrid(fields=count, wavelengths=waves))
+        loss = frozen_loss(frozen.psf, bench)
+        if loss.mean_db <= limit_db:
+            return frozen, loss
     raise ContractError(
-        f"kernels of {grid.max_side_px} px hold {kept:.4f} of the light, wanted {grid.energy}; "
-        "raise max_side_px, lower the energy, or use a better lens"
+        f"{fields} fields and {waves} wavelengths lose {loss.mean_db:.3f} dB, more than the "
+        f"allowed {limit_db}; allow more or use a smoother lens"
     )
 
 
-def _average(traced: TracedPsf, bands: Tensor, side_px: int) -> Tensor:
-    full = traced.kernels * traced.energy_kept[..., None, None]
-    kernels = _centre(torch.einsum("sw,fwij->fsij", bands, full), side_px)
-    return kernels / kernels.sum((-2, -1), keepdim=True)
+def choose_blocks(
+    psf: FrozenPsf, bench: Bench, *, limit_db: float = LOSS_LIMIT_DB
+) -> tuple[Wiener, Loss]:
+    """Give the cheapest block grid with an allowed loss, or the one that loses least.
+
+    The cost of a grid is the area filtered per area answered for.
+    """
+    tried: list[tuple[Wiener, Loss]] = []
+    for block_px, overlap_px in sorted(BLOCKS, key=lambda b: (b[0] / (b[0] - b[1])) ** 2):
+        settings = bench.settings.model_copy(
+            update={"block_px": block_px, "overlap_px": overlap_px}
+        )
+        loss = block_loss(psf, bench, settings)
+        tried.append((settings, loss))
+        if loss.mean_db <= limit_db:
+            break
+    return min(tried, key=lambda pair: max(pair[1].mean_db, limit_db))
 
 
-def _centre(kernels: Tensor, side_px: int) -> Tensor:
-    cut = (kernels.shape[-1] - side_px) // 2
-    return kernels[..., cut : cut + side_px, cut : cut + side_px]
+def freeze_prescription(
+    path: Path,
+    out_path: Path,
+    *,
+    camera: Camera,
+    settings: Wiener | None = None,
+    limit_db: float = LOSS_LIMIT_DB,
+) -> FreezeReport:
+    """Freeze the PSF of a prescription and write it.
+
+    Args:
+        path: The lens (TOML).
+        out_path: Receives the frozen PSF (safetensors).
+        camera: Sensor size, pitch, response and noise.
+        settings: Of the Wiener filter that measures the loss.
+        limit_db: Mean loss allowed for the samples, and for the blocks.
+
+    Raises:
+        ContractError: If the prescription is wrong or no grid keeps the loss.
+    """
+    from camkit.bundle.psf_file import write_psf
+
+    lens = read_prescription(path)
+    chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
+    bench = make_bench(lens, camera, chosen)
+    frozen, loss = choose_samples(lens, camera, bench, limit_db=limit_db)
+    blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db)
+    write_psf(out_path, frozen.psf)
+    fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
+    return FreezeReport(
+        fields=fields,
+        wavelengths=wavelengths,
+        side_px=side_px,
+        energy_kept=frozen.energy_kept,
+        loss_db=loss.mean_db,
+        worst_loss_db=loss.worst_db,
+        loss_limit_db=limit_db,
+        block_px=blocks.block_px,
+        overlap_px=blocks.overlap_px,
+        block_loss_db=blocked.mean_db,
+        efl_mm=paraxial_data(lens).efl_mm,
+        corner_illumination=float(frozen.psf.relative_illumination[-1]),
+    )

@@ -154,7 +154,8 @@ def _spot_residuals(landed: Rays, floor_mm: float) -> Tensor:
     lost = (1 - alive) * _LOST_RAY
     pairs = torch.stack([x * scale + lost, dy * scale], dim=-1)
     each = pairs[0].numel() // 2
-    return pairs.flatten(1) / each**0.5
+    residuals: Tensor = pairs.flatten(1) / each**0.5
+    return residuals
 
 
 def _limit_residuals(
@@ -189,7 +190,7 @@ def _jacobian(problem: _Problem, variables: Tensor) -> tuple[Tensor, Tensor]:
     starts, count = variables.shape
     steps = torch.eye(count, dtype=torch.float64) * _DIFFERENCE
     both = torch.cat([variables[:, None], variables[:, None] + steps], dim=1)
-    values = _residuals(problem, both.flatten(0, 1)).unflatten(0, (starts, count + 1))
+    values = _residuals(problem, both.flatten(0, 1)).reshape(starts, count + 1, -1)
     return values[:, 0], ((values[:, 1:] - values[:, :1]) / _DIFFERENCE).transpose(1, 2)
 
 

@@ -112,7 +112,9 @@ class Lens:
         if not 0 <= self.stop < len(self.surfaces):
             raise ContractError(f"stop must be 0..{len(self.surfaces) - 1}; got {self.stop}")
         if self.aperture_kind not in APERTURE_KINDS:
-            raise ContractError(f"aperture must be one of {APERTURE_KINDS}; got {self.aperture_kind}")
+            raise ContractError(
+                f"aperture must be one of {APERTURE_KINDS}; got {self.aperture_kind}"
+            )
         if not (math.isfinite(self.aperture_value) and self.aperture_value > 0):
             raise ContractError(f"{self.aperture_kind} must be > 0; got {self.aperture_value}")
         if not self.object_distance_mm > 0:
@@ -221,7 +223,10 @@ def parse_prescription(text: str) -> Lens:
 
 
 def write_prescription(lens: Lens, path: Path) -> None:
-    """Write a lens as TOML that `read_prescription` gives back to the last bit.
+    """Write a lens as TOML.
+
+    `read_prescription` gives it back to the last bit, if its curvatures are inverses of radii
+    (as they are in a lens that was read); others come back within 1e-15 of themselves.
 
     Raises:
         ContractError: If the lens is a fabricated copy (index offsets are not written).
@@ -268,10 +273,13 @@ def _radius_text(curvature_per_mm: float) -> str:
     if not curvature_per_mm:
         return "inf"
     radius_mm = 1 / curvature_per_mm
+    # 1 / (1 / r) may be a neighbour of r
+    neighbours = (radius_mm, math.nextafter(radius_mm, 0), math.nextafter(radius_mm, math.inf))
     for digits in range(4, 18):
-        text = f"{radius_mm:.{digits}g}"
-        if 1 / float(text) == curvature_per_mm:
-            return repr(float(text))
+        for value in neighbours:
+            rounded = float(f"{value:.{digits}g}")
+            if 1 / rounded == curvature_per_mm:
+                return repr(rounded)
     return repr(radius_mm)
 
 
@@ -296,7 +304,9 @@ def _parse_surface(table: Mapping[str, Any], number: int) -> Surface:
         curvature_per_mm=1 / radius_mm,
         thickness_mm=_number(table["thickness_mm"], f"{where}: thickness_mm"),
         glass=_text(table.get("glass", "air"), f"{where}: glass"),
-        semi_diameter_mm=_number(table.get("semi_diameter_mm", math.inf), f"{where}: semi_diameter_mm"),
+        semi_diameter_mm=_number(
+            table.get("semi_diameter_mm", math.inf), f"{where}: semi_diameter_mm"
+        ),
         conic=_number(table.get("conic", 0.0), f"{where}: conic"),
         even_asphere=_numbers(table.get("even_asphere", []), f"{where}: even_asphere"),
     )

@@ -57,7 +57,7 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
         down, right = divmod(corner, 2)
         place, weight = _tent(row, column, (down, right), size_px)
         flat = flat.scatter_add(-1, place, weight * spots.weight)
-    kernels = flat.unflatten(-1, (size_px, size_px))
+    kernels = flat.reshape(*row.shape[:2], size_px, size_px)
     kernels = kernels + kernels.flip(-1)
     inside = kernels.sum((-2, -1))
     if bool((inside <= 0).any()):
@@ -94,7 +94,7 @@ def trace_psf(
     fields = max(1, _CHUNK_RAYS // (rays * len(wavelengths_um)))
     parts = [
         splat(trace_spots(lens, some, wavelengths_um, samples), size_px, pitch_um)
-        for some in slopes.split(fields)
+        for some in torch.split(slopes, fields)
     ]
     return TracedPsf(
         kernels=torch.cat([p.kernels for p in parts]),

@@ -78,7 +78,8 @@ def launch(x: Tensor, y: Tensor, slope: Tensor, object_distance_mm: float) -> Ra
             seen from the first vertex, its image at +y.
         object_distance_mm: From the first vertex; inf for parallel rays.
     """
-    x, y, slope = torch.broadcast_tensors(x, y, slope)
+    blank = torch.zeros_like(x + y + slope)
+    x, y, slope = x + blank, y + blank, slope + blank
     if math.isinf(object_distance_mm):
         dx, dy = torch.zeros_like(x), slope
     else:
@@ -122,7 +123,8 @@ def aim(
         slope: tan of the field angle.
         distance_mm: Object distance, inf allowed.
     """
-    wanted_x, wanted_y, slope = torch.broadcast_tensors(target.x, target.y, slope)
+    blank = torch.zeros_like(target.x + slope)
+    wanted_x, wanted_y, slope = target.x + blank, target.y + blank, slope + blank
     if stop == 0 and not bool(tensors.curvature_per_mm[0].any()) and not tensors.aspheric[0]:
         return Aim(x=wanted_x, y=wanted_y, weight=torch.ones_like(wanted_x))
     open_tensors = replace(

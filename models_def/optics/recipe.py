@@ -90,8 +90,25 @@ def read_recipe(path: Path) -> LensRecipe:
         raise ContractError(f"a lens recipe must be TOML; {error}") from error
     surfaces = tuple(_surface(t) for t in table.pop("surface", []))
     _check(table, {f.name for f in fields(LensRecipe)} - {"surfaces"}, "the recipe")
-    values = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
+    values: dict[str, Any] = {key: _value(key, value) for key, value in table.items()}
     return LensRecipe(surfaces=surfaces, **values)
+
+
+def _value(key: str, value: Any) -> Any:
+    """Give a value in the type of its field; lists of numbers become tuples."""
+    wanted = LensRecipe.__annotations__[key]
+    if wanted in (str, int):
+        if not isinstance(value, wanted) or isinstance(value, bool):
+            raise ContractError(f"{key} must be {wanted.__name__}; got {value!r}")
+        return value
+    numbers = value if isinstance(value, list) else [value]
+    if any(isinstance(v, bool) or not isinstance(v, int | float) for v in numbers):
+        raise ContractError(f"{key} must be numbers; got {value!r}")
+    if wanted is float:
+        if isinstance(value, list):
+            raise ContractError(f"{key} must be one number; got {value!r}")
+        return float(value)
+    return tuple(float(v) for v in numbers)
 
 
 def _surface(table: Mapping[str, Any]) -> SurfaceRecipe:

@@ -1,9 +1,10 @@
 """What coarse PSF samples and coarse blocks cost, in dB of the Wiener filter alone.
 
-Sharp procedural scenes are blurred with kernels traced at their own place, given the noise of
-the camera's lowest ISO (where errors of the PSF show most), and restored twice: with the kernel
-under test and with the true one. The loss is 10 log10 of the ratio of the mean squared errors,
-averaged over places that stand for equal areas of the picture.
+As in use: sharp procedural scenes are blurred by fabricated copies of the lens at several
+places, given the noise of the camera at its lowest ISO and at 16 times that, and restored twice:
+with the nominal kernel under test, and with the nominal kernel traced at that very place. The
+loss is 10 log10 of the ratio of the mean squared errors, averaged over copies, ISOs and places;
+these stand for equal areas of the picture.
 """
 
 from dataclasses import dataclass
@@ -17,17 +18,25 @@ from torch import Tensor
 from camkit.bundle.camera import Camera
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf
+from camkit.models_def.optics.frozen import FreezeGrid, corner_height_mm, freeze_at
+from camkit.models_def.optics.kernel_bank import focused_copies
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.sensors.psf import color_kernels, kernel_at
-from camkit.models_def.sensors.wiener import wiener_restore
+from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.scenes import procedural_scene
+from camkit.units import UM_PER_MM
 
 FloatGrid = NDArray[np.float64]
 
 PATCH_PX: Final = 320
 MARGIN_PX: Final = 64
+PLACES: Final = 8
+TRUE_WAVELENGTHS: Final = 13
+ISO_STEPS: Final = (1.0, 16.0)
 OFFSETS: Final = (-0.8, 0.0, 0.8)
 BLOCK_HEIGHTS: Final = (0.35, 0.65, 0.9)
 PROBE_PX: Final = 64
+LARGER_PX: Final = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,9 +52,134 @@ class Loss:
     worst_db: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bench:
+    """The lens at the places where it is judged.
+
+    Attributes:
+        camera: Response, size and noise.
+        nominal: The designed lens; its fields are the axis and the places.
+        copies: Fabricated copies, focused, the same fields.
+        settings: Of the Wiener filter.
+        seed: Of scenes and noise.
+    """
+
+    camera: Camera
+    nominal: FrozenPsf
+    copies: tuple[FrozenPsf, ...]
+    settings: Wiener
+    seed: int
+
+    @property
+    def heights_mm(self) -> FloatGrid:
+        """Sensor heights (place,) of the places."""
+        return self.nominal.field_heights_mm[1:]
+
+
 def sample_heights(corner_mm: float, places: int) -> FloatGrid:
     """Give heights (place,) in the middle of rings of equal area."""
-    return corner_mm * np.sqrt((np.arange(places) + 0.5) / places)
+    return np.asarray(corner_mm * np.sqrt((np.arange(places) + 0.5) / places))
+
+
+def make_bench(
+    lens: Lens, camera: Camera, settings: Wiener, *, copies: int = 2, seed: int = 5
+) -> Bench:
+    """Trace a lens and copies of it at the places where it will be judged.
+
+    Args:
+        lens: Nominal.
+        camera: Response, size and noise.
+        settings: Of the Wiener filter.
+        copies: How many fabricated copies.
+        seed: Of the errors, scenes and noise.
+    """
+    places = sample_heights(corner_height_mm(camera), PLACES)
+    heights = np.concatenate([np.zeros(1), places])
+    grid = FreezeGrid(wavelengths=TRUE_WAVELENGTHS, energy=0.9995, max_side_px=161)
+    traced = [
+        freeze_at(copy, camera, grid, heights).psf
+        for copy in focused_copies(lens, copies + 1, seed)
+    ]
+    return Bench(
+        camera=camera, nominal=traced[0], copies=tuple(traced[1:]), settings=settings, seed=seed
+    )
+
+
+def frozen_loss(frozen: FrozenPsf, bench: Bench) -> Loss:
+    """Measure what the samples of a frozen PSF cost against one traced where it is used."""
+    places = bench.heights_mm
+    zero = np.zeros_like(places)
+    test, ideal = (_kernels(p, bench.camera, zero, places) for p in (frozen, bench.nominal))
+    scenes = _scenes(places.size, PATCH_PX, bench.seed)
+    ratios = []
+    for copy in bench.copies:
+        blurred = _convolve(scenes, _kernels(copy, bench.camera, zero, places))
+        for step in ISO_STEPS:
+            noisy, shot, read = _noisy(blurred, bench.camera, step, bench.seed)
+            wrong, right = (
+                _error(wiener_restore(noisy, kernels, shot, read, bench.settings), scenes)
+                for kernels in (test, ideal)
+            )
+            ratios.append(wrong / right)
+    return _loss(torch.stack(ratios))
+
+
+def block_loss(psf: FrozenPsf, bench: Bench, settings: Wiener) -> Loss:
+    """Measure what one kernel per block, and the block's own border, cost.
+
+    Blocks at three places of the diagonal are probed at nine points of the area they answer
+    for. The other restoration uses the kernel of the probed point and a larger block.
+
+    Args:
+        psf: The frozen PSF.
+        bench: Camera and a copy that blurs.
+        settings: Block and overlap under test.
+    """
+    half = (settings.block_px - settings.overlap_px) / 2
+    corner_px = np.array([bench.camera.width_px, bench.camera.height_px]) / 2
+    ratios = [
+        _probe(psf, bench, settings, (share * corner_px, np.array([dx, dy]) * half))
+        for share in BLOCK_HEIGHTS
+        for dy in OFFSETS
+        for dx in OFFSETS
+    ]
+    return _loss(torch.tensor(ratios))
+
+
+def _probe(
+    psf: FrozenPsf, bench: Bench, settings: Wiener, place: tuple[FloatGrid, FloatGrid]
+) -> float:
+    """Give the ratio of squared errors at one offset of one block: its kernel over the local."""
+    camera, (centre_px, offset_px) = bench.camera, place
+    at_mm = np.stack([centre_px, centre_px + offset_px]) * camera.pixel_pitch_um / UM_PER_MM
+    kernels = _kernels(psf, camera, at_mm[:, 0], at_mm[:, 1])
+    block_kernel, local_kernel = kernels[:1], kernels[1:]
+    true_kernel = _kernels(bench.copies[0], camera, at_mm[1:, 0], at_mm[1:, 1])
+    large = settings.block_px + LARGER_PX
+    scene = _scenes(1, large, bench.seed)
+    noisy, shot, read = _noisy(_convolve(scene, true_kernel), camera, 1.0, bench.seed)
+    top, left = (int(large / 2 + o - PROBE_PX / 2) for o in (offset_px[1], offset_px[0]))
+    sharp = scene[..., top : top + PROBE_PX, left : left + PROBE_PX]
+    errors = []
+    for side, kernel in ((settings.block_px, block_kernel), (large, local_kernel)):
+        start = (large - side) // 2
+        window = slice(start, start + side)
+        restored = wiener_restore(noisy[..., window, window], kernel, shot, read, settings)
+        rows = slice(top - start, top - start + PROBE_PX)
+        columns = slice(left - start, left - start + PROBE_PX)
+        errors.append(float((restored[..., rows, columns] - sharp).square().mean()))
+    return errors[0] / errors[1]
+
+
+def _loss(ratios: Tensor) -> Loss:
+    each = 10 * torch.log10(ratios)
+    return Loss(mean_db=float(each.mean()), worst_db=float(each.max()))
+
+
+def _error(restored: Tensor, scenes: Tensor) -> Tensor:
+    """Give the mean squared error (place,) inside the margin."""
+    inside = slice(MARGIN_PX, -MARGIN_PX)
+    return (restored - scenes)[..., inside, inside].square().mean(dim=(1, 2, 3))
 
 
 def _kernels(psf: FrozenPsf, camera: Camera, x_mm: FloatGrid, y_mm: FloatGrid) -> Tensor:
@@ -62,115 +196,17 @@ def _scenes(count: int, size_px: int, seed: int) -> Tensor:
 
 def _convolve(scenes: Tensor, kernels: Tensor) -> Tensor:
     """Blur (b, 3, h, w) with (b, 3, kh, kw), periodic."""
-    size = scenes.shape[-2:]
-    kh, kw = kernels.shape[-2:]
-    padded = torch.nn.functional.pad(kernels, (0, size[1] - kw, 0, size[0] - kh))
-    origin = torch.roll(padded, (-(kh // 2), -(kw // 2)), dims=(-2, -1))
-    blurred: Tensor = torch.fft.irfft2(torch.fft.rfft2(scenes) * torch.fft.rfft2(origin), s=size)
+    size = (scenes.shape[-2], scenes.shape[-1])
+    blurred: Tensor = torch.fft.irfft2(torch.fft.rfft2(scenes) * to_otf(kernels, size), s=size)
     return blurred
 
 
-def _noisy(pictures: Tensor, camera: Camera, seed: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Add the noise of the lowest ISO; give pictures, shot (3,), read variance (3,)."""
-    noise = camera.noise_at(camera.noise[0].iso)
+def _noisy(
+    pictures: Tensor, camera: Camera, iso_step: float, seed: int
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Add noise; give pictures, shot (3,), read variance (3,)."""
+    noise = camera.noise_at(camera.noise[0].iso * iso_step)
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     variance = pictures.clamp(min=0) * shot[:, None, None] + read[:, None, None]
-    generator = torch.Generator().manual_seed(seed)
-    grain = torch.randn(pictures.shape, generator=generator)
+    grain = torch.randn(pictures.shape, generator=torch.Generator().manual_seed(seed))
     return pictures + variance.sqrt() * grain, shot, read
-
-
-def _loss(wrong: Tensor, right: Tensor) -> Loss:
-    each = 10 * torch.log10(wrong / right)
-    return Loss(mean_db=float(each.mean()), worst_db=float(each.max()))
-
-
-def frozen_loss(
-    frozen: FrozenPsf, truth: FrozenPsf, camera: Camera, settings: Wiener, *, seed: int = 5
-) -> Loss:
-    """Measure what the samples of a frozen PSF cost against a PSF traced where it is used.
-
-    Args:
-        frozen: Under test.
-        truth: Dense in wavelength, its fields are the places (see `sample_heights`) behind a
-            first field on the axis.
-        camera: Response and noise.
-        settings: Of the Wiener filter.
-        seed: Of scenes and noise.
-    """
-    heights = truth.field_heights_mm[1:]
-    zero = np.zeros_like(heights)
-    true_kernels = _kernels(truth, camera, zero, heights)
-    test_kernels = _kernels(frozen, camera, zero, heights)
-    scenes = _scenes(heights.size, PATCH_PX, seed)
-    blurred, shot, read = _noisy(_convolve(scenes, true_kernels), camera, seed)
-    errors = [
-        _crop(wiener_restore(blurred, kernels, shot, read, settings) - scenes)
-        for kernels in (test_kernels, true_kernels)
-    ]
-    wrong, right = (e.square().mean(dim=(1, 2, 3)) for e in errors)
-    return _loss(wrong, right)
-
-
-def _crop(pictures: Tensor) -> Tensor:
-    return pictures[..., MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX]
-
-
-def block_loss(psf: FrozenPsf, camera: Camera, settings: Wiener, *, seed: int = 5) -> Loss:
-    """Measure what one kernel per block, and the block's own border, cost.
-
-    Each block at three places of the diagonal is probed at nine points of the area it answers
-    for; the other restoration uses the kernel of the probed point and a block with 256 more
-    pixels.
-
-    Args:
-        psf: The frozen PSF.
-        camera: Size, response and noise.
-        settings: Block and overlap under test.
-        seed: Of scenes and noise.
-    """
-    pitch_mm = camera.pixel_pitch_um / 1000
-    half = (settings.block_px - settings.overlap_px) / 2
-    diagonal = np.hypot(camera.width_px, camera.height_px) / 2
-    out_x, out_y = camera.width_px / 2 / diagonal, camera.height_px / 2 / diagonal
-    wrong: list[float] = []
-    right: list[float] = []
-    for number, share in enumerate(BLOCK_HEIGHTS):
-        centre = np.array([share * diagonal * out_x, share * diagonal * out_y])
-        for dy in OFFSETS:
-            for dx in OFFSETS:
-                offset = np.array([dx * half, dy * half])
-                pair = _probe(
-                    psf, camera, settings, (centre * pitch_mm, offset, pitch_mm), seed + number
-                )
-                wrong.append(pair[0])
-                right.append(pair[1])
-    return _loss(torch.tensor(wrong), torch.tensor(right))
-
-
-def _probe(
-    psf: FrozenPsf,
-    camera: Camera,
-    settings: Wiener,
-    place: tuple[FloatGrid, FloatGrid, float],
-    seed: int,
-) -> tuple[float, float]:
-    """Give the mean squared errors of one block at one offset: its own kernel, and the local one."""
-    centre_mm, offset_px, pitch_mm = place
-    at_mm = np.stack([centre_mm, centre_mm + offset_px * pitch_mm])
-    block_kernel, local_kernel = _kernels(psf, camera, at_mm[:, 0], at_mm[:, 1]).split(1)
-    large = settings.block_px + 256
-    scene = _scenes(1, large + 2 * MARGIN_PX, seed)
-    blurred, shot, read = _noisy(_convolve(scene, local_kernel), camera, seed)
-    middle = scene.shape[-1] / 2
-    top, left = (int(middle + o - PROBE_PX / 2) for o in (offset_px[1], offset_px[0]))
-    errors = []
-    for side, kernel in ((settings.block_px, block_kernel), (large, local_kernel)):
-        start = int(middle - side / 2)
-        window = slice(start, start + side)
-        restored = wiener_restore(blurred[..., window, window], kernel, shot, read, settings)
-        rows = slice(top - start, top - start + PROBE_PX)
-        columns = slice(left - start, left - start + PROBE_PX)
-        sharp = scene[..., top : top + PROBE_PX, left : left + PROBE_PX]
-        errors.append(float((restored[..., rows, columns] - sharp).square().mean()))
-    return errors[0], errors[1]

@@ -18,7 +18,7 @@ from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError
 from camkit.models_def.sensors.demosaic import mosaic
 
-BLOCK_STEP_PX: Final = 256
+BLOCK_STEP_PX: Final = 128
 # Keeps the slope of the square root finite where a camera without read noise sees no light.
 LEAST_VARIANCE: Final = 1e-12
 
@@ -63,7 +63,8 @@ def blur(planes: Tensor, kernels: Tensor) -> Tensor:
     if kh > h or kw > w:
         raise ContractError(f"kernels of {kh}x{kw} px exceed the planes of {h}x{w} px")
     # A circular product is free of wrapping where the kernel lies wholly inside.
-    spread = torch.fft.irfft2(_spectrum(planes, (h, w)) * _spectrum(kernels, (h, w)), (h, w))
+    product = _spectrum(planes, (h, w)) * _spectrum(kernels, (h, w))
+    spread: Tensor = torch.fft.irfft2(product, (h, w))
     return spread[..., kh - 1 :, kw - 1 :]
 
 
@@ -139,7 +140,8 @@ def expose(planes: Tensor, sensor: Sensor, normal: Tensor | None = None) -> Tens
 
 
 def _spectrum(planes: Tensor, size: tuple[int, int]) -> Tensor:
-    return torch.fft.rfft2(planes, s=size)
+    spectrum: Tensor = torch.fft.rfft2(planes, s=size)
+    return spectrum
 
 
 def _spans(length: int, step_px: int, like: Tensor) -> list[Span]:

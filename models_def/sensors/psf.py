@@ -97,7 +97,8 @@ def kernel_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Ten
     """Give the kernels of image points, turned so that their radial direction points outward.
 
     Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
-    zero outside, negatives cut, normalised. On the axis nothing is turned.
+    zero outside, negatives cut, normalised. On the axis nothing is turned, and neither is the PSF
+    of a single field: one PSF for all places has no direction.
 
     Args:
         kernels: (field, 3, h, w) float32, stored for points along +y (down the rows).
@@ -113,7 +114,7 @@ def kernel_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Ten
     x, y = x_mm.to(torch.float64), y_mm.to(torch.float64)
     height = torch.hypot(x, y)
     blended = _blend(kernels, field_heights_mm.to(torch.float64), height)
-    on_axis = height == 0
+    on_axis = (height == 0) | (field_heights_mm.numel() == 1)
     safe = torch.where(on_axis, torch.ones_like(height), height)
     out_x = torch.where(on_axis, torch.zeros_like(height), x.abs() / safe)
     out_y = torch.where(on_axis, torch.ones_like(height), y.abs() / safe)

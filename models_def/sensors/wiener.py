@@ -13,7 +13,11 @@ from camkit.bundle.stages import Wiener
 PRIOR_SCALE = 3e-4
 PRIOR_EXPONENT = 2.5
 CORNER_FREQUENCY = 1 / 512
-LEAST_NSR = 1e-6
+# Least NSR where the OTF is far from 1: the real lens differs from the frozen PSF.
+KERNEL_ERROR = 1e-2
+LEAST_POWER = 1e-12
+LEAST_SIGNAL = 1e-6
+START_SHARE = 0.1
 CLIPPED_REACH_PX = 2
 TAPER_SHRINK = 4
 
@@ -49,7 +53,8 @@ def wiener_restore(
         read_variance: Same shape as shot.
         settings: Prior, clip iterations, and the overlap, whose outer quarter is tapered.
         saturated: (b, 1 or 3, h, w), true where the sensor clipped; those pixels, and the two
-            beside them that the demosaic reaches, count as unknown.
+            beside them that the demosaic reaches, are at least as bright as they read. Their
+            patches are explained by Richardson-Lucy first; the rest goes through the filter.
 
     Returns:
         (b, 3, h, w).
@@ -59,18 +64,51 @@ def wiener_restore(
     size = (patches.shape[-2], patches.shape[-1])
     otf = to_otf(kernels, size)
     patches = taper_edges(patches, otf, settings.overlap_px // 4)
-    gain = otf.conj() / (otf.abs().square() + _nsr(patches, shot, read_variance, settings))
-    restored = _filter(patches, gain)
+    level = patches.mean(dim=(-2, -1)).clamp(min=0)
+    variance = shot * level + read_variance
+    # A block darker than its read noise is taken to hold that much signal.
+    power = torch.maximum(level * level, read_variance).clamp(min=LEAST_POWER)
+    power = settings.prior_scale * power
     if saturated is None or settings.clip_iterations == 0 or not bool(saturated.any()):
-        return restored
+        return _filter(patches, _gain(otf, variance / power, settings.prior_exponent, size))
     side = 2 * CLIPPED_REACH_PX + 1
     unknown = torch.nn.functional.max_pool2d(
         saturated.to(patches.dtype), side, stride=1, padding=CLIPPED_REACH_PX
     ).bool()
-    for _ in range(settings.clip_iterations):
-        expected = torch.maximum(patches, _filter(restored.clamp(min=0), otf))
-        restored = _filter(torch.where(unknown, expected, patches), gain)
-    return restored
+    # Patches without a clipped sample are not touched: no lights, everything is residual.
+    clipped_patch = unknown.flatten(1).any(dim=1)[:, None, None, None]
+    background = (read_variance / shot.clamp(min=1e-12))[..., None, None]
+    lights = richardson_lucy(patches, otf, background, settings.clip_iterations, unknown)
+    lights = torch.where(clipped_patch, lights, 0)
+    residual = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
+    unexplained = residual.square().mean(dim=(-2, -1)) * clipped_patch[..., 0, 0]
+    variance = torch.maximum(variance, unexplained)
+    return lights + _filter(residual, _gain(otf, variance / power, settings.prior_exponent, size))
+
+
+def richardson_lucy(
+    patches: Tensor, otf: Tensor, background: Tensor, iterations: int, clipped: Tensor
+) -> Tensor:
+    """Sharpen by Richardson-Lucy; clipped samples are at least as bright as they read.
+
+    Args:
+        patches: (b, 3, h, w), periodic.
+        otf: (b, 3, h, w // 2 + 1).
+        background: (b or 1, 3, 1, 1), read_variance / shot.
+        iterations: Rounds.
+        clipped: (b, 1 or 3, h, w) bool.
+
+    References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background).
+    """
+    measured = (patches + background).clamp(min=LEAST_SIGNAL)
+    floor = START_SHARE * patches.mean(dim=(-2, -1), keepdim=True)
+    sharp = torch.maximum(patches, floor.clamp(min=LEAST_SIGNAL))
+    for _ in range(iterations):
+        expected = _filter(sharp, otf).clamp(min=0) + background
+        ratio = measured / expected.clamp(min=LEAST_SIGNAL)
+        ratio = torch.where(clipped, ratio.clamp(min=1), ratio)
+        sharp = sharp * _filter(ratio, otf.conj()).clamp(min=0)
+    return sharp
 
 
 def taper_edges(patches: Tensor, otf: Tensor, ring_px: int) -> Tensor:
@@ -112,17 +150,14 @@ def _filter(patches: Tensor, transfer: Tensor) -> Tensor:
     return filtered
 
 
-def _nsr(patches: Tensor, shot: Tensor, read_variance: Tensor, settings: Wiener) -> Tensor:
-    """Give noise over signal power, (b, 3, h, w // 2 + 1); 0 at zero frequency."""
-    h, w = patches.shape[-2:]
-    level = patches.mean(dim=(-2, -1)).clamp(min=0)
-    variance = shot * level + read_variance
-    # A block darker than its read noise is taken to hold that much signal.
-    power = torch.maximum(level * level, read_variance).clamp(min=1e-12)
-    ratio = (variance / (settings.prior_scale * power))[..., None, None]
-    fy = torch.fft.fftfreq(h, dtype=torch.float64, device=patches.device)[:, None]
-    fx = torch.fft.rfftfreq(w, dtype=torch.float64, device=patches.device)[None, :]
-    rise: Tensor = (fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (settings.prior_exponent / 2)
-    nsr: Tensor = (ratio * rise.to(patches.dtype)).clamp(min=LEAST_NSR)
+def _gain(otf: Tensor, ratio: Tensor, exponent: float, size: tuple[int, int]) -> Tensor:
+    """Give conj(H) / (|H|^2 + NSR); `ratio` (b, 3) is NSR where the rise is one."""
+    h, w = size
+    fy = torch.fft.fftfreq(h, dtype=torch.float64, device=otf.device)[:, None]
+    fx = torch.fft.rfftfreq(w, dtype=torch.float64, device=otf.device)[None, :]
+    rise = ((fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (exponent / 2)).to(otf.real.dtype)
+    power = otf.real.square() + otf.imag.square()
+    nsr = torch.maximum(ratio[..., None, None].to(rise.dtype) * rise, KERNEL_ERROR * (1 - power))
     nsr[..., 0, 0] = 0
-    return nsr
+    gain: Tensor = otf.conj() / (power + nsr)
+    return gain

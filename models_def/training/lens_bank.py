@@ -13,10 +13,9 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.kernel_bank import (
     ChannelResponse,
     colour_kernels,
-    fabricated_copies,
+    focused_copies,
 )
-from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens, read_prescription, with_focus_shift
+from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.optics.spot import relative_illumination
 from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.training.recipe import Recipe
@@ -50,27 +49,13 @@ def build_lens_bank(recipe: Recipe, cache_folder: Path | None = None) -> PsfBank
     return read_bank(cached)
 
 
-def refocused_copies(lens: Lens, count: int, seed: int) -> tuple[Lens, ...]:
-    """Give the nominal lens and `count` - 1 fabricated copies, each focused at its assembly.
-
-    Errors of radius and index move the focus of a copy by some 0.1 mm; a camera is focused when
-    it is built, so the sensor keeps its designed distance from the paraxial focus of the copy,
-    but for the copy's own focus error.
-    """
-    nominal, *copies = fabricated_copies(lens, count, seed)
-    designed_mm = paraxial_data(nominal).bfl_mm
-    shifts = [paraxial_data(copy).bfl_mm - designed_mm for copy in copies]
-    moved = (with_focus_shift(copy, mm) for copy, mm in zip(copies, shifts, strict=True))
-    return (nominal, *moved)
-
-
 def _trace(recipe: Recipe, path: Path) -> PsfBank:
     lens = read_prescription(path)
     plan = recipe.lens
     heights = np.linspace(0.0, corner_height_mm(recipe), plan.fields)
     response = _response(recipe)
     kernels = []
-    for copy in refocused_copies(lens, plan.copies + 2, plan.seed):
+    for copy in focused_copies(lens, plan.copies + 2, plan.seed):
         traced, kept = colour_kernels(
             copy,
             response,

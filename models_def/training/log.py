@@ -75,5 +75,6 @@ def plot_logs(logs: dict[str, Path], chart: Path) -> None:
     right.set(xlabel="CPU minutes", ylabel="validation PSNR, sRGB (dB)")
     for axis in (left, right):
         axis.grid(alpha=0.3)
-        axis.legend()
+        if axis.lines:
+            axis.legend()
     figure.savefig(chart, dpi=120)

@@ -1,1 +1,13 @@
-"""Under construction."""
+"""Writers, in the order in which a finished band passes through them.
+
+Map:
+    picture_writer: the format of a picture; bands from top to bottom, turned to stand upright.
+    writer: opens the writer of a format.
+    exr: OpenEXR, half, or float where half would overflow.
+    tiff, png: 16 bits with an ICC profile.
+    linear_dng, dng: LinearRaw in camera space; Bayer DNG for simulated captures.
+    preview: a small 8-bit picture on the way.
+    icc: ICC profiles from primaries, white and tone.
+    part_file: files that appear complete or not at all.
+    sidecar: what was done, and proof that it is whole.
+"""

@@ -97,7 +97,7 @@ def test_graph_walk_agrees_with_the_design(model: bytes) -> None:
     facts = inspect_graph(model)
     assert facts.stride_px == 8
     assert facts.mac_per_pixel == pytest.approx(4560)
-    assert (facts.global_operators, facts.unblocked) == ((), ())
+    assert (facts.global_operators, facts.unblocked_convolutions) == ((), ())
     assert facts.parameters == 77_376
 
 
@@ -115,6 +115,14 @@ def test_value_that_is_not_finite_is_a_parity_error(network: nn.Module, model: b
     window[0, 0, 0, 0] = np.nan
     with pytest.raises(ParityError, match="differ by nan"):
         check_parity(network.eval(), model, [window])
+
+
+def test_export_without_a_program_is_a_parity_error(
+    network: nn.Module, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch.onnx, "export", lambda *_, **__: None)
+    with pytest.raises(ParityError, match="gave no program"):
+        to_onnx(network)
 
 
 def test_wrong_channels_are_refused(network: nn.Module) -> None:

@@ -82,7 +82,7 @@ def test_probe_stays_within_the_graph_walk_and_the_stated_halo(name: str) -> Non
     )
     assert reach.halo_px <= facts.receptive_field_radius_px <= HALOS_PX[name]
     assert HALOS_PX[name] - facts.stride_px < reach.halo_px
-    assert facts.unblocked == () or name == "trimmed_unet"
+    assert facts.unblocked_convolutions == () or name == "trimmed_unet"
 
 
 @pytest.mark.slow

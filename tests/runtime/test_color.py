@@ -125,3 +125,9 @@ def test_linear_codes_are_rounded() -> None:
     np.testing.assert_array_equal(
         encode_uint16(x, tone="linear")[0, 0], [0, 0, 32768, 65535, 65535]
     )
+
+
+def test_clipped_green_of_a_warm_light_leaves_no_pink() -> None:
+    found = recover_highlights(pixels((1.6, 1.0, 0.9)), GAINS)[:, 0, 0]
+    assert found[1] == pytest.approx((1.6 + 0.9) / 2)
+    np.testing.assert_array_equal(found[[0, 2]], np.float32([1.6, 0.9]))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 
 from camkit.errors import BundleError
 from camkit.runtime.engine import NetworkEngine
@@ -99,6 +99,11 @@ def _nan(model: onnx.ModelProto) -> None:
     model.graph.initializer[0].raw_data = weight.tobytes()
 
 
+def _complex(model: onnx.ModelProto) -> None:
+    weight = numpy_helper.from_array(np.ones(1, np.complex64), "starts")
+    model.graph.initializer[3].CopyFrom(weight)
+
+
 def _huge(model: onnx.ModelProto) -> None:
     model.graph.initializer[0].dims[0] = 2**40
 
@@ -142,6 +147,11 @@ REFUSALS: dict[str, tuple[Mutation, str]] = {
     "new IR": (lambda m: setattr(m, "ir_version", 11), "IR 11"),
     "no opset": (lambda m: m.ClearField("opset_import"), "opset"),
     "double input": (_set_type, "must be float32; got DOUBLE"),
+    "input of no known type": (
+        lambda m: setattr(m.graph.input[0].type.tensor_type, "elem_type", 85),
+        "type 85|not valid",
+    ),
+    "complex constant": (_complex, "complex64"),
     "fixed height": (_fix_height, "height and width open"),
     "batch of two": (_set_batch, "batch 1; got 2"),
     "three axes": (_drop_axis, "got 3 axes"),
@@ -236,6 +246,13 @@ CUTS: dict[str, tuple[onnx.ModelProto, str | None]] = {
     "slice of other size": (_regrouped("Slice", ([0], [2], [1])), "computes 2"),
     "empty slice": (_regrouped("Slice", ([4], [4], [1])), "empty"),
     "slice by 0": (_regrouped("Slice", ([0], [6], [1], [0])), "step 0"),
+    "slice by fractions": (
+        make_model(
+            [NODE("Slice", ["input", "a", "b", "c"], ["output"])],
+            {"a": np.zeros(1, np.int64), "b": np.array([3]), "c": np.ones(1, np.float32)},
+        ),
+        "must be integers|not valid",
+    ),
     "split of rows": (_regrouped("Split", ([3, 3],), axis=2), "along the channels"),
     "split of other sizes": (_regrouped("Split", ([3, 4],), axis=1), "do not make 6"),
 }

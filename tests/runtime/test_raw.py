@@ -152,6 +152,30 @@ def test_xtrans_mosaic_goes_through_libraws_demosaic_in_camera_space(tmp_path):
     assert means == pytest.approx((levels + 1 - 256) / (4095 - 256), abs=2e-3)
 
 
+def test_float_dng_decodes_with_a_note(tmp_path):
+    extra = [
+        (33421, 3, 2, (2, 2), True),
+        (33422, 1, 4, bytes((0, 1, 1, 2)), True),
+        (50714, 4, 1, 0, True),
+        (50717, 4, 1, 1, True),
+    ]
+    light = scene_mosaic().astype(np.float32) / 4095
+    write_other(tmp_path / "x.dng", light, CFA_PHOTOMETRIC, extra)
+    capture = read_capture(tmp_path / "x.dng", isolate=False)
+    assert np.abs(capture.linear_rows(0, 60) - light).max() < 1e-4
+    assert "floating-point DNG" in capture.notes[0]
+
+
+@pytest.mark.parametrize("error", [IndexError("7"), ContractError("7"), MemoryError()])
+def test_whatever_an_odd_file_raises_becomes_a_decode_error(scene, monkeypatch, error):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(raw_worker, "_to_capture", fail)
+    with pytest.raises(DecodeError, match=r"makes no sense|more memory"):
+        read_capture(scene[0], isolate=False)
+
+
 def test_noise_profile_and_white_balance_may_be_missing(tmp_path):
     write_scene(tmp_path / "x.dng", noise=None, iso=None, exposure_time_s=None, color_matrix=None)
     capture = read_capture(tmp_path / "x.dng", isolate=False)

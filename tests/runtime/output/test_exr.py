@@ -7,7 +7,7 @@ import pytest
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import color_stage
-from camkit.runtime.output.exr import HALF_MAX, ExrWriter
+from camkit.runtime.output.exr import HALF_MAX, ExrWriter, _patch_chromaticities
 from camkit.runtime.output.picture_writer import PictureFormat
 from tests.camera_factory import COLOR_MATRIX
 
@@ -88,3 +88,9 @@ def test_error_between_bands_releases_the_file(tmp_path: Path) -> None:
     with pytest.raises(ContractError, match="NaN"):
         write(tmp_path / "a.exr", planes)
     (tmp_path / "a.exr").unlink()
+
+
+def test_header_without_room_for_chromaticities_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "a.exr").write_bytes(b"v/1\x01")
+    with pytest.raises(ContractError, match="no chromaticities"):
+        _patch_chromaticities(tmp_path / "a.exr", (0.0,) * 8)

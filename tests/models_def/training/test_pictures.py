@@ -1,0 +1,71 @@
+import cv2
+import numpy as np
+import pytest
+
+from camkit.colorimetry import decode_srgb
+from camkit.errors import ContractError, DecodeError
+from camkit.models_def.training.pictures import list_pictures, open_source, read_picture, to_linear
+
+
+@pytest.fixture
+def folder(tmp_path):
+    rng = np.random.default_rng(0)
+    for name, shape in (("b.png", (80, 120, 3)), ("a.png", (50, 40, 3))):
+        cv2.imwrite(str(tmp_path / name), rng.integers(0, 256, shape, dtype=np.uint8))
+    (tmp_path / "README.md").write_text("no picture", encoding="utf-8")
+    return tmp_path
+
+
+def test_pictures_are_listed_by_name_and_nothing_else(folder):
+    assert [p.name for p in list_pictures(folder)] == ["a.png", "b.png"]
+    assert list_pictures(None) == ()
+
+
+def test_red_comes_first(tmp_path):
+    cv2.imwrite(str(tmp_path / "red.png"), np.full((4, 4, 3), (0, 0, 255), np.uint8))
+    linear = to_linear(read_picture(tmp_path / "red.png"))
+    assert linear.shape == (3, 4, 4)
+    assert np.allclose(linear[:, 0, 0], [1, 0, 0])
+
+
+def test_8_bit_values_are_decoded_by_the_srgb_curve():
+    values = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
+    expected = decode_srgb(values.astype(np.float32) / 255).transpose(2, 0, 1)
+    assert np.allclose(to_linear(values), expected, atol=1e-7)
+
+
+@pytest.mark.parametrize("side", [16, 64, 200])
+def test_crops_have_the_asked_size_even_of_smaller_pictures(folder, side):
+    source = open_source(folder, picture_share=1.0, scenes=1, scene_px=64)
+    crop = source.draw_crop(np.random.default_rng(1), side)
+    assert crop.shape == (3, side, side)
+    assert crop.dtype == np.float32
+    assert 0 <= crop.min() <= crop.max() <= 1
+
+
+def test_crops_follow_from_the_generator_alone(folder):
+    draws = []
+    for _ in range(2):
+        source = open_source(folder, picture_share=0.5, scenes=2, scene_px=96)
+        rng = np.random.default_rng(7)
+        draws.append([source.draw_crop(rng, 32) for _ in range(6)])
+    assert all(np.array_equal(a, b) for a, b in zip(*draws, strict=True))
+
+
+def test_without_a_folder_crops_are_procedural():
+    source = open_source(None, picture_share=1.0, scenes=1, scene_px=96)
+    crop = source.draw_crop(np.random.default_rng(0), 48)
+    assert crop.shape == (3, 48, 48)
+    assert crop.std() > 0
+
+
+def test_missing_empty_and_broken_sources_are_refused(tmp_path):
+    with pytest.raises(ContractError, match="is not there"):
+        list_pictures(tmp_path / "none")
+    with pytest.raises(ContractError, match="holds no picture"):
+        list_pictures(tmp_path)
+    (tmp_path / "x.png").write_bytes(b"not a picture")
+    (tmp_path / "empty.png").write_bytes(b"")
+    for name in ("x.png", "empty.png"):
+        with pytest.raises(DecodeError, match="cannot be decoded"):
+            read_picture(tmp_path / name)

@@ -1,0 +1,86 @@
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from camkit.errors import ContractError
+from camkit.models_def.training import recipe as module
+from camkit.models_def.training.recipe import read_recipe, samples_digest, to_recipe
+
+SHIPPED = Path(module.__file__).resolve().parents[1] / "recipes" / "duet.toml"
+
+
+def table(recipe_path, **changes):
+    content = tomllib.loads(recipe_path.read_text(encoding="utf-8"))
+    for dotted, value in changes.items():
+        *path, last = dotted.split("__")
+        place = content
+        for part in path:
+            place = place.setdefault(part, {})
+        if value is None:
+            del place[last]
+        else:
+            place[last] = value
+    return content
+
+
+def test_shipped_recipe_has_three_networks_and_the_stated_sensor():
+    recipe = read_recipe(SHIPPED)
+    assert set(recipe.networks) == {"S", "M", "trimmed"}
+    camera = recipe.camera
+    assert (camera.width_px, camera.height_px, camera.pixel_pitch_um) == (6000, 4000, 5.96)
+    levels = camera.white_level - camera.black_level
+    full_well_e = camera.noise[0].gain_e_per_dn * levels
+    assert full_well_e == pytest.approx(camera.full_well_e, rel=1e-3)
+
+
+def test_network_schedule_overrides_the_common_one(recipe):
+    assert recipe.network("S").schedule.steps == 12
+    assert recipe.network("M").schedule.steps == 60
+    assert recipe.network("M").schedule.batch == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "value", "named"),
+    [
+        ("colour", 1, "recipe: unknown key 'colour'"),
+        ("data__sampel_px", 64, "data: unknown key 'sampel_px'"),
+        ("data__sample_px", 64.5, "data.sample_px must be of type int"),
+        ("data__picture_share", 1.5, "data.picture_share must lie in 0..1"),
+        ("schedule__loss", "l3", "schedule.loss must be one of"),
+        ("schedule__precision", "float8", "schedule.precision must be one of"),
+        ("schedule__steps", True, "schedule.steps must be of type int"),
+        ("lens__prescription", None, "lens lacks prescription"),
+        ("camera__width_px", -1, "camera.width_px"),
+        ("camera__shape", 3, "camera.shape"),
+        ("wiener__prior_scale", None, "wiener.prior_scale"),
+        ("networks__S__netwrok", "x", "networks.S: unknown key"),
+        ("networks", {}, "at least one table"),
+        ("name", None, "name must be of type str"),
+    ],
+)
+def test_wrong_recipes_are_refused_by_naming_the_key(recipe_path, change, value, named):
+    with pytest.raises(ContractError, match=named):
+        to_recipe(table(recipe_path, **{change: value}))
+
+
+def test_unknown_size_is_refused_with_those_there_are(recipe):
+    with pytest.raises(ContractError, match="S, M; got 'XL'"):
+        recipe.network("XL")
+
+
+def test_missing_and_broken_files_are_refused(tmp_path):
+    with pytest.raises(ContractError, match="cannot read recipe"):
+        read_recipe(tmp_path / "none.toml")
+    broken = tmp_path / "broken.toml"
+    broken.write_text("name = ", encoding="utf-8")
+    with pytest.raises(ContractError, match="not valid TOML"):
+        read_recipe(broken)
+
+
+def test_digest_follows_what_decides_the_samples_only(recipe_path, recipe):
+    same = to_recipe(table(recipe_path, schedule__steps=99))
+    other = to_recipe(table(recipe_path, wiener__prior_scale=1e-4))
+    assert samples_digest(same, 1) == samples_digest(recipe, 1)
+    assert samples_digest(other, 1) != samples_digest(recipe, 1)
+    assert samples_digest(recipe, 2) != samples_digest(recipe, 1)

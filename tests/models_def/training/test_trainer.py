@@ -1,0 +1,135 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.training.checkpoint import load_network, read_checkpoint, write_checkpoint
+from camkit.models_def.training.log import plot_logs, read_log
+from camkit.models_def.training.psf_bank import gaussian_bank
+from camkit.models_def.training.trainer import TrainOptions, train
+
+
+def options(folder, **changes):
+    return TrainOptions(**({"out_dir": folder, "size": "S", "workers": 0} | changes))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, recipe_path, bank):
+    """Twelve steps in one go."""
+    return train(recipe_path, bank, options(tmp_path_factory.mktemp("whole")))
+
+
+def test_resumed_training_equals_uninterrupted_training_to_the_last_bit(
+    tmp_path, recipe_path, bank, whole
+):
+    train(recipe_path, bank, options(tmp_path, stop_at_step=6))
+    resumed = train(recipe_path, bank, options(tmp_path, resume=True))
+    one, two = read_checkpoint(whole.checkpoint), read_checkpoint(resumed.checkpoint)
+    assert (one.step, two.step) == (12, 12)
+    for part in ("weights", "average"):
+        a, b = getattr(one, part), getattr(two, part)
+        assert all(torch.equal(a[name], b[name]) for name in a)
+    moments = [c.optimizer["state"][0]["exp_avg"] for c in (one, two)]
+    assert torch.equal(*moments)
+
+
+def test_training_changes_the_weights_and_the_average_lags(whole):
+    saved = read_checkpoint(whole.checkpoint)
+    assert any(not torch.equal(saved.weights[n], saved.average[n]) for n in saved.weights)
+
+
+def test_loss_falls_on_a_tiny_run_without_any_picture(tmp_path, recipe_path, bank):
+    result = train(recipe_path, bank, options(tmp_path, size="M"))
+    assert result.steps == 60
+    assert result.valid_db > result.wiener_db + 0.05
+    assert "no photographs" in read_checkpoint(result.checkpoint).training_data
+
+
+def test_the_time_budget_ends_a_run_with_its_decay(tmp_path, recipe_path, bank):
+    result = train(recipe_path, bank, options(tmp_path, size="M", max_minutes=1e-4))
+    assert result.steps < 60
+
+
+def test_log_tells_steps_seconds_and_quality_and_can_be_drawn(whole, tmp_path):
+    entries = read_log(whole.log)
+    assert entries[0]["step"] == 0
+    assert entries[-1]["valid_db"] == pytest.approx(whole.valid_db)
+    assert all({"step", "seconds", "cpu_s"} <= set(e) for e in entries)
+    plot_logs({"S": whole.log}, tmp_path / "chart.png")
+    assert (tmp_path / "chart.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_resumed_log_has_each_step_once(tmp_path, recipe_path, bank):
+    train(recipe_path, bank, options(tmp_path, stop_at_step=6))
+    saved = tmp_path / "tiny_S.pt"
+    early = saved.read_bytes()
+    train(recipe_path, bank, options(tmp_path, resume=True))
+    saved.write_bytes(early)
+    resumed = train(recipe_path, bank, options(tmp_path, resume=True))
+    steps = [e["step"] for e in read_log(resumed.log) if "valid_by_iso" in e]
+    assert steps == [6, 12]
+
+
+def test_broken_log_is_refused(tmp_path):
+    path = tmp_path / "x.jsonl"
+    path.write_text('{"step": 1}\n{"loss": 2}\n', encoding="utf-8")
+    with pytest.raises(ContractError, match="line 2 must be an object with a step"):
+        read_log(path)
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(ContractError, match="line 1 is not JSON"):
+        read_log(path)
+
+
+def test_checkpoint_with_other_kernels_is_not_resumed(tmp_path, recipe_path, bank):
+    train(recipe_path, bank, options(tmp_path, stop_at_step=1))
+    other = gaussian_bank(sensor_height_mm=2.0, axis_px=0.9, corner_px=1.7)
+    with pytest.raises(ContractError, match="other kernels"):
+        train(recipe_path, other, options(tmp_path, resume=True))
+
+
+def test_network_from_a_checkpoint_has_the_averaged_weights(whole):
+    saved = read_checkpoint(whole.checkpoint)
+    network = load_network(saved)
+    assert all(torch.equal(v, saved.average[k]) for k, v in network.state_dict().items())
+    planes = torch.from_numpy(np.random.default_rng(0).random((1, 6, 32, 32), dtype=np.float32))
+    assert network(planes).shape == (1, 3, 32, 32)
+    wrong = replace(saved, average={})
+    with pytest.raises(ContractError, match="do not fit"):
+        load_network(wrong)
+
+
+def test_damaged_checkpoints_are_refused(tmp_path, whole):
+    with pytest.raises(ContractError, match="cannot read checkpoint"):
+        read_checkpoint(tmp_path / "none.pt")
+    path = tmp_path / "x.pt"
+    path.write_bytes(whole.checkpoint.read_bytes()[:100])
+    with pytest.raises(ContractError, match="no checkpoint"):
+        read_checkpoint(path)
+    torch.save({"format": 99}, path)
+    with pytest.raises(ContractError, match="format 1"):
+        read_checkpoint(path)
+    torch.save({"format": 1, "step": 3}, path)
+    with pytest.raises(ContractError, match="wrong entries"):
+        read_checkpoint(path)
+
+
+def test_interrupted_write_keeps_the_old_checkpoint(tmp_path, whole, monkeypatch):
+    path = tmp_path / "x.pt"
+    saved = read_checkpoint(whole.checkpoint)
+    write_checkpoint(path, saved)
+
+    def fail(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(torch, "save", fail)
+    with pytest.raises(KeyboardInterrupt):
+        write_checkpoint(path, replace(saved, step=99))
+    assert read_checkpoint(path).step == 12
+
+
+@pytest.mark.parametrize("changes", [{"max_minutes": 0.0}, {"threads": 0}, {"workers": -1}])
+def test_impossible_options_are_refused(tmp_path, changes):
+    with pytest.raises(ContractError, match=r"must be"):
+        options(tmp_path, **changes)

@@ -1,0 +1,105 @@
+"""The torch forward model and `runtime.simulate` give the same capture."""
+
+import numpy as np
+import pytest
+import torch
+
+from camkit.colorimetry import camera_from_rec709
+from camkit.models_def.sensors.forward import Sensor, block_centres_px, expose, scatter
+from camkit.models_def.sensors.psf import color_kernels, kernel_at
+from camkit.runtime import simulate as runtime
+from camkit.runtime.scatter import scatter as runtime_scatter
+from camkit.runtime.sensor_window import SensorWindow
+from camkit.runtime.simulate import SimulationOptions, simulate
+from tests.camera_factory import make_camera, make_psf
+
+PARITY = 1e-5
+STEP_PX = 48
+
+
+def block_kernels(
+    camera: runtime.Camera, psf: runtime.FrozenPsf, window: SensorWindow, step_px: int
+) -> torch.Tensor:
+    side = psf.kernels.shape[-1]
+    margin = side // 2
+    width, height = window.size_px
+    rows, columns = (
+        block_centres_px(n + 2 * margin, margin, step_px=step_px) for n in (height, width)
+    )
+    y_px, x_px = torch.meshgrid(rows, columns, indexing="ij")
+    x_mm, y_mm = window.to_mm(x_px.numpy().ravel(), y_px.numpy().ravel())
+    kernels = kernel_at(
+        color_kernels(psf, *camera.channel_response.to_arrays()),
+        torch.from_numpy(psf.field_heights_mm),
+        torch.from_numpy(x_mm),
+        torch.from_numpy(y_mm),
+    )
+    return kernels.reshape(len(rows), len(columns), 3, side, side)
+
+
+@pytest.mark.parametrize("size", [(96, 64), (131, 57), (40, 1)])
+def test_varying_blur_agrees(size: tuple[int, int]) -> None:
+    camera = make_camera(400, 300)
+    psf = make_psf(camera, side=11)
+    window = SensorWindow(
+        size_px=size, origin_px=(200, 150), sensor_size_px=(400, 300), pitch_um=5.96
+    )
+    planes = np.random.default_rng(0).random((3, size[1] + 10, size[0] + 10), dtype=np.float32)
+    expected = runtime_scatter(
+        planes, runtime.kernel_lookup(psf, camera), window, margin_px=5, step_px=STEP_PX
+    )
+    kernels = block_kernels(camera, psf, window, STEP_PX)
+    found = scatter(torch.from_numpy(planes), kernels, step_px=STEP_PX)
+    assert np.abs(found.numpy() - expected).max() <= PARITY
+
+
+def test_noiseless_capture_agrees() -> None:
+    camera = make_camera(96, 64)
+    psf = make_psf(camera)
+    scene = np.random.default_rng(1).random((3, 64, 96), dtype=np.float32) * 1.6
+    options = SimulationOptions(noise=False, distort=False, vignette=False)
+    expected = simulate(scene, camera, psf, options)
+
+    margin = psf.kernels.shape[-1] // 2
+    matrix, gains = camera_from_rec709(np.array(camera.color_matrix))
+    planes = runtime.sensor_scene(scene, matrix, psf, expected.window, options, margin)
+    kernels = block_kernels(camera, psf, expected.window, 128)
+    noise = camera.noise_at(options.iso)
+    sensor = Sensor(
+        cfa="RGGB",
+        gains=gains,
+        noise=noise,
+        full_well=camera.full_well_e * noise.shot[1],
+        black_level=camera.black_level,
+        white_level=camera.white_level,
+    )
+    blurred = scatter(torch.from_numpy(planes), kernels)[None]
+    found = expose(blurred, sensor)[0].numpy()
+    one_dn = 1 / (camera.white_level - camera.black_level)
+    signal = (expected.mosaic.astype(np.float32) - camera.black_level) * one_dn
+    difference = np.abs(found - signal)
+    # A signal on the edge of two DN may round either way; nothing else may differ.
+    assert (difference > PARITY).mean() < 1e-3
+    assert difference.max() <= 1.01 * one_dn
+    assert (expected.mosaic == 4095).any()
+
+
+def test_noise_of_both_has_the_same_spread() -> None:
+    camera = make_camera()
+    noise = camera.noise_at(1600)
+    level = 0.1
+    flat = np.full((300, 300), level, dtype=np.float32)
+    dn = runtime.expose(flat, camera, SimulationOptions(iso=1600, seed=0))
+    signal = (dn.astype(float) - 256) / (4095 - 256)
+    sensor = Sensor(
+        cfa="RGGB",
+        gains=(1.0, 1.0, 1.0),
+        noise=noise,
+        full_well=camera.full_well_e * noise.shot[1],
+        black_level=256.0,
+        white_level=4095.0,
+    )
+    normal = torch.randn(1, 300, 300, generator=torch.Generator().manual_seed(0))
+    found = expose(torch.full((1, 3, 300, 300), level), sensor, normal).numpy()
+    assert found.var() == pytest.approx(signal.var(), rel=0.04)
+    assert found.mean() == pytest.approx(signal.mean(), abs=2e-4)

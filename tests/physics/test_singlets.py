@@ -1,0 +1,95 @@
+"""Single lenses whose answer is known exactly."""
+
+import math
+
+import pytest
+import torch
+
+from camkit.models_def.optics.paraxial import focal_lengths
+from camkit.models_def.optics.pupil import launch
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
+
+EXACT_MM = 2e-13
+
+
+def _tensors(
+    surfaces: list[tuple[float, float, float, float]], *, last_mm: float
+) -> SurfaceTensors:
+    """Make tensors from (curvature, conic, thickness, index after) rows."""
+    values = torch.tensor(surfaces, dtype=torch.float64)
+    thickness = values[:, 2].clone()
+    thickness[-1] = last_mm
+    return SurfaceTensors(
+        curvature_per_mm=values[:, 0],
+        conic=values[:, 1],
+        even_asphere=torch.zeros(len(surfaces), 0, dtype=torch.float64),
+        thickness_mm=thickness,
+        semi_diameter_mm=torch.full((len(surfaces),), torch.inf, dtype=torch.float64),
+        index=torch.cat([torch.ones(1, dtype=torch.float64), values[:, 3]]),
+        aspheric=(False,) * len(surfaces),
+    )
+
+
+def _parallel(tensors: SurfaceTensors, half_width_mm: float) -> Rays:
+    height = torch.linspace(-half_width_mm, half_width_mm, 21, dtype=torch.float64)
+    zero = torch.zeros_like(height)
+    return trace(tensors, launch(zero, height, zero, math.inf))
+
+
+def test_plano_hyperbolic_lens_focuses_without_aberration() -> None:
+    """Conic -n^2 on the exit side: all parallel rays meet at R / (n - 1)."""
+    tensors = _tensors([(0.0, 0.0, 4.0, 1.5), (-1 / 25, -2.25, 0.0, 1.0)], last_mm=50.0)
+    assert float(_parallel(tensors, 10.0).y.abs().max()) < EXACT_MM
+
+
+def test_ellipsoid_focuses_inside_its_glass_without_aberration() -> None:
+    """Conic -1/n^2: all parallel rays meet n R / (n - 1) behind the vertex."""
+    tensors = _tensors([(1 / 25, -1 / 2.25, 0.0, 1.5)], last_mm=75.0)
+    assert float(_parallel(tensors, 10.0).y.abs().max()) < EXACT_MM
+
+
+def test_concentric_rays_pass_a_sphere_undeviated() -> None:
+    """Rays towards the centre of curvature meet the sphere at right angles."""
+    tensors = _tensors([(1 / 30, 0.0, 0.0, 1.7)], last_mm=30.0)
+    height = torch.linspace(-9, 9, 11, dtype=torch.float64)
+    length = torch.hypot(height, torch.tensor(30.0, dtype=torch.float64))
+    zero = torch.zeros_like(height)
+    rays = Rays(
+        x=zero,
+        y=height,
+        z=zero,
+        l=zero,
+        m=-height / length,
+        n=30 / length,
+        fate=torch.zeros(11, dtype=torch.int8),
+    )
+    assert float(trace(tensors, rays).y.abs().max()) < EXACT_MM
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 15.0, 40.0])
+def test_plane_plate_shifts_but_does_not_turn_rays(angle_deg: float) -> None:
+    index, thickness = 1.5, 8.0
+    tensors = _tensors([(0.0, 0.0, thickness, index), (0.0, 0.0, 0.0, 1.0)], last_mm=0.0)
+    slope = torch.tan(torch.deg2rad(torch.tensor(angle_deg, dtype=torch.float64)))
+    zero = torch.zeros((), dtype=torch.float64)
+    landed = trace(tensors, launch(zero, zero, slope, math.inf))
+    inside = math.asin(math.sin(math.radians(angle_deg)) / index)
+    assert float(landed.y) == pytest.approx(thickness * math.tan(inside), abs=EXACT_MM)
+    assert float(landed.m / landed.n) == pytest.approx(float(slope), abs=EXACT_MM)
+
+
+def test_thick_lens_focal_length_is_the_lensmaker_s() -> None:
+    c1, c2, t, n = 1 / 40, -1 / 60, 7.0, 1.52
+    tensors = _tensors([(c1, 0.0, t, n), (c2, 0.0, 0.0, 1.0)], last_mm=0.0)
+    power = (n - 1) * (c1 - c2 + (n - 1) * t * c1 * c2 / n)
+    efl, bfl = focal_lengths(tensors)
+    assert float(efl) == pytest.approx(1 / power, rel=1e-14)
+    assert float(bfl) == pytest.approx((1 - (n - 1) * t * c1 / n) / power, rel=1e-14)
+
+
+def test_refraction_keeps_n_sine_of_a_ray_at_a_plane() -> None:
+    tensors = _tensors([(0.0, 0.0, 0.0, 1.62)], last_mm=1.0)
+    slope = torch.linspace(0.0, 3.0, 13, dtype=torch.float64)
+    zero = torch.zeros_like(slope)
+    landed = trace(tensors, launch(zero, zero, slope, math.inf))
+    assert torch.allclose(1.62 * landed.m, torch.sin(torch.atan(slope)), rtol=0, atol=1e-15)

@@ -1,0 +1,185 @@
+"""The pipeline as an application uses it: same bits however it runs, clear refusals."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline, load
+from camkit.runtime.tiling import Cancelled
+from tests.bundle_factory import write_tiny_bundle
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_tiny_bundle(tmp_path_factory.mktemp("bundle"))
+
+
+@pytest.fixture(scope="module")
+def mosaic() -> np.ndarray:
+    rng = np.random.default_rng(2)
+    smooth = np.add.outer(np.linspace(100, 700, 64), np.linspace(0, 200, 96))
+    return (smooth + rng.normal(0, 5, smooth.shape)).clip(0, 1023).astype(np.uint16)
+
+
+def _run(bundle: Path, mosaic: np.ndarray, **choices: object) -> FloatArray:
+    return load(bundle, **choices).process_array(mosaic, iso=100.0)
+
+
+def test_the_picture_has_the_size_of_the_capture_and_is_finite(
+    bundle: Path, mosaic: np.ndarray
+) -> None:
+    image = _run(bundle, mosaic)
+    assert (image.shape, image.dtype) == ((3, 64, 96), np.float32)
+    assert np.isfinite(image).all()
+
+
+@pytest.mark.parametrize(
+    "choice", [{"tile_px": 16}, {"tile_px": 30, "threads": 1}, {"threads": 2}, {"mode": "whole"}]
+)
+def test_tiles_and_threads_do_not_change_a_bit(
+    bundle: Path, mosaic: np.ndarray, choice: dict[str, object]
+) -> None:
+    np.testing.assert_array_equal(_run(bundle, mosaic, **choice), _run(bundle, mosaic))
+
+
+def test_one_pipeline_serves_many_threads_with_equal_bits(
+    bundle: Path, mosaic: np.ndarray
+) -> None:
+    pipeline = load(bundle)
+    with ThreadPoolExecutor(4) as pool:
+        images = list(pool.map(lambda _: pipeline.process_array(mosaic, iso=100.0), range(6)))
+    for image in images[1:]:
+        np.testing.assert_array_equal(image, images[0])
+
+
+def test_out_is_filled_and_returned(bundle: Path, mosaic: np.ndarray) -> None:
+    out = np.empty((3, 64, 96), dtype=np.float32)
+    assert load(bundle).process_array(mosaic, iso=100.0, out=out) is out
+    np.testing.assert_array_equal(out, _run(bundle, mosaic))
+
+
+def test_out_of_the_wrong_shape_is_refused(bundle: Path, mosaic: np.ndarray) -> None:
+    with pytest.raises(ContractError, match=r"out must be float32"):
+        load(bundle).process_array(mosaic, out=np.empty((3, 64, 95), dtype=np.float32))
+
+
+def test_progress_counts_every_tile_and_cancel_stops(bundle: Path, mosaic: np.ndarray) -> None:
+    seen: list[tuple[int, int]] = []
+    pipeline = load(bundle, tile_px=32)
+    pipeline.process_array(mosaic, iso=100.0, progress=lambda *ticks: seen.append(ticks))
+    total = seen[0][1]
+    assert seen == [(i + 1, total) for i in range(total)]
+    assert total > 1
+    with pytest.raises(Cancelled):
+        pipeline.process_array(mosaic, iso=100.0, cancel=lambda: True)
+
+
+def test_a_crop_with_its_origin_keeps_place_and_vignetting(bundle: Path) -> None:
+    """Blocks lie elsewhere in a crop, so means over areas of a smooth scene are compared."""
+    smooth = np.add.outer(np.linspace(300, 500, 64), np.linspace(0, 200, 96)).astype(np.uint16)
+    options = {"undistort": False, "method": "wiener", "color": "camera"}
+    whole = load(bundle, **options).process_array(smooth, iso=100.0)
+    crop = load(bundle, **options).process_array(
+        np.ascontiguousarray(smooth[16:48, 20:84]), iso=100.0, origin_px=(20, 16)
+    )
+
+    def areas(image: FloatArray) -> FloatArray:
+        return image.reshape(3, 2, 8, 6, 8).mean(axis=(2, 4))
+
+    np.testing.assert_allclose(
+        areas(crop[:, 8:-8, 8:-8]), areas(whole[:, 24:40, 28:76]), rtol=0.03
+    )
+
+
+def test_white_balance_gains_scale_the_colours(bundle: Path, mosaic: np.ndarray) -> None:
+    grey = np.full_like(mosaic, 500)
+    options = {"color": "camera", "method": "wiener", "vignetting": False}
+    plain = load(bundle, white_balance=(1.0, 1.0, 1.0), **options).process_array(grey, iso=100.0)
+    red = load(bundle, white_balance=(2.0, 1.0, 1.0), **options).process_array(grey, iso=100.0)
+    centre = np.s_[:, 28:36, 40:56]
+    np.testing.assert_allclose(red[centre][0], 2 * plain[centre][0], rtol=2e-3)
+    np.testing.assert_allclose(red[centre][1], plain[centre][1], rtol=2e-3)
+
+
+def test_exposure_doubles_per_ev(bundle: Path, mosaic: np.ndarray) -> None:
+    np.testing.assert_allclose(
+        _run(bundle, mosaic, exposure_ev=1.0), 2 * _run(bundle, mosaic), rtol=1e-5, atol=1e-6
+    )
+
+
+def test_a_dead_pixel_is_repaired_and_reported(bundle: Path, mosaic: np.ndarray) -> None:
+    broken = mosaic.copy()
+    broken[31, 47] = 1023
+    pipeline = load(bundle)
+    work = pipeline.start(
+        pipeline.capture_of(broken, iso=100.0, white_balance=None, origin_px=None)
+    )
+    image = work.fill(None)
+    assert any("repaired" in warning for warning in work.warnings)
+    np.testing.assert_allclose(image, _run(bundle, mosaic), atol=0.1)
+
+
+def test_the_plan_is_known_before_any_work(bundle: Path, mosaic: np.ndarray) -> None:
+    pipeline = load(bundle)
+    work = pipeline.start(
+        pipeline.capture_of(mosaic, iso=100.0, white_balance=None, origin_px=None)
+    )
+    assert work.plan["noise"]["source"] == "bundle"
+    assert work.plan["tiles"]["mode"] == "exact"
+    assert set(work.seconds) <= {"noise"}
+
+
+def test_noise_is_measured_where_no_iso_is_known(bundle: Path, mosaic: np.ndarray) -> None:
+    pipeline = load(bundle)
+    work = pipeline.start(pipeline.capture_of(mosaic, iso=None, white_balance=None, origin_px=None))
+    assert work.plan["noise"]["source"] == "measured"
+
+
+@pytest.mark.parametrize(
+    ("image", "message"),
+    [
+        (np.zeros((64, 96), np.float64), "uint8, uint16 or float32"),
+        (np.zeros((4, 64, 96), np.float32), r"\(h, w\) or \(3, h, w\)"),
+        (np.zeros((60, 96), np.uint16), "96x60"),
+    ],
+)
+def test_a_wrong_array_is_refused(bundle: Path, image: np.ndarray, message: str) -> None:
+    with pytest.raises(ContractError, match=message):
+        load(bundle).process_array(image)
+
+
+def test_linear_planes_are_taken_with_a_note(bundle: Path) -> None:
+    pipeline = load(bundle)
+    planes = np.full((3, 64, 96), 0.25, dtype=np.float32)
+    work = pipeline.start(pipeline.capture_of(planes, iso=100.0, white_balance=None, origin_px=None))
+    assert any("linear RGB" in warning for warning in work.warnings)
+    assert np.isfinite(work.fill(None)).all()
+
+
+def test_a_size_the_bundle_lacks_is_refused(bundle: Path) -> None:
+    with pytest.raises(ContractError, match=r"holds size\(s\) M"):
+        load(bundle, size="L")
+
+
+def test_an_unknown_option_names_the_known_ones(bundle: Path) -> None:
+    with pytest.raises(ContractError, match=r"unknown option.*tile_px"):
+        load(bundle, tiles=3)
+
+
+def test_arrays_need_a_bundle(mosaic: np.ndarray) -> None:
+    with pytest.raises(ContractError, match="needs a bundle"):
+        Pipeline(None, Options()).process_array(mosaic)
+
+
+@pytest.mark.parametrize("method", ["wiener", "rl", "admm-tv"])
+def test_classical_methods_need_no_network(
+    bundle: Path, mosaic: np.ndarray, method: str
+) -> None:
+    pipeline = load(bundle, method=method)
+    assert pipeline.engine is None
+    assert np.isfinite(pipeline.process_array(mosaic, iso=100.0)).all()

@@ -1,0 +1,95 @@
+"""Rows that are pulled: what is read equals the picture, and nothing is kept for longer."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.rows import ArrayRows, MappedRows, RollingRows, StackedRows
+
+
+def _picture(height: int) -> FloatArray:
+    return np.arange(2 * height * 3, dtype=np.float32).reshape(2, height, 3)
+
+
+def _bands(picture: FloatArray, sizes: list[int]) -> Iterator[FloatArray]:
+    top = 0
+    for size in sizes:
+        yield picture[:, top : top + size]
+        top += size
+
+
+@given(
+    sizes=st.lists(st.integers(1, 7), min_size=1, max_size=8),
+    steps=st.lists(st.integers(1, 9), min_size=1, max_size=12),
+)
+def test_rolling_rows_give_the_rows_of_the_picture(sizes: list[int], steps: list[int]) -> None:
+    picture = _picture(sum(sizes))
+    rolling = RollingRows((2, sum(sizes), 3), _bands(picture, sizes))
+    ahead, behind = rolling.reader(), rolling.reader()
+    top = 0
+    for step in steps:
+        bottom = min(top + step, sum(sizes))
+        if top >= bottom:
+            break
+        np.testing.assert_array_equal(ahead.read(top, bottom), picture[:, top:bottom])
+        np.testing.assert_array_equal(behind.read(top // 2, bottom), picture[:, top // 2 : bottom])
+        top = bottom
+
+
+def test_rows_behind_every_reader_are_forgotten() -> None:
+    picture = _picture(20)
+    rolling = RollingRows((2, 20, 3), _bands(picture, [2] * 10))
+    reader = rolling.reader()
+    for top in range(0, 20, 2):
+        reader.read(top, top + 2)
+        assert len(rolling._kept) <= 2
+
+
+def test_reading_upwards_is_refused() -> None:
+    rolling = RollingRows((2, 8, 3), _bands(_picture(8), [8]))
+    reader = rolling.reader()
+    reader.read(4, 6)
+    with pytest.raises(ContractError, match="downwards"):
+        reader.read(2, 6)
+
+
+def test_bands_that_end_early_are_named() -> None:
+    rolling = RollingRows((2, 8, 3), _bands(_picture(4), [4]))
+    with pytest.raises(ContractError, match="bands end at 4"):
+        rolling.reader().read(0, 6)
+
+
+@pytest.mark.parametrize(("top", "bottom"), [(-1, 2), (3, 3), (2, 9)])
+def test_rows_outside_the_picture_are_refused(top: int, bottom: int) -> None:
+    rolling = RollingRows((2, 8, 3), _bands(_picture(8), [8]))
+    with pytest.raises(ContractError, match="outside"):
+        rolling.reader().read(top, bottom)
+
+
+def test_stacked_and_mapped_rows_act_on_the_same_rows() -> None:
+    picture = _picture(6)
+    both = StackedRows(ArrayRows(picture), ArrayRows(2 * picture))
+    tops: list[int] = []
+
+    def keep_top(rows: FloatArray, top: int) -> FloatArray:
+        tops.append(top)
+        return rows[:1] + rows[2:3]
+
+    mapped = MappedRows(both, keep_top, 1)
+    np.testing.assert_array_equal(mapped.read(1, 4), 3 * picture[:1, 1:4])
+    assert (both.shape, mapped.shape, tops) == ((4, 6, 3), (1, 6, 3), [1])
+
+
+def test_sources_of_different_size_cannot_be_stacked() -> None:
+    with pytest.raises(ContractError, match="differ in size"):
+        StackedRows(ArrayRows(_picture(4)), ArrayRows(_picture(6)))
+
+
+def test_array_rows_need_channels() -> None:
+    with pytest.raises(ContractError, match=r"channel, h, w"):
+        ArrayRows(np.zeros((4, 4), dtype=np.float32))
