@@ -90,7 +90,7 @@ def _cut(rng: Generator, texture: FloatArray, height: int, width: int) -> FloatA
         return texture[y : y + height, x : x + width]
     rows = np.arange(y, y + height) % TEXTURE_SIDE_PX
     columns = np.arange(x, x + width) % TEXTURE_SIDE_PX
-    return texture[rows[:, None], columns]
+    return np.asarray(texture[rows[:, None], columns])
 
 
 def _sky(rng: Generator, height: int, width: int, texture: FloatArray) -> FloatArray:
@@ -155,12 +155,12 @@ def _leaf_mask(
 ) -> FloatArray:
     """Give the coverage (0..1, anti-aliased over one pixel) of a disc, ellipse or rectangle."""
     if kind == 0:
-        return np.clip(np.float32(radius) - np.hypot(dy, dx) + 0.5, 0, 1)
+        return np.asarray(np.clip(np.float32(radius) - np.hypot(dy, dx) + 0.5, 0, 1))
     c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
     u, v = c * dx + s * dy, c * dy - s * dx
     r = np.float32(radius)
     if kind == 1:
-        return np.clip((r - np.hypot(u, 2 * v)) / 1.5 + 0.5, 0, 1)
+        return np.asarray(np.clip((r - np.hypot(u, 2 * v)) / 1.5 + 0.5, 0, 1))
     inside = np.minimum(0.8 * r - np.abs(u), 0.5 * r - np.abs(v))
     return np.clip(inside + 0.5, 0, 1)
 
@@ -168,8 +168,8 @@ def _leaf_mask(
 def _add_panel(rng: Generator, scene: FloatArray) -> None:
     """Put a rectangle of glyphs, a grating or a star on the scene."""
     _, height, width = scene.shape
-    rows = int(min(height, rng.integers(48, 280)))
-    columns = int(min(width, rng.integers(64, 420)))
+    rows = min(height, int(rng.integers(48, 280)))
+    columns = min(width, int(rng.integers(64, 420)))
     top = int(rng.integers(0, height - rows + 1))
     left = int(rng.integers(0, width - columns + 1))
     kind = rng.choice(["text", "grating", "star"], p=[0.6, 0.25, 0.15])
@@ -184,7 +184,7 @@ def _add_panel(rng: Generator, scene: FloatArray) -> None:
 
 def _text(rng: Generator, rows: int, columns: int) -> FloatArray:
     """Set lines of made-up glyphs: ink coverage 0..1."""
-    cell = int(min(rng.integers(9, 40), rows, columns))
+    cell = min(int(rng.integers(9, 40)), rows, columns)
     alphabet = [_glyph(rng, cell) for _ in range(GLYPH_COUNT)]
     ink = np.zeros((rows, columns), dtype=np.float32)
     for y in range(0, rows - cell + 1, int(cell * 1.3)):

@@ -17,6 +17,7 @@ from camkit.runtime.blocks import Block, BlockBank, BlockFilter, ComplexArray, L
 from camkit.runtime.richardson_lucy import (
     apply_transfer,
     background_of,
+    inverse_rfft2,
     richardson_lucy,
     spread_clipped,
 )
@@ -161,7 +162,7 @@ def _admm_tv(
     for _ in range(iterations):
         pull = _divergence(down - dual_down, across - dual_across)
         spectrum = (data + rho * scipy.fft.rfft2(pull)) * inverse
-        sharp = np.asarray(scipy.fft.irfft2(spectrum, s=(size, size)))
+        sharp = inverse_rfft2(spectrum, size)
         dual_down += np.roll(sharp, -1, axis=-2) - sharp
         dual_across += np.roll(sharp, -1, axis=-1) - sharp
         keep = _shrinkage(dual_down, dual_across, threshold)

@@ -194,17 +194,33 @@ def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatAr
     if ring == 0:
         return samples
     shrink = TAPER_SHRINK if size % TAPER_SHRINK == 0 else 1
-    rows = np.add.reduce([samples[:, i::shrink] for i in range(shrink)])
-    small = np.add.reduce([rows[:, :, i::shrink] for i in range(shrink)])
-    small *= np.float32(1 / (shrink * shrink))
+    small = _shrink(_shrink(samples, shrink).swapaxes(1, 2), shrink).swapaxes(1, 2)
     n = size // shrink
     half = otf[:, :, : n // 2 + 1]
     low = np.concatenate([half[:, : n - n // 2], half[:, size - n // 2 :]], axis=1)
     blurred = scipy.fft.irfft2(scipy.fft.rfft2(small) * low, s=(n, n))
-    tapered = np.repeat(np.repeat(blurred, shrink, axis=1), shrink, axis=2)
+    smooth = np.repeat(np.repeat(blurred, shrink, axis=1), shrink, axis=2)
     keep = taper_weights(size, ring)
-    tapered += keep * (samples - tapered)
-    return np.asarray(tapered)
+    tapered = np.array(samples)
+    inner = slice(ring, size - ring)
+    for rows, cols in (
+        (slice(0, ring), slice(0, size)),
+        (slice(size - ring, size), slice(0, size)),
+        (inner, slice(0, ring)),
+        (inner, slice(size - ring, size)),
+    ):
+        part = smooth[:, rows, cols]
+        tapered[:, rows, cols] = part + keep[rows, cols] * (tapered[:, rows, cols] - part)
+    return tapered
+
+
+def _shrink(planes: FloatArray, factor: int) -> FloatArray:
+    """Average every `factor` rows."""
+    total = np.array(planes[:, ::factor])
+    for i in range(1, factor):
+        total += planes[:, i::factor]
+    total *= np.float32(1 / factor)
+    return total
 
 
 @lru_cache(maxsize=4)

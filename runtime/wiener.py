@@ -107,5 +107,7 @@ def _gain(otf: ComplexArray, rise: FloatArray, ratio: NDArray[np.float64]) -> Co
     nsr[:, 0, 0] = 0
     power += nsr
     gain = np.conj(otf)
-    gain /= power
+    # Multiplied, since numpy divides complex by real as complex by complex: twice the time.
+    np.reciprocal(power, out=power)
+    gain *= power
     return gain

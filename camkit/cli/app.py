@@ -1,6 +1,10 @@
 """The commands joined, and the one place where errors become exit codes."""
 
+import logging
 import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated
 
 import typer
@@ -15,6 +19,8 @@ from camkit.cli.process import process
 from camkit.cli.simulate import simulate
 from camkit.cli.train import train
 from camkit.errors import CamkitError
+
+DEBUG_FLAG = "--debug"
 
 app = typer.Typer(
     name="camkit",
@@ -40,15 +46,49 @@ def options(
 
 
 def main() -> None:
-    """Run the command line; every error of camkit becomes one line on stderr."""
-    debug = "--debug" in sys.argv
+    """Run the command line and end the process with its exit code."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line; every expected error becomes one line on stderr.
+
+    Returns:
+        The exit code. A reader that closes the pipe early ends the run with 1, without a word.
+    """
+    debug = DEBUG_FLAG in arguments
     try:
-        app()
-    except CamkitError as error:
+        with _messages(shown=debug):
+            app(list(arguments), prog_name="camkit")
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else ExitCode.INPUT_FAILED
+        if code == ExitCode.INTERRUPTED:
+            typer.echo("camkit: interrupted", err=True)
+        return code
+    except (CamkitError, OSError) as error:
         if debug:
-            raise
-        typer.echo(f"camkit: {error}", err=True)
-        sys.exit(exit_code_of(error))
-    except KeyboardInterrupt:
-        typer.echo("camkit: interrupted", err=True)
-        sys.exit(ExitCode.INTERRUPTED)
+            traceback.print_exc()
+        typer.echo(f"camkit: {_one_line(error)}", err=True)
+        return exit_code_of(error)
+    return ExitCode.DONE
+
+
+@contextmanager
+def _messages(*, shown: bool) -> Iterator[None]:
+    """Show what camkit's modules log, for `--debug`."""
+    if not shown:
+        yield
+        return
+    logger, handler = logging.getLogger("camkit"), logging.StreamHandler()
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.DEBUG)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+        logger.removeHandler(handler)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,18 +1,34 @@
-"""What the design-time commands share: asking for torch, and printing a report."""
+"""What the design-time commands share: asking for torch, keeping files, printing a report."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import util
+from pathlib import Path
 
 import typer
 
-from camkit.errors import UnsupportedError
+from camkit.errors import ContractError, UnsupportedError
 
 
 def require_torch(command: str) -> None:
-    """Raise an error that says how to install torch, if it is not there."""
+    """Raise an error that says how to install torch, if it is not there.
+
+    Raises:
+        UnsupportedError: If torch cannot be imported.
+    """
     if util.find_spec("torch") is None:
         raise UnsupportedError(f"{command} needs torch; install it with: pip install camkit[train]")
+
+
+def refuse_existing(paths: Iterable[Path | None], *, overwrite: bool) -> None:
+    """Refuse to write over a file before any work, unless the caller said so.
+
+    Raises:
+        ContractError: If one of the paths exists.
+    """
+    for path in paths:
+        if path is not None and path.exists() and not overwrite:
+            raise ContractError(f"{path} exists; say --overwrite or another name")
 
 
 def print_report(report: Mapping[str, object], as_json: bool) -> None:

@@ -5,20 +5,39 @@ import os
 import platform
 import sys
 from importlib import metadata, util
-from typing import Annotated, Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import typer
 
-PACKAGES = (
-    "numpy scipy onnxruntime onnx rawpy opencv-contrib-python-headless OpenEXR tifffile "
-    "scikit-image safetensors pydantic typer rich torch onnxscript"
-).split()
+from camkit.cli.choices import Debug, Json
+from camkit.errors import CamkitError
+
+PACKAGES = [
+    "numpy",
+    "scipy",
+    "onnxruntime",
+    "onnx",
+    "rawpy",
+    "opencv-contrib-python-headless",
+    "OpenEXR",
+    "tifffile",
+    "scikit-image",
+    "safetensors",
+    "pydantic",
+    "typer",
+    "rich",
+    "torch",
+    "onnxscript",
+]
 
 
 def doctor(
-    json_: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    json_: Json = False,
+    _debug: Debug = False,
 ) -> None:
-    """Print versions, threads, providers and bundles, and try what `process` needs."""
+    """Print versions, threads, providers and bundles, and try the RAW decoder."""
     report = examine()
     if json_:
         typer.echo(json.dumps(report, indent=2))
@@ -49,12 +68,39 @@ def examine() -> dict[str, Any]:
         "onnxruntime_telemetry": (
             "off" if os.environ.get("ORT_DISABLE_TELEMETRY") == "1" else "not switched off"
         ),
+        "raw_decoder": _try_decoder(),
         "design_time": (
             "ready" if util.find_spec("torch") else "not installed: pip install camkit[train]"
         ),
         "bundles": {name: str(path) for name, path in sorted(built_in_bundles().items())},
         "packages": {name: _version(name) for name in PACKAGES},
     }
+
+
+def _try_decoder() -> str:
+    """Write a small DNG and read it back through the decoder's own process."""
+    import numpy as np
+
+    from camkit.runtime.output.dng import DngTags, write_bayer_dng
+    from camkit.runtime.raw import read_capture
+
+    mosaic = np.random.default_rng(0).integers(100, 1000, (64, 64), dtype=np.uint16)
+    tags = DngTags(
+        cfa="RGGB",
+        black=64,
+        white=1023,
+        color_matrix=None,
+        as_shot_neutral=(1.0, 1.0, 1.0),
+        camera_model="camkit doctor",
+    )
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "doctor.dng"
+        try:
+            write_bayer_dng(path, mosaic, tags=tags)
+            capture = read_capture(path)
+        except (CamkitError, OSError) as error:
+            return f"fails: {error}"
+    return "works" if np.array_equal(capture.samples, mosaic) else "gives wrong samples"
 
 
 def _version(package: str) -> str:
@@ -66,7 +112,7 @@ def _version(package: str) -> str:
 
 def _processor() -> str:
     try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+        with Path("/proc/cpuinfo").open(encoding="utf-8") as lines:
             names = [line.split(":", 1)[1].strip() for line in lines if "model name" in line]
     except OSError:
         names = []

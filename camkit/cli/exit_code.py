@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-from camkit.errors import BundleError, CamkitError, ContractError
+from camkit.errors import BundleError, ContractError
 
 
 class ExitCode(IntEnum):
@@ -16,7 +16,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
-def exit_code_of(error: CamkitError) -> ExitCode:
+def exit_code_of(error: Exception) -> ExitCode:
     """Give the exit code of an error that ended the whole command."""
     if isinstance(error, BundleError):
         return ExitCode.BUNDLE_REFUSED

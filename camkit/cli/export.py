@@ -5,39 +5,79 @@ from typing import Annotated
 
 import typer
 
+from camkit.cli.choices import Debug, Json, Overwrite
+
+PSF_NAME = "psf.safetensors"
+STRESS_NAME = "stress_psf.safetensors"
+REPORT_NAME = "freeze.json"
+
 
 def export(
     checkpoints: Annotated[
         list[Path], typer.Argument(help="One checkpoint per size.", metavar="CHECKPOINT...")
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The bundle (.camkit).")],
-    psf: Annotated[Path, typer.Option(help="The frozen PSF, from `camkit freeze`.")],
+    psf: Annotated[
+        Path | None,
+        typer.Option(help=f"The frozen PSF; default: {PSF_NAME} beside the first checkpoint."),
+    ] = None,
     stress_psf: Annotated[
-        Path | None, typer.Option(help="Kernels off the design point, from `camkit freeze`.")
+        Path | None,
+        typer.Option(help=f"Kernels off the design point; default: {STRESS_NAME} there, if any."),
+    ] = None,
+    freeze: Annotated[
+        Path | None,
+        typer.Option(help=f"Report of `camkit freeze`; default: {REPORT_NAME} there, if any."),
     ] = None,
     prescription: Annotated[
-        Path | None, typer.Option(help="The lens (TOML), to be traced afresh later.")
+        Path | None, typer.Option(help="The lens (TOML); default: the one the recipe names.")
     ] = None,
     version: Annotated[str, typer.Option(help="Semantic version of the bundle.")] = "0.1.0",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
 ) -> None:
     """Pack checkpoints, PSF and prescription, and prove the result (needs torch)."""
-    from camkit.cli.design_time import print_report, require_torch
+    from camkit.cli.design_time import print_report, refuse_existing, require_torch
     from camkit.errors import ContractError
 
     require_torch("camkit export")
-    if out.exists() and not overwrite:
-        raise ContractError(f"{out} exists; say --overwrite or another name")
+    refuse_existing([out], overwrite=overwrite)
+    folder = checkpoints[0].parent
+    frozen = psf or _beside(folder, PSF_NAME)
+    if frozen is None:
+        raise ContractError(
+            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or say --psf"
+        )
     from camkit.export.assemble import Parts, export_bundle
 
     report = export_bundle(
         Parts(
             checkpoints=tuple(checkpoints),
-            psf=psf,
-            stress_psf=stress_psf,
-            prescription=prescription,
+            psf=frozen,
+            stress_psf=stress_psf or _beside(folder, STRESS_NAME),
+            prescription=prescription or _named_prescription(checkpoints[0]),
+            freeze=freeze or _beside(folder, REPORT_NAME),
             version=version,
         ),
         out,
     )
-    print_report(report, as_json=False)
+    print_report(report, json_)
+
+
+def _beside(folder: Path, name: str) -> Path | None:
+    path = folder / name
+    return path if path.is_file() else None
+
+
+def _named_prescription(checkpoint: Path) -> Path | None:
+    """Give the prescription that the checkpoint's recipe names, if it comes with camkit."""
+    import tomllib
+    from importlib import resources
+
+    from camkit.models_def.training.checkpoint import read_checkpoint
+    from camkit.models_def.training.recipe import to_recipe
+
+    recipe = to_recipe(tomllib.loads(read_checkpoint(checkpoint).recipe_toml))
+    folder = Path(str(resources.files("camkit.models_def.prescriptions")))
+    return _beside(folder, f"{recipe.lens.prescription}.toml")

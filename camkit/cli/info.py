@@ -2,11 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from camkit.cli.choices import Debug, Json
 from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.bundle.reader import Bundle
 
 
 def info(
@@ -21,7 +25,8 @@ def info(
     ] = None,
     black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
     white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    json_: Json = False,
+    _debug: Debug = False,
 ) -> None:
     """Say what a bundle or a capture is."""
     if schema:
@@ -48,10 +53,10 @@ def _describe(file: str, mosaic: Any) -> dict[str, Any]:
     path = Path(file)
     if path.suffix == SUFFIX or (not path.exists() and file in built_in_bundles()):
         return _describe_bundle(file)
-    if not path.exists():
+    if not (path.exists() or path.suffix):
         from camkit.bundle.reader import find_bundle
 
-        find_bundle(file)
+        find_bundle(file)  # says which bundles there are
     return _describe_capture(path, mosaic)
 
 
@@ -59,19 +64,27 @@ def _describe_bundle(file: str) -> dict[str, Any]:
     from camkit.bundle.reader import find_bundle, open_bundle
 
     bundle = open_bundle(find_bundle(file))
-    psf = bundle.psf
     manifest = bundle.manifest.model_dump(mode="json", exclude={"members"}, exclude_none=True)
     for facts in manifest["networks"].values():
         facts.pop("node_activation", None)
     return {
         "bundle": str(bundle.path),
         "sha256": bundle.sha256,
-        "psf": {
-            "kernels": list(psf.kernels.shape),
-            "field_heights_mm": [round(float(v), 3) for v in psf.field_heights_mm],
-            "wavelengths_um": [round(float(v), 4) for v in psf.wavelengths_um],
-        },
+        "psf": _describe_psf(bundle),
         **manifest,
+    }
+
+
+def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
+    from camkit.bundle.reader import PSF
+
+    if PSF not in bundle.names:
+        return None
+    psf = bundle.psf
+    return {
+        "kernels": list(psf.kernels.shape),
+        "field_heights_mm": [round(float(v), 3) for v in psf.field_heights_mm],
+        "wavelengths_um": [round(float(v), 4) for v in psf.wavelengths_um],
     }
 
 

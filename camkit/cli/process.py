@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from camkit.cli.choices import Debug
 from camkit.cli.exit_code import ExitCode
-from camkit.errors import CamkitError, ContractError
+from camkit.errors import BundleError, CamkitError, ContractError
 
 if TYPE_CHECKING:
     from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options
+    from camkit.runtime.pipeline import Pipeline
 
 Files = Annotated[list[str], typer.Argument(help="Captures, folders or globs.", metavar="FILES...")]
 
@@ -52,7 +54,7 @@ def process(
     ] = False,
     json_: Annotated[bool, typer.Option("--json", help="One JSON object per file.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the plan, do nothing.")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False,
+    _debug: Debug = False,
 ) -> None:
     """Turn captures into pictures through the camera's bundle."""
     from camkit.cli.mosaic import mosaic_options
@@ -62,7 +64,6 @@ def process(
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options, parse_memory
 
-    del debug  # read where errors become exit codes
     options = Options(
         size=size,
         method=method,  # type: ignore[arg-type]  # checked by Options
@@ -90,31 +91,33 @@ def process(
         raise typer.Exit(ExitCode.NOTHING_MATCHED)
     headerless = mosaic_options(mosaic, black_level, white_level)
     if dry_run:
-        _print_plans(sources, bundle, options, write, headerless, as_json=json_)
-        return
-    with TileProgress(len(sources)) as progress:
-        results = run(
-            sources,
-            bundle=bundle,
-            options=options,
-            write=write,
-            mosaic=headerless,
-            jobs=jobs,
-            progress=progress.tile,
-            on_result=lambda result: progress.result(result, as_json=json_),
-        )
-    if any(result.status == "failed" for result in results):
+        done = _print_plans(sources, bundle, options, write, headerless, as_json=json_)
+    else:
+        with TileProgress() as progress:
+            results = run(
+                sources,
+                bundle=bundle,
+                options=options,
+                write=write,
+                mosaic=headerless,
+                jobs=jobs,
+                progress=progress.tile,
+                on_result=lambda result: progress.result(result, as_json=json_),
+            )
+        done = all(result.status != "failed" for result in results)
+    if not done:
         raise typer.Exit(ExitCode.INPUT_FAILED)
 
 
 def _gains(text: str) -> tuple[float, float, float] | None:
+    """Read --wb: None for the camera's own gains, else (R, G, B) with G = 1."""
     if text == "camera":
         return None
     try:
         r, g, b = (float(part) for part in text.split(","))
     except ValueError:
         raise ContractError(f"--wb takes 'camera' or three gains R,G,B; got {text!r}") from None
-    if g <= 0:
+    if not g > 0:
         raise ContractError(f"--wb gains must be > 0; got {text!r}")
     return r / g, 1.0, b / g
 
@@ -127,22 +130,32 @@ def _print_plans(
     headerless: "MosaicOptions | None",
     *,
     as_json: bool,
-) -> None:
+) -> bool:
+    """Say what would be done with every input; give whether all of it could be."""
     from camkit.runtime.batch import plan_tasks
     from camkit.runtime.pipeline import load
     from camkit.runtime.raw import read_capture
 
+    made: dict[str, Pipeline] = {}
+    done = True
     for task in plan_tasks(sources, bundle=bundle, write=write):
         facts: dict[str, object] = {"input": str(task.source), "output": str(task.target)}
         try:
             if task.refusal is not None:
                 raise ContractError(task.refusal)
-            pipeline = load(task.bundle, options=options)
-            work = pipeline.start(read_capture(task.source, mosaic=headerless))
-            facts |= {"status": "planned", "plan": work.plan, "warnings": list(work.warnings)}
+            if task.bundle not in made:
+                made[task.bundle] = load(task.bundle, options=options)
+            work = made[task.bundle].start(read_capture(task.source, mosaic=headerless))
+            facts |= {"status": "planned", "bundle": task.bundle, "plan": work.plan}
+            facts["warnings"] = list(work.warnings)
         except CamkitError as error:
+            if bundle is not None and isinstance(error, BundleError):
+                raise
             facts |= {"status": "failed", "error": str(error)}
-        if as_json:
-            typer.echo(json.dumps(facts))
-        else:
-            typer.echo("\n".join(f"{key}: {value}" for key, value in facts.items()))
+            done = False
+        typer.echo(json.dumps(facts) if as_json else _lines(facts))
+    return done
+
+
+def _lines(facts: dict[str, object]) -> str:
+    return "\n".join(f"{key}: {value}" for key, value in facts.items())

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 class TileProgress:
     """One bar per running file; safe to call from the working threads."""
 
-    def __init__(self, files: int) -> None:
-        self._files = files
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._bars: dict[Path, TaskID] = {}
         self._live = None
@@ -27,7 +26,13 @@ class TileProgress:
             from rich.console import Console
             from rich.progress import Progress
 
-            self._live = Progress(console=Console(stderr=True), transient=True)
+            # Redirected, results meant for a file or pipe would go to the terminal instead.
+            self._live = Progress(
+                console=Console(stderr=True),
+                transient=True,
+                redirect_stdout=False,
+                redirect_stderr=False,
+            )
 
     def __enter__(self) -> Self:
         if self._live is not None:
@@ -58,12 +63,20 @@ class TileProgress:
             bar = self._bars.pop(result.input, None)
             if self._live is not None and bar is not None:
                 self._live.remove_task(bar)
-            if as_json:
-                typer.echo(json.dumps(result.to_json()))
-            elif result.status == "failed":
-                typer.echo(f"{result.input}: failed: {result.error}", err=True)
-            else:
-                _print_result(result)
+            if self._live is not None:
+                self._live.stop()  # so that bars and results do not share a line
+            _print(result, as_json=as_json)
+            if self._live is not None:
+                self._live.start()
+
+
+def _print(result: "FileResult", *, as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(result.to_json()))
+    elif result.status == "failed":
+        typer.echo(f"{result.input}: failed: {result.error}", err=True)
+    else:
+        _print_result(result)
 
 
 def _print_result(result: "FileResult") -> None:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from camkit.cli.choices import Debug, Overwrite
 from camkit.errors import ContractError
 
 
@@ -23,7 +24,8 @@ def simulate(
     size_px: Annotated[
         str | None, typer.Option(help="W,H of a procedural scene; default: the sensor.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")] = False,
+    overwrite: Overwrite = False,
+    _debug: Debug = False,
 ) -> None:
     """Photograph a scene with the bundle's camera: blur, vignetting, mosaic, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
@@ -31,6 +33,8 @@ def simulate(
     from camkit.runtime.simulate import SimulationOptions, write_capture
     from camkit.runtime.simulate import simulate as simulate_scene
 
+    if out.suffix.lower() != ".dng":
+        raise ContractError(f"a simulated capture is a DNG; expected a name in .dng, got {out}")
     if out.exists() and not overwrite:
         raise ContractError(f"{out} exists; say --overwrite or another name")
     opened = open_bundle(find_bundle(bundle))

@@ -1,9 +1,12 @@
 """`camkit train`: a recipe to a checkpoint."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from camkit.cli.choices import Debug, Json
 
 
 def train(
@@ -13,29 +16,42 @@ def train(
         Path | None, typer.Option(help="Folder of pictures; without it procedural scenes only.")
     ] = None,
     valid: Annotated[
-        Path | None, typer.Option(help="Folder of pictures to validate on.")
+        Path | None, typer.Option(help="Folder of pictures to validate on; default: procedural.")
     ] = None,
-    max_minutes: Annotated[float, typer.Option(help="Wall time of the run.")] = 60.0,
-    out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint and log.")] = Path("runs"),
+    max_minutes: Annotated[
+        float | None,
+        typer.Option(help="Wall time, decay included; default: the recipe's steps."),
+    ] = None,
+    out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint, log and samples.")] = Path(
+        "runs"
+    ),
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
-    threads: Annotated[int | None, typer.Option(help="Threads of torch.")] = None,
+    threads: Annotated[int, typer.Option(help="Threads of torch.")] = 1,
+    workers: Annotated[int, typer.Option(help="Processes that make samples.")] = 1,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    json_: Json = False,
+    _debug: Debug = False,
 ) -> None:
-    """Train one network of a recipe behind the Wiener bank of its frozen PSF (needs torch)."""
+    """Train one network of a recipe behind the Wiener bank of its lens (needs torch)."""
     from camkit.cli.design_time import print_report, require_torch
 
     require_torch("camkit train")
+    from camkit.models_def.training.trainer import TrainOptions
     from camkit.models_def.training.trainer import train as run
 
     result = run(
         recipe,
-        size=size,
-        data_folder=data,
-        valid_folder=valid,
-        max_minutes=max_minutes,
-        resume=resume,
-        out_dir=out_dir,
-        threads=threads,
-        device=device,
+        TrainOptions(
+            out_dir=out_dir,
+            size=size,
+            data_folder=data,
+            valid_folder=valid,
+            max_minutes=max_minutes,
+            resume=resume,
+            threads=threads,
+            workers=workers,
+            device=device,
+        ),
     )
-    print_report(result.to_json(), as_json=False)
+    plain = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(result).items()}
+    print_report(plain, json_)

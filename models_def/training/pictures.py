@@ -21,7 +21,7 @@ from camkit.scenes import procedural_scene
 PICTURE_ENDINGS: Final = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
 SCENE_SEED: Final = 7_000_000
 CANDIDATES: Final = 2
-SRGB_TABLE: Final[FloatArray] = decode_srgb(np.arange(256, dtype=np.float32) / 255)
+SRGB_TABLE: Final[FloatArray] = decode_srgb((np.arange(256) / 255).astype(np.float32))
 
 Generator = np.random.Generator
 

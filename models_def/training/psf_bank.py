@@ -50,7 +50,7 @@ class PsfBank:
     @property
     def radius_px(self) -> int:
         """How far the kernels of the copies reach."""
-        return max(self.copies.shape[-2:]) // 2
+        return int(max(self.copies.shape[-2:])) // 2
 
     @property
     def training_copies(self) -> int:

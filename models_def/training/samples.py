@@ -183,7 +183,8 @@ def _blur(sharp: Tensor, kernels: Tensor, radius_px: int) -> Tensor:
     size = (sharp.shape[-2], sharp.shape[-1])
     spread = torch.fft.irfft2(torch.fft.rfft2(sharp) * to_otf(kernels, size), s=size)
     r = radius_px
-    return spread[..., r : size[0] - r, r : size[1] - r].clamp(min=0)
+    inner: Tensor = spread[..., r : size[0] - r, r : size[1] - r]
+    return inner.clamp(min=0)
 
 
 def _expose(

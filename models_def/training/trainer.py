@@ -15,6 +15,7 @@ from camkit.errors import ContractError
 from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from camkit.models_def.training.credits import describe_data
 from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.lens_bank import build_lens_bank
 from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.progress import TrainingBar
@@ -101,13 +102,14 @@ class TrainResult:
     valid_db: float
 
 
-def train(recipe_path: Path, bank: PsfBank, options: TrainOptions) -> TrainResult:
+def train(recipe_path: Path, options: TrainOptions, *, bank: PsfBank | None = None) -> TrainResult:
     """Train one network of a recipe.
 
     Args:
         recipe_path: TOML recipe.
-        bank: Kernels of the lens, see `lens_bank`.
         options: Where, how long and with what.
+        bank: Kernels to train with; None traces the recipe's lens (about a minute, kept in
+            `out_dir`).
 
     Raises:
         ContractError: If recipe, options or the checkpoint to resume do not fit.
@@ -116,7 +118,11 @@ def train(recipe_path: Path, bank: PsfBank, options: TrainOptions) -> TrainResul
     recipe = read_recipe(recipe_path)
     options.out_dir.mkdir(parents=True, exist_ok=True)
     seed = recipe.network(options.size).schedule.seed
-    pool = open_pool(options.out_dir, recipe_path, bank, options.data_folder, seed=seed)
+    if bank is None:
+        bank = build_lens_bank(recipe, options.out_dir)
+    # A pool of its own: another size may be trained beside this one.
+    samples = options.out_dir / f"samples_{options.size}"
+    pool = open_pool(samples, recipe_path, bank, options.data_folder, seed=seed)
     with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
         pool.start_workers(options.workers)
         cases = make_cases(recipe, bank, options.valid_folder)

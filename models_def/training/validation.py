@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
@@ -86,7 +87,7 @@ def _crops(pictures: Path | None, side: int) -> list[FloatArray]:
     return [to_linear(_middle(read_picture(p), side)) for p in list_pictures(pictures)]
 
 
-def _middle(picture: np.ndarray, side: int) -> np.ndarray:  # type: ignore[type-arg]
+def _middle(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
     height, width, _ = picture.shape
     missing = (max(0, side - height), max(0, side - width), 0)
     picture = np.pad(picture, [(m // 2, m - m // 2) for m in missing], mode="symmetric")
@@ -140,8 +141,9 @@ def to_srgb(stable: Tensor, case: Case, recipe: Recipe) -> FloatArray:
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
     matrix, _ = camera_from_rec709(np.array(recipe.camera.color_matrix))
-    linear_rec709 = apply_matrix(np.linalg.inv(matrix), linear.numpy() / case.sample.illumination)
-    return encode_srgb(linear_rec709)
+    even: FloatArray = (linear / case.sample.illumination).numpy()
+    to_rec709 = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    return encode_srgb(apply_matrix(to_rec709, even))
 
 
 def _psnr(case: Case, recipe: Recipe, stable: Tensor) -> float:

@@ -18,14 +18,14 @@ def options(folder, **changes):
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory, recipe_path, bank):
     """Twelve steps in one go."""
-    return train(recipe_path, bank, options(tmp_path_factory.mktemp("whole")))
+    return train(recipe_path, options(tmp_path_factory.mktemp("whole")), bank=bank)
 
 
 def test_resumed_training_equals_uninterrupted_training_to_the_last_bit(
     tmp_path, recipe_path, bank, whole
 ):
-    train(recipe_path, bank, options(tmp_path, stop_at_step=6))
-    resumed = train(recipe_path, bank, options(tmp_path, resume=True))
+    train(recipe_path, options(tmp_path, stop_at_step=6), bank=bank)
+    resumed = train(recipe_path, options(tmp_path, resume=True), bank=bank)
     one, two = read_checkpoint(whole.checkpoint), read_checkpoint(resumed.checkpoint)
     assert (one.step, two.step) == (12, 12)
     for part in ("weights", "average"):
@@ -41,14 +41,14 @@ def test_training_changes_the_weights_and_the_average_lags(whole):
 
 
 def test_loss_falls_on_a_tiny_run_without_any_picture(tmp_path, recipe_path, bank):
-    result = train(recipe_path, bank, options(tmp_path, size="M"))
+    result = train(recipe_path, options(tmp_path, size="M"), bank=bank)
     assert result.steps == 60
     assert result.valid_db > result.wiener_db + 0.05
     assert "no photographs" in read_checkpoint(result.checkpoint).training_data
 
 
 def test_the_time_budget_ends_a_run_with_its_decay(tmp_path, recipe_path, bank):
-    result = train(recipe_path, bank, options(tmp_path, size="M", max_minutes=1e-4))
+    result = train(recipe_path, options(tmp_path, size="M", max_minutes=1e-4), bank=bank)
     assert result.steps < 60
 
 
@@ -62,12 +62,12 @@ def test_log_tells_steps_seconds_and_quality_and_can_be_drawn(whole, tmp_path):
 
 
 def test_resumed_log_has_each_step_once(tmp_path, recipe_path, bank):
-    train(recipe_path, bank, options(tmp_path, stop_at_step=6))
+    train(recipe_path, options(tmp_path, stop_at_step=6), bank=bank)
     saved = tmp_path / "tiny_S.pt"
     early = saved.read_bytes()
-    train(recipe_path, bank, options(tmp_path, resume=True))
+    train(recipe_path, options(tmp_path, resume=True), bank=bank)
     saved.write_bytes(early)
-    resumed = train(recipe_path, bank, options(tmp_path, resume=True))
+    resumed = train(recipe_path, options(tmp_path, resume=True), bank=bank)
     steps = [e["step"] for e in read_log(resumed.log) if "valid_by_iso" in e]
     assert steps == [6, 12]
 
@@ -83,10 +83,10 @@ def test_broken_log_is_refused(tmp_path):
 
 
 def test_checkpoint_with_other_kernels_is_not_resumed(tmp_path, recipe_path, bank):
-    train(recipe_path, bank, options(tmp_path, stop_at_step=1))
+    train(recipe_path, options(tmp_path, stop_at_step=1), bank=bank)
     other = gaussian_bank(sensor_height_mm=2.0, axis_px=0.9, corner_px=1.7)
     with pytest.raises(ContractError, match="other kernels"):
-        train(recipe_path, other, options(tmp_path, resume=True))
+        train(recipe_path, options(tmp_path, resume=True), bank=other)
 
 
 def test_network_from_a_checkpoint_has_the_averaged_weights(whole):

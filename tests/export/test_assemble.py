@@ -1,0 +1,173 @@
+"""A checkpoint becomes a bundle that proves itself, or nothing is written."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from camkit.bundle.golden import golden_from_bytes
+from camkit.bundle.psf_file import write_psf
+from camkit.bundle.reader import GOLDEN, open_bundle
+from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.errors import ContractError, ParityError
+from camkit.export import assemble
+from camkit.export.assemble import Parts, export_bundle
+from camkit.export.network_facts import MeasuredNetwork
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
+from camkit.runtime.golden_run import develop_case
+
+_MEASURED: dict[str, MeasuredNetwork] = {}
+
+RECIPE = """
+name = "small"
+object_distance_mm = inf
+
+[camera]
+width_px = 640
+height_px = 560
+pixel_pitch_um = 6.0
+cfa = "GRBG"
+black_level = 64.0
+white_level = 4095.0
+full_well_e = 20000.0
+noise = [{ iso = 100.0, gain_e_per_dn = 5.0, read_noise_e = 3.0 }]
+color_matrix = [[0.9, -0.2, -0.1], [-0.4, 1.2, 0.2], [-0.1, 0.2, 0.7]]
+
+[camera.channel_response]
+wavelengths_um = [0.45, 0.55, 0.62]
+response = [[0.0, 0.1, 1.0], [0.1, 1.0, 0.1], [1.0, 0.1, 0.0]]
+source = "made up for tests"
+
+[wiener]
+block_px = 128
+overlap_px = 32
+prior_scale = 1e-3
+prior_exponent = 2.0
+clip_iterations = 2
+
+[lens]
+prescription = "none"
+
+[networks.S]
+network = "lean_s"
+"""
+
+
+def _psf() -> FrozenPsf:
+    at = np.arange(-4, 5)
+    gaussian = np.exp(-np.add.outer(at**2, at**2) / 4.5)
+    kernels = np.tile(gaussian / gaussian.sum(), (3, 1, 3, 1, 1)).astype(np.float32)
+    return FrozenPsf(
+        kernels=kernels,
+        field_heights_mm=np.array([0.0, 1.3, 2.6]),
+        depths_mm=np.array([np.inf]),
+        wavelengths_um=np.array([0.45, 0.55, 0.62]),
+        pixel_pitch_um=6.0,
+        distortion=RadialDistortion(
+            coefficients=np.tile([1.0, -0.02, 0.0, 0.0], (3, 1)), radius_mm=2.55
+        ),
+        relative_illumination=np.array([1.0, 0.9, 0.8]),
+    )
+
+
+def _checkpoint(size: str = "S") -> Checkpoint:
+    torch.manual_seed(0)
+    network = build_network("lean_s")
+    for parameter in network.parameters():
+        if not parameter.abs().max():
+            torch.nn.init.normal_(parameter, std=1e-3)
+    return Checkpoint(
+        recipe_toml=RECIPE,
+        size=size,
+        network="lean_s",
+        config={},
+        bank_digest="",
+        training_data="nothing",
+        step=0,
+        elapsed_s=0.0,
+        cpu_s=0.0,
+        valid_db=None,
+        weights=network.state_dict(),
+        average=network.state_dict(),
+        optimizer={},
+    )
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Parts:
+    folder = tmp_path_factory.mktemp("parts")
+    write_psf(folder / "psf.safetensors", _psf())
+    write_checkpoint(folder / "s.pt", _checkpoint())
+    return Parts(checkpoints=(folder / "s.pt",), psf=folder / "psf.safetensors")
+
+
+@pytest.fixture(autouse=True)
+def _measure_each_network_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The facts of the one network of these tests are measured in the first of them."""
+    honest = assemble.measure_network
+
+    def remembered(size: str, network: Any, windows: Any) -> MeasuredNetwork:
+        if size not in _MEASURED:
+            _MEASURED[size] = honest(size, network, windows)
+        return _MEASURED[size]
+
+    monkeypatch.setattr(assemble, "measure_network", remembered)
+
+
+def test_an_exported_bundle_states_measured_facts_and_repeats_its_golden_cases(
+    parts: Parts, tmp_path: Path
+) -> None:
+    report = export_bundle(parts, tmp_path / "small.camkit")
+    bundle = open_bundle(tmp_path / "small.camkit")
+    facts = bundle.manifest.networks["S"]
+    assert facts.reach_px <= 64
+    assert facts.halo_error[-1].max_abs == 0
+    assert facts.halo_error[0].max_abs > 0
+    assert facts.fp16_safe
+    assert {case.name for case in bundle.manifest.golden} == {"typical", "saturated", "very_dark"}
+    arrays = golden_from_bytes(bundle.member(GOLDEN))
+    for case in bundle.manifest.golden:
+        again = develop_case(bundle, case, arrays[case.name], "S")
+        np.testing.assert_array_equal(again, arrays[case.name].outputs["S"])
+    assert report["bytes"] == (tmp_path / "small.camkit").stat().st_size
+    assert b"95 % energy" in bundle.member("card.md")
+
+
+def test_nothing_is_written_when_the_bundle_fails_its_check(
+    parts: Parts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = assemble.add_outputs
+
+    def lie(*arguments: object) -> object:
+        cases = honest(*arguments)  # type: ignore[arg-type]
+        return {
+            name: replace(case, outputs={s: image + 1.0 for s, image in case.outputs.items()})
+            for name, case in cases.items()
+        }
+
+    monkeypatch.setattr(assemble, "add_outputs", lie)
+    with pytest.raises(ParityError, match="fails its own check"):
+        export_bundle(parts, tmp_path / "wrong.camkit")
+    assert not list(tmp_path.iterdir())
+
+
+def test_two_checkpoints_of_one_size_are_refused(parts: Parts, tmp_path: Path) -> None:
+    twice = replace(parts, checkpoints=parts.checkpoints * 2)
+    with pytest.raises(ContractError, match="keep one"):
+        export_bundle(twice, tmp_path / "x.camkit")
+
+
+def test_a_size_that_no_bundle_holds_must_be_alone(parts: Parts, tmp_path: Path) -> None:
+    write_checkpoint(tmp_path / "other.pt", _checkpoint("trimmed"))
+    both = replace(parts, checkpoints=(*parts.checkpoints, tmp_path / "other.pt"))
+    with pytest.raises(ContractError, match="alone in its bundle"):
+        export_bundle(both, tmp_path / "x.camkit")
+
+
+def test_no_checkpoint_is_refused(parts: Parts, tmp_path: Path) -> None:
+    with pytest.raises(ContractError, match="at least one"):
+        export_bundle(replace(parts, checkpoints=()), tmp_path / "x.camkit")

@@ -1,0 +1,88 @@
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from camkit.bundle.camera import Camera
+from camkit.bundle.psf_file import read_psf
+from camkit.bundle.stages import Wiener
+from camkit.errors import ContractError
+from camkit.models_def.optics import freeze as freeze_module
+from camkit.models_def.optics import sampling
+from camkit.models_def.optics.frozen import FreezeGrid, freeze
+from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.sampling import Bench, block_loss, frozen_loss, make_bench
+
+MODELS = Path(__file__).resolve().parents[3] / "models_def"
+DUET = MODELS / "prescriptions" / "duet.toml"
+SETTINGS = Wiener(prior_scale=3e-4, prior_exponent=2.5)
+
+
+@pytest.fixture(scope="module")
+def camera() -> Camera:
+    table = tomllib.loads((MODELS / "recipes" / "duet.toml").read_text())
+    return Camera.model_validate(table["camera"])
+
+
+@pytest.fixture(scope="module")
+def bench(camera: Camera) -> Bench:
+    patch = pytest.MonkeyPatch()
+    patch.setattr(sampling, "PLACES", 2)
+    patch.setattr(sampling, "TRUE_WAVELENGTHS", 5)
+    made = make_bench(read_prescription(DUET), camera, SETTINGS, copies=1)
+    patch.undo()
+    return made
+
+
+def _small(camera: Camera, fields: int, wavelengths: int) -> FreezeGrid:
+    return FreezeGrid(fields=fields, wavelengths=wavelengths, rays=500, energy=0.98)
+
+
+def test_coarse_samples_lose_more_than_dense_ones(camera: Camera, bench: Bench) -> None:
+    lens = read_prescription(DUET)
+    coarse, dense = (
+        frozen_loss(freeze(lens, camera, _small(camera, *grid)).psf, bench).mean_db
+        for grid in ((3, 3), (17, 7))
+    )
+    assert coarse > dense + 0.1
+    assert dense < 0.3
+
+
+def test_psf_traced_at_the_very_places_loses_nothing(bench: Bench) -> None:
+    assert frozen_loss(bench.nominal, bench).mean_db == 0
+
+
+def test_block_losses_are_measured_where_the_block_answers(bench: Bench) -> None:
+    """A block much smaller than the kernel loses badly."""
+    tiny = SETTINGS.model_copy(update={"block_px": 192, "overlap_px": 64})
+    usual = SETTINGS.model_copy(update={"block_px": 384, "overlap_px": 160})
+    assert block_loss(bench.nominal, bench, tiny).worst_db > 0
+    assert block_loss(bench.nominal, bench, usual).mean_db < 3
+
+
+def test_freezing_writes_the_psf_and_reports_what_it_cost(
+    camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sampling, "PLACES", 2)
+    monkeypatch.setattr(sampling, "TRUE_WAVELENGTHS", 5)
+    monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (5, 9))
+    monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
+    monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
+    out = tmp_path / "psf.safetensors"
+    report = freeze_module.freeze_prescription(DUET, out, camera=camera, limit_db=20.0)
+    psf = read_psf(out)
+    assert psf.kernels.shape[0] == report.fields == 5
+    assert psf.kernels.shape[-1] == report.side_px
+    assert report.energy_kept >= 0.995
+    assert report.loss_db <= 20.0
+    assert json.loads(json.dumps(report.to_json()))["block_px"] == 384
+
+
+def test_loss_that_no_grid_can_keep_is_an_error(
+    camera: Camera, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (3,))
+    monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
+    with pytest.raises(ContractError, match="more than the allowed"):
+        freeze_module.choose_samples(read_prescription(DUET), camera, bench, limit_db=1e-4)

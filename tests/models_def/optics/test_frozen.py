@@ -1,0 +1,119 @@
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from camkit.bundle.camera import Camera, ChannelResponse, IsoNoise
+from camkit.bundle.psf_file import read_psf, write_psf
+from camkit.errors import ContractError
+from camkit.models_def.optics.frozen import (
+    FreezeGrid,
+    corner_height_mm,
+    dense_grid,
+    freeze,
+    freeze_at,
+    freeze_stress,
+)
+from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_response
+from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.sensors.psf import color_kernels
+
+DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
+WAVES = np.linspace(0.42, 0.68, 14)
+SMALL = FreezeGrid(fields=3, wavelengths=5, rays=400, energy=0.99)
+
+
+@pytest.fixture(scope="module")
+def camera() -> Camera:
+    response = gaussian_response(WAVES).response
+    return Camera(
+        width_px=6000,
+        height_px=4000,
+        pixel_pitch_um=5.96,
+        cfa="RGGB",
+        black_level=256,
+        white_level=4095,
+        full_well_e=45000,
+        noise=(IsoNoise(iso=100, gain_e_per_dn=11.72, read_noise_e=3.0),),
+        channel_response=ChannelResponse(
+            wavelengths_um=tuple(WAVES),
+            response=tuple(tuple(row) for row in response),  # type: ignore[arg-type]
+            source="model",
+        ),
+        color_matrix=((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    )
+
+
+def test_corner_is_half_the_diagonal(camera: Camera) -> None:
+    assert corner_height_mm(camera) == pytest.approx(21.489, abs=1e-3)
+
+
+def test_frozen_psf_round_trips_through_its_file(camera: Camera, tmp_path: Path) -> None:
+    frozen = freeze(read_prescription(DUET), camera, SMALL)
+    write_psf(tmp_path / "psf.safetensors", frozen.psf)
+    back = read_psf(tmp_path / "psf.safetensors")
+    assert np.array_equal(back.kernels, frozen.psf.kernels)
+    assert np.array_equal(back.relative_illumination, frozen.psf.relative_illumination)
+    assert back.field_heights_mm[-1] == corner_height_mm(camera)
+    assert frozen.energy_kept >= SMALL.energy
+
+
+def test_kernel_side_is_the_smallest_that_holds_the_light(camera: Camera) -> None:
+    lens = read_prescription(DUET)
+    sides = [
+        freeze(lens, camera, replace(SMALL, energy=energy)).psf.kernels.shape[-1]
+        for energy in (0.9, 0.99)
+    ]
+    assert sides[0] < sides[1] < SMALL.max_side_px
+    assert all(side % 2 == 1 for side in sides)
+
+
+def test_window_too_small_for_the_light_is_refused(camera: Camera) -> None:
+    with pytest.raises(ContractError, match="hold"):
+        freeze(read_prescription(DUET), camera, replace(SMALL, max_side_px=31))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"fields": 1}, {"wavelengths": 0}, {"depths_mm": ()}, {"max_side_px": 64}, {"energy": 1.5}],
+)
+def test_impossible_grid_is_refused(wrong: dict) -> None:
+    with pytest.raises(ContractError):
+        FreezeGrid(**wrong)
+
+
+def test_frozen_colours_equal_a_dense_trace(camera: Camera) -> None:
+    """Five stored wavelengths give the camera's colours as 27 traced ones do."""
+    lens = read_prescription(DUET)
+    heights = np.array([0.0, 12.0])
+    psf = freeze_at(lens, camera, replace(SMALL, energy=0.9995), heights).psf
+    found = color_kernels(psf, *camera.channel_response.to_arrays()).numpy()
+    dense = gaussian_response(np.linspace(0.42, 0.68, 27))
+    expected, _ = colour_kernels(
+        lens, dense, heights, size_px=psf.kernels.shape[-1], pitch_um=5.96, rays=400
+    )
+    apart = np.abs(found - expected).sum((-2, -1))
+    assert apart.max() < 0.05
+
+
+def test_one_wavelength_can_be_frozen(camera: Camera) -> None:
+    psf = freeze(read_prescription(DUET), camera, replace(SMALL, wavelengths=1, energy=0.9)).psf
+    assert psf.wavelengths_um.tolist() == [0.54]
+
+
+def test_dense_grid_doubles_fields_and_triples_wavelengths() -> None:
+    dense = dense_grid(FreezeGrid(fields=13, wavelengths=7))
+    assert (dense.fields, dense.wavelengths) == (25, 19)
+
+
+def test_stress_kernels_spread_as_the_object_comes_near(camera: Camera) -> None:
+    stress = freeze_stress(read_prescription(DUET), camera, replace(SMALL, rays=300)).psf
+    assert math.isinf(stress.depths_mm[-1])
+    centre = torch.from_numpy(stress.kernels[0, :, 1])
+    side = centre.shape[-1]
+    away = torch.arange(side) - side // 2
+    width = (centre.sum(-1) * away**2).sum(-1)
+    assert float(width[0]) > 2 * float(width[-1])

@@ -1,0 +1,75 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.kernel_bank import (
+    ChannelResponse,
+    fabricated_copies,
+    focused_copies,
+    gaussian_response,
+    kernel_bank,
+    wavelength_grid,
+)
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import read_prescription
+
+DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
+
+
+def test_gaussian_response_has_its_width_and_sums_to_one() -> None:
+    waves = np.linspace(0.3, 0.9, 6001)
+    response = gaussian_response(waves)
+    assert response.response.sum(1) == pytest.approx(np.ones(3))
+    for row, centre in zip(response.response, (0.600, 0.540, 0.460), strict=True):
+        above = waves[row >= row.max() / 2]
+        assert above.mean() == pytest.approx(centre, abs=2e-4)
+        assert above[-1] - above[0] == pytest.approx(0.090, abs=4e-4)
+
+
+def test_unnormalised_response_is_refused() -> None:
+    with pytest.raises(ContractError, match="sum to 1"):
+        ChannelResponse(wavelengths_um=np.ones(2), response=np.ones((3, 2)), source="x")
+    with pytest.raises(ContractError, match="must be"):
+        ChannelResponse(wavelengths_um=np.ones(2), response=np.ones((3, 3)) / 3, source="x")
+
+
+def test_bank_holds_the_nominal_lens_first_and_different_copies() -> None:
+    lens = read_prescription(DUET)
+    bank = kernel_bank(
+        lens,
+        gaussian_response(wavelength_grid(3)),
+        copies=3,
+        seed=4,
+        heights_mm=np.array([0.0, 10.0]),
+        size_px=65,
+        pitch_um=5.96,
+        rays=300,
+    )
+    assert bank.kernels.shape == (3, 2, 3, 65, 65)
+    assert bank.kernels.dtype == np.float32
+    assert bank.kernels.sum((-2, -1)) == pytest.approx(np.ones((3, 2, 3)), abs=1e-5)
+    assert bank.energy_kept > 0.999
+    for copy in bank.kernels[1:]:
+        assert np.abs(copy - bank.kernels[0]).sum() > 0.1
+
+
+def test_copies_do_not_depend_on_how_many_are_made() -> None:
+    lens = read_prescription(DUET)
+    assert fabricated_copies(lens, 3, 9)[2] == fabricated_copies(lens, 5, 9)[2]
+
+
+def test_focused_copies_keep_the_designed_distance_from_their_focus() -> None:
+    """All that remains of the focus is its own error of +-0.02 mm."""
+    lens = read_prescription(DUET)
+
+    def defocus_mm(copy_index: int, made: tuple) -> float:
+        copy = made[copy_index]
+        return copy.surfaces[-1].thickness_mm - paraxial_data(copy).bfl_mm
+
+    raw, focused = fabricated_copies(lens, 6, 2), focused_copies(lens, 6, 2)
+    moved = [abs(defocus_mm(i, focused) - defocus_mm(0, focused)) for i in range(1, 6)]
+    drift = [abs(defocus_mm(i, raw) - defocus_mm(0, raw)) for i in range(1, 6)]
+    assert max(moved) <= 0.02 + 1e-12
+    assert max(drift) > 0.05

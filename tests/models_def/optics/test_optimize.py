@@ -1,0 +1,92 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.optimize import design
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.psf import energy_diameter
+from camkit.models_def.optics.pupil import half_disc
+from camkit.models_def.optics.recipe import LensRecipe, read_recipe
+from camkit.models_def.optics.spot import slopes_for_heights, trace_spots
+
+MODELS = Path(__file__).resolve().parents[3] / "models_def"
+RECIPE = MODELS / "recipes" / "duet_lens.toml"
+DUET = MODELS / "prescriptions" / "duet.toml"
+PITCH_MM = 5.96e-3
+
+
+@pytest.fixture(scope="module")
+def recipe() -> LensRecipe:
+    return read_recipe(RECIPE)
+
+
+def test_more_steps_never_end_worse(recipe: LensRecipe) -> None:
+    small = replace(recipe, starts=6, scout_steps=2, kept=2, fields=4, pupil_rays=8)
+    short, long = (design(replace(small, steps=steps)) for steps in (1, 8))
+    assert long.merit <= short.merit
+    assert long.merits == tuple(sorted(long.merits))
+
+
+def test_found_lens_has_the_wanted_focal_length_and_respects_its_ranges(
+    recipe: LensRecipe,
+) -> None:
+    small = replace(recipe, starts=4, scout_steps=2, kept=2, steps=3, fields=4, pupil_rays=8)
+    lens = design(small).lens
+    # radii are rounded to 0.1 um as on a drawing
+    assert paraxial_data(lens).efl_mm == pytest.approx(50.0, abs=2e-3)
+    for surface, free in zip(lens.surfaces[1:-1], recipe.surfaces[1:-1], strict=True):
+        low, high = free.thickness_range_mm
+        assert low - 1e-9 <= surface.thickness_mm <= high + 1e-9
+        low, high = free.curvature_range_per_mm
+        assert low - 1e-6 <= surface.curvature_per_mm <= high + 1e-6
+
+
+def test_same_seed_finds_the_same_lens(recipe: LensRecipe) -> None:
+    small = replace(recipe, starts=3, scout_steps=1, kept=1, steps=1, fields=3, pupil_rays=6)
+    assert design(small) == design(small)
+    assert design(replace(small, seed=12)).lens != design(small).lens
+
+
+def test_duet_is_as_bad_as_it_was_meant_to_be() -> None:
+    """95 % of the light in 30..80 px at the corner, at least 8 px everywhere, F/4, 50 mm."""
+    lens = read_prescription(DUET)
+    data = paraxial_data(lens)
+    assert data.efl_mm == pytest.approx(50.0, abs=1e-3)
+    assert data.f_number == pytest.approx(4.0, abs=1e-4)
+    heights = torch.tensor([0.0, 5.0, 10.0, 15.0, 18.0, 21.489], dtype=torch.float64)
+    waves = torch.tensor([0.46, 0.54, 0.60], dtype=torch.float64)
+    spots = trace_spots(lens, slopes_for_heights(lens, heights), waves, half_disc(1000))
+    diameters = energy_diameter(spots) / PITCH_MM
+    assert 30 < float(diameters[-1]) < 80
+    assert float(diameters.min()) > 8
+    assert bool((spots.fate == 0).all())
+
+
+@pytest.mark.slow
+def test_duet_is_found_again_by_its_recipe(recipe: LensRecipe) -> None:
+    assert design(recipe).lens.surfaces == read_prescription(DUET).surfaces
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("seed = 11", "sed = 11"), "unknown keys"),
+        (("seed = 11", 'seed = "x"'), "must be int"),
+        (("efl_mm = 50.0", "efl_mm = [50.0]"), "one number"),
+        (("efl_mm = 50.0", "efl_mm = true"), "must be numbers"),
+        (("kept = 16", "kept = 999"), "kept must be"),
+        (("[0.5, 20.0]", "[9.0, 2.0]"), "range is"),
+        (("curvature_range_per_mm = [0.0, 0.0]", "curvature_range_per_mm = [0.0, 1.0]"), "stop"),
+        (('"PC-Sultanova2009"', '"PC"'), "known name"),
+        (("seed = 11", "seed ="), "must be TOML"),
+    ],
+)
+def test_wrong_recipe_is_refused(change: tuple[str, str], message: str, tmp_path: Path) -> None:
+    path = tmp_path / "recipe.toml"
+    path.write_text(RECIPE.read_text().replace(*change, 1))
+    with pytest.raises(ContractError, match=message):
+        read_recipe(path)
