@@ -4,7 +4,7 @@ candidates -> frozen_loss (dB of the Wiener filter alone) -> FrozenPsf -> psf.sa
 FrozenPsf -> block_loss of block grids -> FreezeReport
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -80,7 +80,12 @@ class FreezeReport:
 
 
 def choose_samples(
-    lens: Lens, camera: Camera, bench: Bench, *, limit_db: float = LOSS_LIMIT_DB
+    lens: Lens,
+    camera: Camera,
+    bench: Bench,
+    *,
+    limit_db: float = LOSS_LIMIT_DB,
+    grid: FreezeGrid | None = None,
 ) -> tuple[Frozen, Loss]:
     """Freeze with the least wavelengths, then the least fields, whose mean loss is allowed.
 
@@ -89,16 +94,17 @@ def choose_samples(
     Raises:
         ContractError: If even the densest grid loses more.
     """
+    base = grid or FreezeGrid()
     fields = FIELD_COUNTS[-1]
     waves = WAVELENGTH_COUNTS[-1]
     for count in WAVELENGTH_COUNTS:
-        frozen = freeze(lens, camera, FreezeGrid(fields=fields, wavelengths=count))
+        frozen = freeze(lens, camera, replace(base, fields=fields, wavelengths=count))
         if frozen_loss(frozen.psf, bench).mean_db <= limit_db / 2:
             waves = count
             break
     loss = Loss(mean_db=0.0, worst_db=0.0)
     for count in FIELD_COUNTS:
-        frozen = freeze(lens, camera, FreezeGrid(fields=count, wavelengths=waves))
+        frozen = freeze(lens, camera, replace(base, fields=count, wavelengths=waves))
         loss = frozen_loss(frozen.psf, bench)
         if loss.mean_db <= limit_db:
             return frozen, loss
@@ -134,6 +140,7 @@ def freeze_prescription(
     camera: Camera,
     settings: Wiener | None = None,
     limit_db: float = LOSS_LIMIT_DB,
+    grid: FreezeGrid | None = None,
 ) -> FreezeReport:
     """Freeze the PSF of a prescription and write it.
 
@@ -143,6 +150,7 @@ def freeze_prescription(
         camera: Sensor size, pitch, response and noise.
         settings: Of the Wiener filter that measures the loss.
         limit_db: Mean loss allowed for the samples, and for the blocks.
+        grid: Rays, energy and depths; its fields and wavelengths are chosen here.
 
     Raises:
         ContractError: If the prescription is wrong or no grid keeps the loss.
@@ -151,8 +159,9 @@ def freeze_prescription(
 
     lens = read_prescription(path)
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
-    bench = make_bench(lens, camera, chosen)
-    frozen, loss = choose_samples(lens, camera, bench, limit_db=limit_db)
+    rays = (grid or FreezeGrid()).rays
+    bench = make_bench(lens, camera, chosen, rays=rays)
+    frozen, loss = choose_samples(lens, camera, bench, limit_db=limit_db, grid=grid)
     blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape

@@ -54,7 +54,7 @@ class FreezeGrid:
     wavelengths: int = 7
     depths_mm: tuple[float, ...] = (math.inf,)
     energy: float = 0.995
-    max_side_px: int = 129
+    max_side_px: int = 151
     rays: int = 4096
 
     def __post_init__(self) -> None:

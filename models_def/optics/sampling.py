@@ -32,6 +32,8 @@ PATCH_PX: Final = 320
 MARGIN_PX: Final = 64
 PLACES: Final = 8
 TRUE_WAVELENGTHS: Final = 13
+TRUE_ENERGY: Final = 0.999
+TRUE_SIDE_PX: Final = 201
 ISO_STEPS: Final = (1.0, 16.0)
 OFFSETS: Final = (-0.8, 0.0, 0.8)
 BLOCK_HEIGHTS: Final = (0.35, 0.65, 0.9)
@@ -82,7 +84,13 @@ def sample_heights(corner_mm: float, places: int) -> FloatGrid:
 
 
 def make_bench(
-    lens: Lens, camera: Camera, settings: Wiener, *, copies: int = 2, seed: int = 5
+    lens: Lens,
+    camera: Camera,
+    settings: Wiener,
+    *,
+    copies: int = 2,
+    rays: int = 4096,
+    seed: int = 5,
 ) -> Bench:
     """Trace a lens and copies of it at the places where it will be judged.
 
@@ -91,11 +99,14 @@ def make_bench(
         camera: Response, size and noise.
         settings: Of the Wiener filter.
         copies: How many fabricated copies.
+        rays: In half the pupil.
         seed: Of the errors, scenes and noise.
     """
     places = sample_heights(corner_height_mm(camera), PLACES)
     heights = np.concatenate([np.zeros(1), places])
-    grid = FreezeGrid(wavelengths=TRUE_WAVELENGTHS, energy=0.9995, max_side_px=161)
+    grid = FreezeGrid(
+        wavelengths=TRUE_WAVELENGTHS, energy=TRUE_ENERGY, max_side_px=TRUE_SIDE_PX, rays=rays
+    )
     traced = [
         freeze_at(copy, camera, grid, heights).psf
         for copy in focused_copies(lens, copies + 1, seed)
@@ -136,28 +147,47 @@ def block_loss(psf: FrozenPsf, bench: Bench, settings: Wiener) -> Loss:
         settings: Block and overlap under test.
     """
     half = (settings.block_px - settings.overlap_px) / 2
-    corner_px = np.array([bench.camera.width_px, bench.camera.height_px]) / 2
-    ratios = [
-        _probe(psf, bench, settings, (share * corner_px, np.array([dx, dy]) * half))
+    camera = bench.camera
+    corner_px = np.array([camera.width_px, camera.height_px]) / 2
+    places = [
+        (share * corner_px, np.array([dx, dy]) * half)
         for share in BLOCK_HEIGHTS
         for dy in OFFSETS
         for dx in OFFSETS
+    ]
+    pitch_mm = camera.pixel_pitch_um / UM_PER_MM
+    centres = np.stack([centre for centre, _ in places]) * pitch_mm
+    probed = centres + np.stack([offset for _, offset in places]) * pitch_mm
+    blocks, locals_, trues = (
+        _kernels(p, camera, at[:, 0], at[:, 1])
+        for p, at in ((psf, centres), (psf, probed), (bench.copies[0], probed))
+    )
+    scene = _scenes(1, settings.block_px + LARGER_PX, bench.seed)
+    ratios = [
+        _probe(
+            (blocks[i : i + 1], locals_[i : i + 1]),
+            trues[i : i + 1],
+            scene,
+            offset,
+            (bench, settings),
+        )
+        for i, (_, offset) in enumerate(places)
     ]
     return _loss(torch.tensor(ratios))
 
 
 def _probe(
-    psf: FrozenPsf, bench: Bench, settings: Wiener, place: tuple[FloatGrid, FloatGrid]
+    kernels: tuple[Tensor, Tensor],
+    true_kernel: Tensor,
+    scene: Tensor,
+    offset_px: FloatGrid,
+    by: tuple[Bench, Wiener],
 ) -> float:
-    """Give the ratio of squared errors at one offset of one block: its kernel over the local."""
-    camera, (centre_px, offset_px) = bench.camera, place
-    at_mm = np.stack([centre_px, centre_px + offset_px]) * camera.pixel_pitch_um / UM_PER_MM
-    kernels = _kernels(psf, camera, at_mm[:, 0], at_mm[:, 1])
-    block_kernel, local_kernel = kernels[:1], kernels[1:]
-    true_kernel = _kernels(bench.copies[0], camera, at_mm[1:, 0], at_mm[1:, 1])
-    large = settings.block_px + LARGER_PX
-    scene = _scenes(1, large, bench.seed)
-    noisy, shot, read = _noisy(_convolve(scene, true_kernel), camera, 1.0, bench.seed)
+    """Give the ratio of squared errors at an offset: with the block's kernel over the local one."""
+    bench, settings = by
+    block_kernel, local_kernel = kernels
+    large = scene.shape[-1]
+    noisy, shot, read = _noisy(_convolve(scene, true_kernel), bench.camera, 1.0, bench.seed)
     top, left = (int(large / 2 + o - PROBE_PX / 2) for o in (offset_px[1], offset_px[0]))
     sharp = scene[..., top : top + PROBE_PX, left : left + PROBE_PX]
     errors = []

@@ -1,5 +1,6 @@
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,15 @@ from camkit.models_def.optics.sampling import Bench, block_loss, frozen_loss, ma
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
 DUET = MODELS / "prescriptions" / "duet.toml"
 SETTINGS = Wiener(prior_scale=3e-4, prior_exponent=2.5)
+SMALL = FreezeGrid(rays=400)
+
+
+def _shrink(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(sampling, "PLACES", 2)
+    patch.setattr(sampling, "TRUE_WAVELENGTHS", 5)
+    patch.setattr(sampling, "OFFSETS", (-0.8, 0.8))
+    patch.setattr(sampling, "BLOCK_HEIGHTS", (0.9,))
+    patch.setattr(sampling, "LARGER_PX", 128)
 
 
 @pytest.fixture(scope="module")
@@ -28,21 +38,18 @@ def camera() -> Camera:
 @pytest.fixture(scope="module")
 def bench(camera: Camera) -> Bench:
     patch = pytest.MonkeyPatch()
-    patch.setattr(sampling, "PLACES", 2)
-    patch.setattr(sampling, "TRUE_WAVELENGTHS", 5)
-    made = make_bench(read_prescription(DUET), camera, SETTINGS, copies=1)
+    _shrink(patch)
+    made = make_bench(read_prescription(DUET), camera, SETTINGS, copies=1, rays=500)
     patch.undo()
     return made
-
-
-def _small(camera: Camera, fields: int, wavelengths: int) -> FreezeGrid:
-    return FreezeGrid(fields=fields, wavelengths=wavelengths, rays=500, energy=0.98)
 
 
 def test_coarse_samples_lose_more_than_dense_ones(camera: Camera, bench: Bench) -> None:
     lens = read_prescription(DUET)
     coarse, dense = (
-        frozen_loss(freeze(lens, camera, _small(camera, *grid)).psf, bench).mean_db
+        frozen_loss(
+            freeze(lens, camera, replace(SMALL, fields=grid[0], wavelengths=grid[1])).psf, bench
+        ).mean_db
         for grid in ((3, 3), (17, 7))
     )
     assert coarse > dense + 0.1
@@ -57,20 +64,22 @@ def test_block_losses_are_measured_where_the_block_answers(bench: Bench) -> None
     """A block much smaller than the kernel loses badly."""
     tiny = SETTINGS.model_copy(update={"block_px": 192, "overlap_px": 64})
     usual = SETTINGS.model_copy(update={"block_px": 384, "overlap_px": 160})
-    assert block_loss(bench.nominal, bench, tiny).worst_db > 0
-    assert block_loss(bench.nominal, bench, usual).mean_db < 3
+    with pytest.MonkeyPatch.context() as patch:
+        _shrink(patch)
+        lost = [block_loss(bench.nominal, bench, grid).mean_db for grid in (tiny, usual)]
+    assert lost[0] > lost[1]
+    assert lost[1] < 3
 
 
 def test_freezing_writes_the_psf_and_reports_what_it_cost(
     camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sampling, "PLACES", 2)
-    monkeypatch.setattr(sampling, "TRUE_WAVELENGTHS", 5)
+    _shrink(monkeypatch)
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (5, 9))
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
     out = tmp_path / "psf.safetensors"
-    report = freeze_module.freeze_prescription(DUET, out, camera=camera, limit_db=20.0)
+    report = freeze_module.freeze_prescription(DUET, out, camera=camera, limit_db=20.0, grid=SMALL)
     psf = read_psf(out)
     assert psf.kernels.shape[0] == report.fields == 5
     assert psf.kernels.shape[-1] == report.side_px
@@ -85,4 +94,6 @@ def test_loss_that_no_grid_can_keep_is_an_error(
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     with pytest.raises(ContractError, match="more than the allowed"):
-        freeze_module.choose_samples(read_prescription(DUET), camera, bench, limit_db=1e-4)
+        freeze_module.choose_samples(
+            read_prescription(DUET), camera, bench, limit_db=1e-4, grid=SMALL
+        )

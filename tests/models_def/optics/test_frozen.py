@@ -17,9 +17,10 @@ from camkit.models_def.optics.frozen import (
     freeze_at,
     freeze_stress,
 )
+from camkit.models_def.optics.kernel_bank import ChannelResponse as ChannelShares
 from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_response
 from camkit.models_def.optics.prescription import read_prescription
-from camkit.models_def.sensors.psf import color_kernels
+from camkit.models_def.sensors.psf import color_kernels, wavelength_weights
 
 DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
 WAVES = np.linspace(0.42, 0.68, 14)
@@ -73,7 +74,7 @@ def test_kernel_side_is_the_smallest_that_holds_the_light(camera: Camera) -> Non
 
 def test_window_too_small_for_the_light_is_refused(camera: Camera) -> None:
     with pytest.raises(ContractError, match="hold"):
-        freeze(read_prescription(DUET), camera, replace(SMALL, max_side_px=31))
+        freeze(read_prescription(DUET), camera, replace(SMALL, max_side_px=61))
 
 
 @pytest.mark.parametrize(
@@ -91,7 +92,9 @@ def test_frozen_colours_equal_a_dense_trace(camera: Camera) -> None:
     heights = np.array([0.0, 12.0])
     psf = freeze_at(lens, camera, replace(SMALL, energy=0.9995), heights).psf
     found = color_kernels(psf, *camera.channel_response.to_arrays()).numpy()
-    dense = gaussian_response(np.linspace(0.42, 0.68, 27))
+    waves = np.linspace(0.42, 0.68, 27)
+    weights = wavelength_weights(waves, *camera.channel_response.to_arrays())
+    dense = ChannelShares(wavelengths_um=waves, response=weights, source="camera")
     expected, _ = colour_kernels(
         lens, dense, heights, size_px=psf.kernels.shape[-1], pitch_um=5.96, rays=400
     )

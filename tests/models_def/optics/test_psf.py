@@ -151,7 +151,7 @@ def test_slopes_are_found_for_sensor_heights() -> None:
 
 
 def test_unreachable_sensor_height_is_refused() -> None:
-    with pytest.raises(ContractError, match="chief ray is lost|no field reaches"):
+    with pytest.raises(ContractError, match=r"chief ray is lost|no field reaches"):
         slopes_for_heights(read_prescription(DUET), _f64(200.0))
 
 

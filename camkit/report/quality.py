@@ -1,0 +1,281 @@
+"""How well a camera restores: simulated captures at stated places, judged on sRGB values.
+
+    picture -> place on the sensor -> capture through a lens -> method -> PSNR, SSIM
+                                        ^ fabricated copy traced afresh, or the bundle's own PSF
+
+Everything is compared in sensor geometry (distortion stays in, vignetting is divided out), with
+the border of `BORDER_PX` cut off.
+"""
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.metrics import peak_signal_noise_ratio, structural_similarity
+
+from camkit.bundle.reader import Bundle
+from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
+from camkit.contracts import FloatArray, FrozenPsf
+from camkit.errors import ContractError
+from camkit.report.peers import LocalCapture, trim_kernels
+from camkit.runtime.capture import Capture
+from camkit.runtime.color import recover_highlights
+from camkit.runtime.front_rows import FrontRows
+from camkit.runtime.illumination import divide_illumination
+from camkit.runtime.options import Options
+from camkit.runtime.picture import read_scene
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.psf import color_kernels, kernel_at
+from camkit.runtime.sensor_window import centred_origin
+from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+
+PROTOCOL_VERSION: Final = 1
+FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Places from centred on the axis to touching the sensor's corner, as shares of that way."""
+QUADRANTS: Final = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+FABRICATION_SEEDS: Final = (2001, 2002, 2003)
+TUNING_SEED: Final = 2004
+BORDER_PX: Final = 32
+PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+
+PsfKind = Literal["fresh", "bundle"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """One capture of the protocol.
+
+    Attributes:
+        set_name: Folder of the picture.
+        picture: File of the picture.
+        number: Its place in the set, sorted by name; decides lens copy and quadrant.
+        position: Index into `FIELD_SHARES`.
+        iso: Sensitivity.
+        psf: Through a fabricated lens traced afresh, or through the bundle's own PSF.
+    """
+
+    set_name: str
+    picture: Path
+    number: int
+    position: int
+    iso: float
+    psf: PsfKind
+
+    @property
+    def fabrication_seed(self) -> int:
+        """Give the seed of the lens copy."""
+        return FABRICATION_SEEDS[self.number % len(FABRICATION_SEEDS)]
+
+    @property
+    def noise_seed(self) -> int:
+        """Give the seed of the noise, the same for both PSFs and whatever else is run."""
+        text = f"{self.set_name}/{self.picture.name}/{self.position}/{self.iso:g}"
+        return zlib.crc32(text.encode())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exposed:
+    """A capture that was simulated, beside the truth.
+
+    Attributes:
+        simulation: Mosaic and place.
+        sharp: (3, h, w) float32 sRGB values of the sharp picture in sensor geometry.
+        local: The developed planes for methods that are not of the bundle.
+    """
+
+    simulation: Simulation
+    sharp: FloatArray
+    local: LocalCapture
+
+    @property
+    def height_mm(self) -> float:
+        """Give the distance of the crop's middle from the axis."""
+        return float(np.hypot(*self.simulation.window.centre_mm))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """Agreement with the sharp picture on sRGB values."""
+
+    psnr_db: float
+    ssim: float
+
+
+Restorer = Callable[[Exposed], FloatArray]
+
+
+def list_set(folder: Path, count: int | None = None) -> tuple[Path, ...]:
+    """Give the first pictures of a folder by name.
+
+    Raises:
+        ContractError: If there is none.
+    """
+    if not folder.is_dir():
+        raise ContractError(f"there is no folder {folder}; give the folder of the picture sets")
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURE_SUFFIXES)
+    if not found:
+        raise ContractError(f"{folder} holds no pictures ({', '.join(PICTURE_SUFFIXES)})")
+    return tuple(found[:count])
+
+
+def crop_origin(
+    size_px: tuple[int, int],
+    sensor_size_px: tuple[int, int],
+    share: float,
+    quadrant: tuple[int, int],
+) -> tuple[int, int]:
+    """Give the even (x, y) of a crop on the way from the middle of the sensor to a corner.
+
+    Args:
+        size_px: (width, height) of the crop.
+        sensor_size_px: (width, height) of the sensor.
+        share: 0 centred, 1 touching the corner.
+        quadrant: Sign of (x, y) of the corner.
+
+    Raises:
+        ContractError: If the crop is larger than the sensor.
+    """
+    if any(c > s for c, s in zip(size_px, sensor_size_px, strict=True)):
+        raise ContractError(f"a picture of {size_px} px does not fit a sensor of {sensor_size_px}")
+    origin = []
+    for start, side, whole, sign in zip(
+        centred_origin(size_px, sensor_size_px), size_px, sensor_size_px, quadrant, strict=True
+    ):
+        end = (whole - side) // 2 * 2 if sign > 0 else 0
+        origin.append(round((start + share * (end - start)) / 2) * 2)
+    return origin[0], origin[1]
+
+
+def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Exposed:
+    """Photograph a picture.
+
+    Args:
+        shot: Place, ISO and noise.
+        scene: (3, h, w) float32 linear Rec.709.
+        bundle: The camera; its PSF is what methods may know.
+        lens: The PSF that the light really takes.
+    """
+    camera = bundle.manifest.camera
+    sensor = (camera.width_px, camera.height_px)
+    quadrant = QUADRANTS[shot.number % len(QUADRANTS)]
+    size = (scene.shape[2], scene.shape[1])
+    options = SimulationOptions(
+        iso=shot.iso,
+        seed=shot.noise_seed,
+        origin_px=crop_origin(size, sensor, FIELD_SHARES[shot.position], quadrant),
+    )
+    simulation = simulate(scene, camera, lens, options)
+    matrix = rec709_from_camera(np.array(camera.color_matrix, dtype=np.float64))
+    return Exposed(
+        simulation=simulation,
+        sharp=encode_srgb(apply_matrix(matrix, simulation.clean)),
+        local=_develop(simulation, bundle),
+    )
+
+
+def read_picture(path: Path, most_px: int | None = None) -> FloatArray:
+    """Read a picture as linear Rec.709, greys replicated; its middle if a side exceeds a limit."""
+    scene = read_scene(path)
+    if most_px is not None:
+        _, height, width = scene.shape
+        top, left = (max(side - most_px, 0) // 2 for side in (height, width))
+        scene = scene[:, top : top + most_px, left : left + most_px]
+    return np.ascontiguousarray(scene)
+
+
+def finish_planes(planes: FloatArray, exposed: Exposed, bundle: Bundle) -> FloatArray:
+    """Give linear Rec.709 of white-balanced camera planes, vignetting divided out.
+
+    These are the last stages of the pipeline, for planes that a foreign method restored.
+    """
+    raised = recover_highlights(planes, exposed.simulation.white_balance)
+    even = divide_illumination(raised, 0, bundle.psf, exposed.simulation.window)
+    color_matrix = np.array(bundle.manifest.camera.color_matrix, dtype=np.float64)
+    return apply_matrix(rec709_from_camera(color_matrix), even)
+
+
+def pipeline_restorer(bundle: Bundle, *, size: str | None) -> Restorer:
+    """Give camkit's own restoration in sensor geometry.
+
+    Args:
+        bundle: The camera.
+        size: Of the network; None for the Wiener bank alone.
+    """
+    common = Options(undistort=False, threads=1, method="wiener")
+    chosen = common if size is None else Options(undistort=False, threads=1, size=size)
+    return pipeline_of(Pipeline(bundle, chosen) if size is None else _with_network(bundle, chosen))
+
+
+def pipeline_of(pipeline: Pipeline) -> Restorer:
+    """Give the restoration of a pipeline."""
+
+    def restore(exposed: Exposed) -> FloatArray:
+        simulation = exposed.simulation
+        x, y = (int(v) for v in simulation.window.origin_px)
+        return pipeline.process_array(
+            simulation.mosaic,
+            iso=simulation.iso,
+            white_balance=simulation.white_balance,
+            origin_px=(x, y),
+        )
+
+    return restore
+
+
+def judge(restored: FloatArray, sharp: FloatArray) -> Score:
+    """Compare a restoration with the sharp picture.
+
+    Args:
+        restored: (3, h, w) float32 linear Rec.709.
+        sharp: (3, h, w) float32 sRGB values.
+
+    References: Wang et al. 2004 (SSIM with Gaussian weights of sigma 1.5).
+    """
+    inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
+    truth = sharp[inside].transpose(1, 2, 0).astype(np.float64)
+    got = encode_srgb(restored[inside]).transpose(1, 2, 0).astype(np.float64)
+    ssim = structural_similarity(
+        truth,
+        got,
+        data_range=1.0,
+        channel_axis=-1,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+    )
+    # equal pictures would be infinitely good, which no mean survives
+    psnr_db = peak_signal_noise_ratio(truth, got, data_range=1.0) if (truth != got).any() else 120.0
+    return Score(psnr_db=float(psnr_db), ssim=float(ssim))
+
+
+def _with_network(bundle: Bundle, options: Options) -> Pipeline:
+    if options.size not in bundle.manifest.networks:
+        have = ", ".join(sorted(bundle.manifest.networks)) or "none"
+        raise ContractError(f"{bundle.path.name} holds size(s) {have}; asked for {options.size}")
+    return Pipeline(bundle, options)
+
+
+def _develop(simulation: Simulation, bundle: Bundle) -> LocalCapture:
+    camera = bundle.manifest.camera
+    x, y = (int(v) for v in simulation.window.origin_px)
+    capture: Capture = Pipeline(bundle, Options(method="wiener", threads=1)).capture_of(
+        simulation.mosaic,
+        iso=simulation.iso,
+        white_balance=simulation.white_balance,
+        origin_px=(x, y),
+    )
+    front = FrontRows(capture, simulation.white_balance, method="fast", repair=True)
+    kernels = color_kernels(bundle.psf, *camera.channel_response.to_arrays())
+    x_mm, y_mm = (float(v) for v in simulation.window.centre_mm)
+    saturated: NDArray[np.bool_] = capture.saturated_rows(0, capture.height)
+    return LocalCapture(
+        planes=front.read(0, capture.height),
+        kernels=trim_kernels(kernel_at(kernels, bundle.psf.field_heights_mm, x_mm, y_mm)),
+        noise=camera.noise_at(simulation.iso).with_gains(simulation.white_balance),
+        saturated=saturated if saturated.any() else None,
+        window=simulation.window,
+    )
