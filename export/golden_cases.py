@@ -14,7 +14,7 @@ from camkit.contracts import FloatArray, FrozenPsf
 from camkit.runtime.golden_run import develop_case
 from camkit.runtime.rows import ArrayRows
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
-from camkit.runtime.warp import undistort_bands
+from camkit.runtime.geometry.warp import undistort_bands
 from camkit.scenes import procedural_scene
 
 Cases = dict[str, tuple[GoldenCase, GoldenArrays]]

@@ -10,10 +10,10 @@ from camkit.bundle.manifest import HaloError, NetworkFacts
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.export.onnx_graph import check_parity, to_fp16, to_onnx
-from camkit.runtime.engine import NetworkEngine
-from camkit.runtime.graph import inspect_graph
-from camkit.runtime.probe import halo_error_curve, perturbation_reach
-from camkit.runtime.ranges import node_activations
+from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.network.graph import inspect_graph
+from camkit.runtime.network.probe import halo_error_curve, perturbation_reach
+from camkit.runtime.network.ranges import node_activations
 
 PROBE_SEED: Final = 5
 FP16_HEADROOM: Final = 4.0

@@ -15,7 +15,7 @@ from torch import nn
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError, UnsupportedError
-from camkit.runtime.engine import NetworkEngine
+from camkit.runtime.network.engine import NetworkEngine
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -196,7 +196,7 @@ def _shared(options: Options, jobs: int) -> Options:
     """Share threads and memory among the jobs, so that together they keep to the caller's."""
     if jobs == 1:
         return options
-    from camkit.runtime.engine import available_threads
+    from camkit.runtime.network.engine import available_threads
 
     threads = max(1, available_threads(options.threads) // jobs)
     memory = options.max_mem_bytes

@@ -22,7 +22,7 @@ from camkit.bundle.manifest import GoldenCase, NetworkFacts
 from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
-from camkit.runtime.graph import check_graph
+from camkit.runtime.network.graph import check_graph
 from camkit.runtime.proofs import prove_golden, prove_range, prove_tiling
 
 LAYERS: Final = ("schema", "hash", "graph", "golden", "tiling", "range")

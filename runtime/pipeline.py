@@ -19,12 +19,12 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.engine import NetworkEngine, available_threads
-from camkit.runtime.graph import check_graph
+from camkit.runtime.network.engine import NetworkEngine, available_threads
+from camkit.runtime.network.graph import check_graph
 from camkit.runtime.options import Options
 from camkit.runtime.raw import read_capture
 from camkit.runtime.reconstruction import Reconstruction, Setup
-from camkit.runtime.tiling import Cancel, Progress
+from camkit.runtime.network.tiling import Cancel, Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

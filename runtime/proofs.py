@@ -17,11 +17,11 @@ from camkit.bundle.manifest import GoldenCase, Network, NetworkFacts
 from camkit.bundle.reader import GOLDEN, Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
-from camkit.runtime.engine import NetworkEngine
-from camkit.runtime.probe import perturbation_reach
-from camkit.runtime.ranges import FP16_LIMIT, fits_fp16, node_activations
+from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.network.probe import perturbation_reach
+from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
 from camkit.runtime.rows import ArrayRows
-from camkit.runtime.tiling import TileLimits, TilePlan, infer_bands, plan_windows
+from camkit.runtime.network.tiling import TileLimits, TilePlan, infer_bands, plan_windows
 
 _SEED: Final = 7
 _TILE_PX: Final = 64

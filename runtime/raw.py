@@ -1,6 +1,6 @@
 """Read a capture from a file: RAW and DNG in a child process, pictures here.
 
-    read_capture -> PNG, TIFF, EXR by content        -> camkit.runtime.picture
+    read_capture -> PNG, TIFF, EXR by content        -> camkit.runtime.files.picture
                  -> everything else, as RAW or DNG   -> child: camkit.runtime.raw_worker
 
 The child is a plain subprocess: a fork of a process with threads hangs in LibRaw's OpenMP, and
@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 import camkit
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime import raw_checks
+from camkit.runtime.files import raw_checks
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.raw_tags import sensor_place
-from camkit.runtime.tiff_tags import read_tiff_tags
+from camkit.runtime.files.raw_tags import sensor_place
+from camkit.runtime.files.tiff_tags import read_tiff_tags
 
 __all__ = ["Capture", "MosaicOptions", "file_sha256", "is_picture", "named_bundle", "read_capture"]
 
@@ -136,7 +136,7 @@ def file_sha256(path: Path) -> str:
 
 
 def _read_picture(path: Path, mosaic: MosaicOptions | None) -> Capture:
-    from camkit.runtime.picture import read_mosaic, read_picture
+    from camkit.runtime.files.picture import read_mosaic, read_picture
 
     return read_picture(path) if mosaic is None else read_mosaic(path, mosaic)
 

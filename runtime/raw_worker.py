@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime import dng_checks, raw_checks, raw_tags
+from camkit.runtime.files import dng_checks, raw_checks, raw_tags
 from camkit.runtime.capture import Capture
-from camkit.runtime.tiff_tags import TiffTags, read_tiff_tags
+from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8
 FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}

@@ -17,21 +17,21 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 
-from camkit.runtime.baselines import restoration_bank
-from camkit.runtime.blocks import BlockBank, LocalPsf
+from camkit.runtime.bank.baselines import restoration_bank
+from camkit.runtime.bank.blocks import BlockBank, LocalPsf
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock, TimedRows
 from camkit.runtime.color import color_stage, recover_highlights, to_output
-from camkit.runtime.engine import NetworkEngine
-from camkit.runtime.front_rows import FrontRows
-from camkit.runtime.illumination import divide_illumination
-from camkit.runtime.noise import measure_noise
-from camkit.runtime.placement import Placement, place, scale_kernels
-from camkit.runtime.psf import color_kernels
+from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.signal.front_rows import FrontRows
+from camkit.runtime.geometry.illumination import divide_illumination
+from camkit.runtime.signal.noise import measure_noise
+from camkit.runtime.geometry.placement import Placement, place, scale_kernels
+from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
 from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
-from camkit.runtime.stabilise import stabilise, unstabilise
-from camkit.runtime.tiling import (
+from camkit.runtime.signal.stabilise import stabilise, unstabilise
+from camkit.runtime.network.tiling import (
     Cancel,
     Progress,
     TileLimits,
@@ -39,7 +39,7 @@ from camkit.runtime.tiling import (
     infer_bands,
     plan_windows,
 )
-from camkit.runtime.warp import undistort_bands
+from camkit.runtime.geometry.warp import undistort_bands
 
 BAND_ROWS: Final = 128
 FIXED_BYTES: Final = 260_000_000

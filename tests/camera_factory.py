@@ -4,7 +4,7 @@ import numpy as np
 
 from camkit.bundle.camera import Camera, ChannelResponse, IsoNoise
 from camkit.contracts import FrozenPsf, RadialDistortion
-from camkit.runtime.sensor_window import SensorWindow
+from camkit.runtime.geometry.sensor_window import SensorWindow
 
 PITCH_UM = 5.96
 COLOR_MATRIX = ((0.6, -0.1, -0.05), (-0.4, 1.2, 0.2), (-0.1, 0.2, 0.7))

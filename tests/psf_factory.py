@@ -4,8 +4,8 @@ import numpy as np
 import scipy.fft
 
 from camkit.contracts import FloatArray, FrozenPsf, NoiseModel, RadialDistortion
-from camkit.runtime.blocks import LocalPsf, to_otf
-from camkit.runtime.sensor_window import SensorWindow
+from camkit.runtime.bank.blocks import LocalPsf, to_otf
+from camkit.runtime.geometry.sensor_window import SensorWindow
 
 QUIET = NoiseModel(shot=(1e-9,) * 3, read_variance=(1e-12,) * 3)
 ISO_100 = NoiseModel(shot=(2.2e-5,) * 3, read_variance=(4.4e-9,) * 3)

@@ -16,7 +16,7 @@ import camkit
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
 from camkit.contracts import FloatArray
-from camkit.runtime.engine import available_threads
+from camkit.runtime.network.engine import available_threads
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate, write_capture
 from camkit.scenes import procedural_scene
 
@@ -103,7 +103,7 @@ def _developed(
 ) -> FloatArray:
     """Give the crop demosaicked and colour-corrected only: what the lens saw."""
     from camkit.bundle.reader import Bundle
-    from camkit.runtime.demosaic import demosaic
+    from camkit.runtime.signal.demosaic import demosaic
 
     assert isinstance(bundle, Bundle)
     camera = bundle.manifest.camera

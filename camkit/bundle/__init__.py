@@ -6,5 +6,5 @@
     reader                               container + manifest + hashes -> Bundle
     writer                               members -> one file, the same bytes for the same content
 
-Refusals are `BundleError`. Graphs are refused in `camkit.runtime.graph`, which owns onnx.
+Refusals are `BundleError`. Graphs are refused in `camkit.runtime.network.graph`, which owns onnx.
 """

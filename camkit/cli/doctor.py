@@ -55,7 +55,7 @@ def examine() -> dict[str, Any]:
     """Collect the facts that `doctor` prints."""
     from camkit import __version__
     from camkit.bundle.reader import built_in_bundles
-    from camkit.runtime.engine import available_threads, providers
+    from camkit.runtime.network.engine import available_threads, providers
 
     return {
         "camkit": __version__,

@@ -29,7 +29,7 @@ def simulate(
 ) -> None:
     """Photograph a scene with the bundle's camera: blur, vignetting, mosaic, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
-    from camkit.runtime.engine import available_threads
+    from camkit.runtime.network.engine import available_threads
     from camkit.runtime.simulate import SimulationOptions, write_capture
     from camkit.runtime.simulate import simulate as simulate_scene
 
@@ -61,7 +61,7 @@ def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def
         if not seed.isdigit():
             raise ContractError(f"expected procedural:SEED with a number; got {scene!r}")
         return procedural_scene(int(seed), size_px[1], size_px[0])
-    from camkit.runtime.picture import read_scene
+    from camkit.runtime.files.picture import read_scene
 
     return read_scene(Path(scene))
 

@@ -17,9 +17,9 @@ from skimage import restoration
 
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
-from camkit.runtime.baselines import admm_tv_filter
-from camkit.runtime.blocks import BlockBank, LocalPsf
-from camkit.runtime.sensor_window import SensorWindow
+from camkit.runtime.bank.baselines import admm_tv_filter
+from camkit.runtime.bank.blocks import BlockBank, LocalPsf
+from camkit.runtime.geometry.sensor_window import SensorWindow
 
 KERNEL_ENERGY: Final = 0.999
 """Share of the light of every colour that the local kernels keep; a smaller kernel is faster."""

@@ -22,15 +22,15 @@ from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 from camkit.report.peers import LocalCapture, trim_kernels
+from camkit.runtime.bank.psf import color_kernels, kernel_at
 from camkit.runtime.capture import Capture
 from camkit.runtime.color import recover_highlights
-from camkit.runtime.front_rows import FrontRows
-from camkit.runtime.illumination import divide_illumination
-from camkit.runtime.options import Options
-from camkit.runtime.picture import read_scene
+from camkit.runtime.files.picture import read_scene
+from camkit.runtime.geometry.illumination import divide_illumination
+from camkit.runtime.geometry.sensor_window import centred_origin
+from camkit.runtime.options import Method, Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.psf import color_kernels, kernel_at
-from camkit.runtime.sensor_window import centred_origin
+from camkit.runtime.signal.front_rows import FrontRows
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
 
 PROTOCOL_VERSION: Final = 1
@@ -198,20 +198,20 @@ def finish_planes(planes: FloatArray, exposed: Exposed, bundle: Bundle) -> Float
     return apply_matrix(rec709_from_camera(color_matrix), even)
 
 
-def pipeline_restorer(bundle: Bundle, *, size: str | None) -> Restorer:
-    """Give camkit's own restoration in sensor geometry.
+def bundle_restorer(bundle: Bundle, *, method: Method = "net", size: str = "M") -> Restorer:
+    """Give a restoration of the bundle's pipeline, in sensor geometry, on one thread.
 
     Args:
         bundle: The camera.
-        size: Of the network; None for the Wiener bank alone.
+        method: The network, the Wiener bank or another classical method on its blocks.
+        size: Of the network.
+
+    Raises:
+        ContractError: If the bundle lacks the size.
     """
-    common = Options(undistort=False, threads=1, method="wiener")
-    chosen = common if size is None else Options(undistort=False, threads=1, size=size)
-    return pipeline_of(Pipeline(bundle, chosen) if size is None else _with_network(bundle, chosen))
-
-
-def pipeline_of(pipeline: Pipeline) -> Restorer:
-    """Give the restoration of a pipeline."""
+    pipeline = Pipeline(
+        bundle, Options(method=method, size=size, undistort=False, vignetting=True, threads=1)
+    )
 
     def restore(exposed: Exposed) -> FloatArray:
         simulation = exposed.simulation
@@ -250,13 +250,6 @@ def judge(restored: FloatArray, sharp: FloatArray) -> Score:
     # equal pictures would be infinitely good, which no mean survives
     psnr_db = peak_signal_noise_ratio(truth, got, data_range=1.0) if (truth != got).any() else 120.0
     return Score(psnr_db=float(psnr_db), ssim=float(ssim))
-
-
-def _with_network(bundle: Bundle, options: Options) -> Pipeline:
-    if options.size not in bundle.manifest.networks:
-        have = ", ".join(sorted(bundle.manifest.networks)) or "none"
-        raise ContractError(f"{bundle.path.name} holds size(s) {have}; asked for {options.size}")
-    return Pipeline(bundle, options)
 
 
 def _develop(simulation: Simulation, bundle: Bundle) -> LocalCapture:

@@ -37,6 +37,7 @@ __all__ = [
 ]
 
 LOSS_LIMIT_DB: Final = 0.05
+BLOCK_TOLERANCE_DB: Final = 0.1
 FIELD_COUNTS: Final = (7, 9, 11, 13, 17, 21, 25)
 WAVELENGTH_COUNTS: Final = (3, 5, 7, 9, 11, 13)
 BLOCKS: Final = ((768, 160), (512, 160), (384, 160), (512, 192), (384, 192))
@@ -117,9 +118,10 @@ def choose_samples(
 def choose_blocks(
     psf: FrozenPsf, bench: Bench, *, limit_db: float = LOSS_LIMIT_DB
 ) -> tuple[Wiener, Loss]:
-    """Give the cheapest block grid with an allowed loss, or the one that loses least.
+    """Give the cheapest block grid that loses little.
 
-    The cost of a grid is the area filtered per area answered for.
+    Little is the allowed loss, or, where no grid keeps it, `BLOCK_TOLERANCE_DB` more than the
+    best grid loses. The cost of a grid is the area filtered per area answered for.
     """
     tried: list[tuple[Wiener, Loss]] = []
     for block_px, overlap_px in sorted(BLOCKS, key=lambda b: (b[0] / (b[0] - b[1])) ** 2):
@@ -130,7 +132,9 @@ def choose_blocks(
         tried.append((settings, loss))
         if loss.mean_db <= limit_db:
             break
-    return min(tried, key=lambda pair: max(pair[1].mean_db, limit_db))
+    best_db = min(loss.mean_db for _, loss in tried)
+    allowed_db = max(limit_db, best_db + BLOCK_TOLERANCE_DB)
+    return next(pair for pair in tried if pair[1].mean_db <= allowed_db)
 
 
 def freeze_prescription(

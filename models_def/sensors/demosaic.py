@@ -1,6 +1,6 @@
 """Malvar-He-Cutler demosaic in torch, as a convolution with four kernels.
 
-Twin of `camkit.runtime.demosaic` (method "fast"); `tests/parity` holds the two together.
+Twin of `camkit.runtime.signal.demosaic` (method "fast"); `tests/parity` holds the two together.
 """
 
 import torch

@@ -1,6 +1,6 @@
 """The PSF of a field position, in torch: colours weighted, heights blended, turned to the azimuth.
 
-Twin of `camkit.runtime.psf`; `tests/parity` holds the two together.
+Twin of `camkit.runtime.bank.psf`; `tests/parity` holds the two together.
 """
 
 import numpy as np

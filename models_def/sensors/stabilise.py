@@ -1,6 +1,6 @@
 """The noise-stabilising transform in torch: k-sigma, then square root.
 
-Twin of `camkit.runtime.stabilise`; `tests/parity` holds the two together.
+Twin of `camkit.runtime.signal.stabilise`; `tests/parity` holds the two together.
 """
 
 import torch

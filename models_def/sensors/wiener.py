@@ -1,6 +1,6 @@
 """The Wiener filter of one block, in torch: patches with one local kernel each, for training.
 
-Twin of the block filter of `camkit.runtime.wiener`; `tests/parity` holds the two together. A
+Twin of the block filter of `camkit.runtime.bank.wiener`; `tests/parity` holds the two together. A
 patch is one periodic block: cut about 80 px from each side of the result, as the bank does.
 """
 

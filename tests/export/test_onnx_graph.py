@@ -13,8 +13,8 @@ from torch import nn
 from camkit.errors import ContractError, ParityError, UnsupportedError
 from camkit.export.onnx_graph import check_parity, to_fp16, to_onnx
 from camkit.models_def.networks.catalog import build_network
-from camkit.runtime.engine import NetworkEngine, largest_activations
-from camkit.runtime.graph import inspect_graph, with_node_outputs
+from camkit.runtime.network.engine import NetworkEngine, largest_activations
+from camkit.runtime.network.graph import inspect_graph, with_node_outputs
 
 LEAN_OPERATORS = {"Conv", "LeakyRelu", "Add", "DepthToSpace", "Slice"}
 TRIMMED_OPERATORS = {"Conv", "PRelu", "MaxPool", "ConvTranspose", "Concat", "Add"}

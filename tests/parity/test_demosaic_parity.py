@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from camkit.contracts import CFA_PATTERNS
 from camkit.models_def.sensors import demosaic as in_torch
-from camkit.runtime import demosaic as in_numpy
+from camkit.runtime.signal import demosaic as in_numpy
 
 TOLERANCE = 1e-6
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from camkit.models_def.optics import distortion as design
-from camkit.runtime.distortion import distort_points, fit_distortion
+from camkit.runtime.geometry.distortion import distort_points, fit_distortion
 
 RADIUS_MM = 21.489
 PITCH_MM = 5.96e-3

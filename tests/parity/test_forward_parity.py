@@ -8,8 +8,8 @@ from camkit.colorimetry import camera_from_rec709
 from camkit.models_def.sensors.forward import Sensor, block_centres_px, expose, scatter
 from camkit.models_def.sensors.psf import color_kernels, kernel_at
 from camkit.runtime import simulate as runtime
-from camkit.runtime.scatter import scatter as runtime_scatter
-from camkit.runtime.sensor_window import SensorWindow
+from camkit.runtime.geometry.scatter import scatter as runtime_scatter
+from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.simulate import SimulationOptions, simulate
 from tests.camera_factory import make_camera, make_psf
 

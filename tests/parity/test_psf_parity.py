@@ -2,7 +2,7 @@ import numpy as np
 import torch
 
 from camkit.models_def.sensors import psf as torch_psf
-from camkit.runtime import psf as numpy_psf
+from camkit.runtime.bank import psf as numpy_psf
 from tests.psf_factory import coma_kernels, frozen_psf
 
 KERNELS, HEIGHTS_MM = coma_kernels()

@@ -3,7 +3,7 @@ import torch
 
 from camkit.contracts import NoiseModel
 from camkit.models_def.sensors import stabilise as in_torch
-from camkit.runtime import stabilise as in_numpy
+from camkit.runtime.signal import stabilise as in_numpy
 
 TOLERANCE = 1e-6
 NOISE = NoiseModel(shot=(4e-5, 2e-5, 3e-5), read_variance=(4e-8, 1e-8, 2e-8))

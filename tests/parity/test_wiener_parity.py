@@ -6,8 +6,8 @@ from camkit.bundle.stages import Wiener
 from camkit.models_def.sensors.wiener import taper_edges as taper_torch
 from camkit.models_def.sensors.wiener import to_otf as to_otf_torch
 from camkit.models_def.sensors.wiener import wiener_restore
-from camkit.runtime.blocks import Block, taper_edges, to_otf
-from camkit.runtime.wiener import wiener_filter
+from camkit.runtime.bank.blocks import Block, taper_edges, to_otf
+from camkit.runtime.bank.wiener import wiener_filter
 from tests.psf_factory import ISO_100, blur_periodic, coma_kernels, texture, with_noise
 
 TOLERANCE = 1e-5

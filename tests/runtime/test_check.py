@@ -236,7 +236,7 @@ def test_probe_that_reaches_further_than_stated_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from camkit.runtime import proofs
-    from camkit.runtime.probe import ProbedReach
+    from camkit.runtime.network.probe import ProbedReach
 
     far = ProbedReach(radius_px=9, halo_px=9)
     monkeypatch.setattr(proofs, "perturbation_reach", lambda *_, **__: far)

@@ -10,7 +10,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
-from camkit.runtime.tiling import Cancelled
+from camkit.runtime.network.tiling import Cancelled
 from tests.bundle_factory import write_tiny_bundle
 
 

@@ -97,3 +97,25 @@ def test_loss_that_no_grid_can_keep_is_an_error(
         freeze_module.choose_samples(
             read_prescription(DUET), camera, bench, limit_db=1e-4, grid=SMALL
         )
+
+
+@pytest.mark.parametrize(
+    ("losses_db", "chosen_px"),
+    [((0.01, 0.0), 768), ((0.5, 0.01), 384), ((0.9, 0.3), 384), ((0.35, 0.3), 768)],
+)
+def test_cheapest_block_grid_that_loses_little_is_taken(
+    losses_db: tuple[float, float],
+    chosen_px: int,
+    bench: Bench,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    known = dict(zip((768, 384), losses_db, strict=True))
+    monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160), (768, 160)))
+    monkeypatch.setattr(
+        freeze_module,
+        "block_loss",
+        lambda _psf, _bench, grid: sampling.Loss(mean_db=known[grid.block_px], worst_db=1.0),
+    )
+    settings, loss = freeze_module.choose_blocks(bench.nominal, bench, limit_db=0.05)
+    assert settings.block_px == chosen_px
+    assert loss.mean_db == known[chosen_px]

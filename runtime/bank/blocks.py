@@ -1,0 +1,359 @@
+"""A picture in overlapping blocks, each restored with the PSF of its own place, added in order.
+
+    rows -> blocks, mirrored past the borders -> any block filter -> window -> sum -> bands
+
+The grid depends on the picture size, block and overlap alone; the blocks are added row by row
+from left to right, whatever thread restored them, so the bits depend on nothing else.
+
+       |<---- block ---->|
+       |          |<- overlap ->|          over the overlap the window of each block is zero in
+       |                 |                 the outer quarter, one in the inner, sin^2 between
+                  |<---- block ---->|
+"""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.bank.psf import kernel_at
+from camkit.runtime.rows import ArrayRows, RowSource
+from camkit.runtime.geometry.sensor_window import SensorWindow
+
+ComplexArray = NDArray[np.complex64]
+MaskRows = Callable[[int, int], NDArray[np.bool_]]
+
+TAPER_SHRINK: Final = 4
+"""The taper blends to a blurred block that is computed at this fraction of its size."""
+
+BORDER_SHARE: Final = 7 / 16
+"""Mirrored border around the picture, as a share of the overlap."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """What a block filter gets.
+
+    Attributes:
+        samples: (3, b, b) float32, the blurred picture, made periodic by `taper_edges`.
+        otf: (3, b, b // 2 + 1) complex64, the local PSF's; its centre is the origin.
+        unknown: (1 or 3, b, b), true where the sensor clipped; None if nowhere.
+    """
+
+    samples: FloatArray
+    otf: ComplexArray
+    unknown: NDArray[np.bool_] | None = None
+
+
+BlockFilter = Callable[[Block], FloatArray]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalPsf:
+    """The kernels of a camera and where the capture lies on its sensor.
+
+    Attributes:
+        kernels: (field, 3, h, w) float32 of `camkit.runtime.bank.psf.color_kernels`.
+        field_heights_mm: (field,), increasing from 0.
+        window: Place of the capture on the sensor.
+    """
+
+    kernels: FloatArray
+    field_heights_mm: NDArray[np.float64]
+    window: SensorWindow
+
+    def position_mm(self, x_px: float, y_px: float) -> tuple[float, float]:
+        """Give the sensor position of a pixel position of the capture."""
+        x_mm, y_mm = self.window.to_mm(x_px, y_px)
+        return float(x_mm), float(y_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """One block along one axis.
+
+    Attributes:
+        start: First sample, negative where the block begins before the picture.
+        inner: Slice of the block in which its window is not zero and the picture exists.
+        weights: The window over `inner`.
+        centre: Middle of `inner` in picture pixels.
+        index: Picture index of every sample of the block, mirrored past the borders.
+    """
+
+    start: int
+    inner: slice
+    weights: FloatArray
+    centre: float
+    index: NDArray[np.intp]
+
+
+def plan_spans(size_px: int, block_px: int, overlap_px: int) -> tuple[Span, ...]:
+    """Cover an axis with blocks, centred, the least number that leaves a mirrored border.
+
+    Args:
+        size_px: Samples of the picture along the axis.
+        block_px: Length of a block.
+        overlap_px: Overlap of neighbours, at most half a block.
+
+    Raises:
+        ContractError: If the sizes cannot make a grid.
+    """
+    if size_px < 1 or not 0 <= 2 * overlap_px <= block_px or block_px < 1:
+        raise ContractError(
+            "blocks need a picture of at least one pixel and an overlap of half a block at most; "
+            f"got size {size_px}, block {block_px}, overlap {overlap_px}"
+        )
+    step = block_px - overlap_px
+    border = int(overlap_px * BORDER_SHARE)
+    count = max(1, -(-(size_px + 2 * border - overlap_px) // step))
+    first = -((count * step + overlap_px - size_px) // 2)
+    rise = _rise(overlap_px)
+    spans = []
+    for i in range(count):
+        weights = np.ones(block_px, dtype=np.float32)
+        if i > 0:
+            weights[:overlap_px] = rise
+        if i < count - 1:
+            weights[block_px - overlap_px :] = rise[::-1]
+        spans.append(_clip_span(first + i * step, weights, size_px))
+    return tuple(spans)
+
+
+def _rise(overlap_px: int) -> FloatArray:
+    """Zero over a quarter of the overlap, sin^2 over its half, one over the last quarter."""
+    t = (np.arange(overlap_px) + 0.5 - overlap_px / 4) / max(overlap_px / 2, 1)
+    return np.asarray(np.sin(np.pi / 2 * np.clip(t, 0, 1)) ** 2, dtype=np.float32)
+
+
+def _clip_span(start: int, weights: FloatArray, size_px: int) -> Span:
+    live = np.flatnonzero(weights)
+    low, high = max(int(live[0]), -start), min(int(live[-1]) + 1, size_px - start)
+    at = np.arange(start, start + weights.size)
+    period = max(2 * (size_px - 1), 1)
+    folded = at % period
+    return Span(
+        start=start,
+        inner=slice(low, high),
+        weights=weights[low:high],
+        centre=start + (low + high - 1) / 2,
+        index=np.minimum(folded, period - folded) if size_px > 1 else np.zeros_like(at),
+    )
+
+
+def to_otf(kernel: FloatArray, block_px: int) -> ComplexArray:
+    """Transform a (3, kh, kw) kernel to its OTF on a periodic block.
+
+    Returns:
+        (3, b, b // 2 + 1) complex64; the kernel's centre is the origin.
+
+    Raises:
+        ContractError: If the kernel is larger than the block.
+    """
+    _, kh, kw = kernel.shape
+    if max(kh, kw) > block_px:
+        raise ContractError(f"a kernel of {kh}x{kw} px does not fit a block of {block_px} px")
+    rows = np.zeros((3, kh, block_px), dtype=np.float32)
+    rows[:, :, :kw] = kernel
+    half = scipy.fft.rfft(np.roll(rows, -(kw // 2), axis=-1), axis=-1)
+    full = np.zeros((3, block_px, half.shape[-1]), dtype=np.complex64)
+    full[:, : kh - kh // 2] = half[:, kh // 2 :]
+    full[:, block_px - kh // 2 :] = half[:, : kh // 2]
+    return np.asarray(scipy.fft.fft(full, axis=-2, overwrite_x=True))
+
+
+def mirror_otf(otf: ComplexArray, *, flip_x: bool, flip_y: bool) -> ComplexArray:
+    """Give the OTF of the kernel mirrored left-right and/or up-down."""
+    if flip_x != flip_y:
+        otf = np.roll(otf[:, ::-1], 1, axis=1)
+    return np.asarray(np.conj(otf)) if flip_x else otf
+
+
+def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatArray:
+    """Blend the outer ring of a block to its own periodic blur.
+
+    A block cut from a larger picture is no periodic blur of anything: light crosses its edges.
+    Deconvolved as it is, the jump rings through the whole block wherever the OTF is small.
+
+    Args:
+        samples: (3, b, b) float32.
+        otf: (3, b, b // 2 + 1) complex64.
+        ring_px: Width of the ring; 0 leaves the block as it is.
+
+    References: Reeves 2005 (edge taper as pre-processing).
+    """
+    size = samples.shape[-1]
+    ring = min(ring_px, size // 4)
+    if ring == 0:
+        return samples
+    shrink = TAPER_SHRINK if size % TAPER_SHRINK == 0 else 1
+    small = _shrink(_shrink(samples, shrink).swapaxes(1, 2), shrink).swapaxes(1, 2)
+    n = size // shrink
+    half = otf[:, :, : n // 2 + 1]
+    low = np.concatenate([half[:, : n - n // 2], half[:, size - n // 2 :]], axis=1)
+    blurred = scipy.fft.irfft2(scipy.fft.rfft2(small) * low, s=(n, n))
+    smooth = np.repeat(np.repeat(blurred, shrink, axis=1), shrink, axis=2)
+    keep = taper_weights(size, ring)
+    tapered = np.array(samples)
+    inner = slice(ring, size - ring)
+    for rows, cols in (
+        (slice(0, ring), slice(0, size)),
+        (slice(size - ring, size), slice(0, size)),
+        (inner, slice(0, ring)),
+        (inner, slice(size - ring, size)),
+    ):
+        part = smooth[:, rows, cols]
+        tapered[:, rows, cols] = part + keep[rows, cols] * (tapered[:, rows, cols] - part)
+    return tapered
+
+
+def _shrink(planes: FloatArray, factor: int) -> FloatArray:
+    """Average every `factor` rows."""
+    total = np.array(planes[:, ::factor])
+    for i in range(1, factor):
+        total += planes[:, i::factor]
+    total *= np.float32(1 / factor)
+    return total
+
+
+@lru_cache(maxsize=4)
+def taper_weights(size_px: int, ring_px: int) -> FloatArray:
+    """Give (b, b): 1 inside, falling as sin^2 to 0 over the ring."""
+    line = np.ones(size_px, dtype=np.float32)
+    line[:ring_px] = np.sin(np.pi / 2 * (np.arange(ring_px) + 0.5) / ring_px) ** 2
+    line = np.minimum(line, line[::-1])
+    weights = np.asarray(line[:, None] * line)
+    weights.flags.writeable = False
+    return weights
+
+
+class BlockBank:
+    """Restores pictures block by block with the PSF of each block's place; immutable."""
+
+    def __init__(
+        self,
+        psf: LocalPsf,
+        block_filter: BlockFilter,
+        *,
+        block_px: int,
+        overlap_px: int,
+        threads: int = 1,
+    ) -> None:
+        """Plan the grid.
+
+        Args:
+            psf: Kernels and place of the capture.
+            block_filter: Restores one block.
+            block_px: Side of a block, at least that of the kernels.
+            overlap_px: Overlap of neighbouring blocks.
+            threads: Blocks restored at a time; no influence on the bits.
+        """
+        self._psf = psf
+        self._filter = block_filter
+        self._block_px = block_px
+        self._guard_px = overlap_px // 4
+        self._threads = threads
+        self._columns = plan_spans(psf.window.size_px[0], block_px, overlap_px)
+        self._rows = plan_spans(psf.window.size_px[1], block_px, overlap_px)
+
+    def restore_array(
+        self, planes: FloatArray, saturated: NDArray[np.bool_] | None = None
+    ) -> FloatArray:
+        """Restore a whole (3, h, w) picture; `saturated` is (h, w) or (3, h, w)."""
+        mask = None if saturated is None else lambda top, bottom: saturated[..., top:bottom, :]
+        return np.concatenate(list(self.restore_bands(ArrayRows(planes), mask)), axis=1)
+
+    def restore_bands(
+        self, source: RowSource, saturated: MaskRows | None = None
+    ) -> Iterator[FloatArray]:
+        """Restore a picture from top to bottom.
+
+        Args:
+            source: (3, h, w) rows, linear, of the size the bank was planned for.
+            saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (3, rows, w).
+
+        Yields:
+            (3, rows, w) float32, consecutive.
+
+        Raises:
+            ContractError: If the source has another size.
+        """
+        width, height = self._psf.window.size_px
+        if source.shape != (3, height, width):
+            raise ContractError(f"the bank is for (3, {height}, {width}); got {source.shape}")
+        tops = [int(span.index.min()) for span in self._rows]
+        total = np.zeros((3, 0, width), dtype=np.float32)
+        done = 0
+        pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
+        with pool or nullcontext():
+            run: Callable[..., Iterator[Any]] = map if pool is None else pool.map
+            for i, span in enumerate(self._rows):
+                top, bottom = min(tops[i:]), int(span.index.max()) + 1
+                mask = None if saturated is None else saturated(top, bottom)
+                strip = _Strip(source.read(top, bottom), mask, top, span)
+                end = span.start + span.inner.stop
+                total = np.concatenate(
+                    [total, np.zeros((3, end - done - total.shape[1], width), np.float32)], axis=1
+                )
+                first = span.start + span.inner.start - done
+                for column, part in zip(self._columns, self._restore(strip, run), strict=True):
+                    x = column.start + column.inner.start
+                    total[:, first:, x : x + part.shape[2]] += part
+                last = i + 1 == len(self._rows)
+                ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
+                yield total[:, : ready - done]
+                total = total[:, ready - done :].copy()
+                done = ready
+
+    def _restore(self, strip: "_Strip", run: Callable[..., Iterator[Any]]) -> Iterator[FloatArray]:
+        """Give the windowed blocks of one block row, from left to right."""
+        places = [self._psf.position_mm(c.centre, strip.span.centre) for c in self._columns]
+        keys = sorted({(abs(x_mm), abs(y_mm)) for x_mm, y_mm in places})
+        otfs = dict(zip(keys, run(self._otf, keys), strict=True))
+
+        def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
+            x_mm, y_mm = place_mm
+            otf = mirror_otf(otfs[abs(x_mm), abs(y_mm)], flip_x=x_mm < 0, flip_y=y_mm < 0)
+            samples, unknown = strip.cut(column)
+            samples = taper_edges(samples, otf, self._guard_px)
+            block = Block(samples=samples, otf=otf, unknown=unknown)
+            sharp = self._filter(block)[:, strip.span.inner, column.inner]
+            return sharp * (strip.span.weights[:, None] * column.weights)
+
+        return run(restore, self._columns, places)
+
+    def _otf(self, place_mm: tuple[float, float]) -> ComplexArray:
+        kernel = kernel_at(self._psf.kernels, self._psf.field_heights_mm, *place_mm)
+        return to_otf(kernel, self._block_px)
+
+
+@dataclass(frozen=True, slots=True)
+class _Strip:
+    """The rows of one block row, and their clipped samples."""
+
+    rows: FloatArray
+    saturated: NDArray[np.bool_] | None
+    top: int
+    span: Span
+
+    def cut(self, column: Span) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+        """Give samples and clipped samples of one block."""
+        samples = self._take(self.rows, column)
+        if self.saturated is None:
+            return samples, None
+        mask = self.saturated if self.saturated.ndim == 3 else self.saturated[None]
+        unknown = self._take(mask, column)
+        return samples, unknown if unknown.any() else None
+
+    def _take(self, planes: NDArray[Any], column: Span) -> NDArray[Any]:
+        across, down = column.index, self.span.index - self.top
+        if (np.diff(across) == 1).all() and (np.diff(down) == 1).all():
+            return planes[:, down[0] : down[-1] + 1, across[0] : across[-1] + 1]
+        return planes[:, down][:, :, across]

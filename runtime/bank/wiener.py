@@ -1,0 +1,113 @@
+"""The Wiener bank: every block deconvolved with its own PSF, regularised by the noise.
+
+    X = Y conj(H) / (|H|^2 + N / S),  S(f) = prior_scale * level^2 * (f^2 + f0^2)^(-exponent / 2)
+
+Where the sensor clipped, a linear filter would turn the missing light into rings over the whole
+block. There a few rounds of Richardson-Lucy, which take clipped samples as "at least this bright",
+explain the lights first; the Wiener filter gets what they leave unexplained, which counts as noise.
+"""
+
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from camkit.bundle.stages import Wiener
+from camkit.contracts import FloatArray, NoiseModel
+from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, ComplexArray, LocalPsf
+from camkit.runtime.bank.richardson_lucy import (
+    apply_transfer,
+    background_of,
+    richardson_lucy,
+    spread_clipped,
+)
+
+CORNER_FREQUENCY: Final = 1 / 512
+"""f0 in cycles/pixel: below it the prior no longer rises."""
+
+LEAST_POWER: Final = 1e-12
+
+KERNEL_ERROR: Final = 1e-2
+"""Least NSR where the OTF is far from 1: the real lens differs from the frozen PSF, and what the
+frozen OTF calls almost nothing must not be raised without end."""
+
+
+def wiener_bank(
+    psf: LocalPsf, settings: Wiener, noise: NoiseModel, *, threads: int = 1
+) -> BlockBank:
+    """Make the front end of a capture.
+
+    Args:
+        psf: Kernels and place of the capture.
+        settings: The manifest's Wiener stage.
+        noise: Noise of the capture after white balance.
+        threads: Blocks restored at a time; no influence on the bits.
+    """
+    return BlockBank(
+        psf,
+        wiener_filter(settings, noise),
+        block_px=settings.block_px,
+        overlap_px=settings.overlap_px,
+        threads=threads,
+    )
+
+
+def wiener_filter(settings: Wiener, noise: NoiseModel) -> BlockFilter:
+    """Give the Wiener filter of one block as a block filter.
+
+    Args:
+        settings: Prior, and rounds of Richardson-Lucy for clipped blocks.
+        noise: Noise after white balance.
+
+    References: Sun 2021, eq. (2.9); van der Schaaf and van Hateren 1996 (natural-image prior).
+    """
+    shot, read_variance = np.array(noise.shot), np.array(noise.read_variance)
+    background = background_of(noise)
+
+    def restore(block: Block) -> FloatArray:
+        level = np.maximum(block.samples.mean(axis=(-2, -1), dtype=np.float64), 0)
+        variance = shot * level + read_variance
+        # A block darker than its read noise is taken to hold that much signal.
+        power = np.maximum(np.maximum(level * level, read_variance), LEAST_POWER)
+        rise = _prior_rise(block.samples.shape[-1], settings.prior_exponent)
+        if block.unknown is None or settings.clip_iterations == 0:
+            gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
+            return apply_transfer(block.samples, gain)
+        unknown = spread_clipped(block.unknown)
+        lights = richardson_lucy(
+            block.samples, block.otf, background, settings.clip_iterations, unknown
+        )
+        residual = block.samples - apply_transfer(lights, block.otf)
+        np.copyto(residual, 0, where=unknown)
+        unexplained = np.square(residual).mean(axis=(-2, -1), dtype=np.float64)
+        variance = np.maximum(variance, unexplained)
+        gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
+        return lights + apply_transfer(residual, gain)
+
+    return restore
+
+
+@lru_cache(maxsize=4)
+def _prior_rise(block_px: int, exponent: float) -> FloatArray:
+    """Give 1 / S(f) for a prior scale and level of one, (b, b // 2 + 1)."""
+    fy, fx = scipy.fft.fftfreq(block_px)[:, None], scipy.fft.rfftfreq(block_px)[None, :]
+    rise = ((fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (exponent / 2)).astype(np.float32)
+    rise.flags.writeable = False
+    return np.asarray(rise)
+
+
+def _gain(otf: ComplexArray, rise: FloatArray, ratio: NDArray[np.float64]) -> ComplexArray:
+    """Give conj(H) / (|H|^2 + NSR); `ratio` is NSR per colour where the rise is one."""
+    power = np.square(otf.real)
+    power += np.square(otf.imag)
+    nsr = ratio.astype(np.float32)[:, None, None] * rise
+    np.maximum(nsr, np.float32(KERNEL_ERROR) * (1 - power), out=nsr)
+    nsr[:, 0, 0] = 0
+    power += nsr
+    gain = np.conj(otf)
+    # Multiplied, since numpy divides complex by real as complex by complex: twice the time.
+    np.reciprocal(power, out=power)
+    gain *= power
+    return gain

@@ -1,0 +1,157 @@
+"""What the tags of a RAW file say beyond LibRaw: ISO, noise profile, colour matrix, camkit's own.
+
+Nothing here raises on odd values: a tag that is missing or not believable becomes None.
+Tag numbers and meanings: DNG specification 1.7, chapter 4; Exif 2.32, section 4.6.
+"""
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import CfaPattern, NoiseModel, cfa_channels
+from camkit.runtime.files.tiff_tags import TiffTags
+
+IMAGE_DESCRIPTION: Final = 270
+MAKE: Final = 271
+MODEL: Final = 272
+EXPOSURE_TIME: Final = 33434
+ISO_SPEED: Final = 34855
+UNIQUE_CAMERA_MODEL: Final = 50708
+CFA_PLANE_COLOR: Final = 50710
+BLACK_REPEAT: Final = 50713
+COLOR_MATRICES: Final = ((50721, 50778), (50722, 50779))
+ANALOG_BALANCE: Final = 50727
+NOISE_PROFILE: Final = 51041
+
+# EXIF LightSource -> correlated colour temperature in kelvin (Exif 2.32, DNG 1.7)
+_ILLUMINANT_KELVIN: Final = {
+    1: 5500, 2: 3800, 3: 2856, 4: 5500, 9: 5500, 10: 6500, 11: 7500, 12: 6400, 13: 5050, 14: 4150,
+    15: 3525, 17: 2856, 18: 4874, 19: 6774, 20: 5503, 21: 6504, 22: 7504, 23: 5003, 24: 3200,
+}  # fmt: skip
+_D65_KELVIN: Final = 6504
+_BUNDLE_IN_MODEL: Final = re.compile(r"camkit ([A-Za-z0-9_.-]{1,64})")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorPlace:
+    """What a capture made by camkit records of itself; all None for other files."""
+
+    bundle_name: str | None = None
+    origin_px: tuple[int, int] | None = None
+    sensor_size_px: tuple[int, int] | None = None
+    pixel_pitch_um: float | None = None
+
+
+def camera_name(tags: TiffTags) -> str:
+    """Give the camera as people read it; empty if not stated."""
+    unique = tags.text(UNIQUE_CAMERA_MODEL)
+    if unique:
+        return unique
+    make, model = tags.text(MAKE) or "", tags.text(MODEL) or ""
+    return model if model.startswith(make) else f"{make} {model}".strip()
+
+
+def positive(tags: TiffTags, tag: int) -> float | None:
+    """Give the first number of a tag if it is finite and > 0 (zero means unknown in EXIF)."""
+    value = (tags.numbers(tag) or (math.nan,))[0]
+    return float(value) if math.isfinite(value) and value > 0 else None
+
+
+def noise_profile(tags: TiffTags, cfa: CfaPattern | None) -> NoiseModel | None:
+    """Give the DNG NoiseProfile as R, G, B; None if absent or not believable.
+
+    The tag holds (scale, offset) once, per colour plane in CFAPlaneColor order, or (as some
+    cameras write it) per position of the 2x2 cell.
+    """
+    values = tags.numbers(NOISE_PROFILE)
+    if values is None or len(values) % 2:
+        return None
+    pairs = np.array(values, dtype=np.float64).reshape(-1, 2)
+    if not np.isfinite(pairs).all() or (pairs < 0).any():
+        return None
+    rgb = _pairs_by_color(pairs, tags, cfa)
+    if rgb is None:
+        return None
+    shot, read = rgb.T.tolist()
+    return NoiseModel(shot=(shot[0], shot[1], shot[2]), read_variance=(read[0], read[1], read[2]))
+
+
+def _pairs_by_color(
+    pairs: NDArray[np.float64], tags: TiffTags, cfa: CfaPattern | None
+) -> NDArray[np.float64] | None:
+    if len(pairs) == 1:
+        return np.repeat(pairs, 3, axis=0)
+    if len(pairs) == 4 and cfa is not None:
+        colors = np.array(cfa_channels(cfa)).ravel()
+        return np.stack([pairs[colors == c].mean(axis=0) for c in range(3)])
+    if len(pairs) != 3:
+        return None
+    order = tags.numbers(CFA_PLANE_COLOR)
+    opaque = next((d[CFA_PLANE_COLOR] for d in tags.directories if CFA_PLANE_COLOR in d), None)
+    planes = list(opaque) if isinstance(opaque, bytes) else [int(n) for n in order or (0, 1, 2)]
+    if sorted(planes) != [0, 1, 2]:
+        return None
+    return pairs[[planes.index(c) for c in range(3)]]
+
+
+def color_matrix(tags: TiffTags) -> tuple[NDArray[np.float64], str | None] | None:
+    """Give the DNG colour matrix (XYZ to camera) whose light is nearest to D65, and a note.
+
+    Returns:
+        The (3, 3) matrix with AnalogBalance applied, and a note if its light is not D65; None if
+        the file has no believable matrix.
+    """
+    found = []
+    for matrix_tag, light_tag in COLOR_MATRICES:
+        values = tags.numbers(matrix_tag)
+        if values is None or len(values) != 9 or not np.isfinite(values).all():
+            continue
+        light = int((tags.numbers(light_tag) or (0,))[0])
+        kelvin = _ILLUMINANT_KELVIN.get(light, 0)
+        found.append((abs(kelvin - _D65_KELVIN), light, values))
+    if not found:
+        return None
+    distance, light, values = min(found, key=lambda item: item[0])
+    matrix = np.array(values, dtype=np.float64).reshape(3, 3)
+    balance = tags.numbers(ANALOG_BALANCE)
+    if (
+        balance is not None
+        and len(balance) == 3
+        and np.isfinite(balance).all()
+        and min(balance) > 0
+    ):
+        matrix = np.array(balance)[:, None] * matrix
+    if abs(np.linalg.det(matrix)) < 1e-9:
+        return None
+    source = f"EXIF light source {light}" if light else "a light that the file does not state"
+    return matrix, None if distance == 0 else f"colour matrix is for {source}, not D65"
+
+
+def sensor_place(tags: TiffTags) -> SensorPlace:
+    """Give what camkit wrote into ImageDescription, else the bundle of UniqueCameraModel."""
+    match = _BUNDLE_IN_MODEL.fullmatch(tags.text(UNIQUE_CAMERA_MODEL) or "")
+    named = match.group(1) if match else None
+    try:
+        record = json.loads(tags.text(IMAGE_DESCRIPTION) or "")["camkit"]
+        bundle = record.get("bundle", named)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return SensorPlace(bundle_name=named)
+    pitch = record.get("pixel_pitch_um")
+    return SensorPlace(
+        bundle_name=bundle if isinstance(bundle, str) else named,
+        origin_px=_whole_pair(record.get("origin_px"), least=0),
+        sensor_size_px=_whole_pair(record.get("sensor_size_px"), least=1),
+        pixel_pitch_um=float(pitch) if isinstance(pitch, int | float) and 0 < pitch < 1e4 else None,
+    )
+
+
+def _whole_pair(value: Any, *, least: int) -> tuple[int, int] | None:
+    if isinstance(value, list) and len(value) == 2 and all(type(n) is int for n in value):
+        x, y = value
+        return (x, y) if least <= min(x, y) and max(x, y) < 1 << 24 else None
+    return None

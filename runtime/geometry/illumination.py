@@ -1,0 +1,57 @@
+"""Relative illumination of the lens: over the sensor, and divided out of a picture."""
+
+from typing import Final
+
+import numpy as np
+
+from camkit.contracts import FloatArray, FrozenPsf
+from camkit.runtime.geometry.sensor_window import SensorWindow
+
+TABLE_SAMPLES: Final = 4096
+
+
+def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: int) -> FloatArray:
+    """Give the relative illumination of rows top..bottom of a window.
+
+    Linear in the squared field height between the samples of the PSF, since the illumination is
+    an even function of the height; constant beyond the last one.
+
+    Args:
+        psf: Frozen PSF; its relative illumination is 1 on the axis.
+        window: Where the picture lies on the sensor.
+        top: First row.
+        bottom: Row after the last.
+
+    Returns:
+        (bottom - top, w) float32 > 0.
+    """
+    width, _ = window.size_px
+    x_mm, y_mm = window.to_mm(np.arange(width), np.arange(top, bottom))
+    # A table over the squared height makes the lookup two multiplications per pixel.
+    end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
+    squares = np.linspace(0.0, end, TABLE_SAMPLES)
+    table = np.interp(squares, psf.field_heights_mm**2, psf.relative_illumination)
+    table32 = np.append(table, table[-1]).astype(np.float32)
+    scale = (TABLE_SAMPLES - 1) / end
+    at = (x_mm**2 * scale).astype(np.float32) + (y_mm**2 * scale).astype(np.float32)[:, None]
+    index = at.astype(np.int32)
+    at -= index
+    low = table32[index]
+    return np.asarray(low + at * (table32[index + 1] - low), dtype=np.float32)
+
+
+def divide_illumination(
+    band: FloatArray, top: int, psf: FrozenPsf, window: SensorWindow
+) -> FloatArray:
+    """Undo vignetting on a band of a picture in sensor geometry.
+
+    Args:
+        band: (3, rows, w) float32, linear.
+        top: First row of the band in the picture.
+        psf: Frozen PSF.
+        window: Where the picture lies on the sensor.
+
+    Returns:
+        (3, rows, w) float32, a new array.
+    """
+    return np.asarray(band / illumination_band(psf, window, top, top + band.shape[1]))

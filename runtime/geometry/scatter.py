@@ -1,0 +1,113 @@
+"""Blur that varies over the field: each block of the scene is spread with its own PSF.
+
+Raised-cosine windows of twice the block step share every scene pixel among four blocks, so the
+PSF fades from block to block and all energy is kept. (A gather, the PSF of the receiving pixel,
+would not be what light does.)
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+import scipy.fft
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.geometry.sensor_window import SensorWindow
+
+# Against blocks of 32 px, the lens `duet` loses 48 dB at 256 px and 52 to 55 dB at 128 px.
+BLOCK_STEP_PX: Final = 128
+
+KernelLookup = Callable[[float, float], FloatArray]
+
+
+def scatter(
+    planes: FloatArray,
+    kernels_at: KernelLookup,
+    window: SensorWindow,
+    *,
+    margin_px: int,
+    step_px: int = BLOCK_STEP_PX,
+    workers: int = 1,
+) -> FloatArray:
+    """Blur colour planes with the PSFs of every block's centre.
+
+    Args:
+        planes: (3, h + 2 margin, w + 2 margin) float32: the window and what lies around it.
+        kernels_at: Gives the (3, k, k) float32 kernels of a sensor position (x_mm, y_mm); k odd,
+            at most 2 margin + 1.
+        window: Where the inner h x w pixels lie on the sensor.
+        margin_px: Width of the margin.
+        step_px: Distance of block centres.
+        workers: Threads of the FFT.
+
+    Returns:
+        (3, h, w) float32: the light that arrives inside the window.
+
+    Raises:
+        ContractError: If the planes do not have the size of the window with its margin.
+    """
+    width, height = window.size_px
+    if planes.shape != (3, height + 2 * margin_px, width + 2 * margin_px):
+        raise ContractError(
+            f"the planes must be (3, {height} + 2 * {margin_px}, {width} + 2 * {margin_px}); "
+            f"got {planes.shape}"
+        )
+    out = np.zeros((3, height, width), dtype=np.float32)
+    for top, bottom, row_weight in _spans(planes.shape[1], step_px):
+        for left, right, column_weight in _spans(planes.shape[2], step_px):
+            block = planes[:, top:bottom, left:right] * row_weight[:, None]
+            block *= column_weight
+            x_px, y_px = (left + right - 1) / 2 - margin_px, (top + bottom - 1) / 2 - margin_px
+            x_mm, y_mm = window.to_mm(x_px, y_px)
+            kernels = kernels_at(float(x_mm), float(y_mm))
+            spread = convolve_full(block, kernels, workers=workers)
+            reach = margin_px + kernels.shape[-1] // 2
+            _add_inside(out, spread, top - reach, left - reach)
+    return out
+
+
+def _add_inside(out: FloatArray, spread: FloatArray, top: int, left: int) -> None:
+    # The corner of `spread` lies at (top, left) of `out`, perhaps outside.
+    bottom = min(top + spread.shape[1], out.shape[1])
+    right = min(left + spread.shape[2], out.shape[2])
+    first_row, first_column = max(top, 0), max(left, 0)
+    if bottom > first_row and right > first_column:
+        part = spread[:, first_row - top : bottom - top, first_column - left : right - left]
+        out[:, first_row:bottom, first_column:right] += part
+
+
+def convolve_full(block: FloatArray, kernels: FloatArray, *, workers: int = 1) -> FloatArray:
+    """Give the full linear convolution (c, h + kh - 1, w + kw - 1) by FFT in float32.
+
+    Args:
+        block: (c, h, w) float32.
+        kernels: (c, kh, kw) float32.
+        workers: Threads of the FFT.
+    """
+    full = tuple(b + k - 1 for b, k in zip(block.shape[1:], kernels.shape[1:], strict=True))
+    size = [scipy.fft.next_fast_len(n, real=True) for n in full]
+    spectrum = scipy.fft.rfft2(block, size, workers=workers)
+    spectrum *= scipy.fft.rfft2(kernels, size, workers=workers)
+    spread = scipy.fft.irfft2(spectrum, size, workers=workers)
+    return np.asarray(spread[:, : full[0], : full[1]], dtype=np.float32)
+
+
+def _spans(length: int, step: int) -> list[tuple[int, int, FloatArray]]:
+    # Raised cosines of width 2 step, centred every step, sum to 1 between the outer centres;
+    # beyond them the outer windows stay at 1. Blocks at the ends are cut at the picture.
+    count = max(1, round(length / step))
+    pitch = length / count
+    position = np.arange(length, dtype=np.float64) + 0.5
+    spans = []
+    for index in range(count):
+        distance = (position - (index + 0.5) * pitch) / pitch
+        if index == 0:
+            distance = np.maximum(distance, 0.0)
+        if index == count - 1:
+            distance = np.minimum(distance, 0.0)
+        weight = np.where(np.abs(distance) < 1, 0.5 + 0.5 * np.cos(np.pi * distance), 0.0)
+        used = np.flatnonzero(weight)
+        first, last = int(used[0]), int(used[-1]) + 1
+        spans.append((first, last, weight[first:last].astype(np.float32)))
+    return spans

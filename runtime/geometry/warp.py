@@ -1,0 +1,199 @@
+"""Pictures between sensor geometry and ideal geometry, in bands, by Lanczos interpolation.
+
+The ideal picture has the size of the capture and is centred on the ideal position of the
+capture's centre: nothing moves on a whole sensor, and a crop far off the axis stays in view.
+
+cv2.remap rounds positions to 1/32 px and holds them in 16 bits, so sides end at 32766 px. Maps
+are computed on an 8 px lattice that is fixed to the picture and enlarged linearly, so the bands
+do not depend on their height.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray, RadialDistortion
+from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.geometry.distortion import check_distortion, distort_points, undistort_points
+from camkit.runtime.rows import RowSource
+from camkit.runtime.geometry.sensor_window import SensorWindow
+
+FloatGrid = NDArray[np.float64]
+
+LATTICE_PX: Final = 8
+BAND_ROWS: Final = 256
+LANCZOS_REACH_PX: Final = 4
+MAX_SIDE_PX: Final = 32766
+
+
+def undistort_bands(
+    source: RowSource,
+    distortion: RadialDistortion,
+    window: SensorWindow,
+    *,
+    band_rows: int = BAND_ROWS,
+) -> Iterator[FloatArray]:
+    """Undistort a capture, band by band; what lies outside it repeats its edge.
+
+    Args:
+        source: (3, h, w) picture in sensor geometry, of the size of the window.
+        distortion: Radial distortion per colour.
+        window: Where the picture lies on the sensor.
+        band_rows: Height of the bands, a multiple of 8; the pixels do not depend on it.
+
+    Yields:
+        (3, rows, w) float32 in ideal geometry, from top to bottom.
+
+    Raises:
+        ContractError: If sizes disagree or the distortion folds on the sensor.
+        UnsupportedError: If a side is too long for cv2.remap.
+    """
+    warp = Warp(distortion, window, to_sensor=False)
+    yield from _warp_bands(source, warp, band_rows=band_rows, border=cv2.BORDER_REPLICATE)
+
+
+def distort_array(
+    scene: FloatArray, distortion: RadialDistortion, window: SensorWindow, *, margin_px: int = 0
+) -> FloatArray:
+    """Warp an ideal picture into sensor geometry; beyond its border it is mirrored.
+
+    Args:
+        scene: (3, h, w) float32 in ideal geometry, of the size of the window.
+        distortion: Radial distortion per colour.
+        window: Where the capture lies on the sensor.
+        margin_px: Pixels to compute beyond every side of the window.
+
+    Returns:
+        (3, h + 2 margin, w + 2 margin) float32.
+
+    Raises:
+        ContractError: If sizes disagree or the distortion folds on the sensor.
+        UnsupportedError: If a side is too long for cv2.remap.
+    """
+    _check_size(scene.shape, window)
+    height, width = scene.shape[1] + 2 * margin_px, scene.shape[2] + 2 * margin_px
+    warp = Warp(distortion, window, to_sensor=True, margin_px=margin_px)
+    out = np.empty((3, height, width), dtype=np.float32)
+    for channel in range(3):
+        for top in range(0, height, BAND_ROWS):
+            bottom = min(top + BAND_ROWS, height)
+            maps = warp.maps(channel, top, bottom)
+            out[channel, top:bottom] = _remap(scene[channel], maps, cv2.BORDER_REFLECT_101)
+    return out
+
+
+class Warp:
+    """The map of a picture: for pixels of the output, positions in the source."""
+
+    def __init__(
+        self,
+        distortion: RadialDistortion,
+        window: SensorWindow,
+        *,
+        to_sensor: bool,
+        margin_px: int = 0,
+    ) -> None:
+        check_distortion(distortion, window.corner_radius_mm)
+        if max(window.size_px) + 2 * margin_px > MAX_SIDE_PX:
+            raise UnsupportedError(
+                f"pictures are warped up to {MAX_SIDE_PX} px a side; got {window.size_px}; "
+                "switch undistortion off or crop"
+            )
+        self.window = window
+        self._distortion = distortion
+        self._to_sensor = to_sensor
+        self._margin_px = margin_px
+        centre = window.centre_mm
+        self._shift_mm = undistort_points(centre, distortion) - centre
+
+    def shares_map(self, channel: int) -> bool:
+        """Tell whether a colour has the same map as the colour before it."""
+        rows = self._distortion.coefficients
+        return channel > 0 and bool(np.array_equal(rows[channel], rows[channel - 1]))
+
+    def positions(self, channel: int, x_px: FloatGrid, y_px: FloatGrid) -> FloatGrid:
+        """Give (..., 2) source pixel positions of output pixel positions.
+
+        Args:
+            channel: Colour, 0 R, 1 G, 2 B.
+            x_px: Columns of the output, the margin included.
+            y_px: Rows of the output, of the same shape.
+        """
+        points = np.stack(self.window.to_mm(x_px - self._margin_px, y_px - self._margin_px), -1)
+        if self._to_sensor:
+            found = undistort_points(points, self._distortion, channel=channel) - self._shift_mm
+        else:
+            found = distort_points(points + self._shift_mm, self._distortion, channel=channel)
+        return np.stack(self.window.to_px(found[..., 0], found[..., 1]), axis=-1)
+
+    def lattice(self, channel: int, top: int, bottom: int) -> FloatGrid:
+        """Give the positions on the lattice nodes around rows top..bottom (top on the lattice)."""
+        width = self.window.size_px[0] + 2 * self._margin_px
+        middle = (LATTICE_PX - 1) / 2
+        columns = np.arange(-1, -(-width // LATTICE_PX) + 1) * LATTICE_PX + middle
+        rows = np.arange(top // LATTICE_PX - 1, -(-bottom // LATTICE_PX) + 1) * LATTICE_PX + middle
+        x, y = np.meshgrid(columns, rows)
+        return self.positions(channel, x, y)
+
+    def maps(self, channel: int, top: int, bottom: int) -> tuple[NDArray[np.int16], object]:
+        """Give cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
+        nodes = self.lattice(channel, top, bottom).astype(np.float32)
+        width = self.window.size_px[0] + 2 * self._margin_px
+        # cv2.resize places node i in the middle of its cell, as the lattice does.
+        size = (nodes.shape[1] * LATTICE_PX, nodes.shape[0] * LATTICE_PX)
+        dense = cv2.resize(nodes, size, interpolation=cv2.INTER_LINEAR)
+        dense = dense[LATTICE_PX : LATTICE_PX + bottom - top, LATTICE_PX : LATTICE_PX + width]
+        whole, fraction = cv2.convertMaps(dense, None, cv2.CV_16SC2)
+        return whole, fraction
+
+
+def _warp_bands(
+    source: RowSource, warp: Warp, *, band_rows: int, border: int
+) -> Iterator[FloatArray]:
+    _check_size(source.shape, warp.window)
+    if band_rows < LATTICE_PX or band_rows % LATTICE_PX:
+        raise ContractError(f"band_rows must be a multiple of {LATTICE_PX}; got {band_rows}")
+    _, height, width = source.shape
+    tops = range(0, height, band_rows)
+    spans = _source_spans(warp, tops, height)
+    for top, (first, last) in zip(tops, spans, strict=True):
+        bottom = min(top + band_rows, height)
+        rows = source.read(first, last)
+        band = np.empty((3, bottom - top, width), dtype=np.float32)
+        for channel in range(3):
+            if not warp.shares_map(channel):
+                whole, fraction = warp.maps(channel, top, bottom)
+                whole[..., 1] -= first
+            band[channel] = _remap(rows[channel], (whole, fraction), border)
+        yield band
+
+
+def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]:
+    # Sources forget rows above the latest read, so no band may start above the one before it.
+    spans: list[tuple[int, int]] = []
+    lowest = height - 1
+    for top in reversed(tops):
+        bottom = min(top + tops.step, height)
+        y = np.stack([warp.lattice(c, top, bottom)[..., 1] for c in range(3)])
+        first = int(np.floor(y.min())) - LANCZOS_REACH_PX
+        last = int(np.ceil(y.max())) + LANCZOS_REACH_PX + 1
+        lowest = min(lowest, max(first, 0))
+        spans.append((lowest, min(max(last, lowest + 1), height)))
+    return spans[::-1]
+
+
+def _remap(plane: FloatArray, maps: tuple[NDArray[np.int16], object], border: int) -> FloatArray:
+    whole, fraction = maps
+    out = cv2.remap(
+        np.ascontiguousarray(plane), whole, fraction, cv2.INTER_LANCZOS4, borderMode=border
+    )
+    return np.asarray(out, dtype=np.float32)
+
+
+def _check_size(shape: tuple[int, ...], window: SensorWindow) -> None:
+    width, height = window.size_px
+    if shape != (3, height, width):
+        raise ContractError(f"the picture must be (3, {height}, {width}); got {shape}")

@@ -1,0 +1,366 @@
+"""The walk along the nodes of a network: reach, stride, cost, and what breaks exact tiling.
+
+Forwards, each tensor gets its channels and its grid; backwards, the pixels that a run of output
+pixels reads are carried from the output to the input in integers.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from camkit.errors import BundleError
+from camkit.runtime.network.operators import (
+    ELEMENTWISE,
+    GLOBAL_POOLS,
+    NORMALIZATIONS,
+    REDUCTIONS,
+    Axis,
+    Constants,
+    Extent,
+    Node,
+    Windows,
+    check_broadcast,
+    convolution_windows,
+    is_corner_aligned,
+    reduces_space,
+    resize_windows,
+    shuffle_window,
+    unshuffle_window,
+)
+
+_BYTES_PER_VALUE: Final = 4
+# The alignment of onnxruntime's blocked (NCHWc) convolutions, and the channels below which it
+# reads the plain layout into a blocked one; the block is 8 or 16 by processor.
+_BLOCK_ALIGNMENT: Final = 4
+_SMALL_INPUT: Final = 8
+_LARGE_BLOCK: Final = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GraphFacts:
+    """What the graph of a network says about itself.
+
+    Attributes:
+        receptive_field_radius_px: How far a window on the lattice of the stride must reach past
+            the pixels it keeps, apart from what passes through `global_operators`.
+        stride_px: Height and width must be multiples of it.
+        global_operators: "name (type)" of nodes that see the whole picture.
+        unblocked_convolutions: Nodes off onnxruntime's blocked path; bits of tiled and whole
+            may differ there.
+        mac_per_pixel: Multiply-accumulates of all convolutions per output pixel.
+        bytes_per_pixel: Peak of the live float32 activations per output pixel.
+        parameters: Number of constants of floating point.
+    """
+
+    input_name: str
+    input_channels: int
+    output_name: str
+    output_channels: int
+    receptive_field_radius_px: int
+    stride_px: int
+    global_operators: tuple[str, ...]
+    unblocked_convolutions: tuple[str, ...]
+    mac_per_pixel: float
+    bytes_per_pixel: float
+    parameters: int
+
+
+@dataclass(slots=True, kw_only=True)
+class _Walk:
+    constants: Constants
+    extents: dict[str, Extent]
+    windows: dict[str, Windows] = field(default_factory=dict)
+    global_operators: list[str] = field(default_factory=list)
+    unblocked: list[str] = field(default_factory=list)
+    mac_per_pixel: float = 0.0
+
+    def extent(self, node: Node, index: int = 0) -> Extent:
+        name = node.inputs[index] if index < len(node.inputs) else ""
+        if name not in self.extents:
+            raise BundleError(f"{node.label}: input {name!r} is not computed before it is used")
+        return self.extents[name]
+
+    def constant_shape(self, node: Node, index: int) -> tuple[int, ...]:
+        name = node.inputs[index] if index < len(node.inputs) else ""
+        if name not in self.constants:
+            raise BundleError(f"{node.label}: input {index} must be a constant")
+        return self.constants[name].shape
+
+    def integers(self, node: Node, index: int) -> list[int]:
+        self.constant_shape(node, index)
+        values = self.constants[node.inputs[index]]
+        if values.dtype.kind not in "iu":
+            raise BundleError(f"{node.label}: input {index} must be integers; got {values.dtype}")
+        return [int(value) for value in values.ravel()]
+
+    def pass_through(self, node: Node, channels: int, windows: Windows) -> Extent:
+        """Give the extent behind a node with windows, and remember them for the way back."""
+        self.windows[node.outputs[0]] = windows
+        return self.extent(node).through(channels, windows)
+
+    def mark_global(self, node: Node) -> None:
+        self.global_operators.append(f"{node.label} ({node.op})")
+
+
+def walk_graph(
+    nodes: Sequence[Node],
+    constants: Constants,
+    *,
+    source: tuple[str, int],
+    target: tuple[str, int | None],
+) -> GraphFacts:
+    """Walk the nodes in order and give the facts.
+
+    Args:
+        nodes: In the order of computation.
+        constants: By name.
+        source: Name and channels of the input.
+        target: Name of the output, and its channels where declared.
+
+    Raises:
+        BundleError: If a node cannot be followed, or the output is not one sample per pixel of
+            the input with the declared channels.
+    """
+    start = Extent(channels=source[1], axes=(Axis(), Axis()))
+    walk = _Walk(constants=constants, extents={source[0]: start})
+    for node in nodes:
+        extents = _node_extents(walk, node)
+        walk.extents.update(zip(node.outputs, extents, strict=False))
+    final = _final(walk.extents, target)
+    steps = [axis.step for e in walk.extents.values() if e.axes is not None for axis in e.axes]
+    stride = math.lcm(*(step.numerator for step in steps))
+    return GraphFacts(
+        input_name=source[0],
+        input_channels=source[1],
+        output_name=target[0],
+        output_channels=final.channels,
+        receptive_field_radius_px=_reach(nodes, walk, ends=(source[0], target[0]), kept=stride),
+        stride_px=stride,
+        global_operators=tuple(walk.global_operators),
+        unblocked_convolutions=tuple(walk.unblocked),
+        mac_per_pixel=walk.mac_per_pixel,
+        bytes_per_pixel=_peak_bytes(nodes, walk.extents, keep=target[0]),
+        parameters=sum(a.size for a in constants.values() if a.dtype.kind == "f"),
+    )
+
+
+def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> Extent:
+    name, channels = target
+    if name not in extents:
+        raise BundleError(f"output {name!r} is never computed")
+    final = extents[name]
+    if final.axes is None or any(a.step != 1 or a.extra != 0 for a in final.axes):
+        raise BundleError(f"output {name!r} must have the height and width of the input")
+    if channels is not None and channels != final.channels:
+        raise BundleError(
+            f"output {name!r} declares {channels} channels, the graph computes {final.channels}"
+        )
+    return final
+
+
+def _reach(nodes: Sequence[Node], walk: _Walk, *, ends: tuple[str, str], kept: int) -> int:
+    """Carry the runs that the kept pixels 0 .. kept - 1 read from the output back to the input."""
+    source, target = ends
+    reach = 0
+    for axis in range(2):
+        runs = {target: (0, kept - 1)}
+        for node in reversed(nodes):
+            for output in node.outputs:
+                if output not in runs:
+                    continue
+                run = runs[output]
+                if output in walk.windows:
+                    run = walk.windows[output][axis].reads(*run)
+                for name in _names(walk.extents, node.inputs):
+                    old = runs.get(name, run)
+                    runs[name] = min(old[0], run[0]), max(old[1], run[1])
+        first, last = runs.get(source, (0, kept - 1))
+        reach = max(reach, -first, last - kept + 1)
+    return reach
+
+
+def _node_extents(walk: _Walk, node: Node) -> list[Extent]:
+    if node.op in ("Conv", "ConvTranspose"):
+        return [_convolve(walk, node)]
+    if node.op in ELEMENTWISE:
+        return [_elementwise(walk, node)]
+    if node.op in ("MaxPool", "AveragePool"):
+        if len(node.outputs) > 1:
+            raise BundleError(f"{node.label}: pooling with indices is refused")
+        extent = walk.extent(node)
+        windows = convolution_windows(node, tuple(node.integers("kernel_shape", [])))
+        return [walk.pass_through(node, extent.channels, windows)]
+    if node.op in ("DepthToSpace", "SpaceToDepth"):
+        return [_shuffle(walk, node)]
+    if node.op == "Resize":
+        if is_corner_aligned(node):
+            walk.mark_global(node)
+        windows = resize_windows(node, walk.constants)
+        return [walk.pass_through(node, walk.extent(node).channels, windows)]
+    if node.op in ("Concat", "Split", "Slice"):
+        return _regroup(walk, node)
+    return [_global(walk, node)]
+
+
+def _convolve(walk: _Walk, node: Node) -> Extent:
+    shape = walk.constant_shape(node, 1)
+    groups = node.integer("group", 1)
+    extent = walk.extent(node)
+    if len(shape) != 4 or groups < 1:
+        raise BundleError(f"{node.label}: expected a 4-D weight; got shape {shape}")
+    if node.op == "Conv":
+        fan_in, channels = shape[1] * groups, shape[0]
+    else:
+        fan_in, channels = shape[0], shape[1] * groups
+    if fan_in != extent.channels or channels % groups:
+        raise BundleError(f"{node.label}: weight {shape} does not fit {extent.channels} channels")
+    if node.integers("kernel_shape", list(shape[2:])) != list(shape[2:]):
+        raise BundleError(f"{node.label}: kernel_shape contradicts the weight {shape}")
+    result = walk.pass_through(node, channels, convolution_windows(node, shape[2:]))
+    # A transposed convolution spends its multiplications per sample of its input.
+    grid = result.samples_per_pixel / channels
+    if node.op == "ConvTranspose":
+        grid = extent.samples_per_pixel / extent.channels
+    walk.mac_per_pixel += grid * math.prod(shape)
+    if not _is_blocked(node, extent.channels, channels, groups):
+        walk.unblocked.append(node.label)
+    return result
+
+
+def _is_blocked(node: Node, channels_in: int, channels_out: int, groups: int) -> bool:
+    if node.op != "Conv":
+        return False
+    if groups == 1:
+        return channels_in < _SMALL_INPUT or channels_in % _BLOCK_ALIGNMENT == 0
+    if groups == channels_in == channels_out:
+        return channels_out % _BLOCK_ALIGNMENT == 0
+    per_group = (channels_in // groups, channels_out // groups)
+    return all(channels % _LARGE_BLOCK == 0 for channels in per_group)
+
+
+def _elementwise(walk: _Walk, node: Node) -> Extent:
+    operands = [name for name in node.inputs if name and name not in walk.constants]
+    extents = [walk.extent(node, node.inputs.index(name)) for name in operands]
+    if not extents:
+        raise BundleError(f"{node.label}: computes with constants alone; fold them at export")
+    if node.op not in ("BatchNormalization", "Clip"):
+        check_broadcast(node, walk.constants)
+    channels = {extent.channels for extent in extents}
+    if node.op != "BatchNormalization":
+        channels |= {
+            walk.constants[name].shape[-3]
+            for name in node.inputs
+            if name in walk.constants and walk.constants[name].ndim >= 3
+        }
+    if len(channels - {1}) > 1:
+        raise BundleError(f"{node.label}: {sorted(channels)} channels do not go together")
+    return _together(node, extents, max(channels))
+
+
+def _together(node: Node, extents: Sequence[Extent], channels: int) -> Extent:
+    """Give the extent of a tensor computed sample by sample from several."""
+    axes = {extent.axes for extent in extents if extent.axes is not None}
+    if len(axes) > 1:
+        grids = sorted(f"every {rows.step} px (+{rows.extra})" for rows, _ in axes)
+        raise BundleError(
+            f"{node.label}: tensors of different grids meet ({', '.join(grids)}); "
+            "their sizes cannot agree"
+        )
+    return Extent(channels=channels, axes=next(iter(axes), None))
+
+
+def _shuffle(walk: _Walk, node: Node) -> Extent:
+    extent, block = walk.extent(node), node.integer("blocksize", 0)
+    if not 1 <= block <= 64:
+        raise BundleError(f"{node.label}: blocksize {block} is refused")
+    if node.op == "SpaceToDepth":
+        window = unshuffle_window(block)
+        return walk.pass_through(node, extent.channels * block * block, (window, window))
+    if extent.channels % (block * block):
+        raise BundleError(f"{node.label}: {extent.channels} channels are no {block}x{block} blocks")
+    window = shuffle_window(block)
+    return walk.pass_through(node, extent.channels // (block * block), (window, window))
+
+
+def _regroup(walk: _Walk, node: Node) -> list[Extent]:
+    """Follow Concat, Split and Slice along the channels; along space they are refused."""
+    if node.op == "Slice":
+        return [_slice(walk, node)]
+    if node.integer("axis", 0) not in (1, -3):
+        raise BundleError(f"{node.label}: {node.op} is admitted along the channels only")
+    if node.op == "Concat":
+        extents = [walk.extent(node, index) for index in range(len(node.inputs))]
+        return [_together(node, extents, sum(extent.channels for extent in extents))]
+    extent, count = walk.extent(node), len(node.outputs)
+    if len(node.inputs) > 1 and node.inputs[1]:
+        sizes = walk.integers(node, 1)
+    else:
+        size = -(-extent.channels // count)
+        sizes = [size] * (count - 1) + [extent.channels - size * (count - 1)]
+    if len(sizes) != count or min(sizes) < 1 or sum(sizes) != extent.channels:
+        raise BundleError(f"{node.label}: parts {sizes} do not make {extent.channels} channels")
+    return [extent.through(size) for size in sizes]
+
+
+def _slice(walk: _Walk, node: Node) -> Extent:
+    extent = walk.extent(node)
+    starts, ends = walk.integers(node, 1), walk.integers(node, 2)
+    has = [index < len(node.inputs) and bool(node.inputs[index]) for index in range(5)]
+    axes = walk.integers(node, 3) if has[3] else list(range(len(starts)))
+    steps = walk.integers(node, 4) if has[4] else [1]
+    if len(starts) != 1 or len(ends) != 1 or axes not in ([1], [-3]) or len(steps) != 1:
+        raise BundleError(f"{node.label}: Slice is admitted along the channels only")
+    if steps[0] == 0:
+        raise BundleError(f"{node.label}: a Slice cannot have step 0")
+    channels = len(range(extent.channels)[starts[0] : ends[0] : steps[0]])
+    if channels == 0:
+        raise BundleError(f"{node.label}: the Slice is empty")
+    return extent.through(channels)
+
+
+def _global(walk: _Walk, node: Node) -> Extent:
+    """Follow the operators that may see the whole picture."""
+    extent = walk.extent(node)
+    if node.op in NORMALIZATIONS:
+        walk.mark_global(node)
+        return extent
+    if node.op in GLOBAL_POOLS:
+        walk.mark_global(node)
+        return Extent(channels=extent.channels, axes=None)
+    is_over_space = reduces_space(node, walk.constants)
+    if is_over_space:
+        walk.mark_global(node)
+    if node.op == "Softmax":
+        return extent
+    if node.op in REDUCTIONS and node.integer("keepdims", 1) == 1:
+        # Over space the channels stay; otherwise the one axis left to reduce is that of channels.
+        if is_over_space:
+            return Extent(channels=extent.channels, axes=None)
+        return extent.through(1)
+    raise BundleError(f"{node.label}: {node.op} that drops axes is refused; keep dimensions")
+
+
+def _peak_bytes(nodes: Sequence[Node], extents: Mapping[str, Extent], *, keep: str) -> float:
+    """Give the peak of live activations in bytes per pixel, each freed after its last use.
+
+    An elementwise node writes over an operand that nobody needs any more, as onnxruntime does.
+    """
+    last = {name: index for index, node in enumerate(nodes) for name in node.inputs}
+    last[keep] = len(nodes)
+    alive = set(_names(extents, [next(iter(extents))]))
+    peak = 0.0
+    for index, node in enumerate(nodes):
+        dying = {name for name in _names(extents, node.inputs) if last.get(name) == index}
+        outputs = _names(extents, node.outputs)
+        if node.op in ELEMENTWISE:
+            alive -= set(list(dying)[:1])
+        alive |= set(outputs)
+        peak = max(peak, sum(extents[name].samples_per_pixel for name in alive))
+        alive -= dying
+        alive -= {name for name in outputs if name not in last}
+    return peak * _BYTES_PER_VALUE
+
+
+def _names(extents: Mapping[str, Extent], names: Iterable[str]) -> list[str]:
+    return [name for name in names if name in extents]

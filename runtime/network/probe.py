@@ -1,0 +1,149 @@
+"""What a network does, found by running it: how far a pixel reaches, what a short halo costs.
+
+A probe gives a lower bound of the reach (a path may be dead for the probe's input); the walk along
+the graph in `reach` gives an upper one. Export records both and tiling takes the larger.
+"""
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.rows import ArrayRows
+from camkit.runtime.network.tiling import Run, TileLimits, infer_bands, plan_windows
+
+_KICK: Final = 1e3  # far beyond the base, so that it survives rounding after many layers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProbedReach:
+    """How far an input pixel was seen to act.
+
+    Attributes:
+        radius_px: Largest distance, along an axis, between an input pixel and an output pixel
+            that it changes.
+        halo_px: Largest distance between an input pixel and the stride cell of such an output
+            pixel: what tiling needs when all origins lie on the lattice of the stride.
+    """
+
+    radius_px: int
+    halo_px: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HaloCost:
+    """What a halo costs against the untiled run.
+
+    Attributes:
+        halo_px: The halo.
+        max_abs: Largest |difference|, in units of the network's output.
+        psnr_db: Peak (largest |untiled output|) to rms difference; None if there is none.
+    """
+
+    halo_px: int
+    max_abs: float
+    psnr_db: float | None
+
+
+def perturbation_reach(
+    run: Run, size_px: int, rng: np.random.Generator, *, stride_px: int, channels: int = 6
+) -> ProbedReach:
+    """Kick one input pixel at every phase of the stride and see where the output changes.
+
+    Args:
+        run: (1, channels, h, w) float32 -> (1, 3, h, w) float32.
+        size_px: Side of the probed window, a multiple of the stride; more than twice the reach.
+        rng: Draws the base picture.
+        stride_px: Total stride.
+        channels: Input planes.
+
+    Returns:
+        The reach, at most what the window can show.
+
+    Raises:
+        ContractError: If the size is no multiple of the stride, or a change came to the border of
+            the window: the reach is larger than it can show, or the network has a global operator.
+    """
+    if size_px % stride_px or size_px < 4 * stride_px:
+        raise ContractError(
+            f"the probe's side must be a multiple of {stride_px} and >= {4 * stride_px}; "
+            f"got {size_px}"
+        )
+    base = rng.random((1, channels, size_px, size_px)).astype(np.float32)
+    still = run(base).copy()
+    cell = size_px // 2 // stride_px * stride_px
+    radius = halo = 0
+    for phase in range(stride_px):
+        for kick in (_KICK, -_KICK):
+            kicked = base.copy()
+            kicked[:, :, cell + phase, cell + phase] += kick
+            changed = (run(kicked) != still).any(axis=(0, 1))
+            for axis in range(2):
+                hit = np.flatnonzero(changed.any(axis=axis))
+                if hit.size and (hit[0] == 0 or hit[-1] == size_px - 1):
+                    raise ContractError(
+                        f"one pixel acts across the whole window of {size_px} pixels: probe a "
+                        "larger one; a network with a global operator cannot be tiled"
+                    )
+                radius = max(radius, _distance(hit, hit, cell + phase))
+                first = hit // stride_px * stride_px
+                halo = max(halo, _distance(first, first + stride_px - 1, cell + phase))
+    return ProbedReach(radius_px=radius, halo_px=halo)
+
+
+def _distance(first: np.ndarray, last: np.ndarray, pixel: int) -> int:
+    """Give the largest distance from a pixel to the nearest end of any interval first..last."""
+    outside = np.maximum(first - pixel, pixel - last)
+    return max(0, int(outside.max(initial=0)))
+
+
+def halo_error_curve(
+    run: Run, sample: FloatArray, halos_px: Iterable[int], *, stride_px: int, tile_px: int = 128
+) -> tuple[HaloCost, ...]:
+    """Measure what a halo shorter than the reach costs.
+
+    Args:
+        run: The network.
+        sample: (c, h, w) float32, stabilised planes as the network sees them, larger than a tile.
+        halos_px: Halos to try; each is rounded up to the stride.
+        stride_px: Total stride.
+        tile_px: Output tile; small, so that seams are many and the figures are on the safe side.
+
+    Returns:
+        One entry per halo, increasing.
+
+    Raises:
+        ContractError: If the sample is not larger than a tile: there would be no seam.
+    """
+    _, height, width = sample.shape
+    if height <= tile_px or width <= tile_px:
+        raise ContractError(
+            f"the sample must be larger than a tile of {tile_px}; got {width}x{height}"
+        )
+    whole = _infer(
+        run, sample, TileLimits(stride_px=stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True)
+    )
+    peak = float(np.abs(whole).max())
+    costs = []
+    for halo in sorted({-(-h // stride_px) * stride_px for h in halos_px}):
+        limits = TileLimits(stride_px=stride_px, halo_px=halo, tile_px=tile_px)
+        difference = np.abs(_infer(run, sample, limits) - whole)
+        rms = float(np.sqrt(np.mean(np.square(difference, dtype=np.float64))))
+        costs.append(
+            HaloCost(
+                halo_px=halo,
+                max_abs=float(difference.max()),
+                psnr_db=20 * float(np.log10(peak / rms)) if rms > 0 else None,
+            )
+        )
+    return tuple(costs)
+
+
+def _infer(run: Run, sample: FloatArray, limits: TileLimits) -> FloatArray:
+    _, height, width = sample.shape
+    plan = plan_windows(height, width, limits)
+    return np.concatenate(list(infer_bands(run, ArrayRows(sample), plan)), axis=1)

@@ -1,0 +1,189 @@
+"""Full colour planes from a Bayer mosaic, linear float32 in and out; nothing is clipped.
+
+fast     Malvar, He and Cutler 2004: gradient-corrected linear interpolation with 5x5 kernels.
+quality  after Menon, Andriani and Calvagno 2007: green along edges, refined afterwards from the
+         colour differences; in `camkit.runtime.signal.directional`.
+
+Both look at a bounded neighbourhood (`DEMOSAIC_MARGIN_PX`), so rows [t, b) demosaicked with that
+much context equal the same rows of the whole picture bit for bit. At the border the mosaic is
+mirrored about its outermost pixels (reflect 101), which keeps the CFA phase.
+
+The exact form of fast: out[c] at a pixel is the sum over the 5x5 neighbourhood of
+`MALVAR_KERNELS[name]` times the mosaic, name chosen by the pixel's own colour and the wanted one:
+
+    own colour wanted                       the sample itself
+    green wanted at red or blue             "green"
+    red wanted at green of a red row        "along_row"     (likewise blue in a blue row)
+    red wanted at green of a blue row       "along_column"  (likewise blue in a red row)
+    red wanted at blue, blue at red         "diagonal"
+
+References: Malvar, He, Cutler, "High-quality linear interpolation for demosaicing of
+Bayer-patterned color images", ICASSP 2004, figure 2.
+"""
+
+from typing import Final, Literal
+
+import cv2
+import numpy as np
+
+from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, cfa_channels
+from camkit.errors import ContractError
+from camkit.runtime.capture import Capture
+from camkit.runtime.signal.directional import DIRECTIONAL_MARGIN_PX, demosaic_directional
+
+DemosaicMethod = Literal["fast", "quality"]
+
+DEMOSAIC_MARGIN_PX: Final[dict[DemosaicMethod, int]] = {
+    "fast": 2,
+    "quality": DIRECTIONAL_MARGIN_PX,
+}
+BAND_ROWS: Final[dict[DemosaicMethod, int]] = {"fast": 64, "quality": 128}
+
+
+def _kernel(rows: list[list[float]]) -> FloatArray:
+    return np.array(rows, dtype=np.float32) / np.float32(8)
+
+
+_ALONG_ROW: Final = _kernel(
+    [[0, 0, 0.5, 0, 0], [0, -1, 0, -1, 0], [-1, 4, 5, 4, -1], [0, -1, 0, -1, 0], [0, 0, 0.5, 0, 0]]
+)
+
+MALVAR_KERNELS: Final[dict[str, FloatArray]] = {
+    "green": _kernel(
+        [[0, 0, -1, 0, 0], [0, 0, 2, 0, 0], [-1, 2, 4, 2, -1], [0, 0, 2, 0, 0], [0, 0, -1, 0, 0]]
+    ),
+    "along_row": _ALONG_ROW,
+    "along_column": np.ascontiguousarray(_ALONG_ROW.T),
+    "diagonal": _kernel(
+        [
+            [0, 0, -1.5, 0, 0],
+            [0, 2, 0, 2, 0],
+            [-1.5, 0, 6, 0, -1.5],
+            [0, 2, 0, 2, 0],
+            [0, 0, -1.5, 0, 0],
+        ]
+    ),
+}
+
+
+def demosaic(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod = "fast") -> FloatArray:
+    """Interpolate the missing colours of a Bayer mosaic.
+
+    Args:
+        mosaic: (h, w) float32, linear; white-balanced, so that the colours resemble each other.
+        cfa: Letters of the 2x2 cell at pixel (0, 0).
+        method: "fast" or "quality".
+
+    Returns:
+        (3, h, w) float32, R, G, B; the samples themselves are kept exactly.
+
+    Raises:
+        ContractError: If the mosaic is not (h, w) float32, or the method or CFA is unknown.
+    """
+    if mosaic.ndim != 2 or mosaic.dtype != np.float32 or 0 in mosaic.shape:
+        raise ContractError(f"mosaic must be (h, w) float32; got {mosaic.dtype} {mosaic.shape}")
+    if cfa not in CFA_PATTERNS:
+        raise ContractError(f"CFA must be one of {', '.join(CFA_PATTERNS)}; got {cfa!r}")
+    return _demosaic_range(mosaic, cfa, method, (0, mosaic.shape[0]))
+
+
+def demosaic_rows(
+    capture: Capture,
+    gains: tuple[float, float, float],
+    top: int,
+    bottom: int,
+    method: DemosaicMethod = "fast",
+) -> FloatArray:
+    """Linearise, white-balance and demosaic rows top..bottom of a capture.
+
+    Args:
+        capture: A mosaic, or planes, which are only white-balanced.
+        gains: White balance (R, G, B).
+        top: First row.
+        bottom: Row after the last.
+        method: "fast" or "quality".
+
+    Returns:
+        (3, bottom - top, w) float32, equal to the same rows of the whole picture bit for bit.
+
+    Raises:
+        ContractError: If the rows lie outside the picture.
+    """
+    if capture.cfa is None:
+        rows = capture.linear_rows(top, bottom)
+        rows *= np.array(gains, dtype=np.float32)[:, None, None]
+        return rows
+    margin = _margin(method)
+    first, last = max(top - margin, 0), min(bottom + margin, capture.height)
+    mosaic = capture.linear_rows(first, last)
+    cfa = shift_rows(capture.cfa, first)
+    apply_gains(mosaic, cfa, gains)
+    return _demosaic_range(mosaic, cfa, method, (top - first, bottom - first))
+
+
+def apply_gains(mosaic: FloatArray, cfa: CfaPattern, gains: tuple[float, float, float]) -> None:
+    """Multiply every sample of a mosaic by the gain of its colour, in place."""
+    for dy, row in enumerate(cfa_channels(cfa)):
+        for dx, color in enumerate(row):
+            if gains[color] != 1:
+                mosaic[dy::2, dx::2] *= np.float32(gains[color])
+
+
+def shift_rows(cfa: CfaPattern, rows: int) -> CfaPattern:
+    """Give the CFA letters of the cell that starts `rows` below the first."""
+    if rows % 2 == 0:
+        return cfa
+    swapped = cfa[2:] + cfa[:2]
+    return next(pattern for pattern in CFA_PATTERNS if pattern == swapped)
+
+
+def _margin(method: DemosaicMethod) -> int:
+    if method not in DEMOSAIC_MARGIN_PX:
+        raise ContractError(f"demosaic must be fast or quality; got {method!r}")
+    return DEMOSAIC_MARGIN_PX[method]
+
+
+def _demosaic_range(
+    mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod, rows: tuple[int, int]
+) -> FloatArray:
+    """Demosaic the given rows in bands that fit into the cache."""
+    height, width = mosaic.shape
+    margin, step = _margin(method), BAND_ROWS[method]
+    planes = np.empty((3, rows[1] - rows[0], width), dtype=np.float32)
+    for top in range(*rows, step):
+        bottom = min(top + step, rows[1])
+        first, last = max(top - margin, 0), min(bottom + margin, height)
+        band = _demosaic_band(mosaic[first:last], shift_rows(cfa, first), method)
+        planes[:, top - rows[0] : bottom - rows[0]] = band[:, top - first : bottom - first]
+    return planes
+
+
+def _demosaic_band(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod) -> FloatArray:
+    return _malvar(mosaic, cfa) if method == "fast" else demosaic_directional(mosaic, cfa)
+
+
+def _malvar(mosaic: FloatArray, cfa: CfaPattern) -> FloatArray:
+    filtered = {
+        name: cv2.filter2D(mosaic, cv2.CV_32F, kernel, borderType=cv2.BORDER_REFLECT_101)
+        for name, kernel in MALVAR_KERNELS.items()
+    }
+    planes = np.empty((3, *mosaic.shape), dtype=np.float32)
+    cells = cfa_channels(cfa)
+    for dy, row in enumerate(cells):
+        for dx, own in enumerate(row):
+            at = (slice(dy, None, 2), slice(dx, None, 2))
+            for wanted in range(3):
+                name = _kernel_name(own, wanted, row)
+                planes[wanted][at] = (mosaic if name is None else filtered[name])[at]
+    return planes
+
+
+def _kernel_name(own: int, wanted: int, row: tuple[int, int]) -> str | None:
+    """Name the kernel for a pixel of colour `own` in a row of the colours `row`."""
+    if own == wanted:
+        return None
+    if wanted == 1:
+        return "green"
+    if own == 1:
+        return "along_row" if wanted in row else "along_column"
+    return "diagonal"

@@ -1,0 +1,230 @@
+"""`camkit process`: exit codes, what goes to stdout and stderr, what each option does."""
+
+import io
+import json
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from camkit.cli.exit_code import ExitCode
+from camkit.runtime.output.sidecar import sidecar_path
+
+JSON_KEYS = {
+    "input",
+    "output",
+    "status",
+    "error",
+    "bundle",
+    "size",
+    "seconds",
+    "peak_rss_mb",
+    "warnings",
+}
+
+
+def _record(folder: Path, name: str = "a.exr") -> dict:
+    return json.loads(sidecar_path(folder / name).read_text())
+
+
+def test_a_good_run_ends_with_0_and_says_what_it_wrote(captures, camkit_command) -> None:
+    outcome = camkit_command("process", "a.dng", "--bundle", "tiny.camkit", "--out-dir", "out")
+    assert outcome.code == 0
+    assert outcome.out.startswith("a.dng -> out/a.exr: ")
+    assert outcome.err == "", "progress is for terminals"
+    assert (captures / "out" / "a.exr").is_file()
+
+
+def test_without_out_dir_pictures_land_in_the_current_folder(captures, camkit_command) -> None:
+    assert camkit_command("process", "a.dng", "--bundle", "tiny.camkit").code == 0
+    assert (captures / "a.exr").is_file()
+    assert (captures / "a.camkit.json").is_file()
+
+
+def test_json_is_one_object_per_file_with_the_documented_keys(captures, camkit_command) -> None:
+    (captures / "broken.dng").write_bytes(b"no picture")
+    outcome = camkit_command(
+        "process", "*.dng", "--bundle", "tiny.camkit", "--out-dir", "out", "--json"
+    )
+    lines = [json.loads(line) for line in outcome.out.splitlines()]
+    assert [line["status"] for line in lines] == ["ok", "ok", "failed"]
+    assert all(set(line) == JSON_KEYS for line in lines)
+    assert (lines[0]["bundle"], lines[0]["size"]) == ("tiny", "M")
+    assert lines[0]["output"] == "out/a.exr"
+    assert lines[0]["seconds"]["decode"] > 0
+    assert (lines[2]["output"], lines[2]["seconds"]) == (None, {})
+    assert "broken.dng" in lines[2]["error"]
+    assert (outcome.code, outcome.err) == (ExitCode.INPUT_FAILED, "")
+
+
+def test_a_failed_file_is_told_on_stderr(captures, camkit_command) -> None:
+    outcome = camkit_command("process", "absent.dng", "a.dng", "--bundle", "none")
+    assert outcome.code == ExitCode.INPUT_FAILED
+    assert outcome.err.startswith("absent.dng: failed: ")
+    assert outcome.out.startswith("a.dng -> a.exr")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--wb", "1,2"], "--wb"),
+        (["--wb", "1,0,1"], "--wb"),
+        (["--wb", "red"], "--wb"),
+        (["--mosaic", "RGGB"], "--black-level"),
+        (["--mosaic", "RRGB", "--black-level", "0", "--white-level", "9"], "RRGB"),
+        (["--max-mem", "much"], "memory"),
+        (["--max-mem", "1k"], "at least"),
+        (["--assume", "nothing"], "centre, scale"),
+        (["--size", "XL"], "S, M, L"),
+        (["--size", "S"], "holds size"),
+        (["--method", "magic"], "admm-tv"),
+        (["--mode", "slow"], "exact"),
+        (["--format", "jpeg"], "exr"),
+        (["--color", "srgb"], "acescg"),
+        (["--demosaic", "best"], "quality"),
+        (["--jobs", "0"], "jobs"),
+        (["--threads", "0"], "threads"),
+        (["--resume", "--overwrite"], "choose one"),
+    ],
+)
+def test_a_wrong_option_is_refused_in_one_line_before_any_work(
+    captures, camkit_command, arguments: list[str], message: str
+) -> None:
+    outcome = camkit_command("process", "a.dng", "--bundle", "tiny.camkit", *arguments)
+    assert outcome.code == ExitCode.USAGE, outcome
+    assert message in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert not (captures / "a.exr").exists()
+
+
+def test_a_missing_or_damaged_bundle_is_refused_with_3(captures, camkit_command) -> None:
+    assert camkit_command("process", "a.dng", "--bundle", "nobody").code == 3
+    (captures / "bad.camkit").write_bytes(b"no zip")
+    assert camkit_command("process", "a.dng", "--bundle", "bad.camkit").code == 3
+
+
+def test_nothing_matched_ends_with_4(captures, camkit_command) -> None:
+    outcome = camkit_command("process", "*.nef", "--bundle", "tiny.camkit")
+    assert (outcome.code, outcome.out) == (ExitCode.NOTHING_MATCHED, "")
+    assert "*.nef" in outcome.err
+
+
+def test_no_bundle_for_any_file_is_a_usage_error_with_the_list(captures, camkit_command) -> None:
+    bare = captures / "bare.png"
+    cv2.imwrite(str(bare), np.zeros((8, 8, 3), np.uint8))
+    outcome = camkit_command("process", "bare.png")
+    assert outcome.code == ExitCode.USAGE
+    assert "bare.png" in outcome.err
+
+
+def test_two_inputs_of_one_name_are_a_usage_error(captures, camkit_command) -> None:
+    (captures / "more").mkdir()
+    (captures / "more" / "a.dng").write_bytes((captures / "a.dng").read_bytes())
+    outcome = camkit_command("process", "a.dng", "more", "--bundle", "none", "--out-dir", "out")
+    assert outcome.code == ExitCode.USAGE
+    assert not (captures / "out").exists()
+
+
+def test_an_existing_picture_needs_overwrite_or_resume(captures, camkit_command) -> None:
+    run = ("process", "a.dng", "--bundle", "tiny.camkit", "--json")
+    assert camkit_command(*run).code == 0
+    assert camkit_command(*run).code == ExitCode.USAGE
+    assert json.loads(camkit_command(*run, "--resume").out)["status"] == "skipped"
+    assert json.loads(camkit_command(*run, "--overwrite").out)["status"] == "ok"
+
+
+def test_a_skipped_file_is_said_to_be_done_before(captures, camkit_command) -> None:
+    run = ("process", "a.dng", "--bundle", "none", "--resume")
+    camkit_command(*run)
+    assert "done before" in camkit_command(*run).out
+
+
+def test_dry_run_prints_the_plan_and_does_nothing(captures, camkit_command) -> None:
+    before = sorted(captures.rglob("*"))
+    run = ("process", "a.dng", "--bundle", "tiny.camkit", "--out-dir", "out", "--dry-run")
+    outcome = camkit_command(*run)
+    assert outcome.code == 0
+    assert "status: planned" in outcome.out
+    record = json.loads(camkit_command(*run, "--json").out)
+    assert record["plan"]["tiles"]["mode"] == "exact"
+    assert record["output"] == "out/a.exr"
+    assert sorted(captures.rglob("*")) == before
+
+
+def test_dry_run_tells_what_would_fail(captures, camkit_command) -> None:
+    (captures / "c.dng").write_bytes(b"no picture")
+    outcome = camkit_command("process", "*.dng", "--bundle", "tiny.camkit", "--dry-run", "--json")
+    assert outcome.code == ExitCode.INPUT_FAILED
+    assert [json.loads(x)["status"] for x in outcome.out.splitlines()] == [
+        "planned",
+        "planned",
+        "failed",
+    ]
+    assert camkit_command("process", "a.dng", "--bundle", "nobody", "--dry-run").code == 3
+
+
+def test_white_balance_gains_are_taken_relative_to_green(captures, camkit_command) -> None:
+    outcome = camkit_command("process", "a.dng", "--bundle", "tiny.camkit", "--wb", "4,2,3")
+    assert outcome.code == 0
+    assert _record(captures)["options"]["white_balance"] == [2.0, 1.0, 1.5]
+
+
+def test_options_reach_the_sidecar(captures, camkit_command) -> None:
+    outcome = camkit_command(
+        *("process", "a.dng", "--bundle", "tiny.camkit", "--method", "wiener", "--mode", "whole"),
+        *("--no-vignetting", "--no-undistort", "--exposure", "-1.5", "--demosaic", "quality"),
+        *("--color", "acescg", "--max-mem", "2G", "--threads", "1"),
+    )
+    assert outcome.code == 0, outcome.err
+    record = _record(captures)
+    wanted = {
+        "method": "wiener",
+        "mode": "whole",
+        "vignetting": False,
+        "undistort": False,
+        "exposure_ev": -1.5,
+        "demosaic": "quality",
+        "color": "acescg",
+    }
+    assert record["options"].items() >= wanted.items()
+    assert "undistort" not in record["seconds"]
+
+
+def test_a_headerless_mosaic_is_developed_with_its_three_options(captures, camkit_command) -> None:
+    mosaic = np.random.default_rng(0).integers(25, 900, (32, 40), dtype=np.uint16)
+    cv2.imwrite(str(captures / "bare.png"), mosaic)
+    options = ("--mosaic", "GRBG", "--black-level", "25", "--white-level", "1023")
+    outcome = camkit_command("process", "bare.png", "--bundle", "none", *options)
+    assert outcome.code == 0, outcome.err
+    record = _record(captures, "bare.exr")
+    assert record["options"]["mosaic"]["cfa"] == "GRBG"
+
+
+def test_assume_centre_takes_a_picture_of_another_size_with_a_note(
+    captures, camkit_command
+) -> None:
+    picture = np.full((32, 48, 3), 30_000, np.uint16)
+    cv2.imwrite(str(captures / "small.png"), picture)
+    run = ("process", "small.png", "--bundle", "tiny.camkit")
+    assert "--assume centre" in camkit_command(*run).err
+    outcome = camkit_command(*run, "--assume", "centre")
+    assert outcome.code == 0, outcome.err
+    assert "note: assumed centred" in outcome.err
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_on_a_terminal_progress_goes_to_stderr_and_results_stay_on_stdout(
+    captures, camkit_command, monkeypatch
+) -> None:
+    terminal = _Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    outcome = camkit_command("process", "*.dng", "--bundle", "tiny.camkit", "--json")
+    assert [json.loads(line)["status"] for line in outcome.out.splitlines()] == ["ok", "ok"]
+    assert "a.dng" in terminal.getvalue()
+    assert "status" not in terminal.getvalue()

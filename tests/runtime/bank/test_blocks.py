@@ -1,0 +1,175 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camkit.errors import ContractError
+from camkit.runtime.bank.blocks import BlockBank, mirror_otf, plan_spans, taper_edges, to_otf
+from camkit.runtime.rows import ArrayRows, RollingRows
+from tests.psf_factory import coma_kernels, gaussian_kernel, local_psf, psnr_db, texture
+
+SIZES = st.integers(1, 300)
+
+
+def keep(block):
+    return block.samples
+
+
+@given(SIZES, st.sampled_from([(16, 0), (16, 8), (32, 10), (64, 20)]))
+@settings(deadline=None, max_examples=60)
+def test_windows_sum_to_one_and_only_neighbours_overlap(size_px, layout):
+    total = np.zeros(size_px)
+    spans = plan_spans(size_px, *layout)
+    for span in spans:
+        assert span.index.min() >= 0
+        assert span.index.max() < size_px
+        total[span.start + span.inner.start : span.start + span.inner.stop] += span.weights
+    np.testing.assert_allclose(total, 1, atol=1e-6)
+
+
+@given(SIZES)
+@settings(deadline=None, max_examples=30)
+def test_block_samples_inside_the_picture_are_those_of_the_picture(size_px):
+    for span in plan_spans(size_px, 32, 10):
+        at = np.arange(span.start, span.start + 32)
+        inside = (at >= 0) & (at < size_px)
+        np.testing.assert_array_equal(span.index[inside], at[inside])
+
+
+def test_the_grid_is_centred_on_the_sensor():
+    spans = plan_spans(6000, 512, 160)
+    centres = np.array([s.centre for s in spans])
+    np.testing.assert_array_equal(centres + centres[::-1], 5999)
+    assert len(spans) == 17
+
+
+@pytest.mark.parametrize("layout", [(0, 32, 10), (100, 32, 17), (100, 0, 0), (100, 32, -1)])
+def test_a_grid_that_cannot_be_is_refused(layout):
+    with pytest.raises(ContractError, match="blocks need"):
+        plan_spans(*layout)
+
+
+def test_otf_is_the_transform_of_the_kernel_about_its_centre():
+    kernel = coma_kernels()[0][-1][:, 2:-1]
+    block = np.zeros((3, 40, 40))
+    _, kh, kw = kernel.shape
+    for row in range(kh):
+        for col in range(kw):
+            block[:, (row - kh // 2) % 40, (col - kw // 2) % 40] = kernel[:, row, col]
+    np.testing.assert_allclose(to_otf(kernel, 40), np.fft.rfft2(block), atol=1e-6)
+
+
+@pytest.mark.parametrize("flip_x", [False, True])
+@pytest.mark.parametrize("flip_y", [False, True])
+@pytest.mark.parametrize("size", [40, 41])
+def test_mirrored_otf_is_that_of_the_mirrored_kernel(flip_x, flip_y, size):
+    kernel = np.roll(coma_kernels()[0][-1], 2, axis=-1)
+    mirrored = kernel[:, :: -1 if flip_y else 1, :: -1 if flip_x else 1]
+    np.testing.assert_allclose(
+        mirror_otf(to_otf(kernel, size), flip_x=flip_x, flip_y=flip_y),
+        to_otf(mirrored, size),
+        atol=1e-6,
+    )
+
+
+def test_a_kernel_larger_than_its_block_is_refused():
+    with pytest.raises(ContractError, match="does not fit"):
+        to_otf(gaussian_kernel(2.0, 8), 16)
+
+
+def test_taper_leaves_the_inside_alone_and_joins_opposite_edges():
+    samples = np.broadcast_to(np.linspace(0, 1, 64, dtype=np.float32), (3, 64, 64))
+    tapered = taper_edges(samples, to_otf(gaussian_kernel(8.0, 24), 64), 12)
+    np.testing.assert_allclose(tapered[:, 12:-12, 12:-12], samples[:, 12:-12, 12:-12], atol=1e-6)
+    jump = np.abs(tapered[:, 32, 0] - tapered[:, 32, -1]).max()
+    assert jump < 0.25 * np.abs(samples[:, 32, 0] - samples[:, 32, -1]).max()
+
+
+@pytest.mark.parametrize(("size", "ring"), [(3, 40), (64, 0)])
+def test_without_a_ring_nothing_is_tapered(size, ring):
+    samples = np.ones((3, size, size), dtype=np.float32)
+    assert taper_edges(samples, to_otf(gaussian_kernel(1.0, 1), size), ring) is samples
+
+
+@pytest.mark.parametrize("size", [(1, 1), (31, 17), (17, 31), (1, 90), (64, 64), (130, 97)])
+def test_a_bank_that_keeps_its_blocks_gives_the_picture_back(size):
+    planes = texture(size[1], size[0])
+    psf = local_psf(gaussian_kernel(1.0, 3), np.zeros(1), size)
+    kept = BlockBank(psf, keep, block_px=32, overlap_px=12).restore_array(planes)
+    np.testing.assert_allclose(kept, planes, atol=1e-6)
+
+
+@given(st.integers(1, 150), st.integers(1, 150), st.integers(1, 40), st.integers(1, 3))
+@settings(deadline=None, max_examples=25)
+def test_bits_do_not_depend_on_threads_or_on_how_rows_arrive(h, w, band_rows, threads):
+    planes = texture(h, w)
+    psf = local_psf(*coma_kernels(radius_px=6), (w, h))
+    layout = {"block_px": 48, "overlap_px": 16}
+
+    def sharpen(block):
+        return 2 * block.samples - np.roll(block.samples, 1, axis=2) * block.otf.real[0, 0, 1]
+
+    whole = BlockBank(psf, sharpen, **layout).restore_array(planes)
+    bands = (planes[:, top : top + band_rows] for top in range(0, h, band_rows))
+    source = RollingRows(planes.shape, bands).reader()
+    bank = BlockBank(psf, sharpen, threads=threads, **layout)
+    np.testing.assert_array_equal(np.concatenate(list(bank.restore_bands(source)), axis=1), whole)
+
+
+def test_every_block_gets_the_psf_of_its_own_place():
+    """A bank whose filter blurs, on a grid of points, scatters each point outward."""
+    size = 192
+    points = np.zeros((3, size, size), dtype=np.float32)
+    places = [(40, 40), (40, 150), (150, 40), (150, 150), (96, 150)]
+    for row, col in places:
+        points[:, row, col] = 1
+
+    def blur(block):
+        spectrum = np.fft.rfft2(block.samples) * block.otf
+        return np.fft.irfft2(spectrum, s=block.samples.shape[1:]).astype(np.float32)
+
+    psf = local_psf(*coma_kernels(radius_px=10, tail_px=8), (size, size))
+    blurred = BlockBank(psf, blur, block_px=64, overlap_px=32).restore_array(points)
+    for row, col in places:
+        patch = blurred[1, row - 12 : row + 13, col - 12 : col + 13]
+        at = np.arange(-12, 13)
+        shift = np.array([patch.sum(axis=0) @ at, patch.sum(axis=1) @ at]) / patch.sum()
+        outward = np.array([col - 95.5, row - 95.5])
+        assert shift @ outward / np.hypot(*outward) > 0.95 * np.hypot(*shift)
+        assert np.hypot(*shift) > 0.8
+
+
+def test_saturated_samples_reach_the_block_they_lie_in():
+    saturated = np.zeros((70, 90), dtype=bool)
+    saturated[60, 80] = True
+    seen = []
+
+    def note(block):
+        seen.append(0 if block.unknown is None else int(block.unknown.sum()))
+        return block.samples
+
+    psf = local_psf(gaussian_kernel(1.0, 3), np.zeros(1), (90, 70))
+    bank = BlockBank(psf, note, block_px=32, overlap_px=8)
+    bank.restore_array(texture(70, 90), saturated)
+    assert 0 < np.count_nonzero(seen) <= 4
+
+
+def test_a_picture_of_another_size_is_refused():
+    psf = local_psf(gaussian_kernel(1.0, 3), np.zeros(1), (90, 70))
+    bank = BlockBank(psf, keep, block_px=32, overlap_px=8)
+    with pytest.raises(ContractError, match="bank is for"):
+        list(bank.restore_bands(ArrayRows(texture(70, 91))))
+
+
+def test_a_failing_filter_ends_the_run_with_its_own_error():
+    def fail(block):
+        raise ContractError("no")
+
+    psf = local_psf(gaussian_kernel(1.0, 3), np.zeros(1), (90, 70))
+    bank = BlockBank(psf, fail, block_px=32, overlap_px=8, threads=2)
+    with pytest.raises(ContractError, match="no"):
+        bank.restore_array(texture(70, 90))
+
+
+def test_psnr_of_the_tests_is_the_usual_one():
+    assert psnr_db(np.zeros((3, 8, 8)), np.full((3, 8, 8), 0.1)) == pytest.approx(20, abs=1e-6)

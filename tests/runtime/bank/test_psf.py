@@ -1,0 +1,167 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camkit.errors import ContractError
+from camkit.runtime.bank.psf import color_kernels, kernel_at, wavelength_weights
+from tests.psf_factory import coma_kernels, frozen_psf
+
+KERNELS, HEIGHTS_MM = coma_kernels()
+FLAT = np.ones((3, 2))
+PSF_UM = np.array([0.45, 0.55, 0.65])
+
+
+def centroid(kernel):
+    """(x, y) of the energy of (3, h, w) from the centre pixel."""
+    half = kernel.shape[-1] // 2
+    at = np.arange(-half, half + 1)
+    return (kernel.sum(axis=1) @ at).mean(), (kernel.sum(axis=2) @ at).mean()
+
+
+def test_flat_response_gives_the_trapezoid_rule():
+    weights = wavelength_weights(PSF_UM, np.array([0.45, 0.65]), FLAT)
+    np.testing.assert_allclose(weights, [[0.25, 0.5, 0.25]] * 3, atol=1e-12)
+
+
+def test_a_finer_grid_of_the_same_response_changes_nothing():
+    coarse_um = np.array([0.42, 0.53, 0.68])
+    coarse = np.array([[0, 1, 0.2], [0.5, 0.1, 1], [1, 0, 0.0]])
+    fine_um = np.sort(np.concatenate([coarse_um, np.linspace(0.42, 0.68, 50)]))
+    fine_um = np.unique(fine_um)
+    fine = np.stack([np.interp(fine_um, coarse_um, row) for row in coarse])
+    np.testing.assert_allclose(
+        wavelength_weights(PSF_UM, coarse_um, coarse),
+        wavelength_weights(PSF_UM, fine_um, fine),
+        atol=1e-12,
+    )
+
+
+def test_weights_equal_a_brute_force_integral():
+    response_um = np.array([0.40, 0.50, 0.58, 0.70])
+    response = np.random.default_rng(1).random((3, 4))
+    at = np.linspace(0.40, 0.70, 200_001)
+    hats = np.stack([np.interp(at, PSF_UM, row) for row in np.eye(3)])
+    sensed = np.stack([np.interp(at, response_um, row) for row in response])
+    expected = sensed @ hats.T
+    expected /= expected.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(
+        wavelength_weights(PSF_UM, response_um, response), expected, atol=1e-5
+    )
+
+
+def test_one_wavelength_is_interpolated():
+    weights = wavelength_weights(PSF_UM, np.array([0.5]), np.ones((3, 1)))
+    np.testing.assert_allclose(weights, [[0.5, 0.5, 0]] * 3, atol=1e-12)
+
+
+@pytest.mark.parametrize("response", [np.ones((3, 3)), np.array([[1, 1], [1, 1], [0, 0.0]])])
+def test_a_response_that_does_not_fit_is_refused(response):
+    with pytest.raises(ContractError, match="response"):
+        wavelength_weights(PSF_UM, np.array([0.45, 0.65]), response)
+
+
+def test_a_colour_that_sees_one_wavelength_gets_its_kernel():
+    psf = frozen_psf(KERNELS, HEIGHTS_MM, [0.45, 0.55, 0.65])
+    mixed = color_kernels(psf, np.array([0.55]), np.ones((3, 1)))
+    assert mixed.dtype == np.float32
+    np.testing.assert_allclose(mixed, np.repeat(KERNELS[:, 1:2], 3, axis=1), atol=1e-7)
+
+
+def test_colour_kernels_are_normalised_and_symmetric_about_the_meridian():
+    lopsided = np.roll(KERNELS, 1, axis=-1)
+    psf = frozen_psf(lopsided, HEIGHTS_MM, [0.45, 0.55, 0.65])
+    mixed = color_kernels(psf, np.array([0.4, 0.7]), FLAT)
+    np.testing.assert_allclose(mixed.sum(axis=(-2, -1)), 1, atol=1e-6)
+    np.testing.assert_array_equal(mixed, mixed[..., ::-1])
+
+
+def test_a_depth_that_does_not_exist_is_refused():
+    psf = frozen_psf(KERNELS, HEIGHTS_MM, [0.45, 0.55, 0.65])
+    with pytest.raises(ContractError, match="depth_index"):
+        color_kernels(psf, np.array([0.4, 0.7]), FLAT, depth_index=1)
+
+
+def test_on_the_axis_nothing_is_turned():
+    np.testing.assert_allclose(kernel_at(KERNELS, HEIGHTS_MM, 0.0, 0.0), KERNELS[0], atol=1e-7)
+
+
+def test_straight_down_the_stored_kernels_come_back():
+    for kernel, height_mm in zip(KERNELS, HEIGHTS_MM, strict=True):
+        np.testing.assert_allclose(
+            kernel_at(KERNELS, HEIGHTS_MM, 0.0, height_mm), kernel, atol=1e-7
+        )
+
+
+def test_between_heights_kernels_are_interpolated():
+    middle_mm = (HEIGHTS_MM[2] + HEIGHTS_MM[3]) / 2
+    np.testing.assert_allclose(
+        kernel_at(KERNELS, HEIGHTS_MM, 0.0, middle_mm), (KERNELS[2] + KERNELS[3]) / 2, atol=1e-7
+    )
+
+
+def test_beyond_the_last_height_its_kernel_holds():
+    np.testing.assert_allclose(kernel_at(KERNELS, HEIGHTS_MM, 0.0, 99.0), KERNELS[-1], atol=1e-7)
+
+
+def test_one_field_serves_every_place():
+    single = KERNELS[:1]
+    np.testing.assert_allclose(kernel_at(single, np.zeros(1), 0.0, 1.0), single[0], atol=1e-7)
+
+
+def test_a_quarter_turn_is_a_transposition():
+    down = kernel_at(KERNELS, HEIGHTS_MM, 0.0, 1.5)
+    right = kernel_at(KERNELS, HEIGHTS_MM, 1.5, 0.0)
+    np.testing.assert_allclose(right, np.swapaxes(down, 1, 2), atol=1e-7)
+
+
+@given(st.floats(0, 2 * np.pi), st.floats(0.5, 2.0))
+@settings(deadline=None, max_examples=40)
+def test_the_tail_points_outward_at_every_azimuth(azimuth, height_mm):
+    x_mm, y_mm = height_mm * np.cos(azimuth), height_mm * np.sin(azimuth)
+    turned = centroid(kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm))
+    length = np.hypot(*centroid(kernel_at(KERNELS, HEIGHTS_MM, 0.0, height_mm)))
+    np.testing.assert_allclose(
+        turned, (length * np.cos(azimuth), length * np.sin(azimuth)), atol=0.03
+    )
+
+
+def test_light_of_a_point_falls_outward_on_the_sensor():
+    """Scatter one point by hand at the upper left of a sensor: its energy lies up and left."""
+    canvas = np.zeros((60, 60))
+    row, col, centre = 20, 14, 29.5
+    x_mm, y_mm = (col - centre) * 0.04, (row - centre) * 0.04
+    kernel = kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm)[1]
+    half = kernel.shape[0] // 2
+    for dy in range(-half, half + 1):
+        for dx in range(-half, half + 1):
+            canvas[row + dy, col + dx] += kernel[dy + half, dx + half]
+    rows, cols = np.indices(canvas.shape)
+    shift = np.array([(canvas * cols).sum() - col, (canvas * rows).sum() - row])
+    outward = np.array([x_mm, y_mm]) / np.hypot(x_mm, y_mm)
+    assert shift @ outward > 1.0
+    sideways = np.array([-outward[1], outward[0]])
+    assert abs(shift @ sideways) < 0.02 * (shift @ outward)
+
+
+@given(st.floats(0.01, 2), st.floats(0.01, 2))
+@settings(deadline=None, max_examples=20)
+def test_mirrored_places_have_mirrored_bits(x_mm, y_mm):
+    kernel = kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm)
+    left = kernel_at(KERNELS, HEIGHTS_MM, -x_mm, y_mm)
+    both = kernel_at(KERNELS, HEIGHTS_MM, -x_mm, -y_mm)
+    np.testing.assert_array_equal(left, kernel[:, :, ::-1])
+    np.testing.assert_array_equal(both, kernel[:, ::-1, ::-1])
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2))
+@settings(deadline=None, max_examples=30)
+def test_kernels_are_never_negative_and_sum_to_one(x_mm, y_mm):
+    kernel = kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm)
+    assert (kernel >= 0).all()
+    np.testing.assert_allclose(kernel.sum(axis=(-2, -1)), 1, atol=1e-5)
+
+
+def test_kernels_without_their_heights_are_refused():
+    with pytest.raises(ContractError, match="fields"):
+        kernel_at(KERNELS, HEIGHTS_MM[:-1], 0.0, 1.0)

@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from camkit.errors import DecodeError
+from camkit.runtime.files.dng_checks import check_dng, states_white_balance
+from camkit.runtime.files.raw_checks import Levels
+from camkit.runtime.files.tiff_tags import TiffTags
+
+GOOD = {
+    256: (80,),
+    257: (60,),
+    258: (16,),
+    259: (1,),
+    262: (32803,),
+    277: (1,),
+    279: (9600,),
+    33421: (2, 2),
+    50706: (1, 4, 0, 0),
+    50713: (2, 2),
+    50714: (256, 256, 256, 256),
+    50717: (4095,),
+}
+LEVELS = Levels(black=np.full((2, 2), 256, dtype=np.float32), white=4095.0)
+
+
+def check(change=None, *, remove=(), cfa="RGGB", levels=LEVELS):
+    directory = {tag: v for tag, v in (GOOD | (change or {})).items() if tag not in remove}
+    check_dng(TiffTags(directories=(directory,), file_bytes=20000), cfa, levels)
+
+
+def test_a_dng_that_agrees_with_itself_passes():
+    check()
+    check({50714: (256,)}, remove=(50713,))
+    check(remove=(50713, 50714), levels=Levels(black=LEVELS.black * 0, white=4095.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({262: (1,)}, None),
+        ({257: (61,)}, "uncompressed"),
+        ({258: (14,)}, "uncompressed"),
+        ({279: (9000,)}, "uncompressed"),
+        ({50714: (512,)}, "black"),
+        ({50717: (16383,)}, "white"),
+    ],
+)
+def test_contradictions_are_refused(change, message):
+    if message is None:
+        check(change)  # an unknown kind of picture is still the largest one
+        return
+    with pytest.raises(DecodeError, match=message):
+        check(change)
+
+
+def test_a_lost_pattern_a_lost_black_and_a_lost_white_are_refused():
+    with pytest.raises(DecodeError, match="CFA"):
+        check(cfa=None)
+    with pytest.raises(DecodeError, match="gives none"):
+        check(remove=(50714,))
+    with pytest.raises(DecodeError, match="16 bits"):
+        check(remove=(50717,), levels=Levels(black=LEVELS.black, white=65536.0))
+    with pytest.raises(DecodeError, match="no sensor picture"):
+        check(remove=(256, 262))
+
+
+def test_levels_that_libraw_rescales_are_not_compared():
+    check({258: (8, 8, 8), 259: (34892,), 50717: (255,), 50714: (256,)})
+    check({339: (3,), 50717: (1,)})
+
+
+def test_other_files_are_left_alone():
+    check({50717: (1,)}, remove=(50706,))
+
+
+def test_white_balance_is_stated_by_either_tag():
+    assert states_white_balance(TiffTags(directories=({50729: (0.3, 0.3)},), file_bytes=1))
+    assert not states_white_balance(TiffTags(directories=({},), file_bytes=1))

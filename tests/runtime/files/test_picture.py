@@ -1,0 +1,188 @@
+import sys
+
+import cv2
+import numpy as np
+import OpenEXR
+import pytest
+import tifffile
+
+from camkit.colorimetry import ACES_WHITE, ACESCG_PRIMARIES, decode_srgb
+from camkit.errors import DecodeError
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.files.picture import read_mosaic, read_picture, read_scene
+from camkit.runtime.raw import read_capture
+from tests.data_folder import data_path
+
+OPTIONS = MosaicOptions(cfa="GRBG", black_level=25, white_level=1023)
+
+
+def planes_of(dtype, top=None, height=9, width=7):
+    rng = np.random.default_rng(2)
+    if top is None:
+        return rng.normal(1, 2, (3, height, width)).astype(dtype)
+    return rng.integers(0, top, (3, height, width), endpoint=True).astype(dtype)
+
+
+def write_exr(path, planes, names="RGB", **header):
+    channels = dict(zip(names, planes, strict=True))
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage} | header
+    OpenEXR.File(header, channels).write(str(path))
+
+
+def write_png(path, planes):
+    bgr = planes[::-1].transpose(1, 2, 0) if planes.ndim == 3 else planes
+    path.write_bytes(cv2.imencode(".png", np.ascontiguousarray(bgr))[1].tobytes())
+
+
+def test_exr_keeps_highlights_and_negatives(tmp_path):
+    planes = planes_of(np.float32) * 1000
+    write_exr(tmp_path / "x.exr", planes)
+    capture = read_capture(tmp_path / "x.exr")
+    assert capture.contract == "linear_rgb_v1"
+    assert np.array_equal(capture.linear_rows(0, 9), planes)
+    assert np.array_equal(read_scene(tmp_path / "x.exr"), planes)
+    assert len(capture.sha256) == 64
+
+
+def test_luminance_exr_is_grey_and_alpha_is_dropped(tmp_path):
+    planes = planes_of(np.float32)
+    write_exr(tmp_path / "y.exr", planes[:1], "Y")
+    assert np.array_equal(read_picture(tmp_path / "y.exr").samples, np.stack([planes[0]] * 3))
+    write_exr(tmp_path / "a.exr", [*planes, planes[0]], "RGBA")
+    assert read_picture(tmp_path / "a.exr").notes == ("alpha channel dropped",)
+
+
+def test_exr_without_picture_channels_is_refused(tmp_path):
+    write_exr(tmp_path / "x.exr", planes_of(np.float32)[:1], "Z")
+    with pytest.raises(DecodeError, match=r"\['Z'\]"):
+        read_picture(tmp_path / "x.exr")
+
+
+def test_scene_in_acescg_is_converted_to_rec709(tmp_path):
+    chromaticities = (*np.ravel(ACESCG_PRIMARIES).tolist(), *ACES_WHITE)
+    grey = np.full((3, 4, 4), 0.5, dtype=np.float32)
+    red = grey * np.array([1, 0.2, 0.2], dtype=np.float32)[:, None, None]
+    for planes in (grey, red):
+        write_exr(tmp_path / "x.exr", planes, chromaticities=chromaticities)
+        scene = read_scene(tmp_path / "x.exr")
+        if planes is grey:
+            assert np.allclose(scene, 0.5, atol=1e-4)
+        else:
+            assert scene[0, 0, 0] > 0.6
+    notes = read_picture(tmp_path / "x.exr").notes
+    assert "not Rec.709" in notes[0]
+
+
+def test_bad_samples_are_counted_in_a_capture_and_refused_in_a_scene(tmp_path):
+    planes = planes_of(np.float32)
+    planes[0, 0, :2] = np.nan, np.inf
+    write_exr(tmp_path / "x.exr", planes)
+    assert read_picture(tmp_path / "x.exr").notes == ("2 samples are NaN or infinite",)
+    with pytest.raises(DecodeError, match="2 samples"):
+        read_scene(tmp_path / "x.exr")
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif"])
+def test_16_bit_is_linear_as_capture_and_srgb_as_scene(tmp_path, suffix):
+    planes = planes_of(np.uint16, 65535)
+    path = tmp_path / f"x{suffix}"
+    if suffix == ".png":
+        write_png(path, planes)
+    else:
+        tifffile.imwrite(path, planes.transpose(1, 2, 0), photometric="rgb")
+    capture = read_capture(path)
+    assert np.array_equal(capture.samples, planes)
+    assert (capture.white_level, capture.notes) == (65535, ())
+    assert np.allclose(read_scene(path), decode_srgb(planes / np.float32(65535)), atol=1e-6)
+
+
+def test_8_bit_is_srgb_both_ways(tmp_path):
+    planes = planes_of(np.uint8, 255)
+    write_png(tmp_path / "x.png", planes)
+    linear = decode_srgb(planes / np.float32(255))
+    capture = read_capture(tmp_path / "x.png")
+    assert np.abs(capture.linear_rows(0, 9) - linear).max() < 1e-5
+    assert "sRGB" in capture.notes[0]
+    assert capture.saturated_rows(0, 9).sum() == (planes >= 254).sum()
+    assert np.allclose(read_scene(tmp_path / "x.png"), linear, atol=1e-6)
+
+
+def test_float_tiff_is_linear(tmp_path):
+    planes = planes_of(np.float32)
+    tifffile.imwrite(tmp_path / "x.tif", planes.transpose(1, 2, 0), photometric="rgb")
+    assert np.array_equal(read_picture(tmp_path / "x.tif").samples, planes)
+
+
+def test_a_headerless_mosaic_needs_its_options_and_then_takes_them(tmp_path):
+    mosaic = planes_of(np.uint16, 1000)[0]
+    write_png(tmp_path / "x.png", mosaic)
+    with pytest.raises(DecodeError, match="--mosaic RGGB --black-level N"):
+        read_capture(tmp_path / "x.png")
+    capture = read_capture(tmp_path / "x.png", mosaic=OPTIONS)
+    assert np.array_equal(capture.samples, mosaic)
+    assert (capture.contract, capture.cfa) == ("raw_bayer_v1", "GRBG")
+    assert (capture.black_level == 25).all()
+
+
+def test_mosaic_options_that_contradict_the_file_are_refused(tmp_path):
+    write_png(tmp_path / "rgb.png", planes_of(np.uint16, 1000))
+    with pytest.raises(DecodeError, match="one 8- or 16-bit channel"):
+        read_mosaic(tmp_path / "rgb.png", OPTIONS)
+    write_png(tmp_path / "8.png", planes_of(np.uint8, 255)[0])
+    with pytest.raises(DecodeError, match="levels"):
+        read_mosaic(tmp_path / "8.png", OPTIONS)
+    write_png(tmp_path / "16.png", planes_of(np.uint16, 60000)[0])
+    with pytest.raises(DecodeError, match="--white-level"):
+        read_mosaic(tmp_path / "16.png", OPTIONS)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".jpg", ".hdr", ".exr"])
+def test_truncated_pictures_are_refused(tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    planes = planes_of(np.float32, height=64, width=64)
+    if suffix == ".exr":
+        write_exr(path, planes)
+    elif suffix == ".tif":
+        tifffile.imwrite(path, np.abs(planes).transpose(1, 2, 0), photometric="rgb")
+    else:
+        dtype = np.float32 if suffix == ".hdr" else np.uint8
+        bgr = np.abs(planes).transpose(1, 2, 0).astype(dtype)
+        path.write_bytes(cv2.imencode(suffix, bgr)[1].tobytes())
+    read_scene(path)
+    data = path.read_bytes()
+    for share in (0.9, 0.5, 0.0):
+        path.write_bytes(data[: int(share * len(data))])
+        with pytest.raises(DecodeError):
+            read_scene(path)
+
+
+def test_an_exr_that_claims_too_much_is_refused_before_it_is_read(tmp_path):
+    write_exr(tmp_path / "x.exr", planes_of(np.float32))
+    data = (tmp_path / "x.exr").read_bytes()
+    window = np.array([0, 0, 6, 8], dtype="<i4").tobytes()
+    huge = np.array([0, 0, 60000, 60000], dtype="<i4").tobytes()
+    assert window in data
+    (tmp_path / "x.exr").write_bytes(data.replace(window, huge))
+    with pytest.raises(DecodeError):
+        read_picture(tmp_path / "x.exr")
+
+
+def test_a_missing_scene_is_a_decode_error(tmp_path):
+    with pytest.raises(DecodeError, match="cannot read"):
+        read_scene(tmp_path / "none.png")
+
+
+def test_damaged_exr_and_hdr_files_are_refused_and_stdout_stays_clean(capsys):
+    stdout = sys.stdout
+    for path in sorted(data_path("hdr/damaged").iterdir()):
+        with pytest.raises(DecodeError):
+            read_capture(path)
+    assert sys.stdout is stdout
+    assert capsys.readouterr().out == ""
+
+
+def test_real_hdr_pictures_are_read():
+    bright = read_picture(data_path("hdr/BrightRingsNanInf.exr"))
+    assert bright.notes == ("18 samples are NaN or infinite",)
+    assert read_scene(data_path("hdr/StageEnvLatLong.exr")).max() == 4096
+    assert read_scene(data_path("hdr/esplanade.hdr")).max() == 49664

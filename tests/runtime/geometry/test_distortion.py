@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from camkit.contracts import RadialDistortion
+from camkit.errors import ContractError
+from camkit.runtime.geometry.distortion import (
+    check_distortion,
+    distort_points,
+    fit_distortion,
+    undistort_points,
+)
+
+RADIUS_MM = 21.5
+PITCH_MM = 5.96e-3
+THERE_AND_BACK_PX = 1e-4
+RADII = np.linspace(0, RADIUS_MM, 200)
+
+
+def model(*rows: tuple[float, float, float, float]) -> RadialDistortion:
+    filled = rows * 3 if len(rows) == 1 else rows
+    return RadialDistortion(coefficients=np.array(filled, dtype=float), radius_mm=RADIUS_MM)
+
+
+def on_axis_x(radii: np.ndarray) -> np.ndarray:
+    return np.stack([radii, np.zeros_like(radii)], axis=-1)
+
+
+def test_identity_leaves_points_where_they_are() -> None:
+    points = np.random.default_rng(0).uniform(-20, 20, (50, 2))
+    np.testing.assert_array_equal(distort_points(points, model((1, 0, 0, 0))), points)
+
+
+def test_distorted_radius_is_the_polynomial_of_equation_6_10() -> None:
+    xi, k1, k2, k3 = 1.01, -0.06, 0.012, -0.002
+    found = distort_points(on_axis_x(RADII), model((xi, xi * k1, xi * k2, xi * k3)))[:, 0]
+    r = RADII / RADIUS_MM
+    expected = xi * r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6) * RADIUS_MM
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@given(
+    k=st.tuples(st.floats(-0.08, 0.08), st.floats(-0.01, 0.01), st.floats(-0.005, 0.005)),
+    xi=st.floats(0.9, 1.1),
+    angle_rad=st.floats(0, 6.28),
+)
+def test_points_distorted_and_undistorted_return(
+    k: tuple[float, float, float], xi: float, angle_rad: float
+) -> None:
+    distortion = model((xi, xi * k[0], xi * k[1], xi * k[2]))
+    points = RADII[:, None] * np.array([np.cos(angle_rad), np.sin(angle_rad)])
+    there = undistort_points(distort_points(points, distortion), distortion)
+    back = distort_points(undistort_points(points * 0.95, distortion), distortion)
+    assert np.abs(there - points).max() / PITCH_MM < THERE_AND_BACK_PX
+    assert np.abs(back - points * 0.95).max() / PITCH_MM < THERE_AND_BACK_PX
+
+
+def test_direction_from_the_axis_is_kept() -> None:
+    points = np.random.default_rng(1).uniform(-14, 14, (100, 2))
+    moved = undistort_points(points, model((1, -0.05, 0, 0)))
+    cross = points[:, 0] * moved[:, 1] - points[:, 1] * moved[:, 0]
+    assert np.abs(cross).max() < 1e-9
+
+
+def test_each_colour_has_its_own_distortion() -> None:
+    distortion = model((1, 0, 0, 0), (1.01, 0, 0, 0), (1.02, 0, 0, 0))
+    point = np.array([[10.0, 0.0]])
+    found = [distort_points(point, distortion, channel=c)[0, 0] for c in range(3)]
+    np.testing.assert_allclose(found, [10.0, 10.1, 10.2])
+
+
+def test_model_that_folds_on_the_sensor_is_refused() -> None:
+    # r - 0.5 r^3 turns back at r = sqrt(2/3) = 0.816.
+    folding = model((1, -0.5, 0, 0))
+    with pytest.raises(ContractError, match="folds at"):
+        check_distortion(folding, RADIUS_MM)
+    check_distortion(folding, RADIUS_MM * 0.5)
+    with pytest.raises(ContractError, match="no inverse"):
+        undistort_points(on_axis_x(np.array([RADIUS_MM])), folding)
+
+
+def test_model_with_negative_scale_is_refused() -> None:
+    with pytest.raises(ContractError, match="folds"):
+        check_distortion(model((-1, 0, 0, 0)), RADIUS_MM)
+
+
+def test_fit_recovers_the_coefficients_of_every_colour() -> None:
+    truth = model((1.0, -0.05, 0.01, -0.002), (1.01, -0.04, 0, 0), (0.99, 0.03, 0.002, 0))
+    radii = np.linspace(0.5, RADIUS_MM, 12)
+    distorted = np.stack(
+        [distort_points(on_axis_x(radii), truth, channel=c)[:, 0] for c in range(3)]
+    )
+    found = fit_distortion(np.tile(radii, (3, 1)), distorted, RADIUS_MM)
+    np.testing.assert_allclose(found.coefficients, truth.coefficients, atol=1e-10)
+
+
+def test_one_set_of_pairs_serves_all_colours() -> None:
+    radii = np.linspace(0.5, RADIUS_MM, 12)
+    found = fit_distortion(radii, radii * 1.02, RADIUS_MM)
+    np.testing.assert_allclose(found.coefficients, np.tile([1.02, 0, 0, 0], (3, 1)), atol=1e-10)
+
+
+def test_fit_is_the_least_squares_solution() -> None:
+    rng = np.random.default_rng(2)
+    radii = np.linspace(0.5, RADIUS_MM, 40)
+    noisy = radii * (1 - 0.03 * (radii / RADIUS_MM) ** 2) + rng.normal(0, 0.01, 40)
+    found = fit_distortion(radii, noisy, RADIUS_MM).coefficients[0]
+
+    def cost(c: np.ndarray) -> float:
+        r = radii / RADIUS_MM
+        return float(((np.stack([r, r**3, r**5, r**7], 1) @ c - noisy / RADIUS_MM) ** 2).sum())
+
+    steps = np.concatenate([np.eye(4), -np.eye(4)]) * 1e-4
+    assert all(cost(found + step) > cost(found) for step in steps)
+
+
+def test_fit_with_too_few_radii_or_other_shapes_is_refused() -> None:
+    with pytest.raises(ContractError, match="four different"):
+        fit_distortion(np.array([1.0, 2, 2, 2, 1]), np.array([1.0, 2, 2, 2, 1]), RADIUS_MM)
+    with pytest.raises(ContractError, match="pairs"):
+        fit_distortion(np.ones(4), np.ones(5), RADIUS_MM)
+    with pytest.raises(ContractError, match="pairs"):
+        fit_distortion(np.ones((2, 5)), np.ones((2, 5)), RADIUS_MM)

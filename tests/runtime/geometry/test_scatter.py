@@ -1,0 +1,104 @@
+import numpy as np
+import pytest
+import scipy.signal
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.geometry.scatter import convolve_full, scatter
+from camkit.runtime.geometry.sensor_window import SensorWindow
+
+FFT_ERROR = 2e-6
+MARGIN = 4
+
+
+def window(width: int, height: int) -> SensorWindow:
+    return SensorWindow(
+        size_px=(width, height),
+        origin_px=(0, 0),
+        sensor_size_px=(width, height),
+        pitch_um=10.0,
+    )
+
+
+def kernel(seed: int = 0, side: int = 2 * MARGIN + 1) -> FloatArray:
+    values = np.random.default_rng(seed).random((3, side, side), dtype=np.float32)
+    return values / values.sum(axis=(1, 2), keepdims=True)
+
+
+def planes(height: int, width: int) -> FloatArray:
+    shape = (3, height + 2 * MARGIN, width + 2 * MARGIN)
+    return np.random.default_rng(1).random(shape, dtype=np.float32)
+
+
+@pytest.mark.parametrize(("height", "width"), [(50, 70), (1, 1), (1, 90), (33, 2)])
+def test_one_psf_everywhere_is_a_plain_convolution(height: int, width: int) -> None:
+    picture, k = planes(height, width), kernel()
+    found = scatter(picture, lambda *_: k, window(width, height), margin_px=MARGIN, step_px=16)
+    for channel in range(3):
+        expected = scipy.signal.convolve2d(picture[channel], k[channel], mode="valid")
+        np.testing.assert_allclose(found[channel], expected, atol=FFT_ERROR)
+
+
+def test_kernels_are_not_flipped() -> None:
+    picture = np.zeros((3, 9 + 2 * MARGIN, 9 + 2 * MARGIN), dtype=np.float32)
+    picture[:, 4 + MARGIN, 4 + MARGIN] = 1
+    k = kernel()
+    found = scatter(picture, lambda *_: k, window(9, 9), margin_px=MARGIN)
+    np.testing.assert_allclose(found, k, atol=FFT_ERROR)
+
+
+def test_each_block_gets_the_psf_of_its_centre() -> None:
+    asked: list[tuple[float, float]] = []
+
+    def at(x_mm: float, y_mm: float) -> FloatArray:
+        asked.append((x_mm, y_mm))
+        return kernel()
+
+    size = 2 * 64 - 2 * MARGIN
+    scatter(planes(size, size), at, window(size, size), margin_px=MARGIN, step_px=64)
+    assert len(asked) == 4
+    np.testing.assert_allclose(np.abs(asked), 0.0, atol=1e-9 + 0.5)
+    assert sum(x for x, _ in asked) == pytest.approx(0, abs=1e-9)
+
+
+def test_light_is_neither_lost_nor_made() -> None:
+    picture = np.zeros((3, 40 + 2 * MARGIN, 60 + 2 * MARGIN), dtype=np.float32)
+    picture[:, 12:-12, 12:-12] = np.random.default_rng(2).random((3, 24, 44))
+    seeds = iter(range(100))
+    found = scatter(
+        picture, lambda *_: kernel(next(seeds)), window(60, 40), margin_px=MARGIN, step_px=16
+    )
+    np.testing.assert_allclose(found.sum(axis=(1, 2)), picture.sum(axis=(1, 2)), rtol=1e-5)
+
+
+def test_psf_changes_smoothly_between_blocks() -> None:
+    side = 128
+    flat = np.ones((3, side + 2 * MARGIN, side + 2 * MARGIN), dtype=np.float32)
+
+    def dimmed(x_mm: float, y_mm: float) -> FloatArray:
+        return kernel() * np.float32(1 + 0.1 * x_mm)
+
+    found = scatter(flat, dimmed, window(side, side), margin_px=MARGIN, step_px=32)
+    assert np.abs(np.diff(found, axis=2)).max() < 0.01
+
+
+def test_threads_do_not_change_the_bits() -> None:
+    picture, k = planes(60, 60), kernel()
+    one, two = (
+        scatter(picture, lambda *_: k, window(60, 60), margin_px=MARGIN, workers=n) for n in (1, 2)
+    )
+    np.testing.assert_array_equal(one, two)
+
+
+def test_full_convolution_has_all_the_light() -> None:
+    block = np.random.default_rng(5).random((3, 7, 11), dtype=np.float32)
+    full = convolve_full(block, kernel())
+    assert full.shape == (3, 15, 19)
+    np.testing.assert_allclose(full.sum(axis=(1, 2)), block.sum(axis=(1, 2)), rtol=1e-5)
+
+
+def test_planes_without_the_margin_are_refused() -> None:
+    with pytest.raises(ContractError, match="planes must be"):
+        scatter(
+            np.zeros((3, 8, 8), np.float32), lambda *_: kernel(), window(8, 8), margin_px=MARGIN
+        )

@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+
+from camkit.contracts import NoiseModel
+from camkit.errors import ContractError
+from camkit.runtime.signal.stabilise import stabilise, unstabilise
+from tests.psf_factory import with_noise
+
+NOISE = NoiseModel(shot=(4e-5, 2e-5, 3e-5), read_variance=(4e-8, 1e-8, 2e-8))
+
+
+def test_inverse_gives_the_picture_back_including_negatives_above_the_noise_floor():
+    planes = np.random.default_rng(0).random((3, 20, 30), dtype=np.float32) * 8 - 1e-4
+    again = unstabilise(stabilise(planes, NOISE), NOISE)
+    np.testing.assert_allclose(again, planes, atol=4e-6)
+
+
+@pytest.mark.parametrize("gain", [1, 16, 128])
+def test_noise_has_the_same_deviation_at_any_gain_and_level(gain):
+    rng = np.random.default_rng(1)
+    noise = NoiseModel(
+        shot=tuple(v * gain for v in NOISE.shot),
+        read_variance=tuple(v * gain**2 for v in NOISE.read_variance),
+    )
+    for level in (0.05, 0.2, 0.8):
+        flat = with_noise(np.full((3, 300, 300), level, dtype=np.float32), noise, rng)
+        deviation = stabilise(flat, noise, scale=64).std(axis=(1, 2))
+        np.testing.assert_allclose(deviation, 0.5 / 64, rtol=0.03)
+
+
+def test_values_below_every_noise_become_zero():
+    planes = np.full((3, 2, 2), -1, dtype=np.float32)
+    np.testing.assert_array_equal(stabilise(planes, NOISE), 0)
+
+
+def test_planes_are_not_changed():
+    planes = np.ones((3, 4, 4), dtype=np.float32)
+    stabilise(planes, NOISE)
+    unstabilise(planes, NOISE)
+    np.testing.assert_array_equal(planes, 1)
+
+
+def test_noise_without_shot_and_other_shapes_are_refused():
+    planes = np.ones((3, 4, 4), dtype=np.float32)
+    silent = NoiseModel(shot=(0, 0, 0), read_variance=(1e-8,) * 3)
+    with pytest.raises(ContractError, match="shot noise"):
+        stabilise(planes, silent)
+    with pytest.raises(ContractError, match="planes"):
+        unstabilise(planes[0], NOISE)

@@ -1,0 +1,289 @@
+"""Measure how well a bundle restores, beside classical methods, by a fixed protocol.
+
+    python tools/quality.py --tune --bundle duet --data DATA/valid_open --out docs/quality.json
+    python tools/quality.py --bundle duet --data DATA/test --out docs/quality.json --resume
+
+writes the JSON (every measurement, all means) and the page beside it (docs/quality.md).
+"""
+
+import argparse
+import csv
+import json
+import os
+import shlex
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import astuple
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.contracts import FrozenPsf
+from camkit.errors import CamkitError, ContractError
+from camkit.report.comparison import DEFAULT_METHODS, Rival, make_rows, protocol_text
+from camkit.report.fabricated_psf import fabricated_psf, lens_text
+from camkit.report.measurement import (
+    COLUMNS,
+    Measurement,
+    append_journal,
+    finished_rows,
+    measure_all,
+    open_rows,
+    read_journal,
+)
+from camkit.report.peers import PEERS
+from camkit.report.quality import (
+    FIELD_SHARES,
+    TUNING_SEED,
+    Exposed,
+    Shot,
+    expose,
+    list_set,
+    read_picture,
+)
+from camkit.report.quality_table import seconds_per_megapixel, summarise, to_markdown
+from camkit.report.tuning import choose, try_peers, tuned_from_json, tuned_to_json
+
+TUNING_SIDE_PX = 384
+
+
+def main() -> None:
+    arguments = parse_arguments()
+    cv2.setNumThreads(1)
+    try:
+        bundle = open_bundle(find_bundle(arguments.bundle))
+        if arguments.tune:
+            tune(arguments, bundle)
+        else:
+            compare(arguments, bundle)
+    except CamkitError as error:
+        raise SystemExit(f"error: {error}") from error
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    add = parser.add_argument
+    add("--bundle", required=True, help="name or path of the bundle")
+    add("--compare", nargs=2, action="append", default=[], metavar=("PATH", "LABEL"))
+    add("--data", type=Path, required=True, help="folder of the sets (with --tune: of pictures)")
+    add("--sets", default="kodak_odd,bsd100_half_a,set14,set5")
+    add("--per-set", type=int, help="only the first N pictures of a set, by name")
+    add("--isos", default="100,1600")
+    add("--psf", choices=("fresh", "bundle", "both"), default="both")
+    add("--methods", default="", help=f"default: {','.join(DEFAULT_METHODS)}")
+    add("--prescription", type=Path, help="the lens, if the bundle does not hold it")
+    add("--out", type=Path, default=Path("docs/quality.json"))
+    add("--csv", type=Path, help="also write the measurements as a table")
+    add("--work-dir", type=Path, default=Path("runs/quality"), help="journal and traced PSFs")
+    add("--jobs", type=int, default=1, help="captures at a time")
+    add("--limit-seconds", type=float, help="begin no capture after this time")
+    add("--resume", action="store_true", help="keep what the journal holds")
+    add("--tune", action="store_true", help="tune the classical methods on --data")
+    return parser.parse_args()
+
+
+def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Shot], Exposed]:
+    """Give the function that photographs a shot; PSFs stay in memory."""
+
+    @lru_cache(maxsize=8)
+    def lens(seed: int) -> FrozenPsf:
+        return fabricated_psf(
+            bundle,
+            seed,
+            cache_folder=arguments.work_dir / "psf",
+            prescription=arguments.prescription,
+        )
+
+    def photograph(shot: Shot) -> Exposed:
+        psf = bundle.psf
+        if shot.psf == "fresh":
+            psf = lens(TUNING_SEED if arguments.tune else shot.fabrication_seed)
+        most_px = TUNING_SIDE_PX if arguments.tune else None
+        return expose(shot, read_picture(shot.picture, most_px), bundle, psf)
+
+    return photograph
+
+
+def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
+    """Choose the parameters of the peers on development pictures; two places per picture."""
+    photograph = photographer(arguments, bundle)
+    pictures = list_set(arguments.data, arguments.per_set)
+    peers = [name for name in chosen_methods(arguments) if name in PEERS]
+    trials = []
+    began = time.perf_counter()
+    for iso in isos_of(arguments):
+        for number, picture in enumerate(pictures):
+            for position in (number % len(FIELD_SHARES), (number + 2) % len(FIELD_SHARES)):
+                shot = Shot(
+                    set_name=arguments.data.name,
+                    picture=picture,
+                    number=number,
+                    position=position,
+                    iso=iso,
+                    psf="fresh",
+                )
+                trials += try_peers(photograph(shot), bundle, peers)
+            elapsed = time.perf_counter() - began
+            print(f"ISO {iso:g}, {number + 1}/{len(pictures)} pictures, {elapsed:.0f} s")
+    tuned, curves = choose(trials)
+    for peer, by_iso in tuned.items():
+        for iso, value in by_iso.items():
+            ends = PEERS[peer].candidates[0], PEERS[peer].candidates[-1]
+            edge = "  AT THE EDGE of the candidates" if value in ends else ""
+            print(f"{peer}: {PEERS[peer].parameter} {value:g} at ISO {iso:g}{edge}")
+    report = read_report(arguments.out)
+    report["tuned"] = {
+        "data": arguments.data.name,
+        "fabrication_seed": TUNING_SEED,
+        "captures_per_iso": 2 * len(pictures),
+        "bundle_sha256": bundle.sha256,
+        "values": tuned_to_json(tuned),
+        "psnr_db": curves,
+    }
+    write_report(arguments.out, report)
+
+
+def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
+    """Measure all rows on all captures and write the report."""
+    report = read_report(arguments.out)
+    if "tuned" not in report:
+        raise ContractError(f"{arguments.out} holds no tuned parameters; run with --tune first")
+    methods = chosen_methods(arguments)
+    rivals = [
+        Rival(bundle=open_bundle(find_bundle(path)), label=label)
+        for path, label in arguments.compare
+    ]
+    rows = make_rows(
+        bundle,
+        methods,
+        rivals,
+        tuned_from_json(report["tuned"]["values"]),
+        isos_of(arguments),
+        lens_text(bundle, arguments.prescription),
+    )
+    shots = list_shots(arguments)
+    journal = arguments.work_dir / f"{arguments.out.stem}.jsonl"
+    if not arguments.resume:
+        journal.unlink(missing_ok=True)
+    current = {(row.name, row.identity) for row in rows}
+    done = finished_rows(read_journal(journal))
+    work = [(shot, left) for shot in shots if (left := open_rows(shot, rows, done))]
+    print(f"{len(shots)} captures, {len(work)} to do, {len(rows)} methods")
+    photograph = photographer(arguments, bundle)
+    began = time.perf_counter()
+    finished = measure_all(work, photograph, jobs=arguments.jobs, limit_s=arguments.limit_seconds)
+    for number, found in enumerate(finished, start=1):
+        append_journal(journal, found)
+        if number in (3, 10) or number % 25 == 0 or number == len(work):
+            show_pace(found, number, len(work), time.perf_counter() - began)
+    wanted = {(s.psf, s.set_name, s.picture.name, s.position, s.iso) for s in shots}
+    measurements = [
+        m
+        for m in read_journal(journal)
+        if (m.method, m.identity) in current and m.capture in wanted
+    ]
+    names = [row.name for row in rows]
+    report |= {
+        "command": f"python {shlex.join(sys.argv)}",
+        "json_name": arguments.out.name,
+        "machine": machine(),
+        "bundle": {"name": bundle.manifest.name, "sha256": bundle.sha256},
+        "rivals": {rival.label: rival.bundle.sha256 for rival in rivals},
+        "protocol": {"text": protocol_text(bundle, isos_of(arguments)), "captures": len(shots)},
+        "methods": names,
+        "seconds_per_megapixel": seconds_per_megapixel(measurements),
+        "summary": summarise(measurements, names),
+        "columns": list(COLUMNS),
+        "measurements": [list(astuple(m)) for m in measurements],
+    }
+    write_report(arguments.out, report)
+    arguments.out.with_suffix(".md").write_text(to_markdown(report), encoding="utf-8")
+    if arguments.csv is not None:
+        write_csv(arguments.csv, measurements)
+    show_result(report)
+
+
+def chosen_methods(arguments: argparse.Namespace) -> list[str]:
+    return arguments.methods.split(",") if arguments.methods else list(DEFAULT_METHODS)
+
+
+def isos_of(arguments: argparse.Namespace) -> list[float]:
+    return [float(iso) for iso in arguments.isos.split(",")]
+
+
+def list_shots(arguments: argparse.Namespace) -> list[Shot]:
+    """Give all captures, the first picture of every set first, so that a part is a fair part."""
+    kinds: Sequence[Any] = ("fresh", "bundle") if arguments.psf == "both" else (arguments.psf,)
+    shots = [
+        Shot(
+            set_name=name,
+            picture=picture,
+            number=number,
+            position=position,
+            iso=iso,
+            psf=kind,
+        )
+        for name in arguments.sets.split(",")
+        for number, picture in enumerate(list_set(arguments.data / name, arguments.per_set))
+        for position in range(len(FIELD_SHARES))
+        for iso in isos_of(arguments)
+        for kind in kinds
+    ]
+    return sorted(shots, key=lambda shot: shot.number)
+
+
+def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: float) -> None:
+    left_min = elapsed_s / number * (count - number) / 60
+    costs = ", ".join(f"{m.method} {m.seconds:.2f}" for m in found)
+    print(f"{number}/{count}, {elapsed_s / number:.2f} s each, {left_min:.0f} min left; {costs}")
+    sys.stdout.flush()
+
+
+def show_result(report: dict[str, Any]) -> None:
+    for psf, summary in report["summary"].items():
+        print(f"\n{psf}: " + json.dumps(summary["gain_of_m"]))
+        for name, mean in summary["overall"].items():
+            print(f"  {name:>16} {mean['psnr_db']:7.2f} dB  {mean['ssim']:.4f}  n {mean['n']}")
+
+
+def machine() -> dict[str, Any]:
+    """Name the processor and the cores in use."""
+    cpu = "unknown processor"
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        lines = info.read_text(encoding="utf-8").splitlines()
+        names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+        cpu = names[0] if names else cpu
+    return {"cpu": cpu, "cores": len(os.sched_getaffinity(0))}
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def write_report(path: Path, report: dict[str, Any]) -> None:
+    """Write the report; a line per measurement keeps it readable and small."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rest = {k: v for k, v in report.items() if k != "measurements"}
+    text = json.dumps(rest, indent=1)
+    if "measurements" in report:
+        lines = ",\n".join(json.dumps(row) for row in report["measurements"])
+        text = f'{text.rstrip().removesuffix("}").rstrip()},\n "measurements": [\n{lines}\n ]\n}}'
+    part = path.with_suffix(".json.part")
+    part.write_text(text + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def write_csv(path: Path, measurements: Sequence[Measurement]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        writer.writerows(astuple(m) for m in measurements)
+
+
+if __name__ == "__main__":
+    main()
