@@ -147,7 +147,10 @@ class FrozenPsf:
         if self.field_heights_mm[0] != 0:
             raise ContractError(f"the first field must be 0; got {self.field_heights_mm[0]}")
         light = self.relative_illumination
-        if light.shape != self.field_heights_mm.shape or not ((light > 0) & np.isfinite(light)).all():
+        if (
+            light.shape != self.field_heights_mm.shape
+            or not ((light > 0) & np.isfinite(light)).all()
+        ):
             raise ContractError("relative illumination needs one finite value > 0 per field")
         if not (np.isfinite(self.pixel_pitch_um) and self.pixel_pitch_um > 0):
             raise ContractError(f"pixel_pitch_um must be > 0; got {self.pixel_pitch_um}")

@@ -1,10 +1,10 @@
 """Checkpoints, frozen PSF and prescription -> one bundle, proved before it is written.
 
-    PSF, camera       -> golden captures                    (golden_cases)
-    a first bundle    -> what a network is given for them
-    checkpoints       -> networks -> ONNX + measured facts  (network_facts)
-    a second bundle   -> its outputs on the golden captures
-    everything        -> card, preview, manifest -> bundle -> `check_bundle`
+PSF, camera       -> golden captures                    (golden_cases)
+a first bundle    -> what a network is given for them
+checkpoints       -> networks -> ONNX + measured facts  (network_facts)
+a second bundle   -> its outputs on the golden captures
+everything        -> card, preview, manifest -> bundle -> `check_bundle`
 """
 
 import json
@@ -55,6 +55,7 @@ LICENCE: Final = "CC-BY-4.0"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
 SIZES: Final[tuple[NetworkSize, ...]] = get_args(NetworkSize)
 DEFAULT_SIZE: Final[NetworkSize] = "M"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:

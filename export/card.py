@@ -41,7 +41,13 @@ def card_text(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> str:
             f"| {height:.2f} | {energy_diameter_px(kernel, 0.95):.0f} | "
             f"{modulation(kernel, 0.1):.2f} | {psf.relative_illumination[i]:.3f} |"
         )
-    lines += ["", "## Networks", "", "| size | kMAC/px | parameters | reach (px) |", "|---|---|---|---|"]
+    lines += [
+        "",
+        "## Networks",
+        "",
+        "| size | kMAC/px | parameters | reach (px) |",
+        "|---|---|---|---|",
+    ]
     for size, facts in manifest.networks.items():
         lines.append(
             f"| {size} | {facts.mac_per_pixel / 1e3:.1f} | {facts.parameters} | {facts.reach_px} |"
@@ -54,7 +60,9 @@ def card_text(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> str:
         "|---|" + "---|" * len(manifest.networks),
     ]
     for name, arrays in golden.items():
-        values = (f"{_psnr_db(arrays.outputs[size], arrays.reference):.2f}" for size in manifest.networks)
+        values = (
+            f"{_psnr_db(arrays.outputs[size], arrays.reference):.2f}" for size in manifest.networks
+        )
         lines.append(f"| {name} | " + " | ".join(values) + " |")
     lines += [
         "",

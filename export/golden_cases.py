@@ -11,10 +11,10 @@ from camkit.bundle.manifest import Camera, GoldenCase
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray, FrozenPsf
+from camkit.runtime.geometry.warp import undistort_bands
 from camkit.runtime.golden_run import develop_case
 from camkit.runtime.rows import ArrayRows
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
-from camkit.runtime.geometry.warp import undistort_bands
 from camkit.scenes import procedural_scene
 
 Cases = dict[str, tuple[GoldenCase, GoldenArrays]]
@@ -90,8 +90,7 @@ def add_outputs(
             capture=arrays.capture,
             reference=arrays.reference,
             outputs={
-                size: develop_case(bundle, case, arrays, size)
-                for size in bundle.manifest.networks
+                size: develop_case(bundle, case, arrays, size) for size in bundle.manifest.networks
             },
             network_input=windows[name][0],
         )

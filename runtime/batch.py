@@ -8,24 +8,45 @@ One file's failure never stops the others; `resume` skips only what a sidecar pr
 
 import glob
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 from camkit.errors import CamkitError, ContractError
+from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
-from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.raw import named_bundle
 
 FileProgress = Callable[[Path, int, int], None]
 
 CAPTURE_SUFFIXES: Final = frozenset(
-    ".dng .arw .cr2 .cr3 .crw .nef .nrw .raf .rw2 .orf .pef .srw .kdc .dcr .3fr .iiq .rwl .exr "
-    ".tif .tiff .png".split()
+    [
+        ".dng",
+        ".arw",
+        ".cr2",
+        ".cr3",
+        ".crw",
+        ".nef",
+        ".nrw",
+        ".raf",
+        ".rw2",
+        ".orf",
+        ".pef",
+        ".srw",
+        ".kdc",
+        ".dcr",
+        ".3fr",
+        ".iiq",
+        ".rwl",
+        ".exr",
+        ".tif",
+        ".tiff",
+        ".png",
+    ]
 )
 NO_BUNDLE: Final = "none"
 
@@ -67,9 +88,7 @@ def expand(files: Sequence[str | Path]) -> list[Path]:
     return list(found)
 
 
-def plan_tasks(
-    sources: Sequence[Path], *, bundle: str | None, write: WriteOptions
-) -> list[Task]:
+def plan_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptions) -> list[Task]:
     """Decide bundle and output of every input, and refuse what cannot be before any work.
 
     Raises:

@@ -10,9 +10,7 @@ from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 
 
-def develop_case(
-    bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str
-) -> FloatArray:
+def develop_case(bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str) -> FloatArray:
     """Give the pipeline's output (3, h, w) for a golden capture, on one thread.
 
     Args:

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FloatArray
-from camkit.errors import BundleError, ContractError
+from camkit.errors import ContractError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
+from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.options import Options
 from camkit.runtime.raw import read_capture
 from camkit.runtime.reconstruction import Reconstruction, Setup
-from camkit.runtime.network.tiling import Cancel, Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,9 +136,7 @@ class Pipeline:
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
         """
-        capture = self.capture_of(
-            image, iso=iso, white_balance=white_balance, origin_px=origin_px
-        )
+        capture = self.capture_of(image, iso=iso, white_balance=white_balance, origin_px=origin_px)
         return self.start(capture, progress=progress, cancel=cancel).fill(out)
 
     def capture_of(

@@ -20,8 +20,8 @@ from camkit.errors import BundleError, ParityError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.probe import perturbation_reach
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
-from camkit.runtime.rows import ArrayRows
 from camkit.runtime.network.tiling import TileLimits, TilePlan, infer_bands, plan_windows
+from camkit.runtime.rows import ArrayRows
 
 _SEED: Final = 7
 _TILE_PX: Final = 64

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 import camkit
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.files import raw_checks
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.files import raw_checks
 from camkit.runtime.files.raw_tags import sensor_place
 from camkit.runtime.files.tiff_tags import read_tiff_tags
 

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.files import dng_checks, raw_checks, raw_tags
 from camkit.runtime.capture import Capture
+from camkit.runtime.files import dng_checks, raw_checks, raw_tags
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8

@@ -16,21 +16,16 @@ from camkit.bundle.manifest import HaloError, Illumination, Network, Undistort, 
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
-
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import BlockBank, LocalPsf
+from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock, TimedRows
 from camkit.runtime.color import color_stage, recover_highlights, to_output
-from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.signal.front_rows import FrontRows
 from camkit.runtime.geometry.illumination import divide_illumination
-from camkit.runtime.signal.noise import measure_noise
 from camkit.runtime.geometry.placement import Placement, place, scale_kernels
-from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
-from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
-from camkit.runtime.signal.stabilise import stabilise, unstabilise
+from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.tiling import (
     Cancel,
     Progress,
@@ -39,7 +34,11 @@ from camkit.runtime.network.tiling import (
     infer_bands,
     plan_windows,
 )
-from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
+from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
+from camkit.runtime.signal.front_rows import FrontRows
+from camkit.runtime.signal.noise import measure_noise
+from camkit.runtime.signal.stabilise import stabilise, unstabilise
 
 BAND_ROWS: Final = 128
 FIXED_BYTES: Final = 260_000_000
@@ -130,9 +129,7 @@ class Reconstruction:
         if bundle is not None:
             rows = self._restored_rows(bundle, rows)
         if self.capture.cfa is not None:
-            rows = MappedRows(
-                rows, lambda band, _: recover_highlights(band, self.white_balance), 3
-            )
+            rows = MappedRows(rows, lambda band, _: recover_highlights(band, self.white_balance), 3)
         if bundle is not None:
             rows = self._corrected_rows(bundle, rows)
         _, height, _ = self.shape
@@ -151,9 +148,7 @@ class Reconstruction:
         if out is None:
             out = np.empty(self.shape, dtype=np.float32)
         if out.shape != self.shape or out.dtype != np.float32:
-            raise ContractError(
-                f"out must be float32 {self.shape}; got {out.dtype} {out.shape}"
-            )
+            raise ContractError(f"out must be float32 {self.shape}; got {out.dtype} {out.shape}")
         top = 0
         for band in self.bands():
             out[:, top : top + band.shape[1]] = band
@@ -202,9 +197,7 @@ class Reconstruction:
                     f"{self.capture.contract}; use another bundle or --bundle none"
                 )
             self._warnings.append("a linear RGB capture in a raw_bayer_v1 bundle: not demosaicked")
-        placement = place(
-            self.capture, bundle.manifest.camera, self._setup.options.assume
-        )
+        placement = place(self.capture, bundle.manifest.camera, self._setup.options.assume)
         if placement.note:
             self._warnings.append(placement.note)
         return placement
@@ -358,9 +351,7 @@ class Reconstruction:
         window = self._placement.window
         if options.vignetting and manifest.stage(Illumination) is not None:
             rows = TimedRows(
-                MappedRows(
-                    rows, lambda band, top: divide_illumination(band, top, psf, window), 3
-                ),
+                MappedRows(rows, lambda band, top: divide_illumination(band, top, psf, window), 3),
                 self._clock,
                 "illumination",
             )

@@ -16,13 +16,13 @@ from camkit.bundle.camera import Camera
 from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import CfaPattern, FloatArray, FrozenPsf, NoiseModel, cfa_channels
 from camkit.errors import ContractError, UnsupportedError
-from camkit.runtime.geometry.illumination import illumination_band
-from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
-from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.bank.psf import color_kernels, kernel_at
+from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.geometry.scatter import KernelLookup, scatter
 from camkit.runtime.geometry.sensor_window import SensorWindow, centred_origin
 from camkit.runtime.geometry.warp import distort_array
+from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
+from camkit.runtime.output.part_file import atomic_output
 
 NOISE_ROWS: Final = 256
 

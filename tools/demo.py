@@ -66,9 +66,7 @@ def main() -> None:
 def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) -> None:
     """Compare crops from axis to corner with the sharp scene, in sensor geometry."""
     bundle = open_bundle(find_bundle(name))
-    matrix = np.linalg.inv(
-        camera_from_rec709(np.array(bundle.manifest.camera.color_matrix))[0]
-    )
+    matrix = np.linalg.inv(camera_from_rec709(np.array(bundle.manifest.camera.color_matrix))[0])
     developed = camkit.load(name, method="wiener", undistort=False, vignetting=True)
     methods = {
         "wiener": developed,

@@ -67,7 +67,7 @@ def lens_text(bundle: Bundle, prescription: Path | None) -> str:
 
 
 def _trace(bundle: Bundle, text: str, seed: int) -> FrozenPsf:
-    from camkit.models_def.optics.freeze import FreezeGrid, dense_grid, freeze
+    from camkit.models_def.optics.frozen import FreezeGrid, dense_grid, freeze
     from camkit.models_def.optics.kernel_bank import focused_copies
     from camkit.models_def.optics.prescription import parse_prescription
 

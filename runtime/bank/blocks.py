@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import kernel_at
-from camkit.runtime.rows import ArrayRows, RowSource
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.rows import ArrayRows, RowSource
 
 ComplexArray = NDArray[np.complex64]
 MaskRows = Callable[[int, int], NDArray[np.bool_]]

@@ -1,8 +1,8 @@
 """What capture files say, and whether it can be believed.
 
-    tiff_tags     tags of TIFF-based files, read within bounds
-    raw_tags      metadata of a RAW file from its tags
-    raw_checks    refuses unbelievable decodes
-    dng_checks    a DNG against itself and against LibRaw
-    picture       EXR, TIFF and PNG as captures or scenes
+tiff_tags     tags of TIFF-based files, read within bounds
+raw_tags      metadata of a RAW file from its tags
+raw_checks    refuses unbelievable decodes
+dng_checks    a DNG against itself and against LibRaw
+picture       EXR, TIFF and PNG as captures or scenes
 """

@@ -29,8 +29,8 @@ from camkit.colorimetry import (
 )
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
-from camkit.runtime.files import raw_checks
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.files import raw_checks
 from camkit.runtime.files.tiff_tags import read_tiff_tags
 
 EXR_MAGIC: Final = b"\x76\x2f\x31\x01"

@@ -15,8 +15,8 @@ from camkit.bundle.manifest import Camera
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
-from camkit.runtime.options import Assumption
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.options import Assumption
 
 PITCH_TOLERANCE: Final = 0.02
 
@@ -75,9 +75,7 @@ def _window(
     sensor: tuple[int, int],
     pitch_um: float,
 ) -> SensorWindow:
-    return SensorWindow(
-        size_px=size, origin_px=origin, sensor_size_px=sensor, pitch_um=pitch_um
-    )
+    return SensorWindow(size_px=size, origin_px=origin, sensor_size_px=sensor, pitch_um=pitch_um)
 
 
 def _scaled(size: tuple[int, int], sensor: tuple[int, int], pitch_um: float) -> Placement:

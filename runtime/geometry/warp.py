@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.distortion import check_distortion, distort_points, undistort_points
-from camkit.runtime.rows import RowSource
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.rows import RowSource
 
 FloatGrid = NDArray[np.float64]
 

@@ -22,7 +22,13 @@ from onnx import numpy_helper
 from camkit.bundle.facts import NetworkFacts
 from camkit.errors import BundleError
 from camkit.runtime.network.graph_walk import GraphFacts, walk_graph
-from camkit.runtime.network.operators import ELEMENTWISE, GLOBAL_POOLS, NORMALIZATIONS, REDUCTIONS, Node
+from camkit.runtime.network.operators import (
+    ELEMENTWISE,
+    GLOBAL_POOLS,
+    NORMALIZATIONS,
+    REDUCTIONS,
+    Node,
+)
 
 ALLOWED_OPERATORS: Final = (
     ELEMENTWISE

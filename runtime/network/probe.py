@@ -13,8 +13,8 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.rows import ArrayRows
 from camkit.runtime.network.tiling import Run, TileLimits, infer_bands, plan_windows
+from camkit.runtime.rows import ArrayRows
 
 _KICK: Final = 1e3  # far beyond the base, so that it survives rounding after many layers
 

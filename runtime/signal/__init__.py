@@ -1,7 +1,7 @@
 """The signal before and behind the restoration, in the order of one photograph.
 
-    noise         noise of a capture that states none; repair of broken samples
-    demosaic      mosaic to three planes; `directional` is its slower, better method
-    front_rows    repair, white balance and demosaic joined, as rows
-    stabilise     k-sigma and square root around the network
+noise         noise of a capture that states none; repair of broken samples
+demosaic      mosaic to three planes; `directional` is its slower, better method
+front_rows    repair, white balance and demosaic joined, as rows
+stabilise     k-sigma and square root around the network
 """

@@ -13,8 +13,8 @@ from camkit.models_def.networks.catalog import NETWORK_NAMES, build_network
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.probe import perturbation_reach
-from camkit.runtime.rows import ArrayRows
 from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.rows import ArrayRows
 
 # lattice halo in px: what exact tiling needs
 HALOS_PX = {"lean_s": 56, "lean_m": 96, "lean_l": 96, "trimmed_unet": 24}

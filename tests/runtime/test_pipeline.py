@@ -8,9 +8,9 @@ import pytest
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.network.tiling import Cancelled
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
-from camkit.runtime.network.tiling import Cancelled
 from tests.bundle_factory import write_tiny_bundle
 
 
@@ -47,9 +47,7 @@ def test_tiles_and_threads_do_not_change_a_bit(
     np.testing.assert_array_equal(_run(bundle, mosaic, **choice), _run(bundle, mosaic))
 
 
-def test_one_pipeline_serves_many_threads_with_equal_bits(
-    bundle: Path, mosaic: np.ndarray
-) -> None:
+def test_one_pipeline_serves_many_threads_with_equal_bits(bundle: Path, mosaic: np.ndarray) -> None:
     pipeline = load(bundle)
     with ThreadPoolExecutor(4) as pool:
         images = list(pool.map(lambda _: pipeline.process_array(mosaic, iso=100.0), range(6)))
@@ -91,9 +89,7 @@ def test_a_crop_with_its_origin_keeps_place_and_vignetting(bundle: Path) -> None
     def areas(image: FloatArray) -> FloatArray:
         return image.reshape(3, 2, 8, 6, 8).mean(axis=(2, 4))
 
-    np.testing.assert_allclose(
-        areas(crop[:, 8:-8, 8:-8]), areas(whole[:, 24:40, 28:76]), rtol=0.03
-    )
+    np.testing.assert_allclose(areas(crop[:, 8:-8, 8:-8]), areas(whole[:, 24:40, 28:76]), rtol=0.03)
 
 
 def test_white_balance_gains_scale_the_colours(bundle: Path, mosaic: np.ndarray) -> None:
@@ -156,7 +152,9 @@ def test_a_wrong_array_is_refused(bundle: Path, image: np.ndarray, message: str)
 def test_linear_planes_are_taken_with_a_note(bundle: Path) -> None:
     pipeline = load(bundle)
     planes = np.full((3, 64, 96), 0.25, dtype=np.float32)
-    work = pipeline.start(pipeline.capture_of(planes, iso=100.0, white_balance=None, origin_px=None))
+    work = pipeline.start(
+        pipeline.capture_of(planes, iso=100.0, white_balance=None, origin_px=None)
+    )
     assert any("linear RGB" in warning for warning in work.warnings)
     assert np.isfinite(work.fill(None)).all()
 
@@ -177,9 +175,7 @@ def test_arrays_need_a_bundle(mosaic: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("method", ["wiener", "rl", "admm-tv"])
-def test_classical_methods_need_no_network(
-    bundle: Path, mosaic: np.ndarray, method: str
-) -> None:
+def test_classical_methods_need_no_network(bundle: Path, mosaic: np.ndarray, method: str) -> None:
     pipeline = load(bundle, method=method)
     assert pipeline.engine is None
     assert np.isfinite(pipeline.process_array(mosaic, iso=100.0)).all()

@@ -8,6 +8,7 @@ from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.illumination import illumination_band
+from camkit.runtime.geometry.warp import Warp
 from camkit.runtime.raw import read_capture
 from camkit.runtime.simulate import (
     Simulation,
@@ -17,7 +18,6 @@ from camkit.runtime.simulate import (
     simulate,
     write_capture,
 )
-from camkit.runtime.geometry.warp import Warp
 from tests.camera_factory import delta_psf, make_camera, make_psf, whole_window
 
 CAMERA = make_camera()

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
-from camkit.runtime.rows import ArrayRows, RollingRows
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import Warp, distort_array, undistort_bands
+from camkit.runtime.rows import ArrayRows, RollingRows
 
 SENSOR = (1536, 1024)
 PITCH_UM = 20.0

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.rows import ArrayRows
 from camkit.runtime.network.tiling import (
     Cancelled,
     Span,
@@ -21,6 +20,7 @@ from camkit.runtime.network.tiling import (
     infer_bands,
     plan_windows,
 )
+from camkit.runtime.rows import ArrayRows
 from tests.small_network import HALO_PX, STRIDE_PX, small_network
 
 ENGINES = {n: NetworkEngine(small_network(), threads=n) for n in (1, 2)}
