@@ -23,31 +23,11 @@ from camkit.runtime.raw import named_bundle
 
 FileProgress = Callable[[Path, int, int], None]
 
-CAPTURE_SUFFIXES: Final = frozenset(
-    [
-        ".dng",
-        ".arw",
-        ".cr2",
-        ".cr3",
-        ".crw",
-        ".nef",
-        ".nrw",
-        ".raf",
-        ".rw2",
-        ".orf",
-        ".pef",
-        ".srw",
-        ".kdc",
-        ".dcr",
-        ".3fr",
-        ".iiq",
-        ".rwl",
-        ".exr",
-        ".tif",
-        ".tiff",
-        ".png",
-    ]
+RAW_SUFFIXES: Final = frozenset(
+    {".dng", ".arw", ".cr2", ".cr3", ".crw", ".nef", ".nrw", ".raf", ".rw2", ".orf", ".pef"}
+    | {".srw", ".kdc", ".dcr", ".3fr", ".iiq", ".rwl"}
 )
+CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
 NO_BUNDLE: Final = "none"
 
 
@@ -81,7 +61,8 @@ def expand(files: Sequence[str | Path]) -> list[Path]:
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() in CAPTURE_SUFFIXES)
             found.update(dict.fromkeys(p for p in inside if p.is_file()))
         elif not path.exists() and glob.has_magic(str(item)):
-            matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))
+            # pathlib has no glob that takes an absolute pattern
+            matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))  # noqa: PTH207
             found.update(dict.fromkeys(p for p in matches if p.is_file()))
         else:
             found[path] = None
@@ -161,6 +142,7 @@ def process(
         jobs: Captures at once; the threads are shared among them.
         progress: Called with (file, done, total) at every tile, from the working thread.
         on_result: Called with each result as it is ready.
+        **choices: Single fields of `Options` and `WriteOptions` by name.
 
     Returns:
         One result per input, in their order; failures carry their message.

@@ -197,7 +197,8 @@ def load(
 
     Args:
         bundle: Name of a built-in bundle, path of a bundle file, or None to develop only.
-        options: What changes the pixels. Single fields may also be given by name (size="S").
+        options: What changes the pixels.
+        **choices: Single fields of `Options` by name, such as size="S".
 
     Raises:
         BundleError: If the bundle is refused.

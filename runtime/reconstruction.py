@@ -203,7 +203,7 @@ class Reconstruction:
         return placement
 
     def _choose_noise(self) -> NoiseModel | None:
-        """Give the noise after white balance: of the file, else the bundle's at its ISO, else measured."""
+        """Give the noise after white balance: the file's, else the bundle's at ISO, else measured."""
         bundle = self._setup.bundle
         if bundle is None:
             return None

@@ -2,8 +2,8 @@
 
     find_bundle(name or path) -> open_bundle(path) -> Bundle
 
-Graphs are not looked at here: `camkit.runtime.network.graph.check_graph` does that before a session is
-made, since `onnx` belongs to the runtime.
+Graphs are not looked at here: `camkit.runtime.network.graph.check_graph` does that before a
+session is made, since `onnx` belongs to the runtime.
 """
 
 import difflib

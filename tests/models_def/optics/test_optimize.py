@@ -68,7 +68,11 @@ def test_duet_is_as_bad_as_it_was_meant_to_be() -> None:
 
 @pytest.mark.slow
 def test_duet_is_found_again_by_its_recipe(recipe: LensRecipe) -> None:
-    assert design(recipe).lens.surfaces == read_prescription(DUET).surfaces
+    found, kept = design(recipe).lens, read_prescription(DUET)
+    for one, other in zip(found.surfaces, kept.surfaces, strict=True):
+        assert one.curvature_per_mm == pytest.approx(other.curvature_per_mm, abs=1e-5)
+        assert one.thickness_mm == pytest.approx(other.thickness_mm, abs=1e-2)
+        assert one.conic == pytest.approx(other.conic, abs=1e-2)
 
 
 @pytest.mark.parametrize(
