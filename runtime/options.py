@@ -24,7 +24,7 @@ class Options:
         size: Network size held by the bundle: S, M or L.
         method: The network behind the Wiener bank, or a classical method alone.
         mode: Tiling: exact (bits of the whole picture), fast (smaller halo), whole (one window).
-        demosaic: fast or quality.
+        demosaic: fast or quality; None for the method of the bundle, fast without one.
         color: Colour space of the result.
         white_balance: Gains (R, G, B), or None for the capture's own.
         exposure_ev: Factor 2**exposure_ev on the result.
@@ -39,7 +39,7 @@ class Options:
     size: str = "M"
     method: Method = "net"
     mode: Mode = "exact"
-    demosaic: DemosaicMethod = "fast"
+    demosaic: DemosaicMethod | None = None
     color: OutputColor = "rec709"
     white_balance: tuple[float, float, float] | None = None
     exposure_ev: float = 0.0
@@ -54,7 +54,8 @@ class Options:
         _check_choice("size", self.size, SIZES)
         _check_choice("method", self.method, get_args(Method))
         _check_choice("mode", self.mode, get_args(Mode))
-        _check_choice("demosaic", self.demosaic, get_args(DemosaicMethod))
+        if self.demosaic is not None:
+            _check_choice("demosaic", self.demosaic, get_args(DemosaicMethod))
         _check_choice("color", self.color, get_args(OutputColor))
         if self.assume is not None:
             _check_choice("assume", self.assume, get_args(Assumption))

@@ -8,6 +8,7 @@ A `Pipeline` is immutable and may serve many threads at once; each capture gets 
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
@@ -40,6 +41,23 @@ class Picture:
     """
 
     image: FloatArray
+    orientation: int
+    seconds: dict[str, float]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """What became of a capture whose bands went to a callback.
+
+    Attributes:
+        shape: (3, h, w) of the picture.
+        orientation: EXIF orientation (1..8) that a viewer should apply.
+        seconds: Seconds per stage.
+        warnings: What the user should know.
+    """
+
+    shape: tuple[int, int, int]
     orientation: int
     seconds: dict[str, float]
     warnings: tuple[str, ...]
@@ -102,6 +120,43 @@ class Pipeline:
         image = work.fill(out)
         return Picture(
             image=image,
+            orientation=capture.orientation,
+            seconds={"decode": decode_s, **work.seconds},
+            warnings=work.warnings,
+        )
+
+    def stream(
+        self,
+        file: str | Path,
+        on_band: Callable[[int, FloatArray], None],
+        *,
+        mosaic: MosaicOptions | None = None,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Summary:
+        """Read one capture and hand its picture on, band by band, without holding it.
+
+        Args:
+            file: RAW, DNG, EXR, TIFF or PNG.
+            on_band: Called with (first row, band (3, rows, w) float32) from top to bottom.
+            mosaic: How to read a headerless mosaic.
+            progress: Called with (tiles done, tiles in all).
+            cancel: Asked at every tile; true raises `Cancelled`.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+            ContractError: If capture and bundle do not fit each other.
+        """
+        began = time.perf_counter()
+        capture = read_capture(Path(file), mosaic=mosaic)
+        decode_s = time.perf_counter() - began
+        work = self.start(capture, progress=progress, cancel=cancel)
+        top = 0
+        for band in work.bands():
+            on_band(top, band)
+            top += band.shape[1]
+        return Summary(
+            shape=work.shape,
             orientation=capture.orientation,
             seconds={"decode": decode_s, **work.seconds},
             warnings=work.warnings,
@@ -219,6 +274,11 @@ def load(
 
 def _engine(bundle: Bundle, size: str, threads: int) -> NetworkEngine:
     networks = bundle.manifest.networks
+    if bundle.manifest.border != "edge":
+        raise UnsupportedError(
+            f"bundle {bundle.manifest.name} continues pictures by {bundle.manifest.border}; "
+            "this runtime offers edge"
+        )
     if size not in networks:
         raise ContractError(
             f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(networks))}; "

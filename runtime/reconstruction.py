@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.bundle.manifest import HaloError, Illumination, Network, Undistort, Wiener
+from camkit.bundle.manifest import Demosaic, HaloError, Illumination, Network, Undistort, Wiener
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
@@ -34,7 +34,7 @@ from camkit.runtime.network.tiling import (
     infer_bands,
     plan_windows,
 )
-from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, DemosaicMethod, Options
 from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
 from camkit.runtime.signal.front_rows import FrontRows
 from camkit.runtime.signal.noise import measure_noise
@@ -203,7 +203,7 @@ class Reconstruction:
         return placement
 
     def _choose_noise(self) -> NoiseModel | None:
-        """Give the noise after white balance: the file's, else the bundle's at ISO, else measured."""
+        """Give the noise after white balance: the file's, the bundle's at its ISO, or measured."""
         bundle = self._setup.bundle
         if bundle is None:
             return None
@@ -253,10 +253,15 @@ class Reconstruction:
         self._front = FrontRows(
             self.capture,
             self.white_balance,
-            method=self._setup.options.demosaic,
+            method=self._demosaic_method(),
             repair=self._setup.bundle is not None,
         )
         return TimedRows(self._front, self._clock, "demosaic")
+
+    def _demosaic_method(self) -> DemosaicMethod:
+        chosen, bundle = self._setup.options.demosaic, self._setup.bundle
+        stage = None if bundle is None else bundle.manifest.stage(Demosaic)
+        return chosen or ("fast" if stage is None else stage.method)
 
     def network_input(self, scale: float) -> FloatArray:
         """Give what a network is given for the whole capture, (6, h, w), for export and tests.

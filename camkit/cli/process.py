@@ -31,7 +31,9 @@ def process(
     color: Annotated[str, typer.Option(help="EXR colour: rec709, acescg or camera.")] = "rec709",
     wb: Annotated[str, typer.Option(help="'camera' or gains R,G,B.")] = "camera",
     exposure: Annotated[float, typer.Option(help="Exposure in EV.")] = 0.0,
-    demosaic: Annotated[str, typer.Option(help="fast or quality.")] = "fast",
+    demosaic: Annotated[
+        str | None, typer.Option(help="fast or quality; default: the bundle's.")
+    ] = None,
     linear: Annotated[bool, typer.Option("--linear", help="Linear TIFF, no sRGB curve.")] = False,
     vignetting: Annotated[bool, typer.Option(help="Divide by relative illumination.")] = True,
     undistort: Annotated[bool, typer.Option(help="Undo the lens's distortion.")] = True,

@@ -12,6 +12,7 @@ from camkit.runtime.network.tiling import Cancelled
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
 from tests.bundle_factory import write_tiny_bundle
+from tests.capture_factory import write_tiny_captures
 
 
 @pytest.fixture(scope="module")
@@ -179,3 +180,15 @@ def test_classical_methods_need_no_network(bundle: Path, mosaic: np.ndarray, met
     pipeline = load(bundle, method=method)
     assert pipeline.engine is None
     assert np.isfinite(pipeline.process_array(mosaic, iso=100.0)).all()
+
+
+def test_streamed_bands_are_the_rows_of_the_picture(tmp_path: Path) -> None:
+    path = write_tiny_captures(tmp_path, ["a"])
+    bands: list[tuple[int, FloatArray]] = []
+    pipeline = load(path)
+    summary = pipeline.stream(tmp_path / "a.dng", lambda top, band: bands.append((top, band)))
+    picture = pipeline.process(tmp_path / "a.dng")
+    np.testing.assert_array_equal(np.concatenate([b for _, b in bands], axis=1), picture.image)
+    assert [top for top, _ in bands][0] == 0
+    assert summary.shape == picture.image.shape
+    assert set(summary.seconds) == set(picture.seconds)
