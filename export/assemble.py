@@ -28,6 +28,7 @@ from camkit.bundle.manifest import (
     NetworkSize,
     Undistort,
     WhiteBalance,
+    Wiener,
 )
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, PSF, STRESS_PSF, Bundle
@@ -210,7 +211,7 @@ def _manifest(
         stages=(
             WhiteBalance(),
             Demosaic(method="fast"),
-            recipe.wiener,
+            _bank(recipe, parts),
             *((Network(scale=recipe.scale),) if networks else ()),
             Illumination(),
             Undistort(),
@@ -221,6 +222,12 @@ def _manifest(
         freeze=_freeze_facts(parts),
         exported_with={name: metadata.version(name) for name in PACKAGES},
     )
+
+
+def _bank(recipe: Recipe, parts: Parts) -> Wiener:
+    """Give the recipe's bank on the block grid that freezing chose by measured loss."""
+    grid = {k: v for k, v in _freeze_facts(parts).items() if k in {"block_px", "overlap_px"}}
+    return Wiener.model_validate({**recipe.wiener.model_dump(), **grid})
 
 
 def _freeze_facts(parts: Parts) -> dict[str, Any]:

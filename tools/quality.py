@@ -12,8 +12,10 @@ import json
 import os
 import shlex
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple
 from functools import lru_cache
 from pathlib import Path
@@ -48,7 +50,7 @@ from camkit.report.quality import (
 from camkit.report.quality_table import seconds_per_megapixel, summarise, to_markdown
 from camkit.report.tuning import choose, try_peers, tuned_from_json, tuned_to_json
 
-TUNING_SIDE_PX = 384
+TUNING_SIDE_PX = 320
 
 
 def main() -> None:
@@ -88,15 +90,20 @@ def parse_arguments() -> argparse.Namespace:
 
 def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Shot], Exposed]:
     """Give the function that photographs a shot; PSFs stay in memory."""
+    tracing = threading.Lock()
 
     @lru_cache(maxsize=8)
-    def lens(seed: int) -> FrozenPsf:
+    def traced(seed: int) -> FrozenPsf:
         return fabricated_psf(
             bundle,
             seed,
             cache_folder=arguments.work_dir / "psf",
             prescription=arguments.prescription,
         )
+
+    def lens(seed: int) -> FrozenPsf:
+        with tracing:
+            return traced(seed)
 
     def photograph(shot: Shot) -> Exposed:
         psf = bundle.psf
@@ -113,22 +120,28 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
     photograph = photographer(arguments, bundle)
     pictures = list_set(arguments.data, arguments.per_set)
     peers = [name for name in chosen_methods(arguments) if name in PEERS]
+    shots = [
+        Shot(
+            set_name=arguments.data.name,
+            picture=picture,
+            number=number,
+            position=(number + step) % len(FIELD_SHARES),
+            iso=iso,
+            psf="fresh",
+        )
+        for number, picture in enumerate(pictures)
+        for step in (0, 2)
+        for iso in isos_of(arguments)
+    ]
     trials = []
     began = time.perf_counter()
-    for iso in isos_of(arguments):
-        for number, picture in enumerate(pictures):
-            for position in (number % len(FIELD_SHARES), (number + 2) % len(FIELD_SHARES)):
-                shot = Shot(
-                    set_name=arguments.data.name,
-                    picture=picture,
-                    number=number,
-                    position=position,
-                    iso=iso,
-                    psf="fresh",
-                )
-                trials += try_peers(photograph(shot), bundle, peers)
-            elapsed = time.perf_counter() - began
-            print(f"ISO {iso:g}, {number + 1}/{len(pictures)} pictures, {elapsed:.0f} s")
+    with ThreadPoolExecutor(max_workers=arguments.jobs) as pool:
+        tried = pool.map(lambda shot: try_peers(photograph(shot), bundle, peers), shots)
+        for number, found in enumerate(tried, start=1):
+            trials += found
+            print(
+                f"{number}/{len(shots)} captures, {time.perf_counter() - began:.0f} s", flush=True
+            )
     tuned, curves = choose(trials)
     for peer, by_iso in tuned.items():
         for iso, value in by_iso.items():
@@ -139,7 +152,7 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
     report["tuned"] = {
         "data": arguments.data.name,
         "fabrication_seed": TUNING_SEED,
-        "captures_per_iso": 2 * len(pictures),
+        "captures": len(shots),
         "bundle_sha256": bundle.sha256,
         "values": tuned_to_json(tuned),
         "psnr_db": curves,

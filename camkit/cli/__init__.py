@@ -4,7 +4,9 @@
     info      what a bundle or a capture is       check      prove a bundle
     doctor    what this machine has               freeze, train, export   design time (torch)
 
-`app` joins the commands and turns camkit's errors into one line and an exit code.
+`app` joins the commands and turns errors into one line and an exit code (`exit_code`). Shared by
+commands: `choices` (options), `mosaic` (headerless mosaics), `progress` (bars and results),
+`design_time` (asking for torch, keeping files).
 """
 
 from camkit.cli.app import main

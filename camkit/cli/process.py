@@ -28,13 +28,15 @@ def process(
     size: Annotated[str, typer.Option(help="Size of the network: S, M or L.")] = "M",
     out_dir: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path(),
     format_: Annotated[str, typer.Option("--format", help="exr, tiff, png or dng.")] = "exr",
-    color: Annotated[str, typer.Option(help="EXR colour: rec709, acescg or camera.")] = "rec709",
+    color: Annotated[
+        str, typer.Option(help="rec709, acescg or camera; a DNG is camera.")
+    ] = "rec709",
     wb: Annotated[str, typer.Option(help="'camera' or gains R,G,B.")] = "camera",
     exposure: Annotated[float, typer.Option(help="Exposure in EV.")] = 0.0,
     demosaic: Annotated[
         str | None, typer.Option(help="fast or quality; default: the bundle's.")
     ] = None,
-    linear: Annotated[bool, typer.Option("--linear", help="Linear TIFF, no sRGB curve.")] = False,
+    linear: Annotated[bool, typer.Option("--linear", help="TIFF and PNG without curve.")] = False,
     vignetting: Annotated[bool, typer.Option(help="Divide by relative illumination.")] = True,
     undistort: Annotated[bool, typer.Option(help="Undo the lens's distortion.")] = True,
     mosaic: Annotated[

@@ -16,7 +16,7 @@ def simulate(
     bundle: Annotated[str, typer.Option(help="Bundle NAME or PATH of the camera.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The DNG to write.")],
     iso: Annotated[float, typer.Option(help="ISO speed of the capture.")] = 100.0,
-    seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     origin_px: Annotated[
         str | None, typer.Option(help="X,Y of a crop on the sensor; default: centred.")
     ] = None,

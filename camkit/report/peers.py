@@ -23,8 +23,8 @@ from camkit.runtime.geometry.sensor_window import SensorWindow
 
 KERNEL_ENERGY: Final = 0.999
 """Share of the light of every colour that the local kernels keep; a smaller kernel is faster."""
-BLOCK_PX: Final = 512
 OVERLAP_PX: Final = 160
+"""Of the block grid; a block that is larger than the crop by this much covers it alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +89,8 @@ def trim_kernels(kernels: FloatArray, energy: float = KERNEL_ENERGY) -> FloatArr
 def wiener(capture: LocalCapture, balance: float) -> FloatArray:
     """Restore with `skimage.restoration.wiener`, its own Laplacian as regulariser.
 
+    The filter takes the picture for periodic, so the padded border is tapered first.
+
     Args:
         capture: The developed crop.
         balance: Weight of the regulariser.
@@ -97,7 +99,9 @@ def wiener(capture: LocalCapture, balance: float) -> FloatArray:
     """
     return _each_plane(
         capture,
-        lambda plane, kernel: restoration.wiener(plane, kernel, balance, clip=False),
+        lambda plane, kernel: restoration.wiener(
+            _taper(plane, kernel), kernel, balance, clip=False
+        ),
     )
 
 
@@ -124,10 +128,11 @@ def admm_tv(capture: LocalCapture, weight: float) -> FloatArray:
     psf = LocalPsf(
         kernels=capture.kernels[None], field_heights_mm=np.zeros(1), window=capture.window
     )
+    widest = max(*capture.planes.shape[1:], OVERLAP_PX) + OVERLAP_PX
     bank = BlockBank(
         psf,
         admm_tv_filter(capture.noise, weight=weight),
-        block_px=BLOCK_PX,
+        block_px=4 * scipy.fft.next_fast_len(-(-widest // 4), real=True),
         overlap_px=OVERLAP_PX,
         threads=1,
     )
@@ -138,17 +143,17 @@ PEERS: Final[dict[str, Peer]] = {
     "skimage_wiener": Peer(
         restore=wiener,
         parameter="balance",
-        candidates=(1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0),
+        candidates=(3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0, 3.0, 10.0),
     ),
     "skimage_rl": Peer(
         restore=richardson_lucy,
         parameter="iterations",
-        candidates=(2, 4, 6, 8, 12, 16, 24, 32),
+        candidates=(4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0),
     ),
     "admm_tv": Peer(
         restore=admm_tv,
         parameter="weight",
-        candidates=(1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0),
+        candidates=(0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0),
     ),
 }
 
@@ -166,6 +171,25 @@ def _each_plane(
         sharp = restore(padded, kernel)
         out[:] = sharp[rows[0] : rows[0] + height, columns[0] : columns[0] + width]
     return restored
+
+
+def _taper(plane: FloatArray, kernel: FloatArray) -> FloatArray:
+    """Blend the outermost kernel width of a padded plane to its own periodic blur.
+
+    References: Reeves 2005 (edge taper as pre-processing).
+    """
+    side = kernel.shape[-1]
+    spread = np.zeros(plane.shape, dtype=np.float32)
+    spread[:side, :side] = kernel
+    spread = np.roll(spread, (-(side // 2), -(side // 2)), axis=(0, 1))
+    blurred = scipy.fft.irfft2(scipy.fft.rfft2(plane) * scipy.fft.rfft2(spread), s=plane.shape)
+    rise = np.sin(np.pi / 2 * (np.arange(side, dtype=np.float32) + 0.5) / side) ** 2
+    keep = []
+    for length in plane.shape:
+        line = np.ones(length, dtype=np.float32)
+        line[:side] = rise
+        keep.append(np.minimum(line, line[::-1]))
+    return np.asarray(blurred + keep[0][:, None] * keep[1] * (plane - blurred), dtype=np.float32)
 
 
 def _border(side_px: int, margin_px: int) -> tuple[int, int]:

@@ -89,7 +89,7 @@ def test_an_error_is_one_line_and_debug_adds_the_traceback(monkeypatch, capsys) 
 def test_a_system_error_is_one_line_too(monkeypatch, capsys) -> None:
     _failing(monkeypatch, PermissionError(13, "Permission denied", "out"))
     assert run(["process", "x"]) == ExitCode.INPUT_FAILED
-    assert capsys.readouterr().err.count("\n") == 1
+    assert capsys.readouterr().err == "camkit: out: Permission denied\n"
 
 
 def test_an_interrupt_ends_with_130_and_says_so(monkeypatch, camkit_command) -> None:

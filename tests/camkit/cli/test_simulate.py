@@ -77,5 +77,9 @@ def test_what_cannot_be_photographed_is_refused_and_nothing_is_written(
     assert not (captures / "s.dng").exists()
 
 
+def test_a_negative_seed_is_a_usage_error(captures, camkit_command) -> None:
+    assert _simulate(camkit_command, "procedural:3", "--seed", "-1").code == ExitCode.USAGE
+
+
 def test_only_a_dng_is_written(captures, camkit_command) -> None:
     assert _simulate(camkit_command, "procedural:3", out="s.png").code == ExitCode.USAGE

@@ -1,0 +1,62 @@
+"""The whole chain by its commands: train, export, check, simulate, process."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import torch
+
+from camkit.bundle.psf_file import write_psf
+from camkit.bundle.reader import open_bundle
+from camkit.models_def.optics.frozen import FreezeGrid, freeze
+from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.training.recipe import read_recipe
+from tests.models_def.training.conftest import RECIPE
+
+PRESCRIPTION = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
+SMALL = {
+    "width_px = 600": "width_px = 1600",
+    "height_px = 400": "height_px = 1200",
+    'prescription = "duet"': 'prescription = "duet"\ncopies = 1\nfields = 3\nkernel_px = 65\n'
+    "rays = 512",
+    "steps = 12": "steps = 4",
+}
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def test_a_recipe_becomes_a_proved_bundle_that_turns_a_capture_into_a_picture(
+    camkit_command, tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = RECIPE
+    for old, new in SMALL.items():
+        text = text.replace(old, new)
+    (tmp_path / "tiny.toml").write_text(text, encoding="utf-8")
+    trained = camkit_command("train", "tiny.toml", "--size", "S", "--workers", "0", "--json")
+    assert trained.code == 0, trained.err
+    assert json.loads(trained.out)["steps"] == 4
+
+    grid = FreezeGrid(fields=3, wavelengths=3, rays=512, max_side_px=65, energy=0.97)
+    frozen = freeze(
+        read_prescription(PRESCRIPTION), read_recipe(tmp_path / "tiny.toml").camera, grid
+    )
+    write_psf(tmp_path / "runs" / "psf.safetensors", frozen.psf)
+    exported = camkit_command("export", "runs/tiny_S.pt", "-o", "tiny.camkit")
+    assert exported.code == 0, exported.err
+    bundle = open_bundle(tmp_path / "tiny.camkit")
+    assert {"prescription.toml", "golden.safetensors", "card.md"} <= set(bundle.names)
+    assert camkit_command("check", "tiny.camkit", "--level", "golden").code == 0
+
+    scene = ("simulate", "procedural:5", "--bundle", "tiny.camkit", "-o", "shot.dng")
+    assert camkit_command(*scene, "--size-px", "192,128").code == 0
+    run = ("process", "shot.dng", "--bundle", "tiny.camkit", "--size", "S", "--json")
+    result = json.loads(camkit_command(*run).out)
+    assert (result["status"], result["size"]) == ("ok", "S"), result["error"]

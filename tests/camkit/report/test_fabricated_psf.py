@@ -1,0 +1,62 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.bundle.psf_file import psf_to_bytes
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.writer import write_bundle
+from camkit.contracts import FrozenPsf
+from camkit.errors import ContractError
+from camkit.report.fabricated_psf import fabricated_psf, lens_text
+from tests.bundle_factory import tiny_camera, tiny_manifest, tiny_members, tiny_psf
+
+LENS = (Path(__file__).resolve().parents[3] / "models_def/prescriptions/duet.toml").read_text()
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    """The lens of duet in front of a small sensor, frozen at 2 fields and 3 wavelengths."""
+    path = tmp_path_factory.mktemp("lens") / "small.camkit"
+    members = tiny_members() | {
+        "psf.safetensors": psf_to_bytes(tiny_psf()),
+        "prescription.toml": LENS.encode(),
+    }
+    camera = tiny_camera().model_copy(update={"width_px": 320, "height_px": 240})
+    write_bundle(path, tiny_manifest().model_copy(update={"camera": camera}), members)
+    return open_bundle(path)
+
+
+def traced(bundle: Bundle, seed: int, folder: Path) -> FrozenPsf:
+    return fabricated_psf(bundle, seed, cache_folder=folder)
+
+
+def test_the_grid_is_twice_and_three_times_as_dense(bundle: Bundle, tmp_path: Path) -> None:
+    psf = traced(bundle, 1, tmp_path)
+    assert psf.field_heights_mm.size == 2 * 2 - 1
+    assert psf.wavelengths_um.size == 3 * 3 - 2
+
+
+def test_copies_differ_by_seed_and_from_the_design_and_are_kept(
+    bundle: Bundle, tmp_path: Path
+) -> None:
+    first = traced(bundle, 1, tmp_path)
+    (kept,) = tmp_path.iterdir()
+    before = kept.stat().st_mtime_ns
+    again = traced(bundle, 1, tmp_path)
+    np.testing.assert_array_equal(first.kernels, again.kernels)
+    assert kept.stat().st_mtime_ns == before
+    other = traced(bundle, 2, tmp_path)
+    assert not np.array_equal(first.distortion.coefficients, other.distortion.coefficients)
+
+
+def test_a_bundle_without_a_lens_asks_for_one(bundle: Bundle, tmp_path: Path) -> None:
+    path = tmp_path / "lens.toml"
+    path.write_text(LENS)
+    members = {k: v for k, v in bundle.manifest.members.items() if k != "prescription.toml"}
+    manifest = bundle.manifest.model_copy(update={"members": members})
+    bare = dataclasses.replace(bundle, manifest=manifest)
+    with pytest.raises(ContractError, match="--prescription"):
+        lens_text(bare, None)
+    assert lens_text(bare, path) == LENS == lens_text(bundle, None)

@@ -1,0 +1,149 @@
+"""The documents say what the program does: commands, options, keys, fields and links exist."""
+
+import json
+import re
+import shlex
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+import camkit
+from camkit.bundle.manifest import Manifest
+from camkit.cli.app import app
+from camkit.runtime.output.sidecar import sidecar_path
+from tests.capture_factory import write_tiny_captures
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+MADE_BY_EXPORT = "camkit/bundles/duet.camkit"
+EVERYWHERE = {"--help", "-h", "--debug"}
+
+
+@cache
+def _commands() -> dict[str, Any]:
+    return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+
+def _options(command: str) -> set[str]:
+    found = set()
+    for parameter in _commands()[command].params:
+        if parameter.param_type_name == "option":
+            found |= {*parameter.opts, *parameter.secondary_opts}
+    return found
+
+
+def _code_lines(text: str) -> list[str]:
+    """Give the lines of indented and fenced code that call camkit."""
+    lines = [line.strip() for line in text.splitlines() if line.startswith("    ")]
+    for block in re.findall(r"^```sh[^\n]*\n(.*?)^```$", text, re.DOTALL | re.MULTILINE):
+        lines += block.splitlines()
+    lines = [re.sub(r"^\.venv/bin/", "", line) for line in lines]
+    return [line for line in lines if line.startswith("camkit ")]
+
+
+def _inline(text: str) -> list[str]:
+    return [code for code in re.findall(r"`([^`\n]+)`", text) if code.startswith("camkit ")]
+
+
+def _id(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=_id)
+def test_every_command_line_parses(document: Path) -> None:
+    for line in _code_lines(document.read_text(encoding="utf-8")):
+        words = shlex.split(line, comments=True)[1:]
+        assert words[0] in _commands(), line
+        try:
+            _commands()[words[0]].make_context(words[0], words[1:])
+        except Exception as error:  # noqa: BLE001 - the line is told with whatever is wrong
+            pytest.fail(f"{line}: {error}")
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=_id)
+def test_every_command_in_a_sentence_exists_with_its_options(document: Path) -> None:
+    for code in _inline(document.read_text(encoding="utf-8")):
+        words = code.split()[1:]
+        if words[0].startswith("-") or words[0] == "COMMAND":
+            continue
+        assert words[0] in _commands(), code
+        unknown = {w for w in words if w.startswith("--")} - _options(words[0]) - EVERYWHERE
+        assert not unknown, code
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=_id)
+def test_every_link_leads_somewhere(document: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
+        if not target.startswith("http"):
+            assert (document.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=_id)
+def test_every_file_and_module_named_exists(document: Path) -> None:
+    text = document.read_text(encoding="utf-8")
+    tops = "camkit|runtime|export|models_def|tests|tools|docs"
+    for name in re.findall(rf"`((?:{tops})/[A-Za-z0-9_./-]+)`", text):
+        assert name == MADE_BY_EXPORT or (ROOT / name).exists(), name
+    for module in re.findall(r"`camkit((?:\.[a-z_]+)+)\b[^`]*`", text):
+        parts = module.strip(".").split(".")
+        here = parts[0] in camkit.__all__
+        places = [Path("camkit", *parts[:n]) for n in range(1, len(parts) + 1)]
+        files = [ROOT / p.with_suffix(".py") for p in places] + [ROOT / p for p in places[-1:]]
+        assert here or any(f.exists() for f in files), module
+
+
+def _sections() -> dict[str, str]:
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    parts = re.split(r"^## camkit ([a-z]+)[^\n]*\n", text, flags=re.MULTILINE)[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def test_the_reference_has_a_section_for_every_command() -> None:
+    assert set(_sections()) == set(_commands())
+
+
+@pytest.mark.parametrize("command", ["process", "info", "check", "simulate", "doctor"])
+def test_the_reference_lists_the_options_of_use_time(command: str) -> None:
+    _check_options(command)
+
+
+@pytest.mark.parametrize("command", ["freeze", "train", "export"])
+def test_the_reference_lists_the_options_of_design_time(command: str) -> None:
+    _check_options(command)
+
+
+def _check_options(command: str) -> None:
+    documented = set(re.findall(r"`(--[a-z-]+|-o)\b", _sections()[command]))
+    parameters = [p for p in _commands()[command].params if p.param_type_name == "option"]
+    unknown = documented - _options(command) - EVERYWHERE
+    assert not unknown
+    for parameter in parameters:
+        names = {*parameter.opts, *parameter.secondary_opts}
+        assert names & (documented | EVERYWHERE), f"{command}: {names} is not documented"
+
+
+def test_the_reference_lists_the_keys_of_sidecar_and_json(tmp_path: Path) -> None:
+    bundle = write_tiny_captures(tmp_path, ["a"])
+    (result,) = camkit.process(tmp_path / "a.dng", bundle=bundle, out_dir=tmp_path / "out")
+    assert result.output is not None, result.error
+    section = _sections()["process"]
+    sentence = section.partition("One object of")[2].partition("With `--dry-run`")[0]
+    table = section.partition("### The sidecar")[2].partition("`--resume` skips")[0]
+    in_table = set(re.findall(r"`([a-z0-9_]+)`", "".join(re.findall(r"^\|(.*?)\|", table, re.M))))
+    assert set(result.to_json()) <= set(re.findall(r"`([a-z_]+)`", sentence))
+    assert in_table == set(json.loads(sidecar_path(result.output).read_text()))
+
+
+def test_the_format_lists_every_field_of_the_manifest() -> None:
+    text = (ROOT / "docs" / "bundle-format.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([a-z0-9_]+)`", text))
+    schema = Manifest.model_json_schema()
+    fields = set(schema["properties"])
+    for part in ("Camera", "Wiener", "GoldenCase", "CardRow", "NetworkFacts"):
+        fields |= set(schema["$defs"][part]["properties"])
+    said_in_words = {"type", "member", "input_name", "input_channels"}
+    said_in_words |= {"output_name", "output_channels"}
+    assert fields - said_in_words <= named
