@@ -7,6 +7,7 @@ One file's failure never stops the others; `resume` skips only what a sidecar pr
 """
 
 import glob
+import logging
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,9 +18,12 @@ from typing import Final
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
+from camkit.runtime.network.tiling import Cancel, Cancelled
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.raw import named_bundle
+
+logger = logging.getLogger(__name__)
 
 FileProgress = Callable[[Path, int, int], None]
 
@@ -128,6 +132,7 @@ def process(
     mosaic: MosaicOptions | None = None,
     jobs: int = 1,
     progress: FileProgress | None = None,
+    cancel: Cancel | None = None,
     on_result: Callable[[FileResult], None] | None = None,
     **choices: object,
 ) -> list[FileResult]:
@@ -141,6 +146,7 @@ def process(
         mosaic: How to read headerless mosaics.
         jobs: Captures at once; the threads are shared among them.
         progress: Called with (file, done, total) at every tile, from the working thread.
+        cancel: Asked at every tile; true ends the run with `Cancelled`, finished files stay.
         on_result: Called with each result as it is ready.
         **choices: Single fields of `Options` and `WriteOptions` by name.
 
@@ -157,14 +163,18 @@ def process(
     listed = [files] if isinstance(files, str | Path) else list(files)
     tasks = plan_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
     if write.format == "dng":
+        if options.color == "acescg":
+            raise ContractError("a DNG holds camera RGB; leave --color out or say camera")
         options = replace(options, color="camera")
     pipelines = _Pipelines(_shared(options, jobs))
     if bundle is not None and tasks:
         pipelines.get(str(bundle))
     write.out_dir.mkdir(parents=True, exist_ok=True)
 
+    plan = _Plan(write=write, mosaic=mosaic, progress=progress, cancel=cancel)
+
     def run(task: Task) -> FileResult:
-        result = _run_task(task, pipelines, write, mosaic, progress)
+        result = _run_task(task, pipelines, plan)
         if on_result is not None:
             on_result(result)
         return result
@@ -206,6 +216,16 @@ def _shared(options: Options, jobs: int) -> Options:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plan:
+    """What all tasks of a run share."""
+
+    write: WriteOptions
+    mosaic: MosaicOptions | None
+    progress: FileProgress | None
+    cancel: Cancel | None
+
+
 class _Pipelines:
     """One pipeline per bundle, made when first needed."""
 
@@ -222,23 +242,29 @@ class _Pipelines:
             return self._made[bundle]
 
 
-def _run_task(
-    task: Task,
-    pipelines: _Pipelines,
-    write: WriteOptions,
-    mosaic: MosaicOptions | None,
-    progress: FileProgress | None,
-) -> FileResult:
+def _run_task(task: Task, pipelines: _Pipelines, plan: _Plan) -> FileResult:
     if task.refusal is not None:
         return FileResult.failure(task.source, None, task.refusal)
     named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
+    write = plan.write
     try:
         pipeline = pipelines.get(task.bundle)
-        if write.resume and proved_done(task.source, task.target, pipeline, write, mosaic):
+        if write.resume and proved_done(task.source, task.target, pipeline, write, plan.mosaic):
             return FileResult.skip(task.source, task.target, pipeline)
-        tick = None if progress is None else _tick(progress, task.source)
-        return develop_file(task.source, task.target, pipeline, write, mosaic, tick)
+        tick = None if plan.progress is None else _tick(plan.progress, task.source)
+        return develop_file(
+            task.source,
+            task.target,
+            pipeline,
+            write,
+            mosaic=plan.mosaic,
+            progress=tick,
+            cancel=plan.cancel,
+        )
+    except Cancelled:
+        raise
     except (CamkitError, OSError) as error:
+        logger.debug("%s failed", task.source, exc_info=error)
         return FileResult.failure(task.source, named, f"{error}")
 
 

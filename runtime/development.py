@@ -4,13 +4,13 @@ import json
 import resource
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
 from camkit.errors import ContractError
 from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.output.linear_dng import LinearDngWriter
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
@@ -147,20 +147,23 @@ def develop_file(
     target: Path,
     pipeline: Pipeline,
     write: WriteOptions,
+    *,
     mosaic: MosaicOptions | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
 ) -> FileResult:
     """Turn one capture into a picture and a sidecar; either both appear or neither changes.
 
     Raises:
         DecodeError: If the capture cannot be read.
         ContractError: If capture and bundle do not fit each other.
+        Cancelled: If `cancel` said so.
     """
     began = time.perf_counter()
     capture = read_capture(source, mosaic=mosaic)
     decode_s = time.perf_counter() - began
     decoded_mb = decode_peak_mb()
-    work = pipeline.start(capture, progress=progress)
+    work = pipeline.start(capture, progress=progress, cancel=cancel)
     with atomic_output(target) as part:
         write_s = _write_picture(part, work, write)
         output_sha256 = file_sha256(part)

@@ -159,6 +159,7 @@ def _read_isolated(path: Path, limits: _Limits) -> Capture:
             stdout=subprocess.PIPE,
             stderr=complaints,
             env=_child_environment(),
+            process_group=0,  # an interrupt is for the parent, which then ends the child
         ) as child,
     ):
         expired = threading.Event()

@@ -41,6 +41,10 @@ from camkit.runtime.signal.noise import measure_noise
 from camkit.runtime.signal.stabilise import stabilise, unstabilise
 
 BAND_ROWS: Final = 128
+STAGE_ORDER: Final = (
+    *("noise", "demosaic", "wiener", "rl", "admm-tv", "stabilise", "network"),
+    *("illumination", "undistort", "color"),
+)
 FIXED_BYTES: Final = 260_000_000
 """Interpreter, libraries and what the stages keep besides planes (measured, see docs)."""
 ROW_BYTES_PER_COLUMN: Final = 60_000
@@ -106,8 +110,9 @@ class Reconstruction:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Give the seconds per stage so far."""
-        return dict(self._clock.seconds)
+        """Give the seconds per stage so far, in the order of the data."""
+        spent = self._clock.seconds
+        return {name: spent[name] for name in sorted(spent, key=STAGE_ORDER.index)}
 
     @property
     def warnings(self) -> tuple[str, ...]:

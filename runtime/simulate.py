@@ -54,6 +54,8 @@ class SimulationOptions:
     def __post_init__(self) -> None:
         if not (self.iso > 0 and np.isfinite(self.iso)):
             raise ContractError(f"iso must be > 0; got {self.iso}")
+        if self.seed < 0:
+            raise ContractError(f"seed must be >= 0; got {self.seed}")
         if not (self.exposure > 0 and np.isfinite(self.exposure)):
             raise ContractError(f"exposure must be > 0; got {self.exposure}")
 

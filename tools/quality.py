@@ -83,7 +83,7 @@ def parse_arguments() -> argparse.Namespace:
     add("--work-dir", type=Path, default=Path("runs/quality"), help="journal and traced PSFs")
     add("--jobs", type=int, default=1, help="captures at a time")
     add("--limit-seconds", type=float, help="begin no capture after this time")
-    add("--resume", action="store_true", help="keep what the journal holds")
+    add("--resume", action="store_true", help="keep and report what the journal holds")
     add("--tune", action="store_true", help="tune the classical methods on --data")
     return parser.parse_args()
 
@@ -193,12 +193,8 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         append_journal(journal, found)
         if number in (3, 10) or number % 25 == 0 or number == len(work):
             show_pace(found, number, len(work), time.perf_counter() - began)
-    wanted = {(s.psf, s.set_name, s.picture.name, s.position, s.iso) for s in shots}
-    measurements = [
-        m
-        for m in read_journal(journal)
-        if (m.method, m.identity) in current and m.capture in wanted
-    ]
+    # what an earlier run measured counts too, as long as nothing that decides it has changed
+    measurements = [m for m in read_journal(journal) if (m.method, m.identity) in current]
     names = [row.name for row in rows]
     report |= {
         "command": f"python {shlex.join(sys.argv)}",
@@ -206,7 +202,7 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         "machine": machine(),
         "bundle": {"name": bundle.manifest.name, "sha256": bundle.sha256},
         "rivals": {rival.label: rival.bundle.sha256 for rival in rivals},
-        "protocol": {"text": protocol_text(bundle, isos_of(arguments)), "captures": len(shots)},
+        "protocol": {"text": protocol_text(bundle, isos_of(arguments))},
         "methods": names,
         "seconds_per_megapixel": seconds_per_megapixel(measurements),
         "summary": summarise(measurements, names),
@@ -229,7 +225,7 @@ def isos_of(arguments: argparse.Namespace) -> list[float]:
 
 
 def list_shots(arguments: argparse.Namespace) -> list[Shot]:
-    """Give all captures, the first picture of every set first, so that a part is a fair part."""
+    """Give all captures, those of the first picture of every set first: a part is a fair part."""
     kinds: Sequence[Any] = ("fresh", "bundle") if arguments.psf == "both" else (arguments.psf,)
     shots = [
         Shot(
@@ -246,7 +242,7 @@ def list_shots(arguments: argparse.Namespace) -> list[Shot]:
         for iso in isos_of(arguments)
         for kind in kinds
     ]
-    return sorted(shots, key=lambda shot: shot.number)
+    return sorted(shots, key=lambda shot: (shot.number, shot.position))
 
 
 def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: float) -> None:

@@ -100,11 +100,10 @@ def _row(bundle: Bundle, name: str, tuned: Tuned, isos: Sequence[float], base: s
             raise ContractError(
                 f"{name} is not tuned for ISO {', '.join(missing)}; run with --tune first"
             )
-        used = tuned_to_json({name: {iso: values[iso] for iso in isos}})
         return Row(
             name=name,
             restore=_peer_restorer(bundle, name, values),
-            identity=identity_of(base, used),
+            identity=identity_of(base, tuned_to_json({name: values})),
         )
     if name in BANK_METHODS:
         method: Any = BANK_METHODS[name]

@@ -238,7 +238,9 @@ def _to_rec709(chromaticities: Any) -> Matrix | None:
         return None
     values = np.asarray(chromaticities, dtype=np.float64).ravel()
     expected = np.array([*np.ravel(REC709_PRIMARIES), *D65])
-    if values.shape != (8,) or not (np.isfinite(values).all() and (values[1::2] > 0).all()):
+    # Primaries may be imaginary (the blue of ACES 2065-1 has y < 0); the white may not.
+    ys = values[1::2]
+    if values.shape != (8,) or not (np.isfinite(values).all() and ys.all() and ys[-1] > 0):
         raise DecodeError(f"EXR chromaticities are not believable: {values.tolist()}")
     if np.abs(values - expected).max() <= _CHROMATICITY_TOLERANCE:
         return None

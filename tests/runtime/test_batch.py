@@ -16,6 +16,7 @@ import camkit
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.batch import expand
 from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.network.tiling import Cancelled
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.capture_factory import write_tiny_captures
 
@@ -211,3 +212,17 @@ def test_kill_in_mid_batch_and_resume_give_the_same_and_nothing_half(tmp_path: P
     for result in whole:
         assert result.output is not None
         np.testing.assert_array_equal(_pixels(result.output), _pixels(out / result.output.name))
+
+
+def test_cancel_ends_the_run_and_keeps_what_is_finished(captures: Path) -> None:
+    done: list[Path] = []
+    with pytest.raises(Cancelled):
+        camkit.process(
+            captures / "*.dng",
+            bundle=captures / "tiny.camkit",
+            out_dir=captures / "out",
+            on_result=lambda result: done.append(result.input),
+            cancel=lambda: bool(done),
+        )
+    assert [p.name for p in done] == ["a.dng"]
+    assert sorted(p.name for p in (captures / "out").iterdir()) == ["a.camkit.json", "a.exr"]

@@ -189,6 +189,6 @@ def test_streamed_bands_are_the_rows_of_the_picture(tmp_path: Path) -> None:
     summary = pipeline.stream(tmp_path / "a.dng", lambda top, band: bands.append((top, band)))
     picture = pipeline.process(tmp_path / "a.dng")
     np.testing.assert_array_equal(np.concatenate([b for _, b in bands], axis=1), picture.image)
-    assert [top for top, _ in bands][0] == 0
+    assert next(top for top, _ in bands) == 0
     assert summary.shape == picture.image.shape
     assert set(summary.seconds) == set(picture.seconds)

@@ -38,8 +38,8 @@ def test_identities_follow_lens_and_parameters(bundle: Bundle) -> None:
 
     first = identities(TUNED, "lens")
     assert len(set(first)) == len(METHODS)
-    retuned = identities(TUNED | {"admm_tv": {100.0: 2.0}}, "lens")
-    assert [a == b for a, b in zip(first, retuned, strict=True)] == [
+    second = identities(TUNED | {"admm_tv": {100.0: 2.0}}, "lens")
+    assert [a == b for a, b in zip(first, second, strict=True)] == [
         name != "admm_tv" for name in METHODS
     ]
     assert not set(first) & set(identities(TUNED, "another lens"))
