@@ -130,7 +130,6 @@ def process(
     options: Options | None = None,
     write: WriteOptions | None = None,
     mosaic: MosaicOptions | None = None,
-    jobs: int = 1,
     progress: FileProgress | None = None,
     cancel: Cancel | None = None,
     on_result: Callable[[FileResult], None] | None = None,
@@ -142,9 +141,8 @@ def process(
         files: Captures, folders or globs.
         bundle: Name or path; None takes the bundle each file names; "none" only develops.
         options: What changes the pixels. Single fields may also be given by name (size="S").
-        write: Where and how to write. Single fields may also be given by name (out_dir="out").
+        write: Where and how to write, how many at once. Single fields also by name (jobs=2).
         mosaic: How to read headerless mosaics.
-        jobs: Captures at once; the threads are shared among them.
         progress: Called with (file, done, total) at every tile, from the working thread.
         cancel: Asked at every tile; true ends the run with `Cancelled`, finished files stay.
         on_result: Called with each result as it is ready.
@@ -158,15 +156,13 @@ def process(
         BundleError: If the named bundle is refused.
     """
     options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
-    if jobs < 1:
-        raise ContractError(f"jobs must be >= 1; got {jobs}")
     listed = [files] if isinstance(files, str | Path) else list(files)
     tasks = plan_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
     if write.format == "dng":
         if options.color == "acescg":
             raise ContractError("a DNG holds camera RGB; leave --color out or say camera")
         options = replace(options, color="camera")
-    pipelines = _Pipelines(_shared(options, jobs))
+    pipelines = _Pipelines(_shared(options, write.jobs))
     if bundle is not None and tasks:
         pipelines.get(str(bundle))
     write.out_dir.mkdir(parents=True, exist_ok=True)
@@ -179,9 +175,9 @@ def process(
             on_result(result)
         return result
 
-    if jobs == 1:
+    if write.jobs == 1:
         return [run(task) for task in tasks]
-    with ThreadPoolExecutor(jobs, thread_name_prefix="camkit") as pool:
+    with ThreadPoolExecutor(write.jobs, thread_name_prefix="camkit") as pool:
         return list(pool.map(run, tasks))
 
 

@@ -34,6 +34,7 @@ class WriteOptions:
         linear: TIFF without the sRGB curve.
         resume: Skip what a sidecar proves done.
         overwrite: Replace pictures that exist.
+        jobs: Captures at once; threads and memory are shared among them.
     """
 
     out_dir: Path = Path()
@@ -41,12 +42,15 @@ class WriteOptions:
     linear: bool = False
     resume: bool = False
     overwrite: bool = False
+    jobs: int = 1
 
     def __post_init__(self) -> None:
         if self.format not in get_args(FileFormat):
             raise ContractError(
                 f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"
             )
+        if self.jobs < 1:
+            raise ContractError(f"jobs must be >= 1; got {self.jobs}")
         if self.resume and self.overwrite:
             raise ContractError("resume keeps what is done, overwrite redoes it: choose one")
 

@@ -88,6 +88,7 @@ def process(
         linear=linear,
         resume=resume,
         overwrite=overwrite,
+        jobs=jobs,
     )
     sources = expand(files)
     if not sources:
@@ -104,7 +105,6 @@ def process(
                 options=options,
                 write=write,
                 mosaic=headerless,
-                jobs=jobs,
                 progress=progress.tile,
                 on_result=lambda result: progress.result(result, as_json=json_),
             )
