@@ -1,0 +1,144 @@
+"""Measure what docs/measurements.md states, and print the tables as Markdown.
+
+python tools/measure.py speed CAPTURE.dng [--runs 3] [--sizes S,M]
+python tools/measure.py tiling [--bundle duet]
+python tools/measure.py raws FOLDER --out-dir out/raws
+"""
+
+import argparse
+import json
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from camkit.bundle.reader import built_in_bundles, find_bundle, open_bundle
+from camkit.cli.doctor import examine
+from camkit.runtime.network.engine import NetworkEngine, available_threads
+from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.rows import ArrayRows
+
+NOKIA = ("--mosaic", "GRBG", "--black-level", "25", "--white-level", "1023")
+RAW_OPTIONS = {"nokia_n900_bayer_grbg10.png": NOKIA}
+TRANSFORMS = ("wiener", "network")
+
+
+def main() -> None:
+    """Run one of the measurements."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    speed = commands.add_parser("speed")
+    speed.add_argument("capture", type=Path)
+    speed.add_argument("--bundle", default="duet")
+    speed.add_argument("--runs", type=int, default=3)
+    speed.add_argument("--sizes", default="S,M")
+    tiling = commands.add_parser("tiling")
+    tiling.add_argument("--bundle", default=None)
+    tiling.add_argument("--width", type=int, default=6000)
+    tiling.add_argument("--height", type=int, default=4000)
+    raws = commands.add_parser("raws")
+    raws.add_argument("folder", type=Path)
+    raws.add_argument("--out-dir", type=Path, default=Path("out/raws"))
+    arguments = parser.parse_args()
+    machine = examine()
+    print(f"Machine: {machine['processor']}, {machine['threads']} threads, {platform.system()}\n")
+    {"speed": measure_speed, "tiling": measure_tiling, "raws": measure_raws}[arguments.command](
+        arguments
+    )
+
+
+def measure_speed(arguments: argparse.Namespace) -> None:
+    """Time `camkit process` to EXR in fresh processes, sizes taken in turn; medians."""
+    sizes = arguments.sizes.split(",")
+    found: dict[str, list[dict[str, float]]] = {size: [] for size in sizes}
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(arguments.runs):
+            for size in sizes:
+                command = [
+                    *(sys.executable, "-m", "camkit", "process", str(arguments.capture)),
+                    *("--bundle", arguments.bundle, "--size", size, "--json", "--overwrite"),
+                    *("--out-dir", folder),
+                ]
+                done = subprocess.run(command, capture_output=True, text=True, check=True)
+                result = json.loads(done.stdout)
+                found[size].append({**result["seconds"], "peak_mb": result["peak_rss_mb"]})
+    stages = [name for name in found[sizes[0]][0] if name != "peak_mb"]
+    print("| size | " + " | ".join(stages) + " | all | neither network nor FFT | peak MB |")
+    print("|" + "---|" * (len(stages) + 4))
+    for size, runs in found.items():
+        median = {key: statistics.median(run[key] for run in runs) for key in runs[0]}
+        totals = [sum(run[name] for name in stages) for run in runs]
+        rest = [sum(run[name] for name in stages if name not in TRANSFORMS) for run in runs]
+        cells = [f"{median[name]:.2f}" for name in stages]
+        cells += [f"{statistics.median(totals):.1f}", f"{statistics.median(rest):.1f}"]
+        print(f"| {size} | " + " | ".join(cells) + f" | {median['peak_mb']:.0f} |")
+
+
+def measure_tiling(arguments: argparse.Namespace) -> None:
+    """Compare the planned tiling with one window, for every network of the bundles."""
+    names = [arguments.bundle] if arguments.bundle else sorted(built_in_bundles())
+    print("| bundle | size | picture | windows | largest difference |\n|---|---|---|---|---|")
+    for name in names:
+        bundle = open_bundle(find_bundle(name))
+        for size, facts in bundle.manifest.networks.items():
+            engine = NetworkEngine(bundle.network_bytes(size), threads=available_threads(None))
+            shape = (facts.input_channels, arguments.height, arguments.width)
+            planes = np.random.default_rng(0).uniform(0, 3, shape).astype(np.float32)
+            limits = TileLimits(
+                stride_px=facts.stride_px,
+                halo_px=facts.reach_px,
+                bytes_per_px=facts.bytes_per_pixel,
+            )
+            plan = plan_windows(arguments.height, arguments.width, limits)
+            whole = TileLimits(
+                stride_px=facts.stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True
+            )
+            (one,) = infer_bands(
+                engine.run,
+                ArrayRows(planes),
+                plan_windows(arguments.height, arguments.width, whole),
+            )
+            worst, top = 0.0, 0
+            for band in infer_bands(engine.run, ArrayRows(planes), plan):
+                difference = np.abs(band - one[:, top : top + band.shape[1]])
+                worst, top = max(worst, float(difference.max())), top + band.shape[1]
+            picture = f"{arguments.width}x{arguments.height}"
+            print(f"| {name} | {size} | {picture} | {plan.window_count} | {worst:g} |")
+
+
+def measure_raws(arguments: argparse.Namespace) -> None:
+    """Develop every file of a folder without a bundle, and say what became of it."""
+    arguments.out_dir.mkdir(parents=True, exist_ok=True)
+    print("| file | result | size | CFA | black | white | seconds | notes |")
+    print("|---|---|---|---|---|---|---|---|")
+    for path in sorted(p for p in arguments.folder.rglob("*") if p.is_file()):
+        options = RAW_OPTIONS.get(path.name, ())
+        result = _camkit(
+            *("process", str(path), "--bundle", "none", "--format", "png", "--overwrite"),
+            *("--out-dir", str(arguments.out_dir), "--json", *options),
+        )
+        if not result or result["status"] != "ok":
+            reason = result.get("error", "no answer") if result else "no answer"
+            print(f"| {path.name} | refused | | | | | | {reason.split(': ', 1)[-1]} |")
+            continue
+        facts = _camkit("info", str(path), "--json", *options)
+        levels = sorted(set(facts["black_level"]))
+        print(
+            f"| {path.name} | ok | {facts['width']}x{facts['height']} | {facts['cfa'] or 'none'} | "
+            f"{', '.join(f'{v:g}' for v in levels)} | {facts['white_level']:g} | "
+            f"{sum(result['seconds'].values()):.1f} | {'; '.join(result['warnings'])} |"
+        )
+
+
+def _camkit(*words: str) -> dict:
+    command = [sys.executable, "-m", "camkit", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return json.loads(done.stdout) if done.stdout.strip() else {}
+
+
+if __name__ == "__main__":
+    main()
