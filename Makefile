@@ -13,7 +13,7 @@ demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 
 test: check  ## set-up with everything, gate, tests with branch coverage
 	$(DEV)/bin/python -m coverage erase
-	$(DEV)/bin/python -m coverage run -m pytest -q
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto
 	$(DEV)/bin/python -m coverage combine -q
 	$(DEV)/bin/python tools/coverage_gate.py
 
