@@ -7,20 +7,26 @@ leaves demo.dng, demo.exr, demo.png, their sidecars, and before_after.png.
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 import camkit
-from camkit.bundle.reader import find_bundle, open_bundle
-from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
 from camkit.contracts import FloatArray
+from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.network.engine import available_threads
+from camkit.runtime.output.sidecar import read_sidecar
+from camkit.runtime.signal.demosaic import demosaic
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate, write_capture
 from camkit.scenes import procedural_scene
 
 CROP_PX = 512
+EXPOSURE = 0.5
 FIELDS = (0.0, 0.25, 0.5, 0.75, 0.95)
 
 
@@ -43,7 +49,12 @@ def main() -> None:
         scene,
         camera,
         bundle.psf,
-        SimulationOptions(iso=arguments.iso, seed=1, workers=available_threads(None)),
+        SimulationOptions(
+            iso=arguments.iso,
+            seed=1,
+            exposure=EXPOSURE,
+            workers=available_threads(None),
+        ),
     )
     del scene
     capture = out_dir / "demo.dng"
@@ -58,6 +69,10 @@ def main() -> None:
             raise SystemExit(f"{capture}: {result.error}")
         print(f"{result.output}: {sum(result.seconds.values()):.1f} s, {result.peak_rss_mb:.0f} MB")
         print("  " + ", ".join(f"{name} {s:.2f} s" for name, s in result.seconds.items()))
+        if result.output is not None:
+            record = read_sidecar(result.output) or {}
+            for name, decided in record.get("plan", {}).items():
+                print(f"  plan, {name}: {decided}")
         for warning in result.warnings:
             print(f"  note: {warning}")
     _show_quality(simulation, arguments.bundle, arguments.iso, out_dir / "before_after.png")
@@ -66,10 +81,9 @@ def main() -> None:
 def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) -> None:
     """Compare crops from axis to corner with the sharp scene, in sensor geometry."""
     bundle = open_bundle(find_bundle(name))
-    matrix = np.linalg.inv(camera_from_rec709(np.array(bundle.manifest.camera.color_matrix))[0])
-    developed = camkit.load(name, method="wiener", undistort=False, vignetting=True)
+    matrix = rec709_from_camera(np.array(bundle.manifest.camera.color_matrix))
     methods = {
-        "wiener": developed,
+        "wiener": camkit.load(name, method="wiener", undistort=False),
         "net M": camkit.load(name, undistort=False),
     }
     height, width = simulation.mosaic.shape
@@ -83,7 +97,7 @@ def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) 
         cut = np.s_[..., y : y + CROP_PX, x : x + CROP_PX]
         sharp = encode_srgb(apply_matrix(matrix, simulation.clean[cut]))
         mosaic = np.ascontiguousarray(simulation.mosaic[cut])
-        tiles = [encode_srgb(_developed(mosaic, simulation, matrix, bundle))]
+        tiles = [encode_srgb(_seen(mosaic, simulation, bundle, x, y))]
         for pipeline in methods.values():
             image = pipeline.process_array(
                 mosaic, iso=iso, white_balance=simulation.white_balance, origin_px=(x, y)
@@ -96,21 +110,18 @@ def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) 
     print(f"\n{picture}: before, Wiener bank, network, sharp scene; one row per field position")
 
 
-def _developed(
-    mosaic: np.ndarray, simulation: Simulation, matrix: np.ndarray, bundle: object
+def _seen(
+    mosaic: NDArray[np.uint16], simulation: Simulation, bundle: Bundle, x: int, y: int
 ) -> FloatArray:
-    """Give the crop demosaicked and colour-corrected only: what the lens saw."""
-    from camkit.bundle.reader import Bundle
-    from camkit.runtime.signal.demosaic import demosaic
-
-    assert isinstance(bundle, Bundle)
+    """Give a crop demosaicked, white-balanced and without vignetting: what the lens saw."""
     camera = bundle.manifest.camera
-    signal = (mosaic.astype(np.float32) - camera.black_level) / (
-        camera.white_level - camera.black_level
-    )
-    planes = demosaic(signal.astype(np.float32), camera.cfa or "RGGB")
-    gains = np.array(simulation.white_balance, np.float32)[:, None, None]
-    return apply_matrix(matrix, planes * gains)
+    window = replace(simulation.window, size_px=(CROP_PX, CROP_PX), origin_px=(float(x), float(y)))
+    signal = mosaic.astype(np.float32) - np.float32(camera.black_level)
+    signal /= np.float32(camera.white_level - camera.black_level)
+    planes = demosaic(signal, camera.cfa or "RGGB")
+    planes *= np.array(simulation.white_balance, np.float32)[:, None, None]
+    planes = divide_illumination(planes, 0, bundle.psf, window)
+    return apply_matrix(rec709_from_camera(np.array(camera.color_matrix)), planes)
 
 
 def _psnr(image: FloatArray, sharp: FloatArray, border_px: int = 32) -> float:
