@@ -291,26 +291,31 @@ class BlockBank:
         tops = [int(span.index.min()) for span in self._rows]
         total = np.zeros((3, 0, width), dtype=np.float32)
         done = 0
+        for i, span in enumerate(self._rows):
+            top, bottom = min(tops[i:]), int(span.index.max()) + 1
+            mask = None if saturated is None else saturated(top, bottom)
+            strip = _Strip(source.read(top, bottom), mask, top, span)
+            end = span.start + span.inner.stop
+            total = np.concatenate(
+                [total, np.zeros((3, end - done - total.shape[1], width), np.float32)], axis=1
+            )
+            self._add_blocks(strip, total[:, span.start + span.inner.start - done :])
+            last = i + 1 == len(self._rows)
+            ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
+            yield total[:, : ready - done]
+            total = total[:, ready - done :].copy()
+            done = ready
+
+    def _add_blocks(self, strip: "_Strip", total: FloatArray) -> None:
+        """Add the windowed blocks of one block row to its rows, from left to right."""
+        # The threads end with the block row: a generator that waits for its next reader must not
+        # own any, since the garbage collector may close it while another thread is starting.
         pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
         with pool or nullcontext():
             run: Callable[..., Iterator[Any]] = map if pool is None else pool.map
-            for i, span in enumerate(self._rows):
-                top, bottom = min(tops[i:]), int(span.index.max()) + 1
-                mask = None if saturated is None else saturated(top, bottom)
-                strip = _Strip(source.read(top, bottom), mask, top, span)
-                end = span.start + span.inner.stop
-                total = np.concatenate(
-                    [total, np.zeros((3, end - done - total.shape[1], width), np.float32)], axis=1
-                )
-                first = span.start + span.inner.start - done
-                for column, part in zip(self._columns, self._restore(strip, run), strict=True):
-                    x = column.start + column.inner.start
-                    total[:, first:, x : x + part.shape[2]] += part
-                last = i + 1 == len(self._rows)
-                ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
-                yield total[:, : ready - done]
-                total = total[:, ready - done :].copy()
-                done = ready
+            for column, part in zip(self._columns, self._restore(strip, run), strict=True):
+                x = column.start + column.inner.start
+                total[:, :, x : x + part.shape[2]] += part
 
     def _restore(self, strip: "_Strip", run: Callable[..., Iterator[Any]]) -> Iterator[FloatArray]:
         """Give the windowed blocks of one block row, from left to right."""

@@ -1,3 +1,5 @@
+import threading
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -173,3 +175,13 @@ def test_a_failing_filter_ends_the_run_with_its_own_error():
 
 def test_psnr_of_the_tests_is_the_usual_one():
     assert psnr_db(np.zeros((3, 8, 8)), np.full((3, 8, 8), 0.1)) == pytest.approx(20, abs=1e-6)
+
+
+def test_a_bank_that_waits_between_bands_owns_no_threads() -> None:
+    """Else the collector, closing an abandoned generator, could wait for a thread that waits."""
+    psf = local_psf(gaussian_kernel(1.0, 3), np.zeros(1), (90, 200))
+    bank = BlockBank(psf, keep, block_px=32, overlap_px=8, threads=2)
+    bands = bank.restore_bands(ArrayRows(texture(200, 90)))
+    before = threading.active_count()
+    next(bands)
+    assert threading.active_count() == before
