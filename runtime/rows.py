@@ -91,23 +91,32 @@ class StackedRows:
 
 
 class RollingRows:
-    """Bands that arrive from top to bottom, kept only while a reader still needs them."""
+    """Bands that arrive from top to bottom, kept only while a reader still needs them.
+
+    Readers know their rows, but the rows know only the places of their readers: without a cycle
+    everything is freed as soon as the last reader is.
+    """
 
     def __init__(self, shape: tuple[int, int, int], bands: Iterator[FloatArray]) -> None:
         self.shape = shape
         self._bands = bands
         self._kept: list[tuple[int, FloatArray]] = []
         self._end = 0
-        self._readers: list[RowReader] = []
+        self._tops: list[int] = []
 
     def reader(self) -> "RowReader":
         """Give a new reader; make all readers before the first one reads."""
-        reader = RowReader(self)
-        self._readers.append(reader)
-        return reader
+        self._tops.append(0)
+        return RowReader(self, len(self._tops) - 1)
 
-    def _read(self, top: int, bottom: int) -> FloatArray:
-        needed = min(r.top for r in self._readers)
+    def read_for(self, reader: int, top: int, bottom: int) -> FloatArray:
+        """Give rows to one of the readers; `RowReader.read` says what is refused."""
+        if not 0 <= top < bottom <= self.shape[1]:
+            raise ContractError(f"rows {top}..{bottom} lie outside 0..{self.shape[1]}")
+        if top < self._tops[reader]:
+            raise ContractError(f"rows are read downwards; got {top} after {self._tops[reader]}")
+        self._tops[reader] = top
+        needed = min(self._tops)
         self._kept = [(y, b) for y, b in self._kept if y + b.shape[1] > needed]
         while self._end < bottom:
             band = next(self._bands, None)
@@ -122,11 +131,11 @@ class RollingRows:
 
 
 class RowReader:
-    """One reader of `RollingRows`; its `top` never moves back."""
+    """One reader of `RollingRows`; it never moves back."""
 
-    def __init__(self, rows: RollingRows) -> None:
+    def __init__(self, rows: RollingRows, number: int) -> None:
         self._rows = rows
-        self.top = 0
+        self._number = number
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -139,9 +148,4 @@ class RowReader:
         Raises:
             ContractError: If the rows lie outside the picture or above an earlier read.
         """
-        if not 0 <= top < bottom <= self.shape[1]:
-            raise ContractError(f"rows {top}..{bottom} lie outside 0..{self.shape[1]}")
-        if top < self.top:
-            raise ContractError(f"rows are read downwards; got {top} after {self.top}")
-        self.top = top
-        return self._rows._read(top, bottom)  # noqa: SLF001 - reader and rows are one thing
+        return self._rows.read_for(self._number, top, bottom)

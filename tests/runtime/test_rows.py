@@ -1,5 +1,6 @@
 """Rows that are pulled: what is read equals the picture, and nothing is kept for longer."""
 
+import gc
 from collections.abc import Iterator
 
 import numpy as np
@@ -93,3 +94,23 @@ def test_sources_of_different_size_cannot_be_stacked() -> None:
 def test_array_rows_need_channels() -> None:
     with pytest.raises(ContractError, match=r"channel, h, w"):
         ArrayRows(np.zeros((4, 4), dtype=np.float32))
+
+
+def test_rows_are_freed_with_their_last_reader() -> None:
+    closed: list[bool] = []
+
+    def bands() -> Iterator[FloatArray]:
+        try:
+            yield _picture(4)
+            yield _picture(4)
+        finally:
+            closed.append(True)
+
+    reader = RollingRows((2, 8, 3), bands()).reader()
+    reader.read(0, 2)
+    gc.disable()
+    try:
+        del reader
+        assert closed == [True]
+    finally:
+        gc.enable()
