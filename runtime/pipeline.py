@@ -113,14 +113,11 @@ class Pipeline:
             DecodeError: If the file cannot be read.
             ContractError: If capture and bundle do not fit each other.
         """
-        began = time.perf_counter()
-        capture = read_capture(Path(file), mosaic=mosaic)
-        decode_s = time.perf_counter() - began
-        work = self.start(capture, progress=progress, cancel=cancel)
+        work, decode_s = self._begin(file, mosaic, progress, cancel)
         image = work.fill(out)
         return Picture(
             image=image,
-            orientation=capture.orientation,
+            orientation=work.capture.orientation,
             seconds={"decode": decode_s, **work.seconds},
             warnings=work.warnings,
         )
@@ -147,20 +144,30 @@ class Pipeline:
             DecodeError: If the file cannot be read.
             ContractError: If capture and bundle do not fit each other.
         """
-        began = time.perf_counter()
-        capture = read_capture(Path(file), mosaic=mosaic)
-        decode_s = time.perf_counter() - began
-        work = self.start(capture, progress=progress, cancel=cancel)
+        work, decode_s = self._begin(file, mosaic, progress, cancel)
         top = 0
         for band in work.bands():
             on_band(top, band)
             top += band.shape[1]
         return Summary(
             shape=work.shape,
-            orientation=capture.orientation,
+            orientation=work.capture.orientation,
             seconds={"decode": decode_s, **work.seconds},
             warnings=work.warnings,
         )
+
+    def _begin(
+        self,
+        file: str | Path,
+        mosaic: MosaicOptions | None,
+        progress: Progress | None,
+        cancel: Cancel | None,
+    ) -> tuple[Reconstruction, float]:
+        """Read a capture and plan its reconstruction; also give the seconds of reading."""
+        began = time.perf_counter()
+        capture = read_capture(Path(file), mosaic=mosaic)
+        decode_s = time.perf_counter() - began
+        return self.start(capture, progress=progress, cancel=cancel), decode_s
 
     def process_array(
         self,
