@@ -19,7 +19,8 @@ from camkit.errors import CamkitError, ContractError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.network.tiling import Cancel, Cancelled
-from camkit.runtime.options import Options
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, LEAST_MAX_MEM_BYTES, Options
+from camkit.runtime.output.sidecar import read_sidecar
 from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.raw import named_bundle
 
@@ -55,7 +56,8 @@ class Task:
 def expand(files: Sequence[str | Path]) -> list[Path]:
     """Give the captures named by files, folders and globs, each once, in the order given.
 
-    A folder stands for the captures directly in it, by name; a glob that matches nothing and a
+    A folder stands for the captures directly in it, by name, without the pictures that a sidecar
+    beside them calls its output; a glob that matches nothing and a
     folder without captures stand for nothing; a file that does not exist is kept and fails later.
     """
     found: dict[Path, None] = {}
@@ -63,7 +65,7 @@ def expand(files: Sequence[str | Path]) -> list[Path]:
         path = Path(item)
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() in CAPTURE_SUFFIXES)
-            found.update(dict.fromkeys(p for p in inside if p.is_file()))
+            found.update(dict.fromkeys(p for p in inside if p.is_file() and not _is_result(p)))
         elif not path.exists() and glob.has_magic(str(item)):
             # pathlib has no glob that takes an absolute pattern
             matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))  # noqa: PTH207
@@ -71,6 +73,11 @@ def expand(files: Sequence[str | Path]) -> list[Path]:
         else:
             found[path] = None
     return list(found)
+
+
+def _is_result(path: Path) -> bool:
+    record = read_sidecar(path)
+    return record is not None and Path(str(record["output"])).name == path.name
 
 
 def plan_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptions) -> list[Task]:
@@ -206,10 +213,13 @@ def _shared(options: Options, jobs: int) -> Options:
     from camkit.runtime.network.engine import available_threads
 
     threads = max(1, available_threads(options.threads) // jobs)
-    memory = options.max_mem_bytes
-    return replace(
-        options, threads=threads, max_mem_bytes=None if memory is None else memory // jobs
-    )
+    memory = options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
+    if memory // jobs < LEAST_MAX_MEM_BYTES:
+        raise ContractError(
+            f"{memory // 10**6} MB shared by {jobs} jobs are {memory // jobs // 10**6} MB each; a "
+            f"job needs at least {LEAST_MAX_MEM_BYTES // 10**6} MB: raise --max-mem or lower --jobs"
+        )
+    return replace(options, threads=threads, max_mem_bytes=memory // jobs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -216,6 +216,10 @@ class Pipeline:
         """
         if self.bundle is None:
             raise ContractError("process_array needs a bundle: it says what the numbers mean")
+        if not isinstance(image, np.ndarray):
+            raise ContractError(f"expected a numpy array; got {type(image).__name__}")
+        if image.dtype == np.float32 and not np.isfinite(image).any():
+            raise ContractError("the array holds no finite sample")
         camera = self.bundle.manifest.camera
         is_mosaic = image.ndim == 2
         if not is_mosaic and (image.ndim != 3 or image.shape[0] != 3):

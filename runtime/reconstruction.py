@@ -243,7 +243,14 @@ class Reconstruction:
             tile_px=options.tile_px,
             whole=options.mode == "whole",
         )
-        plan = plan_windows(self.capture.height, self.capture.width, limits)
+        try:
+            plan = plan_windows(self.capture.height, self.capture.width, limits)
+        except ContractError as error:
+            spent = (FIXED_BYTES + rows + self.capture.samples.nbytes) // 10**6
+            raise ContractError(
+                f"of the cap of {memory // 10**6} MB everything but the network takes {spent} MB; "
+                f"{error}"
+            ) from error
         self.plan["tiles"] = {
             "mode": options.mode,
             "halo_px": halo,

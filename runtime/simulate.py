@@ -27,6 +27,10 @@ from camkit.runtime.output.part_file import atomic_output
 NOISE_ROWS: Final = 256
 
 
+LEAST_DNG_SIDE_PX: Final = 22
+"""LibRaw 0.22 takes smaller pictures for no RAW file (tried side by side)."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationOptions:
     """What is simulated and how.
@@ -124,8 +128,15 @@ def write_capture(path: Path, simulation: Simulation, camera: Camera, bundle_nam
     """Write a simulated capture as a DNG that names its bundle and its place on the sensor.
 
     Raises:
+        ContractError: If a side is shorter than RAW developers take.
         OSError: If the file cannot be written.
     """
+    if min(simulation.mosaic.shape) < LEAST_DNG_SIDE_PX:
+        height, width = simulation.mosaic.shape
+        raise ContractError(
+            f"a DNG needs sides of at least {LEAST_DNG_SIDE_PX} px to be read again; "
+            f"got {width}x{height}"
+        )
     window = simulation.window
     x0, y0 = (int(v) for v in window.origin_px)
     red, green, blue = (1 / gain for gain in simulation.white_balance)

@@ -6,6 +6,9 @@ leaves demo.dng, demo.exr, demo.png, their sidecars, and before_after.png.
 """
 
 import argparse
+import json
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -43,6 +46,7 @@ def main() -> None:
 
     bundle = open_bundle(find_bundle(arguments.bundle))
     camera = bundle.manifest.camera
+    print("photographing a 24-megapixel scene (about a minute) ...", flush=True)
     began = time.perf_counter()
     scene = procedural_scene(arguments.seed, camera.height_px, camera.width_px)
     simulation = simulate(
@@ -62,20 +66,29 @@ def main() -> None:
     print(f"{capture}: photographed in {time.perf_counter() - began:.1f} s")
 
     for kind in ("exr", "png"):
-        (result,) = camkit.process(
-            capture, bundle=arguments.bundle, out_dir=out_dir, format=kind, overwrite=True
-        )
-        if result.status != "ok":
-            raise SystemExit(f"{capture}: {result.error}")
-        print(f"{result.output}: {sum(result.seconds.values()):.1f} s, {result.peak_rss_mb:.0f} MB")
-        print("  " + ", ".join(f"{name} {s:.2f} s" for name, s in result.seconds.items()))
-        if result.output is not None:
-            record = read_sidecar(result.output) or {}
-            for name, decided in record.get("plan", {}).items():
-                print(f"  plan, {name}: {decided}")
-        for warning in result.warnings:
-            print(f"  note: {warning}")
+        _process(capture, arguments.bundle, out_dir, kind)
     _show_quality(simulation, arguments.bundle, arguments.iso, out_dir / "before_after.png")
+
+
+def _process(capture: Path, bundle: str, out_dir: Path, kind: str) -> None:
+    """Run the command in a process of its own, so that its memory is its own."""
+    print(f"{capture}: processing to {kind} ...", flush=True)
+    command = [
+        *(sys.executable, "-m", "camkit", "process", str(capture), "--bundle", bundle),
+        *("--out-dir", str(out_dir), "--format", kind, "--overwrite", "--json"),
+    ]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+    result = json.loads(done.stdout or "{}")
+    if result.get("status") != "ok":
+        raise SystemExit(f"{capture}: {result.get('error', 'no answer')}")
+    seconds = result["seconds"]
+    print(f"{result['output']}: {sum(seconds.values()):.1f} s, {result['peak_rss_mb']:.0f} MB")
+    print("  " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
+    plan = (read_sidecar(Path(result["output"])) or {}).get("plan", {})
+    for name, decided in plan.items():
+        print(f"  plan, {name}: " + ", ".join(f"{key} {value}" for key, value in decided.items()))
+    for warning in result["warnings"]:
+        print(f"  note: {warning}")
 
 
 def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) -> None:

@@ -65,7 +65,8 @@ def place(capture: Capture, camera: Camera, assume: Assumption | None) -> Placem
         return Placement(window=_window(size, (0.0, 0.0), sensor, pitch))
     raise ContractError(
         f"the capture has {size[0]}x{size[1]} pixels, the bundle's sensor {sensor[0]}x{sensor[1]}; "
-        "use another bundle, or say --assume centre (same pitch) or --assume scale"
+        "for a crop say where it lies (origin_px), else use another bundle, or --assume centre "
+        "(same pitch) or --assume scale"
     )
 
 
