@@ -71,6 +71,8 @@ def blur(planes: Tensor, kernels: Tensor) -> Tensor:
 def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) -> Tensor:
     """Blur one picture whose PSF varies: each block is spread with its own kernels.
 
+    Divided by the same of a field of ones, so that equal radiance stays equal.
+
     Args:
         planes: (3, h + 2 m, w + 2 m), m = k // 2: the picture and what lies around it.
         kernels: (rows, columns, 3, k, k), one set per block; see `block_centres_px`.
@@ -89,15 +91,18 @@ def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) ->
             f"{len(rows)}x{len(columns)} blocks need as many kernels; got {kernels.shape[:2]}"
         )
     out = planes.new_zeros(3, planes.shape[-2] + side - 1, planes.shape[-1] + side - 1)
+    light = torch.zeros_like(out)
     for row, (top, bottom, row_weight) in enumerate(rows):
         for column, (left, right, column_weight) in enumerate(columns):
-            block = planes[:, top:bottom, left:right] * row_weight[:, None] * column_weight
+            weight = row_weight[:, None] * column_weight
             size = bottom - top + side - 1, right - left + side - 1
-            product = _spectrum(block, size) * _spectrum(kernels[row, column], size)
-            spread = torch.fft.irfft2(product, size)
-            out[:, top : top + size[0], left : left + size[1]] += spread
+            transfer = _spectrum(kernels[row, column], size)
+            place = slice(top, top + size[0]), slice(left, left + size[1])
+            block = planes[:, top:bottom, left:right] * weight
+            out[:, *place] += torch.fft.irfft2(_spectrum(block, size) * transfer, size)
+            light[:, *place] += torch.fft.irfft2(_spectrum(weight[None], size) * transfer, size)
     inner = slice(side - 1, 1 - side if side > 1 else None)
-    return out[:, inner, inner]
+    return out[:, inner, inner] / light[:, inner, inner]
 
 
 def block_centres_px(length: int, margin_px: int, *, step_px: int = BLOCK_STEP_PX) -> Tensor:

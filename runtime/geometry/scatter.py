@@ -32,6 +32,10 @@ def scatter(
 ) -> FloatArray:
     """Blur colour planes with the PSFs of every block's centre.
 
+    Kernels of neighbouring blocks whose centroids differ pile light up or thin it out where the
+    blocks meet. The sum is divided by what it makes of a field of ones, so that equal radiance
+    stays equal: vignetting is a factor of its own.
+
     Args:
         planes: (3, h + 2 margin, w + 2 margin) float32: the window and what lies around it.
         kernels_at: Gives the (3, k, k) float32 kernels of a sensor position (x_mm, y_mm); k odd,
@@ -54,16 +58,21 @@ def scatter(
             f"got {planes.shape}"
         )
     out = np.zeros((3, height, width), dtype=np.float32)
+    light = np.zeros_like(out)
     for top, bottom, row_weight in _spans(planes.shape[1], step_px):
         for left, right, column_weight in _spans(planes.shape[2], step_px):
-            block = planes[:, top:bottom, left:right] * row_weight[:, None]
-            block *= column_weight
+            weight = row_weight[:, None] * column_weight
             x_px, y_px = (left + right - 1) / 2 - margin_px, (top + bottom - 1) / 2 - margin_px
             x_mm, y_mm = window.to_mm(x_px, y_px)
             kernels = kernels_at(float(x_mm), float(y_mm))
-            spread = convolve_full(block, kernels, workers=workers)
             reach = margin_px + kernels.shape[-1] // 2
-            _add_inside(out, spread, top - reach, left - reach)
+            for total, block in (
+                (out, planes[:, top:bottom, left:right] * weight),
+                (light, weight[None]),
+            ):
+                spread = convolve_full(block, kernels, workers=workers)
+                _add_inside(total, spread, top - reach, left - reach)
+    out /= light
     return out
 
 
@@ -81,14 +90,14 @@ def convolve_full(block: FloatArray, kernels: FloatArray, *, workers: int = 1) -
     """Give the full linear convolution (c, h + kh - 1, w + kw - 1) by FFT in float32.
 
     Args:
-        block: (c, h, w) float32.
+        block: (c, h, w) float32, or (1, h, w) for all kernels.
         kernels: (c, kh, kw) float32.
         workers: Threads of the FFT.
     """
     full = tuple(b + k - 1 for b, k in zip(block.shape[1:], kernels.shape[1:], strict=True))
     size = [scipy.fft.next_fast_len(n, real=True) for n in full]
-    spectrum = scipy.fft.rfft2(block, size, workers=workers)
-    spectrum *= scipy.fft.rfft2(kernels, size, workers=workers)
+    spectrum = scipy.fft.rfft2(kernels, size, workers=workers)
+    spectrum *= scipy.fft.rfft2(block, size, workers=workers)
     spread = scipy.fft.irfft2(spectrum, size, workers=workers)
     return np.asarray(spread[:, : full[0], : full[1]], dtype=np.float32)
 
