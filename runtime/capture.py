@@ -4,7 +4,7 @@ The samples stay as the file stores them (24 megapixels of uint16 are 48 MB); ro
 when a stage asks for them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -73,6 +73,7 @@ class Capture:
         camera: Make and model as people read it; empty if not stated.
         sha256: Hash of the file; None for arrays.
         notes: What a person should know of this decode.
+        decoder_peak_mb: Peak memory of the process that decoded; 0 where it was this one.
     """
 
     samples: NDArray[Any]
@@ -92,6 +93,7 @@ class Capture:
     camera: str = ""
     sha256: str | None = None
     notes: tuple[str, ...] = ()
+    decoder_peak_mb: float = field(default=0.0, compare=False)
 
     def __post_init__(self) -> None:
         self._check_samples()

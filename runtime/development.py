@@ -124,26 +124,10 @@ class FileResult:
         }
 
 
-def peak_rss_mb(decoded_mb: float = 0.0) -> float:
-    """Give the peak memory of this process, in MB, its decoding child included.
-
-    Args:
-        decoded_mb: What `decode_peak_mb` gave when the child had ended.
-    """
-    return max(_max_rss_mb(resource.RUSAGE_SELF), decoded_mb)
-
-
-def decode_peak_mb() -> float:
-    """Give the most that this process and a decoding child can have held together so far, in MB.
-
-    To be asked when the child has ended: later the parent grows, but the child is gone.
-    """
-    return _max_rss_mb(resource.RUSAGE_SELF) + _max_rss_mb(resource.RUSAGE_CHILDREN)
-
-
-def _max_rss_mb(who: int) -> float:
+def peak_rss_mb() -> float:
+    """Give the peak memory of this process so far, in MB."""
     unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(who).ru_maxrss * unit / 1e6
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
 def develop_file(
@@ -166,7 +150,8 @@ def develop_file(
     began = time.perf_counter()
     capture = read_capture(source, mosaic=mosaic)
     decode_s = time.perf_counter() - began
-    decoded_mb = decode_peak_mb()
+    # What both held while the child decoded; later this process grows, but the child is gone.
+    decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
     work = pipeline.start(capture, progress=progress, cancel=cancel)
     with atomic_output(target) as part:
         write_s = _write_picture(part, work, write)
@@ -179,7 +164,7 @@ def develop_file(
         bundle=_bundle_name(pipeline),
         size=_size(pipeline),
         seconds=seconds,
-        peak_rss_mb=peak_rss_mb(decoded_mb),
+        peak_rss_mb=max(peak_rss_mb(), decoded_mb),
         warnings=work.warnings,
     )
     record = {

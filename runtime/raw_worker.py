@@ -258,7 +258,8 @@ def _is_repeated(samples: NDArray[Any]) -> bool:
 
 
 def _send(capture: Capture, out: BinaryIO) -> None:
-    out.write(json.dumps(header_of(capture)).encode() + b"\n")
+    header = header_of(capture) | {"decoder_peak_mb": _peak_mb()}
+    out.write(json.dumps(header).encode() + b"\n")
     samples = capture.samples
     planes = (
         [samples] if samples.ndim == 2 else list(samples[: 1 if _is_repeated(samples) else None])
@@ -267,6 +268,15 @@ def _send(capture: Capture, out: BinaryIO) -> None:
         for top in range(0, plane.shape[0], WRITE_ROWS):
             out.write(np.ascontiguousarray(plane[top : top + WRITE_ROWS]).data)
     out.flush()
+
+
+def _peak_mb() -> float:
+    """Give the peak memory of this process; getrusage would also count its parent's before exec."""
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii")
+        return int(status.split("VmHWM:", 1)[1].split(maxsplit=1)[0]) * 1024 / 1e6
+    except (OSError, IndexError, ValueError):
+        return 0.0
 
 
 def _limit_memory(max_memory_mb: int) -> None:
