@@ -12,7 +12,7 @@ DemosaicMethod = Literal["fast", "quality"]
 Assumption = Literal["centre", "scale"]
 
 SIZES: Final = ("S", "M", "L")
-DEFAULT_MAX_MEM_BYTES: Final = 1_150_000_000
+DEFAULT_MAX_MEM_BYTES: Final = 1_120_000_000
 LEAST_MAX_MEM_BYTES: Final = 400_000_000
 
 
@@ -31,7 +31,7 @@ class Options:
         vignetting: Divide by the relative illumination.
         undistort: Undo the radial distortion.
         assume: What the caller vouches for where the capture's size does not match the sensor.
-        max_mem_bytes: Memory the process may take; None for the default of 1.15 GB.
+        max_mem_bytes: Memory the process may take; None for the default of 1.12 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
     """
