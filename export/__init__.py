@@ -1,1 +1,8 @@
-"""Under construction."""
+"""Torch checkpoint to bundle, in the order of the work.
+
+    golden_cases    small captures of known scenes
+    onnx_graph      a network becomes ONNX, held against torch
+    network_facts   what is measured about it
+    energy, card    the card and the preview for people
+    assemble        everything packed, proved, written
+"""

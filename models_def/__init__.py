@@ -1,1 +1,8 @@
-"""Under construction."""
+"""Design time, in torch: a lens and a network become a frozen PSF and a checkpoint.
+
+    prescriptions/, recipes/   what a person edits (TOML)
+    optics/                    lens, rays, spots, PSF, freezing
+    sensors/                   the forward model and the front end, differentiable
+    networks/                  the recovery networks
+    training/                  samples, trainer, validation
+"""

@@ -1,1 +1,15 @@
-"""Under construction."""
+"""Use time: a capture and a bundle make a picture. Never torch.
+
+    capture, raw, raw_worker, files/   a file becomes linear samples with metadata
+    signal/                            repair, white balance, demosaic; the stabilising transform
+    bank/                              frozen PSF, blocks, Wiener filter, classical methods
+    network/                           graphs read, run and tiled exactly
+    geometry/                          place on the sensor, illumination, distortion
+    color, output/                     camera colour to files and sidecars
+
+    rows, clock                        how stages pull rows, and what each costs
+    options, reconstruction            the stages of one capture joined
+    pipeline, development, batch       one capture in memory, one file, many files
+    check, proofs, golden_run          a bundle proves itself
+    simulate                           the digital twin: a scene becomes a RAW file
+"""

@@ -1,1 +1,10 @@
-"""Under construction."""
+"""What is measured for people: the accuracy protocol, in the order of its work.
+
+    fabricated_psf   lenses with fabrication errors, traced afresh and densely
+    quality          where a picture is placed, how it is captured and scored
+    peers            the classical methods that camkit is compared with
+    tuning           their parameters, chosen on validation pictures
+    measurement      the journal of single measurements, which may be resumed
+    comparison       the rows of the comparison
+    quality_table    means, gains and the page
+"""

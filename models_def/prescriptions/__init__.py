@@ -1,1 +1,1 @@
-"""Under construction."""
+"""Lenses as TOML; read by `camkit.models_def.optics.prescription`."""

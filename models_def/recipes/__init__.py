@@ -1,1 +1,1 @@
-"""Under construction."""
+"""Cameras, training and lens searches as TOML; unknown keys are errors."""

@@ -1,1 +1,8 @@
-"""Under construction."""
+"""The sensor and the front end in torch; each has a twin in the runtime (tests/parity).
+
+    forward     blur, mosaic, noise, clipping, with gradients
+    demosaic    mosaic to planes
+    psf         the kernel of an image point
+    wiener      the Wiener filter of a patch
+    stabilise   the transform around the network
+"""
