@@ -5,4 +5,6 @@
     network_facts   what is measured about it
     energy, card    the card and the preview for people
     assemble        everything packed, proved, written
+
+Nothing is written when a proof fails.
 """

@@ -5,4 +5,6 @@
     sensors/                   the forward model and the front end, differentiable
     networks/                  the recovery networks
     training/                  samples, trainer, validation
+
+`models_def` and `runtime` never import each other.
 """

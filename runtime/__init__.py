@@ -12,4 +12,6 @@
     pipeline, development, batch       one capture in memory, one file, many files
     check, proofs, golden_run          a bundle proves itself
     simulate                           the digital twin: a scene becomes a RAW file
+
+`runtime` and `models_def` never import each other.
 """

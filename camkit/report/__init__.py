@@ -7,4 +7,6 @@
     measurement      the journal of single measurements, which may be resumed
     comparison       the rows of the comparison
     quality_table    means, gains and the page
+
+Test pictures are only ever measured on.
 """

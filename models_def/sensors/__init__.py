@@ -5,4 +5,6 @@
     psf         the kernel of an image point
     wiener      the Wiener filter of a patch
     stabilise   the transform around the network
+
+All take batches and hand gradients on.
 """
