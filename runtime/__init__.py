@@ -7,7 +7,7 @@
     geometry/                          place on the sensor, illumination, distortion
     color, output/                     camera colour to files and sidecars
 
-    rows, clock                        how stages pull rows, and what each costs
+    rows, clock, memory                how stages pull rows, and what each costs
     options, reconstruction            the stages of one capture joined
     pipeline, development, batch       one capture in memory, one file, many files
     check, proofs, golden_run          a bundle proves itself

@@ -1,8 +1,6 @@
 """One capture file developed: decode, reconstruct, write, and say what was done in a sidecar."""
 
 import json
-import resource
-import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,6 +8,7 @@ from typing import Any, Literal, Self, get_args
 
 from camkit.errors import ContractError
 from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.output.linear_dng import LinearDngWriter
 from camkit.runtime.output.part_file import atomic_output
@@ -122,12 +121,6 @@ class FileResult:
             "peak_rss_mb": round(self.peak_rss_mb, 1),
             "warnings": list(self.warnings),
         }
-
-
-def peak_rss_mb() -> float:
-    """Give the peak memory of this process so far, in MB."""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
 def develop_file(

@@ -26,6 +26,7 @@ from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture
 from camkit.runtime.files import dng_checks, raw_checks, raw_tags
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
+from camkit.runtime.memory import peak_rss_mb
 
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8
 FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
@@ -258,7 +259,7 @@ def _is_repeated(samples: NDArray[Any]) -> bool:
 
 
 def _send(capture: Capture, out: BinaryIO) -> None:
-    header = header_of(capture) | {"decoder_peak_mb": _peak_mb()}
+    header = header_of(capture) | {"decoder_peak_mb": peak_rss_mb()}
     out.write(json.dumps(header).encode() + b"\n")
     samples = capture.samples
     planes = (
@@ -268,15 +269,6 @@ def _send(capture: Capture, out: BinaryIO) -> None:
         for top in range(0, plane.shape[0], WRITE_ROWS):
             out.write(np.ascontiguousarray(plane[top : top + WRITE_ROWS]).data)
     out.flush()
-
-
-def _peak_mb() -> float:
-    """Give the peak memory of this process; getrusage would also count its parent's before exec."""
-    try:
-        status = Path("/proc/self/status").read_text(encoding="ascii")
-        return int(status.split("VmHWM:", 1)[1].split(maxsplit=1)[0]) * 1024 / 1e6
-    except (OSError, IndexError, ValueError):
-        return 0.0
 
 
 def _limit_memory(max_memory_mb: int) -> None:
