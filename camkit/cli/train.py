@@ -18,9 +18,12 @@ def train(
     valid: Annotated[
         Path | None, typer.Option(help="Folder of pictures to validate on; default: procedural.")
     ] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Steps of the whole schedule; default: the recipe's.")
+    ] = None,
     max_minutes: Annotated[
         float | None,
-        typer.Option(help="Wall time, decay included; default: the recipe's steps."),
+        typer.Option(help="Wall time, decay included; default: until the steps are done."),
     ] = None,
     out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint, log and samples.")] = Path(
         "runs"
@@ -46,6 +49,7 @@ def train(
             size=size,
             data_folder=data,
             valid_folder=valid,
+            steps=steps,
             max_minutes=max_minutes,
             resume=resume,
             threads=threads,

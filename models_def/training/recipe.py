@@ -66,6 +66,10 @@ class DataRecipe:
         exposure_max_ev: Greatest exposure; above 0 highlights clip.
         block_jitter_px: How far the block centre whose kernel filters a patch may lie from it.
         border_share: Share of samples that lie at one or more picture borders.
+        drift_share: Share of samples whose lens has drifted since it was measured: its kernels
+            are scaled and turned, each uniformly within the two limits below.
+        drift_scale: Largest relative change of the kernels' size, by heat or refocusing.
+        drift_turn_deg: Largest turn of the kernels, by a lens turned in its mount.
         target_max: Targets are clipped at this multiple of the white level.
     """
 
@@ -83,11 +87,17 @@ class DataRecipe:
     exposure_max_ev: float = 1.0
     block_jitter_px: float = 176.0
     border_share: float = 0.2
+    drift_share: float = 0.0
+    drift_scale: float = 0.05
+    drift_turn_deg: float = 5.0
     target_max: float = 4.0
 
     def __post_init__(self) -> None:
         _check_share("data.picture_share", self.picture_share)
         _check_share("data.border_share", self.border_share)
+        _check_share("data.drift_share", self.drift_share)
+        if not 0 <= self.drift_scale < 0.5:
+            raise ContractError(f"data.drift_scale must be in [0, 0.5); got {self.drift_scale}")
         if not 0 < self.iso_min <= self.iso_max:
             raise ContractError(f"data.iso_min must be in (0, iso_max]; got {self.iso_min}")
         if self.exposure_min_ev > self.exposure_max_ev:

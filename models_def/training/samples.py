@@ -7,6 +7,7 @@ A sample is one place on the sensor with one blur. It is simulated with surround
 `margin_px`, so that the Wiener filter sees true context, and cut to `sample_px` afterwards.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -48,6 +49,7 @@ class Exposure:
         iso: Sensitivity.
         factor: Exposure, 1 for the picture as it is.
         borders: Whether the picture ends at the (top, bottom, left, right) of the sample.
+        drift: (size, turn in radians) of the copy's kernels against the traced ones.
     """
 
     x_mm: float
@@ -58,6 +60,7 @@ class Exposure:
     iso: float
     factor: float = 1.0
     borders: Sides = (False, False, False, False)
+    drift: tuple[float, float] = (1.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +114,17 @@ def draw_exposure(rng: Generator, recipe: Recipe, bank: PsfBank) -> Exposure:
         iso=float(np.exp(rng.uniform(np.log(data.iso_min), np.log(data.iso_max)))),
         factor=float(2.0**stops),
         borders=(bool(borders[0]), bool(borders[1]), bool(borders[2]), bool(borders[3])),
+        drift=_draw_drift(rng, recipe),
     )
+
+
+def _draw_drift(rng: Generator, recipe: Recipe) -> tuple[float, float]:
+    """Draw how far the lens has drifted; most have not."""
+    data = recipe.data
+    if rng.random() >= data.drift_share:
+        return 1.0, 0.0
+    size, turn = rng.uniform(-1, 1, 2) * (data.drift_scale, np.deg2rad(data.drift_turn_deg))
+    return float(1 + size), float(turn)
 
 
 def tint_crop(rng: Generator, crop: FloatArray) -> FloatArray:
@@ -144,7 +157,9 @@ def make_sample(
     to_camera = torch.from_numpy(matrix * exposure.factor).float()
     flat = to_camera @ torch.from_numpy(crop).reshape(3, -1)
     sharp = flat.reshape(1, 3, side, side).clamp_(min=0)
-    kernels = bank.blur_kernels(exposure.copy, exposure.x_mm, exposure.y_mm)
+    kernels = _drifted(
+        bank.blur_kernels(exposure.copy, exposure.x_mm, exposure.y_mm), *exposure.drift
+    )
     blurred = _blur(sharp, kernels, bank.radius_px) * illumination
     capture, saturated = _expose(blurred, gains, recipe, exposure.iso, rng)
     noise = camera.noise_at(exposure.iso).with_gains(gains)
@@ -166,6 +181,18 @@ def make_sample(
         noise=noise,
         illumination=illumination,
     )
+
+
+def _drifted(kernels: Tensor, size: float, turn: float) -> Tensor:
+    """Scale and turn (1, 3, h, w) kernels about their centre; each keeps its light."""
+    if (size, turn) == (1.0, 0.0):
+        return kernels
+    cos, sin = math.cos(turn) / size, math.sin(turn) / size
+    matrix = torch.tensor([[[cos, sin, 0.0], [-sin, cos, 0.0]]], dtype=kernels.dtype)
+    shape = list(kernels.shape)
+    grid = torch.nn.functional.affine_grid(matrix, shape, align_corners=True)
+    moved = torch.nn.functional.grid_sample(kernels, grid, align_corners=True)
+    return moved / moved.sum((-2, -1), keepdim=True)
 
 
 def _lost(true: Tensor, unknown: Tensor, gains: tuple[float, float, float]) -> Tensor:

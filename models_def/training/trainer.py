@@ -43,6 +43,7 @@ class TrainOptions:
         size: Which network of the recipe.
         data_folder: Pictures to train on; None for procedural scenes alone.
         valid_folder: Pictures to choose by; None for procedural scenes.
+        steps: Steps of the whole schedule; None for the recipe's.
         max_minutes: Wall time after which the schedule, decay included, ends; None for its steps.
         stop_at_step: Stop there though the schedule goes on, as an interruption would.
         resume: Go on from the checkpoint in `out_dir`.
@@ -57,6 +58,7 @@ class TrainOptions:
     size: str = "M"
     data_folder: Path | None = None
     valid_folder: Path | None = None
+    steps: int | None = None
     max_minutes: float | None = None
     stop_at_step: int | None = None
     resume: bool = False
@@ -69,6 +71,8 @@ class TrainOptions:
     def __post_init__(self) -> None:
         if self.max_minutes is not None and self.max_minutes <= 0:
             raise ContractError(f"max_minutes must be > 0; got {self.max_minutes}")
+        if self.steps is not None and self.steps < 1:
+            raise ContractError(f"steps must be >= 1; got {self.steps}")
         if self.threads < 1 or self.workers < 0:
             raise ContractError(
                 f"threads must be >= 1, workers >= 0; got {self.threads}, {self.workers}"
@@ -141,6 +145,7 @@ class _Run:
         self.toml = recipe_path.read_text(encoding="utf-8")
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
+        self.steps = options.steps or self.entry.schedule.steps
         self.path = options.out_dir / f"{self.recipe.name}_{options.size}.pt"
         self.fitter = Fitter(self.entry, options.device)
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
@@ -199,7 +204,7 @@ class _Run:
         self._save(pool)
 
     def _progress(self, budget_s: float | None) -> float:
-        return progress_of(self.step, self.entry.schedule.steps, self.elapsed_s(), budget_s)
+        return progress_of(self.step, self.steps, self.elapsed_s(), budget_s)
 
     def _is_over(self, progress: float) -> bool:
         return progress >= 1 or self.step == self.options.stop_at_step

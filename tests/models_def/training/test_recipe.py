@@ -24,9 +24,9 @@ def table(recipe_path, **changes):
     return content
 
 
-def test_shipped_recipe_has_three_networks_and_the_stated_sensor():
+def test_shipped_recipe_has_its_networks_and_the_stated_sensor():
     recipe = read_recipe(SHIPPED)
-    assert set(recipe.networks) == {"S", "M", "trimmed"}
+    assert set(recipe.networks) == {"S", "M", "L", "trimmed"}
     camera = recipe.camera
     assert (camera.width_px, camera.height_px, camera.pixel_pitch_um) == (6000, 4000, 5.96)
     levels = camera.white_level - camera.black_level
@@ -47,6 +47,8 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("data__sampel_px", 64, "data: unknown key 'sampel_px'"),
         ("data__sample_px", 64.5, "data.sample_px must be of type int"),
         ("data__picture_share", 1.5, "data.picture_share must lie in 0..1"),
+        ("data__drift_share", -0.1, "data.drift_share must lie in 0..1"),
+        ("data__drift_scale", 0.5, "data.drift_scale must be in"),
         ("schedule__loss", "l3", "schedule.loss must be one of"),
         ("schedule__precision", "float8", "schedule.precision must be one of"),
         ("schedule__steps", True, "schedule.steps must be of type int"),

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.sensors.stabilise import unstabilise
 from camkit.models_def.training.psf_bank import PsfBank
 from camkit.models_def.training.samples import (
     Exposure,
@@ -127,6 +128,73 @@ def test_drawn_exposures_stay_in_their_ranges(recipe, bank):
     assert max(heights) <= corner_height_mm(recipe)
     at_border = np.mean([any(e.borders) for e in drawn])
     assert 0.1 < at_border <= data.border_share + 0.05
+
+
+def spot_sample(recipe, bank, **changes):
+    """Photograph one point of light in the dark, without noise to speak of."""
+    crop = grey(recipe, bank, 0.0)
+    middle = crop.shape[1] // 2
+    crop[:, middle, middle] = 20.0
+    exposure = replace(CENTRE, iso=1e-3, **changes)
+    sample = make_sample(crop, exposure, recipe, bank, np.random.default_rng(0))
+    green = unstabilise(sample.planes[None, :3], *noise_of(sample), scale=recipe.scale)[0, 1]
+    return green.numpy().astype(np.float64)
+
+
+def noise_of(sample):
+    return torch.tensor(sample.noise.shot), torch.tensor(sample.noise.read_variance)
+
+
+def spread(spot):
+    """Give the covariance (yy, xx, xy) of a spot, as light on the sensor."""
+    light = np.clip(spot, 0, None) / np.clip(spot, 0, None).sum()
+    y, x = np.indices(spot.shape)
+    y = y - (light * y).sum()
+    x = x - (light * x).sum()
+    return [(light * a * b).sum() for a, b in ((y, y), (x, x), (x, y))]
+
+
+@pytest.fixture
+def long_bank():
+    """A lens whose spot is three times as long down the rows as across."""
+    offsets = np.arange(-12, 13)
+    kernel = np.exp(-0.5 * ((offsets[:, None] / 3.0) ** 2 + (offsets[None, :] / 1.0) ** 2))
+    kernels = np.broadcast_to(kernel / kernel.sum(), (2, 2, 3, 25, 25)).astype(np.float32)
+    return PsfBank(
+        copies=kernels.copy(),
+        copy_heights_mm=np.array([0.0, 2.0]),
+        frozen=kernels[0].copy(),
+        frozen_heights_mm=np.array([0.0, 2.0]),
+        relative_illumination=np.array([1.0, 1.0]),
+    )
+
+
+def test_drift_scales_the_spot_and_keeps_its_light(recipe, long_bank):
+    still = spot_sample(recipe, long_bank)
+    grown = spot_sample(recipe, long_bank, drift=(1.25, 0.0))
+    assert grown.sum() == pytest.approx(still.sum(), rel=0.02)
+    assert spread(grown)[0] / spread(still)[0] == pytest.approx(1.25**2, rel=0.04)
+
+
+def test_drift_turns_the_spot(recipe, long_bank):
+    upright = spread(spot_sample(recipe, long_bank))
+    lying = spread(spot_sample(recipe, long_bank, drift=(1.0, np.pi / 2)))
+    assert upright[0] > 3 * upright[1]
+    assert lying[1] == pytest.approx(upright[0], rel=0.05)
+    assert lying[0] == pytest.approx(upright[1], rel=0.05)
+
+
+def test_as_many_samples_drift_as_the_recipe_says(recipe, bank):
+    data = replace(recipe.data, drift_share=0.3, drift_scale=0.05, drift_turn_deg=2.0)
+    rng = np.random.default_rng(0)
+    drifts = np.array(
+        [draw_exposure(rng, replace(recipe, data=data), bank).drift for _ in range(500)]
+    )
+    moved = (drifts != (1.0, 0.0)).any(axis=1)
+    assert 0.24 < moved.mean() < 0.36
+    assert 0.04 < np.abs(drifts[:, 0] - 1).max() <= 0.05
+    assert 1.5 < np.rad2deg(np.abs(drifts[:, 1]).max()) <= 2.0
+    assert all(draw_exposure(rng, recipe, bank).drift == (1.0, 0.0) for _ in range(20))
 
 
 def test_crop_of_another_size_is_refused(recipe, bank):
