@@ -45,7 +45,7 @@ from camkit.export.golden_cases import (
 )
 from camkit.export.network_facts import MeasuredNetwork, measure_network
 from camkit.models_def.training.checkpoint import Checkpoint, load_network, read_checkpoint
-from camkit.models_def.training.recipe import Recipe, to_recipe
+from camkit.models_def.training.recipe import Recipe, differing_camera, to_recipe
 from camkit.runtime.check import check_bundle
 from camkit.runtime.golden_run import develop_case
 from camkit.runtime.options import Options
@@ -63,7 +63,7 @@ class Parts:
     """What goes into a bundle.
 
     Attributes:
-        checkpoints: One per size, of one recipe.
+        checkpoints: One per size, of one camera.
         psf: Frozen PSF of `camkit freeze`.
         stress_psf: Kernels off the design point.
         prescription: The lens as designed.
@@ -86,7 +86,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         What was written: sizes of network, bytes, and the lines of the proof.
 
     Raises:
-        ContractError: If the checkpoints are not of one recipe, or a size comes twice.
+        ContractError: If the checkpoints are not of one camera, or a size comes twice.
         ParityError: If torch and ONNX, or the bundle and its own golden cases, disagree.
         BundleError: If the parts contradict each other.
     """
@@ -149,8 +149,14 @@ def _read_checkpoints(paths: tuple[Path, ...]) -> dict[NetworkSize, Checkpoint]:
         found[size] = checkpoint
     if not found:
         raise ContractError("export needs at least one checkpoint")
-    if len({c.recipe_toml for c in found.values()}) > 1:
-        raise ContractError("the checkpoints are of different recipes; train them from one")
+    recipes = {size: to_recipe(tomllib.loads(c.recipe_toml)) for size, c in found.items()}
+    first = next(iter(recipes.values()))
+    for size, recipe in recipes.items():
+        if what := differing_camera(first, recipe):
+            raise ContractError(
+                f"the checkpoints are of different cameras: the recipe of {size} has another "
+                f"{what}; train them for one"
+            )
     return dict(sorted(found.items(), key=lambda item: SIZES.index(item[0])))
 
 

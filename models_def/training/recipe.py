@@ -245,6 +245,15 @@ def _network(size: str, entry: Mapping[str, Any], schedule: ScheduleRecipe) -> N
     )
 
 
+def differing_camera(one: Recipe, other: Recipe) -> str | None:
+    """Name the first part by which two recipes describe different cameras, None if none does.
+
+    How networks are trained, and on which samples, may differ from size to size.
+    """
+    parts = ("name", "object_distance_mm", "scale", "camera", "wiener", "lens")
+    return next((part for part in parts if getattr(one, part) != getattr(other, part)), None)
+
+
 def samples_digest(recipe: Recipe, seed: int) -> str:
     """Give a hash of all that decides the training samples, to name their pool by."""
     content = {

@@ -5,7 +5,12 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.models_def.training import recipe as module
-from camkit.models_def.training.recipe import read_recipe, samples_digest, to_recipe
+from camkit.models_def.training.recipe import (
+    differing_camera,
+    read_recipe,
+    samples_digest,
+    to_recipe,
+)
 
 SHIPPED = Path(module.__file__).resolve().parents[1] / "recipes" / "duet.toml"
 
@@ -86,3 +91,11 @@ def test_digest_follows_what_decides_the_samples_only(recipe_path, recipe):
     assert samples_digest(same, 1) == samples_digest(recipe, 1)
     assert samples_digest(other, 1) != samples_digest(recipe, 1)
     assert samples_digest(recipe, 2) != samples_digest(recipe, 1)
+
+
+def test_training_may_differ_within_a_camera_but_nothing_else(recipe_path):
+    one = to_recipe(table(recipe_path))
+    longer = to_recipe(table(recipe_path, schedule__steps=99, data__iso_max=900.0))
+    assert differing_camera(one, longer) is None
+    assert differing_camera(one, to_recipe(table(recipe_path, scale=32.0))) == "scale"
+    assert differing_camera(one, to_recipe(table(recipe_path, wiener__overlap_px=16))) == "wiener"
