@@ -3,7 +3,9 @@
     python tools/quality.py --tune --bundle duet --data DATA/valid_open --out docs/quality.json
     python tools/quality.py --bundle duet --data DATA/test --out docs/quality.json --resume
 
-writes the JSON (every measurement, all means) and the page beside it (docs/quality.md).
+writes the JSON (every measurement, all means) and the page beside it (docs/quality.md). What was
+measured lies in a journal in the work directory; `--resume` measures only what is missing there
+or what has changed, so rows, captures and kinds of PSF may be measured in several runs.
 """
 
 import argparse
@@ -31,8 +33,10 @@ from camkit.report.fabricated_psf import fabricated_psf, lens_text
 from camkit.report.measurement import (
     COLUMNS,
     Measurement,
+    Row,
     append_journal,
     finished_rows,
+    latest,
     measure_all,
     open_rows,
     read_journal,
@@ -48,9 +52,10 @@ from camkit.report.quality import (
     read_picture,
 )
 from camkit.report.quality_table import seconds_per_megapixel, summarise, to_markdown
-from camkit.report.tuning import choose, try_peers, tuned_from_json, tuned_to_json
+from camkit.report.tuning import at_edge, choose, try_peers, tuned_from_json, tuned_to_json
 
-TUNING_SIDE_PX = 320
+TUNING_SIDE_PX = 272
+SIZES = ("S", "M", "L")
 
 
 def main() -> None:
@@ -76,7 +81,8 @@ def parse_arguments() -> argparse.Namespace:
     add("--per-set", type=int, help="only the first N pictures of a set, by name")
     add("--isos", default="100,1600")
     add("--psf", choices=("fresh", "bundle", "both"), default="both")
-    add("--methods", default="", help=f"default: {','.join(DEFAULT_METHODS)}")
+    add("--methods", default="", help=f"default: {','.join(DEFAULT_METHODS)} and all sizes")
+    add("--tuned", type=Path, help="report that holds the tuned parameters; default: --out")
     add("--prescription", type=Path, help="the lens, if the bundle does not hold it")
     add("--out", type=Path, default=Path("docs/quality.json"))
     add("--csv", type=Path, help="also write the measurements as a table")
@@ -84,6 +90,7 @@ def parse_arguments() -> argparse.Namespace:
     add("--jobs", type=int, default=1, help="captures at a time")
     add("--limit-seconds", type=float, help="begin no capture after this time")
     add("--resume", action="store_true", help="keep and report what the journal holds")
+    add("--places", type=int, default=2, help="with --tune: field positions of every picture")
     add("--tune", action="store_true", help="tune the classical methods on --data")
     return parser.parse_args()
 
@@ -116,10 +123,10 @@ def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Sho
 
 
 def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
-    """Choose the parameters of the peers on development pictures; two places per picture."""
+    """Choose the parameters of the peers on development pictures, each at `--places` places."""
     photograph = photographer(arguments, bundle)
     pictures = list_set(arguments.data, arguments.per_set)
-    peers = [name for name in chosen_methods(arguments) if name in PEERS]
+    peers = [name for name in chosen_methods(arguments, bundle) if name in PEERS]
     shots = [
         Shot(
             set_name=arguments.data.name,
@@ -130,7 +137,7 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
             psf="fresh",
         )
         for number, picture in enumerate(pictures)
-        for step in (0, 2)
+        for step in range(0, 2 * arguments.places, 2)
         for iso in isos_of(arguments)
     ]
     trials = []
@@ -144,10 +151,10 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
             )
     tuned, curves = choose(trials)
     for peer, by_iso in tuned.items():
-        for iso, value in by_iso.items():
-            ends = PEERS[peer].candidates[0], PEERS[peer].candidates[-1]
-            edge = "  AT THE EDGE of the candidates" if value in ends else ""
-            print(f"{peer}: {PEERS[peer].parameter} {value:g} at ISO {iso:g}{edge}")
+        for iso, setting in by_iso.items():
+            edges = at_edge(peer, setting)
+            edge = f"  AT THE EDGE of the candidates: {', '.join(edges)}" if edges else ""
+            print(f"{peer}: {PEERS[peer].describe(setting)} at ISO {iso:g}{edge}")
     report = read_report(arguments.out)
     report["tuned"] = {
         "data": arguments.data.name,
@@ -163,9 +170,11 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
 def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     """Measure all rows on all captures and write the report."""
     report = read_report(arguments.out)
-    if "tuned" not in report:
-        raise ContractError(f"{arguments.out} holds no tuned parameters; run with --tune first")
-    methods = chosen_methods(arguments)
+    source = arguments.tuned or arguments.out
+    tuned = read_report(source).get("tuned")
+    if tuned is None:
+        raise ContractError(f"{source} holds no tuned parameters; run with --tune first")
+    methods = chosen_methods(arguments, bundle)
     rivals = [
         Rival(bundle=open_bundle(find_bundle(path)), label=label)
         for path, label in arguments.compare
@@ -174,34 +183,27 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         bundle,
         methods,
         rivals,
-        tuned_from_json(report["tuned"]["values"]),
+        tuned_from_json(tuned["values"]),
         isos_of(arguments),
         lens_text(bundle, arguments.prescription),
     )
-    shots = list_shots(arguments)
     journal = arguments.work_dir / f"{arguments.out.stem}.jsonl"
     if not arguments.resume:
         journal.unlink(missing_ok=True)
+    measure_missing(arguments, bundle, rows, journal)
     current = {(row.name, row.identity) for row in rows}
-    done = finished_rows(read_journal(journal))
-    work = [(shot, left) for shot in shots if (left := open_rows(shot, rows, done))]
-    print(f"{len(shots)} captures, {len(work)} to do, {len(rows)} methods")
-    photograph = photographer(arguments, bundle)
-    began = time.perf_counter()
-    finished = measure_all(work, photograph, jobs=arguments.jobs, limit_s=arguments.limit_seconds)
-    for number, found in enumerate(finished, start=1):
-        append_journal(journal, found)
-        if number in (3, 10) or number % 25 == 0 or number == len(work):
-            show_pace(found, number, len(work), time.perf_counter() - began)
     # what an earlier run measured counts too, as long as nothing that decides it has changed
-    measurements = [m for m in read_journal(journal) if (m.method, m.identity) in current]
+    measurements = latest(m for m in read_journal(journal) if (m.method, m.identity) in current)
+    commands = report.get("commands", []) if arguments.resume else []
+    command = f"python {shlex.join(sys.argv)}"
     names = [row.name for row in rows]
     report |= {
-        "command": f"python {shlex.join(sys.argv)}",
+        "commands": [*(c for c in commands if c != command), command],
         "json_name": arguments.out.name,
         "machine": machine(),
         "bundle": {"name": bundle.manifest.name, "sha256": bundle.sha256},
         "rivals": {rival.label: rival.bundle.sha256 for rival in rivals},
+        "tuned": tuned,
         "protocol": {"text": protocol_text(bundle, isos_of(arguments))},
         "methods": names,
         "seconds_per_megapixel": seconds_per_megapixel(measurements),
@@ -216,8 +218,28 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     show_result(report)
 
 
-def chosen_methods(arguments: argparse.Namespace) -> list[str]:
-    return arguments.methods.split(",") if arguments.methods else list(DEFAULT_METHODS)
+def measure_missing(
+    arguments: argparse.Namespace, bundle: Bundle, rows: Sequence[Row], journal: Path
+) -> None:
+    """Measure what the journal lacks and add it there."""
+    shots = list_shots(arguments)
+    done = finished_rows(read_journal(journal))
+    work = [(shot, left) for shot in shots if (left := open_rows(shot, rows, done))]
+    print(f"{len(shots)} captures, {len(work)} to do, {len(rows)} methods", flush=True)
+    photograph = photographer(arguments, bundle)
+    began = time.perf_counter()
+    finished = measure_all(work, photograph, jobs=arguments.jobs, limit_s=arguments.limit_seconds)
+    for number, found in enumerate(finished, start=1):
+        append_journal(journal, found)
+        if number in (3, 10) or number % 25 == 0 or number == len(work):
+            show_pace(found, number, len(work), time.perf_counter() - began)
+
+
+def chosen_methods(arguments: argparse.Namespace, bundle: Bundle) -> list[str]:
+    """Give the methods asked for, or the usual ones and every size that the bundle holds."""
+    if arguments.methods:
+        return arguments.methods.split(",")
+    return [*DEFAULT_METHODS, *(size for size in SIZES if size in bundle.manifest.networks)]
 
 
 def isos_of(arguments: argparse.Namespace) -> list[float]:
@@ -247,8 +269,9 @@ def list_shots(arguments: argparse.Namespace) -> list[Shot]:
 
 def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: float) -> None:
     left_min = elapsed_s / number * (count - number) / 60
+    each = f"{elapsed_s / number:.2f} s ({time.process_time() / number:.2f} s of processor) each"
     costs = ", ".join(f"{m.method} {m.seconds:.2f}" for m in found)
-    print(f"{number}/{count}, {elapsed_s / number:.2f} s each, {left_min:.0f} min left; {costs}")
+    print(f"{number}/{count}, {each}, {left_min:.0f} min left; {costs}")
     sys.stdout.flush()
 
 

@@ -11,7 +11,7 @@ from camkit.bundle.reader import PSF, Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.measurement import Row, identity_of
-from camkit.report.peers import PEERS
+from camkit.report.peers import PEERS, Setting, part_sides
 from camkit.report.quality import (
     BORDER_PX,
     FABRICATION_SEEDS,
@@ -25,7 +25,10 @@ from camkit.report.quality import (
 from camkit.report.tuning import Tuned, tuned_to_json
 
 BANK_METHODS: Final = {"bank": "wiener", "bank_rl": "rl", "bank_admm_tv": "admm-tv"}
-DEFAULT_METHODS: Final = ("input", *PEERS, "bank", "S", "M")
+PEER_VERSION: Final = 2
+"""Part of the identity of the peers' rows; 2: cut into parts, the PSF no longer mirrored twice."""
+DEFAULT_METHODS: Final = ("input", *PEERS, "bank")
+"""Rows of every comparison; the sizes of the networks follow them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +62,7 @@ def make_rows(
 
     Args:
         bundle: The camera.
-        methods: Names of `DEFAULT_METHODS`, or bank_rl and bank_admm_tv.
+        methods: Names of `DEFAULT_METHODS`, of sizes, or bank_rl and bank_admm_tv.
         rivals: Further bundles.
         tuned: Parameters of the classical peers.
         isos: Sensitivities that parameters are needed for.
@@ -103,7 +106,7 @@ def _row(bundle: Bundle, name: str, tuned: Tuned, isos: Sequence[float], base: s
         return Row(
             name=name,
             restore=_peer_restorer(bundle, name, values),
-            identity=identity_of(base, tuned_to_json({name: values})),
+            identity=identity_of(base, PEER_VERSION, tuned_to_json({name: values})),
         )
     if name in BANK_METHODS:
         method: Any = BANK_METHODS[name]
@@ -129,7 +132,7 @@ def _developer(bundle: Bundle) -> Restorer:
     return restore
 
 
-def _peer_restorer(bundle: Bundle, name: str, values: dict[float, float]) -> Restorer:
+def _peer_restorer(bundle: Bundle, name: str, values: dict[float, Setting]) -> Restorer:
     def restore(exposed: Exposed) -> FloatArray:
         planes = PEERS[name].restore(exposed.local, values[exposed.simulation.iso])
         return finish_planes(planes, exposed, bundle)
@@ -159,6 +162,7 @@ def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
     corner_mm = np.hypot(camera.width_px, camera.height_px) / 2 * camera.pixel_pitch_um / 1000
     shares = ", ".join(f"{share:g}" for share in FIELD_SHARES)
     seeds = ", ".join(map(str, FABRICATION_SEEDS))
+    part_px, overlap_px = part_sides(psf.kernels.shape[-1])
     return [
         f"Each picture (sRGB decoded to linear light) is a crop of the {camera.width_px} x "
         f"{camera.height_px} sensor at {len(FIELD_SHARES)} places: {shares} of the way from "
@@ -173,7 +177,9 @@ def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
         "seed was used in training or tuning.",
         f"PSNR and SSIM (Gaussian weights) on sRGB values, in sensor geometry, vignetting divided "
         f"out, {BORDER_PX} pixels cut at every border.",
-        "The classical methods get the bundle's kernel at the middle of the crop for each colour, "
-        "linear white-balanced demosaicked planes and a mirrored border; nothing is clipped. "
-        "scikit-image has no ADMM-TV: that one is camkit's own.",
+        f"The three classical methods get linear white-balanced demosaicked planes, cut into parts "
+        f"of {part_px} px with {overlap_px} px overlap, mirrored past the borders of the picture; "
+        "every part is tapered and restored with the bundle's PSF at its middle for each colour; "
+        "nothing is clipped. Richardson-Lucy is scikit-image's round for round, on transforms that "
+        "are made once. scikit-image has no ADMM-TV: that one is camkit's own.",
     ]

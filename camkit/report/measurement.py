@@ -142,6 +142,11 @@ def finished_rows(
     return done
 
 
+def latest(measurements: Iterable[Measurement]) -> list[Measurement]:
+    """Keep one measurement of every method and capture, the last: two runs may share a journal."""
+    return list({(m.capture, m.method): m for m in measurements}.values())
+
+
 def measure(
     shot: Shot, rows: Sequence[Row], expose: Callable[[Shot], Exposed]
 ) -> list[Measurement]:

@@ -21,8 +21,9 @@ from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
-from camkit.report.peers import LocalCapture, trim_kernels
-from camkit.runtime.bank.psf import color_kernels, kernel_at
+from camkit.report.peers import LocalCapture
+from camkit.runtime.bank.blocks import LocalPsf
+from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.capture import Capture
 from camkit.runtime.color import recover_highlights
 from camkit.runtime.files.picture import read_scene
@@ -42,6 +43,7 @@ TUNING_SEED: Final = 2004
 BORDER_PX: Final = 32
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
+FloatGrid = NDArray[np.float64]
 PsfKind = Literal["fresh", "bundle"]
 
 
@@ -235,9 +237,7 @@ def judge(restored: FloatArray, sharp: FloatArray) -> Score:
 
     References: Wang et al. 2004 (SSIM with Gaussian weights of sigma 1.5).
     """
-    inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
-    truth = sharp[inside].transpose(1, 2, 0).astype(np.float64)
-    got = encode_srgb(restored[inside]).transpose(1, 2, 0).astype(np.float64)
+    truth, got = _inner_srgb(restored, sharp)
     ssim = structural_similarity(
         truth,
         got,
@@ -247,9 +247,26 @@ def judge(restored: FloatArray, sharp: FloatArray) -> Score:
         sigma=1.5,
         use_sample_covariance=False,
     )
+    return Score(psnr_db=_psnr(truth, got), ssim=float(ssim))
+
+
+def psnr(restored: FloatArray, sharp: FloatArray) -> float:
+    """Give the PSNR of `judge` alone, in a tenth of its time."""
+    return _psnr(*_inner_srgb(restored, sharp))
+
+
+def _inner_srgb(restored: FloatArray, sharp: FloatArray) -> tuple[FloatGrid, FloatGrid]:
+    """Give truth and restoration as (h, w, 3) sRGB values without the border."""
+    inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
+    truth = sharp[inside].transpose(1, 2, 0).astype(np.float64)
+    return truth, encode_srgb(restored[inside]).transpose(1, 2, 0).astype(np.float64)
+
+
+def _psnr(truth: FloatGrid, got: FloatGrid) -> float:
     # equal pictures would be infinitely good, which no mean survives
-    psnr_db = peak_signal_noise_ratio(truth, got, data_range=1.0) if (truth != got).any() else 120.0
-    return Score(psnr_db=float(psnr_db), ssim=float(ssim))
+    if (truth == got).all():
+        return 120.0
+    return float(peak_signal_noise_ratio(truth, got, data_range=1.0))
 
 
 def _develop(simulation: Simulation, bundle: Bundle) -> LocalCapture:
@@ -262,13 +279,14 @@ def _develop(simulation: Simulation, bundle: Bundle) -> LocalCapture:
         origin_px=(x, y),
     )
     front = FrontRows(capture, simulation.white_balance, method="fast", repair=True)
-    kernels = color_kernels(bundle.psf, *camera.channel_response.to_arrays())
-    x_mm, y_mm = (float(v) for v in simulation.window.centre_mm)
     saturated: NDArray[np.bool_] = capture.saturated_rows(0, capture.height)
     return LocalCapture(
         planes=front.read(0, capture.height),
-        kernels=trim_kernels(kernel_at(kernels, bundle.psf.field_heights_mm, x_mm, y_mm)),
+        psf=LocalPsf(
+            kernels=color_kernels(bundle.psf, *camera.channel_response.to_arrays()),
+            field_heights_mm=bundle.psf.field_heights_mm,
+            window=simulation.window,
+        ),
         noise=camera.noise_at(simulation.iso).with_gains(simulation.white_balance),
         saturated=saturated if saturated.any() else None,
-        window=simulation.window,
     )

@@ -13,12 +13,13 @@ TITLES: Final = {
     "input": "input (developed only)",
     "skimage_wiener": "scikit-image Wiener",
     "skimage_rl": "scikit-image Richardson-Lucy",
-    "admm_tv": "ADMM-TV, one local PSF",
+    "admm_tv": "ADMM-TV",
     "bank": "our Wiener bank",
     "bank_rl": "our blocks, Richardson-Lucy",
     "bank_admm_tv": "our blocks, ADMM-TV",
     "S": "network S",
     "M": "network M",
+    "L": "network L",
 }
 PSF_TITLES: Final = {
     "fresh": "fabricated lenses, PSF traced afresh",
@@ -167,11 +168,16 @@ def _heights(measurements: Iterable[Measurement]) -> dict[str, float]:
 def _protocol_lines(report: Mapping[str, Any]) -> list[str]:
     machine, protocol = report["machine"], report["protocol"]
     tuned = "; ".join(
-        f"{peer} {', '.join(f'{v:g} at ISO {iso}' for iso, v in by_iso.items())}"
+        f"{TITLES.get(peer, peer)}: "
+        + " and ".join(
+            f"{', '.join(f'{name} {v:g}' for name, v in values.items())} at ISO {iso}"
+            for iso, values in by_iso.items()
+        )
         for peer, by_iso in report["tuned"]["values"].items()
     )
     return [
-        f"Written by `{report['command']}` on {machine['cpu']} with {machine['cores']} cores; "
+        f"Written by {', then '.join(f'`{command}`' for command in report['commands'])} on "
+        f"{machine['cpu']} with {machine['cores']} cores; "
         f"every single measurement stands in `{report['json_name']}`.",
         "",
         *(f"- {line}" for line in protocol["text"]),

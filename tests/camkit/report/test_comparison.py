@@ -4,16 +4,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.bundle.manifest import Wiener
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError
 from camkit.report.comparison import Rival, make_rows, protocol_text
 from camkit.report.quality import Shot, expose
+from camkit.report.tuning import Tuned
 from tests.bundle_factory import write_tiny_bundle
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
 
-TUNED = {"skimage_wiener": {100.0: 0.01}, "skimage_rl": {100.0: 4.0}, "admm_tv": {100.0: 1.0}}
+TUNED: Tuned = {
+    "skimage_wiener": {100.0: (0.01,)},
+    "skimage_rl": {100.0: (4.0,)},
+    "admm_tv": {100.0: (1.0, 4.0)},
+}
 METHODS = ("input", "skimage_wiener", "skimage_rl", "admm_tv", "bank", "bank_rl", "M")
 
 
@@ -33,16 +39,45 @@ def test_every_row_restores_a_capture_and_no_two_alike(bundle: Bundle) -> None:
 
 
 def test_identities_follow_lens_and_parameters(bundle: Bundle) -> None:
-    def identities(tuned: dict[str, dict[float, float]], lens: str) -> list[str]:
+    def identities(tuned: Tuned, lens: str) -> list[str]:
         return [r.identity for r in make_rows(bundle, METHODS, [], tuned, [100.0], lens)]
 
     first = identities(TUNED, "lens")
     assert len(set(first)) == len(METHODS)
-    second = identities(TUNED | {"admm_tv": {100.0: 2.0}}, "lens")
+    second = identities(TUNED | {"admm_tv": {100.0: (2.0, 4.0)}}, "lens")
     assert [a == b for a, b in zip(first, second, strict=True)] == [
         name != "admm_tv" for name in METHODS
     ]
     assert not set(first) & set(identities(TUNED, "another lens"))
+
+
+def with_other_network(bundle: Bundle) -> Bundle:
+    """The same camera, PSF and stages, with the network M trained anew."""
+    manifest = bundle.manifest
+    name = bundle.network_facts("M").member
+    member = manifest.members[name].model_copy(update={"sha256": "0" * 64})
+    members = manifest.members | {name: member}
+    return dataclasses.replace(bundle, manifest=manifest.model_copy(update={"members": members}))
+
+
+def with_other_wiener(bundle: Bundle) -> Bundle:
+    stages = [
+        stage.model_copy(update={"prior_scale": 2 * stage.prior_scale})
+        if isinstance(stage, Wiener)
+        else stage
+        for stage in bundle.manifest.stages
+    ]
+    manifest = bundle.manifest.model_copy(update={"stages": stages})
+    return dataclasses.replace(bundle, manifest=manifest)
+
+
+def test_a_new_network_changes_the_identity_of_its_own_row_only(bundle: Bundle) -> None:
+    def changed(other: Bundle) -> list[str]:
+        old, new = (make_rows(b, METHODS, [], TUNED, [100.0], "lens") for b in (bundle, other))
+        return [a.name for a, b in zip(old, new, strict=True) if a.identity != b.identity]
+
+    assert changed(with_other_network(bundle)) == ["M"]
+    assert changed(with_other_wiener(bundle)) == ["bank", "bank_rl", "M"]
 
 
 def test_a_rival_with_the_same_members_has_the_identity_of_its_size(bundle: Bundle) -> None:

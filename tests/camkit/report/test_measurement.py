@@ -15,6 +15,7 @@ from camkit.report.measurement import (
     append_journal,
     finished_rows,
     identity_of,
+    latest,
     measure_all,
     open_rows,
     read_journal,
@@ -92,6 +93,12 @@ def test_a_journal_damaged_in_the_middle_is_refused(tmp_path: Path) -> None:
     path.write_text("{" + path.read_text())
     with pytest.raises(ContractError, match="line 1"):
         read_journal(path)
+
+
+def test_of_two_measurements_of_the_same_the_last_counts() -> None:
+    first, again = make_measurement(psnr_db=20.0), make_measurement(psnr_db=21.0)
+    others = [make_measurement(method="S"), make_measurement(psf="bundle")]
+    assert latest([first, *others, again]) == [again, *others]
 
 
 def test_only_rows_not_yet_measured_are_open() -> None:

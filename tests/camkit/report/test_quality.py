@@ -22,6 +22,7 @@ from camkit.report.quality import (
     finish_planes,
     judge,
     list_set,
+    psnr,
     read_picture,
 )
 from tests.psf_factory import texture
@@ -91,7 +92,9 @@ def test_a_sharp_picture_is_judged_perfect_and_noise_costs_what_it_should() -> N
     assert perfect.psnr_db > 100
     assert perfect.ssim == pytest.approx(1, abs=1e-4)
     off = np.clip(sharp + 0.01 * np.random.default_rng(0).standard_normal(sharp.shape), 0, 1)
-    assert judge(decode_srgb(off.astype(np.float32)), sharp).psnr_db == pytest.approx(40, abs=0.2)
+    restored = decode_srgb(off.astype(np.float32))
+    assert judge(restored, sharp).psnr_db == pytest.approx(40, abs=0.2)
+    assert psnr(restored, sharp) == judge(restored, sharp).psnr_db
 
 
 def test_the_border_is_not_judged() -> None:

@@ -40,11 +40,14 @@ def run(psf: str = "fresh", pictures: int = 2) -> list[Measurement]:
 
 def report(measurements: list[Measurement]) -> dict[str, object]:
     return {
-        "command": "python tools/quality.py",
+        "commands": ["python tools/quality.py --psf fresh", "python tools/quality.py --resume"],
         "json_name": "quality.json",
         "machine": {"cpu": "a processor", "cores": 2},
         "protocol": {"text": ["as stated"]},
-        "tuned": {"data": "valid", "values": {"admm_tv": {"100": 1.0, "1600": 3.0}}},
+        "tuned": {
+            "data": "valid",
+            "values": {"admm_tv": {"100": {"weight": 20.0, "iterations": 12.0}}},
+        },
         "methods": list(METHODS),
         "summary": summarise(measurements, METHODS),
     }
@@ -78,13 +81,14 @@ def test_captures_that_lack_a_method_are_left_out_of_the_comparison() -> None:
 
 def test_the_page_holds_every_number_and_says_which_aims_were_reached() -> None:
     page = to_markdown(report(run() + run("bundle")))
-    assert "| best classical (ADMM-TV, one local PSF) | +2.50 | +2.0 | yes |" in page
+    assert "| best classical (ADMM-TV) | +2.50 | +2.0 | yes |" in page
     assert "| our Wiener bank | +2.00 | +1.5 | yes |" in page
     assert "| U-Net | +0.50 | +0.0 | yes |" in page
     assert "| network M | 26.00 / 0.510 | 25.00 / 0.510 | 25.50 / 0.510 |" in page
     assert "1 (5.0 mm), n = 2" in page
     assert "the bundle's own PSF" in page
-    assert "admm_tv 1 at ISO 100, 3 at ISO 1600" in page
+    assert "ADMM-TV: weight 20, iterations 12 at ISO 100." in page
+    assert "`python tools/quality.py --psf fresh`, then `python tools/quality.py --resume`" in page
 
 
 def test_a_missed_aim_is_called_missed() -> None:
