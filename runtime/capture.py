@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.memory import mapping_of
 
 Contract = Literal["raw_bayer_v1", "linear_rgb_v1"]
 
@@ -154,6 +155,11 @@ class Capture:
         """Give the number of columns."""
         return int(self.samples.shape[-1])
 
+    @property
+    def resident_bytes(self) -> int:
+        """Give the memory that the samples take; none where they are read from the file."""
+        return 0 if mapping_of(self.samples) is not None else self.samples.nbytes
+
     def linear_rows(self, top: int, bottom: int) -> FloatArray:
         """Give rows top..bottom as a linear signal: black is 0, white level 1, negatives kept.
 
@@ -164,7 +170,7 @@ class Capture:
             ContractError: If the rows lie outside the picture.
         """
         self._check_rows(top, bottom)
-        rows = self.samples[..., top:bottom, :].astype(np.float32)
+        rows = self.samples[..., top:bottom, :].astype(np.float32, order="C")
         black = self._black_rows(top)
         scale = np.float32(1) / (np.float32(self.white_level) - black)
         if self.cfa is None or (black == black[0, 0]).all():

@@ -12,12 +12,25 @@ class StageClock:
     """A stack of running stages; only the innermost one is charged.
 
     One clock belongs to one capture and one thread.
+
+    Attributes:
+        seconds: Wall seconds per stage.
+        cpu_seconds: CPU seconds of all threads of this process while a stage ran; what runs
+            beside the stages, such as the writer's thread, is charged to them too.
     """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.cpu_seconds: dict[str, float] = {}
         self._running: list[str] = []
         self._since = 0.0
+        self._cpu_since = 0.0
+
+    @property
+    def running(self) -> str | None:
+        """Name the innermost stage that runs now; may be asked from another thread."""
+        running = self._running[-1:]
+        return running[0] if running else None
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -40,11 +53,12 @@ class StageClock:
             yield band
 
     def _charge(self) -> None:
-        now = time.perf_counter()
+        now, cpu = time.perf_counter(), time.process_time()
         if self._running:
             name = self._running[-1]
             self.seconds[name] = self.seconds.get(name, 0.0) + now - self._since
-        self._since = now
+            self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + cpu - self._cpu_since
+        self._since, self._cpu_since = now, cpu
 
 
 class TimedRows:

@@ -1,7 +1,12 @@
-"""The peak memory of this process."""
+"""The peak memory of this process, and arrays that lie in a file instead."""
 
+import mmap
 import sys
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 def peak_rss_mb() -> float:
@@ -24,3 +29,18 @@ def _max_rss_mb() -> float:
         return 0.0
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+def mapping_of(samples: NDArray[Any]) -> mmap.mmap | None:
+    """Give the file mapping that an array is a view of; None for an array in memory."""
+    owner: Any = samples
+    while isinstance(owner, np.ndarray):
+        owner = owner.base
+    return owner if isinstance(owner, mmap.mmap) else None
+
+
+def release_pages(samples: NDArray[Any]) -> None:
+    """Give back what was read of a mapped array; it is read again when it is asked for."""
+    mapping = mapping_of(samples)
+    if mapping is not None and hasattr(mmap, "MADV_DONTNEED"):
+        mapping.madvise(mmap.MADV_DONTNEED)

@@ -7,12 +7,19 @@ Every stage reads rows from a `RowSource` and yields bands of finished rows from
 """
 
 from collections.abc import Callable, Iterator
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.slices import run_slices
+
+CHUNK_SAMPLES: Final = 1 << 18
+"""Samples of one channel that a pointwise function gets at once: what it makes stays in cache."""
+
+STALE_ROWS: Final = 128
+"""Rows of a band that may wait for their successors after their last reader has passed."""
 
 
 class RowSource(Protocol):
@@ -51,14 +58,31 @@ class ArrayRows:
 
 
 class MappedRows:
-    """A row source whose rows are computed from another source by a pointwise function."""
+    """A row source whose rows are computed from another source by a pointwise function.
+
+    The function gets a few rows at a time, from several threads at once.
+    """
 
     def __init__(
-        self, source: RowSource, function: Callable[[FloatArray, int], FloatArray], channels: int
+        self,
+        source: RowSource,
+        function: Callable[[FloatArray, int], FloatArray],
+        channels: int,
+        *,
+        threads: int = 1,
     ) -> None:
+        """Name source and function.
+
+        Args:
+            source: Where rows are read.
+            function: (rows, first row) -> (channels, as many rows, w) float32.
+            channels: Of the result.
+            threads: Threads that share the rows of one read; no influence on the bits.
+        """
         self._source = source
         self._function = function
         self._channels = channels
+        self._threads = threads
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -68,7 +92,18 @@ class MappedRows:
 
     def read(self, top: int, bottom: int) -> FloatArray:
         """Give function(rows, top) of the rows top..bottom."""
-        return self._function(self._source.read(top, bottom), top)
+        rows = self._source.read(top, bottom)
+        width = rows.shape[2]
+        mapped = np.empty((self._channels, bottom - top, width), dtype=np.float32)
+        chunk = max(1, CHUNK_SAMPLES // width)
+
+        def fill(first: int, last: int) -> None:
+            for start in range(first, last, chunk):
+                part = slice(start, min(start + chunk, last))
+                mapped[:, part] = self._function(rows[:, part], top + start)
+
+        run_slices(fill, bottom - top, threads=self._threads)
+        return mapped
 
 
 class StackedRows:
@@ -117,7 +152,9 @@ class RollingRows:
             raise ContractError(f"rows are read downwards; got {top} after {self._tops[reader]}")
         self._tops[reader] = top
         needed = min(self._tops)
-        self._kept = [(y, b) for y, b in self._kept if y + b.shape[1] > needed]
+        self._kept = [
+            _without_stale(y, b, needed) for y, b in self._kept if y + b.shape[1] > needed
+        ]
         while self._end < bottom:
             band = next(self._bands, None)
             if band is None:
@@ -128,6 +165,14 @@ class RollingRows:
         pieces = [b[:, max(top - y, 0) : bottom - y] for y, b in self._kept if y < bottom]
         pieces = [p for p in pieces if p.shape[1]]
         return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
+
+
+def _without_stale(top: int, band: FloatArray, needed: int) -> tuple[int, FloatArray]:
+    """Copy the rows that are still needed, if so many are not that the band is worth freeing."""
+    stale = needed - top
+    if stale < max(STALE_ROWS, band.shape[1] // 2):
+        return top, band
+    return needed, band[:, stale:].copy()
 
 
 class RowReader:

@@ -13,14 +13,9 @@ from numpy.typing import NDArray
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import UnsupportedError
-from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, ComplexArray, LocalPsf
-from camkit.runtime.bank.richardson_lucy import (
-    apply_transfer,
-    background_of,
-    inverse_rfft2,
-    richardson_lucy,
-    spread_clipped,
-)
+from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
+from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, spread_clipped
+from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, inverse, transform
 from camkit.runtime.bank.wiener import wiener_filter
 
 Method = Literal["wiener", "rl", "admm-tv"]
@@ -154,15 +149,15 @@ def _admm_tv(
     iterations: int,
 ) -> FloatArray:
     size = samples.shape[-1]
-    inverse = 1 / (np.square(np.abs(otf)) + rho * _gradient_power(size))
-    data = np.conj(otf) * scipy.fft.rfft2(samples)
+    damping = 1 / (np.square(np.abs(otf)) + rho * _gradient_power(size))
+    data = np.conj(otf) * transform(samples)
     sharp = samples
     down, across = np.zeros_like(sharp), np.zeros_like(sharp)
     dual_down, dual_across = np.zeros_like(sharp), np.zeros_like(sharp)
     for _ in range(iterations):
         pull = _divergence(down - dual_down, across - dual_across)
-        spectrum = (data + rho * scipy.fft.rfft2(pull)) * inverse
-        sharp = inverse_rfft2(spectrum, size)
+        spectrum = (data + rho * transform(pull)) * damping
+        sharp = inverse(spectrum, size)
         dual_down += np.roll(sharp, -1, axis=-2) - sharp
         dual_across += np.roll(sharp, -1, axis=-1) - sharp
         keep = _shrinkage(dual_down, dual_across, threshold)

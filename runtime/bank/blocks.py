@@ -19,16 +19,15 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import kernel_at
+from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, transform
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RowSource
 
-ComplexArray = NDArray[np.complex64]
 MaskRows = Callable[[int, int], NDArray[np.bool_]]
 
 TAPER_SHRINK: Final = 4
@@ -93,6 +92,9 @@ class Span:
     weights: FloatArray
     centre: float
     index: NDArray[np.intp]
+
+
+PlainBlock = Callable[[Span, Span], bool]
 
 
 def plan_spans(size_px: int, block_px: int, overlap_px: int) -> tuple[Span, ...]:
@@ -160,19 +162,27 @@ def to_otf(kernel: FloatArray, block_px: int) -> ComplexArray:
     _, kh, kw = kernel.shape
     if max(kh, kw) > block_px:
         raise ContractError(f"a kernel of {kh}x{kw} px does not fit a block of {block_px} px")
-    rows = np.zeros((3, kh, block_px), dtype=np.float32)
-    rows[:, :, :kw] = kernel
-    half = scipy.fft.rfft(np.roll(rows, -(kw // 2), axis=-1), axis=-1)
-    full = np.zeros((3, block_px, half.shape[-1]), dtype=np.complex64)
-    full[:, : kh - kh // 2] = half[:, kh // 2 :]
-    full[:, block_px - kh // 2 :] = half[:, : kh // 2]
-    return np.asarray(scipy.fft.fft(full, axis=-2, overwrite_x=True))
+    block = np.zeros((3, block_px, block_px), dtype=np.float32)
+    down, across = kh // 2, kw // 2
+    for rows, kernel_rows in _halves(kh, down):
+        for cols, kernel_cols in _halves(kw, across):
+            block[:, rows, cols] = kernel[:, kernel_rows, kernel_cols]
+    return transform(block)
+
+
+def _halves(length: int, middle: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Give (in the block, in the kernel) of what lies from the centre on, and before it."""
+    before = slice(-middle, None) if middle else slice(0, 0)
+    return (slice(0, length - middle), slice(middle, None)), (before, slice(0, middle))
 
 
 def mirror_otf(otf: ComplexArray, *, flip_x: bool, flip_y: bool) -> ComplexArray:
     """Give the OTF of the kernel mirrored left-right and/or up-down."""
     if flip_x != flip_y:
-        otf = np.roll(otf[:, ::-1], 1, axis=1)
+        turned = np.empty_like(otf)
+        turned[:, 0] = otf[:, 0]
+        turned[:, 1:] = otf[:, :0:-1]
+        return np.conj(turned, out=turned) if flip_x else turned
     return np.asarray(np.conj(otf)) if flip_x else otf
 
 
@@ -198,8 +208,7 @@ def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatAr
     n = size // shrink
     half = otf[:, :, : n // 2 + 1]
     low = np.concatenate([half[:, : n - n // 2], half[:, size - n // 2 :]], axis=1)
-    blurred = scipy.fft.irfft2(scipy.fft.rfft2(small) * low, s=(n, n))
-    smooth = np.repeat(np.repeat(blurred, shrink, axis=1), shrink, axis=2)
+    blurred = apply_transfer(small, low)
     keep = taper_weights(size, ring)
     tapered = np.array(samples)
     inner = slice(ring, size - ring)
@@ -209,9 +218,16 @@ def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatAr
         (inner, slice(0, ring)),
         (inner, slice(size - ring, size)),
     ):
-        part = smooth[:, rows, cols]
+        part = _grow(blurred, shrink, rows, cols)
         tapered[:, rows, cols] = part + keep[rows, cols] * (tapered[:, rows, cols] - part)
     return tapered
+
+
+def _grow(small: FloatArray, factor: int, rows: slice, cols: slice) -> FloatArray:
+    """Repeat every sample `factor` times along both axes, for these rows and columns only."""
+    down, across = (np.arange(s.start, s.stop) // factor for s in (rows, cols))
+    wide = np.asarray(small[:, down[0] : down[-1] + 1]).take(across, axis=2)
+    return np.asarray(wide.take(down - down[0], axis=1))
 
 
 def _shrink(planes: FloatArray, factor: int) -> FloatArray:
@@ -271,13 +287,17 @@ class BlockBank:
         return np.concatenate(list(self.restore_bands(ArrayRows(planes), mask)), axis=1)
 
     def restore_bands(
-        self, source: RowSource, saturated: MaskRows | None = None
+        self,
+        source: RowSource,
+        saturated: MaskRows | None = None,
+        plain: PlainBlock | None = None,
     ) -> Iterator[FloatArray]:
         """Restore a picture from top to bottom.
 
         Args:
             source: (3, h, w) rows, linear, of the size the bank was planned for.
             saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (3, rows, w).
+            plain: Tells which blocks, given as (row span, column span), stay as they are.
 
         Yields:
             (3, rows, w) float32, consecutive.
@@ -294,17 +314,17 @@ class BlockBank:
         for i, span in enumerate(self._rows):
             top, bottom = min(tops[i:]), int(span.index.max()) + 1
             mask = None if saturated is None else saturated(top, bottom)
-            strip = _Strip(source.read(top, bottom), mask, top, span)
-            end = span.start + span.inner.stop
-            total = np.concatenate(
-                [total, np.zeros((3, end - done - total.shape[1], width), np.float32)], axis=1
-            )
+            strip = _Strip(source.read(top, bottom), mask, top, span, plain)
+            total = _lengthened(total, span.start + span.inner.stop - done)
             self._add_blocks(strip, total[:, span.start + span.inner.start - done :])
             last = i + 1 == len(self._rows)
             ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
-            yield total[:, : ready - done]
-            total = total[:, ready - done :].copy()
+            finished, total = total[:, : ready - done].copy(), total[:, ready - done :].copy()
             done = ready
+            # What is not needed again must not wait here while the network works.
+            del strip, mask
+            yield finished
+            del finished
 
     def _add_blocks(self, strip: "_Strip", total: FloatArray) -> None:
         """Add the windowed blocks of one block row to its rows, from left to right."""
@@ -320,23 +340,34 @@ class BlockBank:
     def _restore(self, strip: "_Strip", run: Callable[..., Iterator[Any]]) -> Iterator[FloatArray]:
         """Give the windowed blocks of one block row, from left to right."""
         places = [self._psf.position_mm(c.centre, strip.span.centre) for c in self._columns]
-        keys = sorted({(abs(x_mm), abs(y_mm)) for x_mm, y_mm in places})
+        filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
+        keys = sorted({(abs(x_mm), abs(y_mm)) for x_mm, y_mm in filtered})
         otfs = dict(zip(keys, run(self._otf, keys), strict=True))
 
         def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
+            window = strip.span.weights[:, None] * column.weights
+            if strip.is_plain(column):
+                return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
             x_mm, y_mm = place_mm
             otf = mirror_otf(otfs[abs(x_mm), abs(y_mm)], flip_x=x_mm < 0, flip_y=y_mm < 0)
             samples, unknown = strip.cut(column)
             samples = taper_edges(samples, otf, self._guard_px)
             block = Block(samples=samples, otf=otf, unknown=unknown)
             sharp = self._filter(block)[:, strip.span.inner, column.inner]
-            return sharp * (strip.span.weights[:, None] * column.weights)
+            return sharp * window
 
         return run(restore, self._columns, places)
 
     def _otf(self, place_mm: tuple[float, float]) -> ComplexArray:
         kernel = kernel_at(self._psf.kernels, self._psf.field_heights_mm, *place_mm)
         return to_otf(kernel, self._block_px)
+
+
+def _lengthened(planes: FloatArray, rows: int) -> FloatArray:
+    """Give the planes with zero rows added below, `rows` in all."""
+    longer = np.zeros((planes.shape[0], rows, planes.shape[2]), dtype=np.float32)
+    longer[:, : planes.shape[1]] = planes
+    return longer
 
 
 @dataclass(frozen=True, slots=True)
@@ -347,6 +378,11 @@ class _Strip:
     saturated: NDArray[np.bool_] | None
     top: int
     span: Span
+    plain: PlainBlock | None = None
+
+    def is_plain(self, column: Span) -> bool:
+        """Tell whether a block stays as it is."""
+        return self.plain is not None and self.plain(self.span, column)
 
     def cut(self, column: Span) -> tuple[FloatArray, NDArray[np.bool_] | None]:
         """Give samples and clipped samples of one block."""

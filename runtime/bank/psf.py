@@ -17,7 +17,8 @@ from camkit.errors import ContractError
 
 FloatGrid = NDArray[np.float64]
 
-PAD_PX: Final = 2
+PAD_PX: Final = 4
+"""Zeros around a kernel that is turned: a gather beyond its border finds zeros in all its taps."""
 
 
 def wavelength_weights(
@@ -150,16 +151,24 @@ def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
     rows = dx * out_x + dy * out_y + h // 2
     cols = dx * out_y - dy * out_x + w // 2
     row0, col0 = np.floor(rows), np.floor(cols)
-    row_weights, col_weights = _catmull_rom(rows - row0), _catmull_rom(cols - col0)
+    row_weights, col_weights = (
+        [weight.astype(np.float32) for weight in _catmull_rom(t)]
+        for t in (rows - row0, cols - col0)
+    )
     padded = np.pad(kernel, ((0, 0), (PAD_PX, PAD_PX), (PAD_PX, PAD_PX))).reshape(c, -1)
     width = w + 2 * PAD_PX
+    first_row = np.clip(row0, 1 - PAD_PX, h + 1).astype(np.intp) + (PAD_PX - 1)
+    first_col = np.clip(col0, 1 - PAD_PX, w + 1).astype(np.intp) + (PAD_PX - 1)
+    first = first_row * width + first_col
     turned = np.zeros_like(kernel)
     for i in range(4):
-        row = np.clip(row0.astype(np.intp) + (i - 1 + PAD_PX), 0, h + 2 * PAD_PX - 1)
+        line = np.zeros_like(kernel)
         for j in range(4):
-            col = np.clip(col0.astype(np.intp) + (j - 1 + PAD_PX), 0, width - 1)
-            weight = (row_weights[i] * col_weights[j]).astype(np.float32)
-            turned += weight * padded.take(row * width + col, axis=1)
+            tap = padded[:, i * width + j :].take(first, axis=1)
+            tap *= col_weights[j]
+            line += tap
+        line *= row_weights[i]
+        turned += line
     return turned
 
 

@@ -1,11 +1,11 @@
 """Richardson-Lucy on one periodic block: positive, at ease with highlights and missing samples."""
 
 import numpy as np
-import scipy.fft
 import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel
+from camkit.runtime.bank.spectrum import apply_transfer
 
 CLIPPED_REACH_PX = 2
 """How far the demosaic spreads a clipped sample."""
@@ -54,19 +54,6 @@ def background_of(noise: NoiseModel) -> FloatArray:
     """Give read_variance / shot as (3, 1, 1): the light that would make the read noise."""
     shot = np.maximum(np.array(noise.shot), 1e-12)
     return np.asarray(np.array(noise.read_variance) / shot, dtype=np.float32)[:, None, None]
-
-
-def apply_transfer(samples: FloatArray, transfer: NDArray[np.complex64]) -> FloatArray:
-    """Multiply the spectrum of a periodic (3, h, w) block by a transfer function."""
-    spectrum = scipy.fft.rfft2(samples)
-    spectrum *= transfer
-    return inverse_rfft2(spectrum, samples.shape[-1])
-
-
-def inverse_rfft2(spectrum: NDArray[np.complex64], width: int) -> FloatArray:
-    """Invert `rfft2` in place, axis by axis: half the time of scipy's irfft2."""
-    half = scipy.fft.ifft(spectrum, axis=-2, overwrite_x=True)
-    return np.asarray(scipy.fft.irfft(half, n=width, axis=-1, overwrite_x=True))
 
 
 def spread_clipped(saturated: NDArray[np.bool_]) -> NDArray[np.bool_]:

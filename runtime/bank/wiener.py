@@ -16,13 +16,9 @@ from numpy.typing import NDArray
 
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray, NoiseModel
-from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, ComplexArray, LocalPsf
-from camkit.runtime.bank.richardson_lucy import (
-    apply_transfer,
-    background_of,
-    richardson_lucy,
-    spread_clipped,
-)
+from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
+from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, spread_clipped
+from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
 
 CORNER_FREQUENCY: Final = 1 / 512
 """f0 in cycles/pixel: below it the prior no longer rises."""

@@ -31,7 +31,9 @@ from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.mapped_tiff import map_plain_tiff
 from camkit.runtime.files.tiff_tags import read_tiff_tags
+from camkit.runtime.memory import release_pages
 
 EXR_MAGIC: Final = b"\x76\x2f\x31\x01"
 MAX_EXR_PIXELS_PER_BYTE: Final = 4096
@@ -41,6 +43,7 @@ MOSAIC_ADVICE: Final = (
 )
 _JPEG_MAGIC: Final = b"\xff\xd8"
 _CHROMATICITY_TOLERANCE: Final = 2e-3
+_BAND_ROWS: Final = 64
 
 # OpenEXR.File prints its warnings; they must not land in stdout, which may carry JSON
 _exr_lock = threading.Lock()
@@ -109,7 +112,7 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
         black=np.full((2, 2), options.black_level, dtype=np.float32), white=options.white_level
     )
     raw_checks.check_levels(levels, int(np.iinfo(samples.dtype).max))
-    over = float(np.mean(samples > options.white_level * raw_checks.OVER_WHITE_FACTOR))
+    over = _share_above(samples, options.white_level * raw_checks.OVER_WHITE_FACTOR)
     if over > raw_checks.OVER_WHITE_SHARE:
         raise DecodeError(
             f"{over:.0%} of the samples lie above --white-level {options.white_level:g} "
@@ -122,6 +125,14 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
         white_level=options.white_level,
         notes=("headerless mosaic: pattern and levels as given",),
     )
+
+
+def _share_above(samples: NDArray[Any], limit: float) -> float:
+    """Give the share of samples above a limit, in bands that stay in cache."""
+    tops = range(0, samples.shape[0], _BAND_ROWS)
+    count = sum(int(np.count_nonzero(samples[top : top + _BAND_ROWS] > limit)) for top in tops)
+    release_pages(samples)
+    return count / samples.size
 
 
 def read_scene(path: Path) -> FloatArray:
@@ -163,11 +174,15 @@ def _is_exr(path: Path) -> bool:
 def _decode(path: Path) -> _Picture:
     if _is_exr(path):
         return _decode_exr(path)
+    raw_checks.check_chunks_inside(read_tiff_tags(path))
+    mapped = map_plain_tiff(path)
+    if mapped is not None:
+        planes = mapped if mapped.ndim == 2 else np.moveaxis(mapped, -1, 0)
+        return _Picture(samples=planes, to_rec709=None, notes=())
     data = path.read_bytes()
     # libjpeg fills what is missing with grey and only warns
     if data.startswith(_JPEG_MAGIC) and b"\xff\xd9" not in data[-65536:]:
         raise DecodeError("the JPEG has no end marker: it is cut off, copy it again")
-    raw_checks.check_chunks_inside(read_tiff_tags(path))
     try:
         decoded = (
             cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None

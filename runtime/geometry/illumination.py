@@ -8,6 +8,8 @@ from camkit.contracts import FloatArray, FrozenPsf
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
 TABLE_SAMPLES: Final = 4096
+GAIN_SAMPLES: Final = 1 << 21
+"""So many that the nearest one errs by less than 1e-6 for any lens that halves its light."""
 
 
 def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: int) -> FloatArray:
@@ -43,7 +45,7 @@ def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: in
 def divide_illumination(
     band: FloatArray, top: int, psf: FrozenPsf, window: SensorWindow
 ) -> FloatArray:
-    """Undo vignetting on a band of a picture in sensor geometry.
+    """Undo vignetting on a band of a picture in sensor geometry; see `IlluminationGain`.
 
     Args:
         band: (3, rows, w) float32, linear.
@@ -54,4 +56,33 @@ def divide_illumination(
     Returns:
         (3, rows, w) float32, a new array.
     """
-    return np.asarray(band / illumination_band(psf, window, top, top + band.shape[1]))
+    return IlluminationGain(psf, window).divide(band, top)
+
+
+class IlluminationGain:
+    """One over the relative illumination of a window, looked up by the squared field height."""
+
+    def __init__(self, psf: FrozenPsf, window: SensorWindow) -> None:
+        """Make the table.
+
+        Args:
+            psf: Frozen PSF; its relative illumination is 1 on the axis.
+            window: Where the picture lies on the sensor.
+        """
+        width, height = window.size_px
+        x_mm, y_mm = window.to_mm(np.arange(width), np.arange(height))
+        end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
+        squares = np.linspace(0.0, end, TABLE_SAMPLES)
+        coarse = np.interp(squares, psf.field_heights_mm**2, psf.relative_illumination)
+        # Rounded one by one, the two indices of a pixel may sum to one more than the last.
+        fine = np.linspace(0.0, end, GAIN_SAMPLES + 1)
+        self._table = (1 / np.interp(fine, squares, coarse)).astype(np.float32)
+        scale = (GAIN_SAMPLES - 1) / end
+        self._columns = np.rint(x_mm**2 * scale).astype(np.intp)
+        self._rows = np.rint(y_mm**2 * scale).astype(np.intp)
+
+    def divide(self, band: FloatArray, top: int) -> FloatArray:
+        """Undo vignetting on a (3, rows, w) band that starts at row `top`; a new array."""
+        rows = self._rows[top : top + band.shape[1], None]
+        gain = self._table.take(rows + self._columns, mode="clip")
+        return np.asarray(band * gain)

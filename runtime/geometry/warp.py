@@ -9,6 +9,7 @@ do not depend on their height.
 """
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Final
 
 import cv2
@@ -20,6 +21,7 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.distortion import check_distortion, distort_points, undistort_points
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import RowSource
+from camkit.runtime.slices import run_slices
 
 FloatGrid = NDArray[np.float64]
 
@@ -35,6 +37,7 @@ def undistort_bands(
     window: SensorWindow,
     *,
     band_rows: int = BAND_ROWS,
+    threads: int = 1,
 ) -> Iterator[FloatArray]:
     """Undistort a capture, band by band; what lies outside it repeats its edge.
 
@@ -43,6 +46,7 @@ def undistort_bands(
         distortion: Radial distortion per colour.
         window: Where the picture lies on the sensor.
         band_rows: Height of the bands, a multiple of 8; the pixels do not depend on it.
+        threads: Threads that share a band; the pixels do not depend on them.
 
     Yields:
         (3, rows, w) float32 in ideal geometry, from top to bottom.
@@ -52,7 +56,7 @@ def undistort_bands(
         UnsupportedError: If a side is too long for cv2.remap.
     """
     warp = Warp(distortion, window, to_sensor=False)
-    yield from _warp_bands(source, warp, band_rows=band_rows, border=cv2.BORDER_REPLICATE)
+    yield from _warp_bands(source, warp, band_rows=band_rows, threads=threads)
 
 
 def distort_array(
@@ -151,7 +155,7 @@ class Warp:
 
 
 def _warp_bands(
-    source: RowSource, warp: Warp, *, band_rows: int, border: int
+    source: RowSource, warp: Warp, *, band_rows: int, threads: int
 ) -> Iterator[FloatArray]:
     _check_size(source.shape, warp.window)
     if band_rows < LATTICE_PX or band_rows % LATTICE_PX:
@@ -161,14 +165,27 @@ def _warp_bands(
     spans = _source_spans(warp, tops, height)
     for top, (first, last) in zip(tops, spans, strict=True):
         bottom = min(top + band_rows, height)
-        rows = source.read(first, last)
         band = np.empty((3, bottom - top, width), dtype=np.float32)
-        for channel in range(3):
-            if not warp.shares_map(channel):
-                whole, fraction = warp.maps(channel, top, bottom)
-                whole[..., 1] -= first
-            band[channel] = _remap(rows[channel], (whole, fraction), border)
+        fill = partial(_warp_rows, warp, (source.read(first, last), first), (band, top))
+        run_slices(fill, bottom - top, threads=threads, lattice=LATTICE_PX)
+        del fill  # it holds rows that nobody needs while the next band is waited for
         yield band
+
+
+def _warp_rows(
+    warp: Warp,
+    source: tuple[FloatArray, int],
+    target: tuple[FloatArray, int],
+    begin: int,
+    end: int,
+) -> None:
+    """Fill rows begin..end of a band; source and target come with the row they start at."""
+    (rows, first), (band, top) = source, target
+    for channel in range(3):
+        if not warp.shares_map(channel):
+            whole, fraction = warp.maps(channel, top + begin, top + end)
+            whole[..., 1] -= first
+        band[channel, begin:end] = _remap(rows[channel], (whole, fraction), cv2.BORDER_REPLICATE)
 
 
 def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]:

@@ -3,6 +3,7 @@
 Map:
     picture_writer: the format of a picture; bands from top to bottom, turned to stand upright.
     writer: opens the writer of a format.
+    band_queue: a writer on a thread of its own.
     exr: OpenEXR, half, or float where half would overflow.
     tiff, png: 16 bits with an ICC profile.
     linear_dng, dng: LinearRaw in camera space; Bayer DNG for simulated captures.

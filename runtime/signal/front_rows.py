@@ -4,6 +4,7 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.runtime.capture import Capture
+from camkit.runtime.memory import release_pages
 from camkit.runtime.signal.demosaic import (
     DEMOSAIC_MARGIN_PX,
     DemosaicMethod,
@@ -12,6 +13,7 @@ from camkit.runtime.signal.demosaic import (
     shift_rows,
 )
 from camkit.runtime.signal.noise import REPAIR_MARGIN_PX, repair_mosaic, repair_planes
+from camkit.runtime.slices import run_slices
 
 
 class FrontRows:
@@ -29,8 +31,10 @@ class FrontRows:
         *,
         method: DemosaicMethod,
         repair: bool,
+        threads: int = 1,
     ) -> None:
         self._capture = capture
+        self._threads = threads
         self._gains = white_balance
         self._method = method
         self._repair = repair
@@ -51,27 +55,43 @@ class FrontRows:
 
     def read(self, top: int, bottom: int) -> FloatArray:
         """Give rows top..bottom as (3, bottom - top, w) float32, white-balanced."""
-        capture = self._capture
-        self.clipped += int(np.count_nonzero(capture.saturated_rows(top, bottom)))
+        planes = np.empty((3, bottom - top, self._capture.width), dtype=np.float32)
+        counts: list[tuple[int, int]] = []
+
+        def fill(first: int, last: int) -> None:
+            found = self._fill(planes[:, first:last], top + first)
+            counts.append(found)
+
+        run_slices(fill, bottom - top, threads=self._threads)
+        release_pages(self._capture.samples)
         self._counted += bottom - top
+        self.clipped += sum(clipped for clipped, _ in counts)
+        self.repaired += sum(repaired for _, repaired in counts)
+        return planes
+
+    def _fill(self, planes: FloatArray, top: int) -> tuple[int, int]:
+        """Fill planes with the rows from `top` on; count clipped and repaired samples."""
+        capture, bottom = self._capture, top + planes.shape[1]
+        clipped = int(np.count_nonzero(capture.saturated_rows(top, bottom)))
         margin = REPAIR_MARGIN_PX
         if capture.cfa is not None:
             margin += DEMOSAIC_MARGIN_PX[self._method]
         above, below = max(top - margin, 0), min(bottom + margin, capture.height)
         rows = capture.linear_rows(above, below)
         inside = slice(top - above, bottom - above)
-        rows = self._repaired(rows, inside)
+        rows, repaired = self._repaired(rows, inside)
         if capture.cfa is None:
             gains = np.array(self._gains, dtype=np.float32)[:, None, None]
-            return rows[:, inside] * gains
+            np.multiply(rows[:, inside], gains, out=planes)
+            return clipped, repaired
         cfa = shift_rows(capture.cfa, above)
         apply_gains(rows, cfa, self._gains)
-        return np.ascontiguousarray(demosaic(rows, cfa, self._method)[:, inside])
+        planes[:] = demosaic(rows, cfa, self._method)[:, inside]
+        return clipped, repaired
 
-    def _repaired(self, rows: FloatArray, inside: slice) -> FloatArray:
+    def _repaired(self, rows: FloatArray, inside: slice) -> tuple[FloatArray, int]:
         if not self._repair:
-            return rows
+            return rows, 0
         repair = repair_mosaic if self._capture.cfa is not None else repair_planes
         rows, mask = repair(rows)
-        self.repaired += int(np.count_nonzero(mask[..., inside, :]))
-        return rows
+        return rows, int(np.count_nonzero(mask[..., inside, :]))

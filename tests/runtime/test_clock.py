@@ -35,3 +35,17 @@ def test_bands_and_rows_pass_unchanged() -> None:
     np.testing.assert_array_equal(np.concatenate(passed, axis=1), planes)
     assert set(clock.seconds) == {"read", "made"}
     assert rows.shape == (1, 4, 3)
+
+
+def test_cpu_seconds_are_charged_like_wall_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr(time, "process_time", lambda: now[0])
+    clock = StageClock()
+    assert clock.running is None
+    with clock.stage("outer"):
+        now[0] += 1.0
+        with clock.stage("inner"):
+            assert clock.running == "inner"
+            now[0] += 10.0
+    now[0] += 100.0
+    assert clock.cpu_seconds == {"outer": 1.0, "inner": 10.0}

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.rows import ArrayRows, MappedRows, RollingRows, StackedRows
+from camkit.runtime.rows import STALE_ROWS, ArrayRows, MappedRows, RollingRows, StackedRows
 
 
 def _picture(height: int) -> FloatArray:
@@ -114,3 +114,27 @@ def test_rows_are_freed_with_their_last_reader() -> None:
         assert closed == [True]
     finally:
         gc.enable()
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_mapped_rows_do_not_depend_on_threads(threads: int) -> None:
+    picture = np.random.default_rng(0).random((2, 90, 40000), dtype=np.float32)
+
+    def shade(rows: FloatArray, top: int) -> FloatArray:
+        return rows * np.arange(top, top + rows.shape[1], dtype=np.float32)[:, None]
+
+    mapped = MappedRows(ArrayRows(picture), shade, 2, threads=threads)
+    np.testing.assert_array_equal(mapped.read(10, 77), shade(picture[:, 10:77], 10))
+
+
+def test_of_a_tall_band_only_the_rows_still_needed_are_kept() -> None:
+    tall = 4 * STALE_ROWS
+    picture = _picture(tall + 1)
+    rolling = RollingRows(picture.shape, _bands(picture, [tall, 1]))
+    reader = rolling.reader()
+    reader.read(0, 1)
+    top = tall - 2
+    np.testing.assert_array_equal(reader.read(top, tall + 1), picture[:, top : tall + 1])
+    kept = [band for _, band in rolling._kept]
+    assert [band.shape[1] for band in kept] == [2, 1]
+    assert kept[0].base is None

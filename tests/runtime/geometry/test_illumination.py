@@ -1,6 +1,10 @@
 import numpy as np
 
-from camkit.runtime.geometry.illumination import divide_illumination, illumination_band
+from camkit.runtime.geometry.illumination import (
+    IlluminationGain,
+    divide_illumination,
+    illumination_band,
+)
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from tests.camera_factory import PITCH_UM, make_camera, make_psf, whole_window
 
@@ -54,3 +58,15 @@ def test_single_pixel_on_the_axis_has_full_light() -> None:
     camera = make_camera(1, 1)
     psf = make_psf(make_camera())
     assert illumination_band(psf, whole_window(camera), 0, 1) == 1.0
+
+
+def test_the_gain_is_one_over_the_illumination_wherever_a_band_begins() -> None:
+    camera = make_camera()
+    psf, window = make_psf(camera), whole_window(camera)
+    light = illumination_band(psf, window, 0, 64)
+    gain = IlluminationGain(psf, window)
+    ones = np.ones((3, 64, 96), dtype=np.float32)
+    whole = gain.divide(ones, 0)
+    np.testing.assert_allclose(whole * light, ones, rtol=2e-6)
+    for top, bottom in ((0, 1), (13, 40), (63, 64)):
+        np.testing.assert_array_equal(gain.divide(ones[:, top:bottom], top), whole[:, top:bottom])

@@ -174,3 +174,12 @@ def test_side_beyond_the_limit_of_remap_is_refused() -> None:
     )
     with pytest.raises(UnsupportedError, match="32766"):
         distort_array(np.zeros((3, 2, 40000), np.float32), IDENTITY, long)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_undistorted_pixels_do_not_depend_on_threads(threads: int) -> None:
+    picture = np.random.default_rng(5).random((3, SENSOR[1], SENSOR[0]), dtype=np.float32)
+    alone, shared = (
+        list(undistort_bands(ArrayRows(picture), BARREL, window(), threads=n)) for n in (1, threads)
+    )
+    np.testing.assert_array_equal(np.concatenate(alone, 1), np.concatenate(shared, 1))

@@ -1,0 +1,56 @@
+"""The front as rows: bands on any number of threads are parts of the whole, counts included."""
+
+import numpy as np
+import pytest
+
+from camkit.runtime.capture import Capture
+from camkit.runtime.signal.demosaic import demosaic_rows
+from camkit.runtime.signal.front_rows import FrontRows
+
+GAINS = (2.0, 1.0, 1.5)
+
+
+def bayer_capture() -> Capture:
+    samples = np.random.default_rng(0).integers(300, 500, (70, 64)).astype(np.uint16)
+    samples[9::20, 11::20] = 1000  # alone far above all around them: broken
+    samples[30:40, 30:40] = 1023  # a light that clips
+    return Capture(
+        samples=samples,
+        cfa="GRBG",
+        black_level=np.full((2, 2), 64, dtype=np.float32),
+        white_level=1023.0,
+    )
+
+
+def planes_capture() -> Capture:
+    samples = np.random.default_rng(1).random((3, 70, 64), dtype=np.float32)
+    samples[1, 20, 20] = np.nan
+    return Capture(
+        samples=samples, cfa=None, black_level=np.zeros(3, dtype=np.float32), white_level=1.0
+    )
+
+
+@pytest.mark.parametrize("capture", [bayer_capture(), planes_capture()], ids=["mosaic", "planes"])
+@pytest.mark.parametrize("method", ["fast", "quality"])
+@pytest.mark.parametrize(("threads", "step"), [(1, 9), (2, 33), (3, 70)])
+def test_bands_on_any_number_of_threads_are_the_whole(
+    capture: Capture, method: str, threads: int, step: int
+) -> None:
+    whole = FrontRows(capture, GAINS, method=method, repair=True)
+    wanted = whole.read(0, 70)
+    shared = FrontRows(capture, GAINS, method=method, repair=True, threads=threads)
+    bands = [shared.read(top, min(top + step, 70)) for top in range(0, 70, step)]
+    np.testing.assert_array_equal(np.concatenate(bands, axis=1), wanted)
+    assert shared.repaired == whole.repaired > 0
+    assert shared.clipped == whole.clipped
+    assert shared.clipped_fraction == whole.clipped_fraction
+
+
+def test_without_repair_the_front_is_balance_and_demosaic() -> None:
+    capture = bayer_capture()
+    front = FrontRows(capture, GAINS, method="fast", repair=False, threads=2)
+    np.testing.assert_array_equal(
+        front.read(5, 60), demosaic_rows(capture, GAINS, 5, 60, method="fast")
+    )
+    assert front.repaired == 0
+    assert front.clipped > 0

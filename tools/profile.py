@@ -1,0 +1,410 @@
+"""Profile `camkit process`: where the time, the threads and the memory of one photograph go.
+
+python tools/profile.py stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
+python tools/profile.py layers [--bundle duet] [--size M] [--threads 2]
+python tools/profile.py jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
+python tools/profile.py sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
+python tools/profile.py exr PICTURE.exr
+"""
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import defaultdict
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.writer import write_bundle
+from camkit.report.bench.gemm import gemm_peak_gmac_per_s
+from camkit.runtime.clock import StageClock
+from camkit.runtime.memory import peak_rss_mb
+from camkit.runtime.network.engine import available_threads
+from camkit.runtime.output.band_queue import BandQueue
+from camkit.runtime.output.part_file import atomic_output
+from camkit.runtime.output.picture_writer import PictureFormat
+from camkit.runtime.output.writer import open_writer
+from camkit.runtime.pipeline import load
+from camkit.runtime.raw import file_sha256, read_capture
+
+TRANSFORMS = ("wiener", "network")
+SAMPLE_S = 0.02
+
+
+def main() -> None:
+    """Run one of the profiles."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    stages = commands.add_parser("stages")
+    stages.add_argument("capture", type=Path)
+    stages.add_argument("--format", default="exr", choices=("exr", "tiff", "png"))
+    stages.add_argument("--runs", type=int, default=3)
+    layers = commands.add_parser("layers")
+    jobs = commands.add_parser("jobs")
+    jobs.add_argument("capture", type=Path)
+    jobs.add_argument("--files", type=int, default=20)
+    jobs.add_argument("--jobs", type=int, default=2)
+    sizes = commands.add_parser("sizes")
+    sizes.add_argument("--megapixels", default="24,100,400")
+    sizes.add_argument("--max-mem", default="2G")
+    exr = commands.add_parser("exr")
+    exr.add_argument("picture", type=Path)
+    for command in (stages, layers, jobs, sizes):
+        command.add_argument("--bundle", default="duet")
+        command.add_argument("--size", default="M")
+        command.add_argument("--threads", type=int, default=None)
+    arguments = parser.parse_args()
+    {
+        "stages": profile_stages,
+        "layers": profile_layers,
+        "jobs": profile_jobs,
+        "sizes": profile_sizes,
+        "exr": profile_exr,
+    }[arguments.command](arguments)
+
+
+@dataclass
+class Samples:
+    """What a thread beside the work sees of it, every 20 ms."""
+
+    clock: StageClock
+    rss_mb: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    cpu_s: dict[int, float] = field(default_factory=dict)
+    names: dict[int, str] = field(default_factory=dict)
+
+    def take(self) -> None:
+        """Note memory of the running stage and CPU seconds of every thread."""
+        stage = self.clock.running or "else"
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+        rss = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+        self.rss_mb[stage] = max(self.rss_mb[stage], rss)
+        self.names |= {t.native_id or 0: t.name for t in threading.enumerate()}
+        for task in Path("/proc/self/task").iterdir():
+            try:
+                spent = int((task / "schedstat").read_text(encoding="ascii").split()[0])
+            except (OSError, IndexError):
+                continue  # the thread has ended meanwhile
+            self.cpu_s[int(task.name)] = spent / 1e9
+
+    def by_kind(self) -> dict[str, float]:
+        """Sum the CPU seconds of main thread, Python threads by name, and native threads."""
+        found: dict[str, float] = defaultdict(float)
+        for thread, seconds in self.cpu_s.items():
+            name = self.names.get(thread, "onnxruntime and OpenCV")
+            if thread == os.getpid():
+                name = "main"
+            elif name.startswith("ThreadPoolExecutor"):
+                name = "slices and blocks"
+            elif name.startswith("camkit-writer"):
+                name = "writer"
+            found[name] += seconds
+        return found
+
+
+def profile_stages(arguments: argparse.Namespace) -> None:
+    """Develop one capture in this process and say where wall, CPU and memory went."""
+    runs = []
+    for _ in range(arguments.runs):
+        script = [sys.executable, __file__, "stages", str(arguments.capture), "--runs", "0"]
+        script += ["--size", arguments.size, "--bundle", arguments.bundle]
+        script += ["--format", arguments.format]
+        script += [] if arguments.threads is None else ["--threads", str(arguments.threads)]
+        done = subprocess.run(script, capture_output=True, text=True, check=True)
+        runs.append(json.loads(done.stdout))
+    if not runs:
+        print(json.dumps(_profile_once(arguments)))
+        return
+    stages = list(runs[0]["wall"])
+    print("| stage | wall s | CPU s | CPU / wall | RSS MB |\n|---|---|---|---|---|")
+    for stage in stages:
+        wall, cpu, rss = (
+            statistics.median(run[key].get(stage, 0.0) for run in runs)
+            for key in ("wall", "cpu", "rss_mb")
+        )
+        ratio = f"{cpu / wall:.2f}" if wall > 0.005 else ""
+        print(f"| {stage} | {wall:.2f} | {cpu:.2f} | {ratio} | {rss:.0f} |")
+    for key in ("all", "neither network nor FFT", "start", "peak MB"):
+        print(f"| {key} | {statistics.median(run['total'][key] for run in runs):.2f} | | | |")
+    print("\n| thread | CPU s |\n|---|---|")
+    for kind in sorted({k for run in runs for k in run["threads"]}):
+        print(f"| {kind} | {statistics.median(r['threads'].get(kind, 0.0) for r in runs):.2f} |")
+
+
+def _profile_once(arguments: argparse.Namespace) -> dict:
+    began = time.perf_counter()
+    pipeline = load(arguments.bundle, size=arguments.size, threads=arguments.threads)
+    start_s = time.perf_counter() - began
+    wall, cpu = {}, {}
+    began, began_cpu = time.perf_counter(), time.process_time()
+    capture = read_capture(arguments.capture)
+    wall["decode"] = time.perf_counter() - began
+    cpu["decode"] = time.process_time() - began_cpu
+    work = pipeline.start(capture)
+    samples, ended = Samples(work.clock), threading.Event()
+
+    def watch() -> None:
+        while not ended.wait(SAMPLE_S):
+            samples.take()
+
+    watcher = threading.Thread(target=watch, name="profile")
+    watcher.start()
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / f"picture.{arguments.format}"
+        picture = PictureFormat(
+            width=capture.width,
+            height=capture.height,
+            color=work.color,
+            orientation=capture.orientation,
+        )
+        with atomic_output(target) as part:
+            waited = 0.0
+            with open_writer(part, arguments.format, picture) as writer:
+                with BandQueue(writer) as queue:
+                    for band in work.bands():
+                        before = time.perf_counter()
+                        queue.write(band)
+                        waited += time.perf_counter() - before
+                    before = time.perf_counter()
+                waited += time.perf_counter() - before
+            wall |= {**work.seconds, "write": waited}
+            before = time.perf_counter()
+            file_sha256(part)
+            wall["hash"] = time.perf_counter() - before
+            before = time.perf_counter()
+        wall["sync"] = time.perf_counter() - before
+    all_s = time.perf_counter() - began
+    ended.set()
+    watcher.join()
+    cpu |= work.clock.cpu_seconds
+    rest = all_s - sum(wall.get(name, 0.0) for name in TRANSFORMS)
+    total = {"all": all_s, "neither network nor FFT": rest, "start": start_s}
+    total["peak MB"] = max(peak_rss_mb(), capture.decoder_peak_mb)
+    return {
+        "wall": wall,
+        "cpu": cpu,
+        "rss_mb": samples.rss_mb,
+        "threads": samples.by_kind(),
+        "total": total,
+    }
+
+
+def profile_layers(arguments: argparse.Namespace) -> None:
+    """Time every node of a network on one window and compare it with the matrix product."""
+    import onnx
+    import onnxruntime as ort
+
+    threads = available_threads(arguments.threads)
+    data = open_bundle(find_bundle(arguments.bundle)).network_bytes(arguments.size)
+    side = 1024
+    macs = _macs_by_node(data, side)
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.enable_mem_pattern = False
+    options.enable_profiling = True
+    options.log_severity_level = 4
+    with tempfile.TemporaryDirectory() as folder:
+        options.profile_file_prefix = str(Path(folder) / "ort")
+        session = ort.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        channels = onnx.load_from_string(data).graph.input[0].type.tensor_type.shape.dim[1]
+        window = np.random.default_rng(0).random(
+            (1, channels.dim_value, side, side), dtype=np.float32
+        )
+        for _ in range(8):
+            session.run(None, {"input": window})
+        events = json.loads(Path(session.end_profiling()).read_text(encoding="utf-8"))
+    times: dict[str, list[float]] = defaultdict(list)
+    kinds: dict[str, str] = {}
+    for event in events:
+        if event.get("cat") == "Node" and event["name"].endswith("_kernel_time"):
+            name = event["name"].removesuffix("_kernel_time")
+            times[name].append(event["dur"] / 1e6)
+            kinds[name] = event["args"].get("op_name", "")
+    peak = gemm_peak_gmac_per_s(threads)
+    medians = {name: statistics.median(spent[2:] or spent) for name, spent in times.items()}
+    total = sum(medians.values())
+    print(f"{arguments.bundle} {arguments.size}, {side}x{side}, {threads} thread(s); ", end="")
+    print(f"matrix product {peak:.0f} GMAC/s, nodes {total * 1e3:.0f} ms")
+    print(
+        "| node | kind | ms | share | GMAC/s | of the matrix product |\n|---|---|---|---|---|---|"
+    )
+    for name, seconds in sorted(medians.items(), key=lambda item: -item[1]):
+        mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
+        speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
+        row = f"| {name} | {kinds[name]} | {seconds * 1e3:.1f} | {seconds / total:.1%} | {speed} |"
+        print(row)
+    done = sum(macs.values()) / total / 1e9
+    print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
+
+
+def _keys(name: str) -> tuple[str, ...]:
+    """Give names under which an optimised node may stand in the graph as exported."""
+    plain = name.removesuffix("_nchwc").removesuffix("_token")
+    return name, plain
+
+
+def _macs_by_node(data: bytes, side: int) -> dict[str, float]:
+    """Count the multiplications of every convolution on a square window."""
+    import onnx
+
+    model = onnx.load_from_string(data)
+    for axis in (2, 3):
+        model.graph.input[0].type.tensor_type.shape.dim[axis].dim_value = side
+    for dim in model.graph.output[0].type.tensor_type.shape.dim[2:]:
+        dim.Clear()
+    inferred = onnx.shape_inference.infer_shapes(model)
+    shapes = {
+        value.name: [d.dim_value for d in value.type.tensor_type.shape.dim]
+        for value in (*inferred.graph.value_info, *inferred.graph.output)
+    }
+    weights = {tensor.name: list(tensor.dims) for tensor in model.graph.initializer}
+    macs = {}
+    for node in model.graph.node:
+        if node.op_type == "Conv" and node.input[1] in weights:
+            _, depth, *kernel = weights[node.input[1]]
+            size = float(np.prod(shapes[node.output[0]]) * depth * np.prod(kernel))
+            macs[node.name] = macs[node.output[0]] = size
+    # Each convolution is known by two names; only one of them may be summed.
+    return {
+        node.name or node.output[0]: macs[node.name]
+        for node in model.graph.node
+        if node.name in macs
+    }
+
+
+def profile_jobs(arguments: argparse.Namespace) -> None:
+    """Process copies of a capture one at a time and several at a time."""
+    print("| jobs | files | wall s | s per file | peak MB |\n|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        inside = Path(folder) / "in"
+        inside.mkdir()
+        for i in range(arguments.files):
+            # Links, since copies would measure the disk.
+            (inside / f"photo_{i:02d}{arguments.capture.suffix}").symlink_to(
+                arguments.capture.resolve()
+            )
+        for jobs in (1, arguments.jobs):
+            target = Path(folder) / f"out_{jobs}"
+            command = [sys.executable, "-m", "camkit", "process", str(inside)]
+            command += ["--bundle", arguments.bundle, "--size", arguments.size]
+            command += ["--jobs", str(jobs), "--out-dir", str(target)]
+            began = time.perf_counter()
+            subprocess.run(command, capture_output=True, check=True)
+            seconds = time.perf_counter() - began
+            peaks = [
+                json.loads(path.read_text(encoding="utf-8"))["peak_rss_mb"]
+                for path in target.glob("*.camkit.json")
+            ]
+            print(
+                f"| {jobs} | {arguments.files} | {seconds:.1f} | "
+                f"{seconds / arguments.files:.2f} | {max(peaks):.0f} |"
+            )
+            shutil.rmtree(target)
+
+
+def profile_sizes(arguments: argparse.Namespace) -> None:
+    """Process TIFF mosaics of growing size with a bundle stretched to that sensor, to TIFF."""
+    import tifffile
+
+    bundle = open_bundle(find_bundle(arguments.bundle))
+    print("| megapixels | picture | s | s per megapixel | peak MB |\n|---|---|---|---|---|")
+    for megapixels in (float(n) for n in arguments.megapixels.split(",")):
+        height = round((megapixels * 1e6 / 1.5) ** 0.5 / 16) * 16
+        width = height * 3 // 2
+        with tempfile.TemporaryDirectory() as folder:
+            large, mosaic = Path(folder) / "large.camkit", Path(folder) / "mosaic.tif"
+            _write_stretched(bundle, large, width, height)
+            camera = bundle.manifest.camera
+            samples = tifffile.memmap(mosaic, shape=(height, width), dtype=np.uint16)
+            rng = np.random.default_rng(0)
+            middle = (camera.black_level + camera.white_level) / 3
+            for top in range(0, height, 256):
+                shape = samples[top : top + 256].shape
+                samples[top : top + 256] = rng.normal(middle, 20, shape).astype(np.uint16)
+            samples.flush()
+            del samples
+            command = [sys.executable, "-m", "camkit", "process", str(mosaic), "--json"]
+            command += ["--bundle", str(large), "--size", arguments.size, "--format", "tiff"]
+            command += ["--out-dir", str(Path(folder) / "out"), "--max-mem", arguments.max_mem]
+            command += ["--mosaic", camera.cfa, "--black-level", f"{camera.black_level:g}"]
+            command += ["--white-level", f"{camera.white_level:g}"]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            result = json.loads(done.stdout) if done.stdout.strip() else {"error": done.stderr}
+            if result.get("status") != "ok":
+                print(f"| {megapixels:g} | {width}x{height} | {result.get('error')} | | |")
+                continue
+            seconds = sum(result["seconds"].values())
+            print(
+                f"| {megapixels:g} | {width}x{height} | {seconds:.1f} | "
+                f"{seconds / (width * height / 1e6):.2f} | {result['peak_rss_mb']:.0f} |"
+            )
+
+
+def _write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:
+    """Write a bundle whose sensor has as many pixels over the same width in millimetres."""
+    camera = bundle.manifest.camera
+    pitch_um = camera.pixel_pitch_um * camera.width_px / width
+    members = {name: bundle.member(name) for name in bundle.names}
+    for name in members.keys() & {"psf.safetensors", "stress_psf.safetensors"}:
+        psf = psf_from_bytes(members[name])
+        members[name] = psf_to_bytes(replace(psf, pixel_pitch_um=pitch_um))
+    stretched = camera.model_copy(
+        update={"width_px": width, "height_px": height, "pixel_pitch_um": pitch_um}
+    )
+    write_bundle(path, bundle.manifest.model_copy(update={"camera": stretched}), members)
+
+
+def profile_exr(arguments: argparse.Namespace) -> None:
+    """Write rows of a real picture with every compression of EXR; time, size, time to read."""
+    import Imath
+    import OpenEXR
+
+    source = OpenEXR.InputFile(str(arguments.picture))
+    box = source.header()["dataWindow"]
+    width, rows = box.max.x - box.min.x + 1, 384
+    top = max(0, (box.max.y - rows) // 2)
+    half = Imath.PixelType(Imath.PixelType.HALF)
+    planes = {
+        name: np.frombuffer(source.channel(name, half, top, top + rows - 1), np.float16)
+        .reshape(rows, width)
+        .copy()
+        for name in "RGB"
+    }
+    print("| compression | CPU ms/MP | bytes/px | CPU ms/MP to read |\n|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "x.exr"
+        for name in ("NO", "RLE", "ZIPS", "ZIP", "PIZ", "DWAA"):
+            best, best_read = float("inf"), float("inf")
+            for _ in range(5):
+                header = OpenEXR.Header(width, rows)
+                packing = getattr(Imath.Compression, f"{name}_COMPRESSION")
+                header["compression"] = Imath.Compression(packing)
+                header["channels"] = {c: Imath.Channel(half) for c in "RGB"}
+                began = time.process_time()
+                out = OpenEXR.OutputFile(str(path), header)
+                out.writePixels(planes, rows)
+                out.close()
+                best = min(best, time.process_time() - began)
+                began = time.process_time()
+                written = OpenEXR.InputFile(str(path))
+                for channel in "RGB":
+                    written.channel(channel, half)
+                best_read = min(best_read, time.process_time() - began)
+            pixels = width * rows
+            print(
+                f"| {name} | {best * 1e9 / pixels:.0f} | {path.stat().st_size / pixels:.2f} | "
+                f"{best_read * 1e9 / pixels:.0f} |"
+            )
+
+
+if __name__ == "__main__":
+    main()
