@@ -4,7 +4,7 @@ import json
 import os
 import platform
 import sys
-from importlib import metadata, util
+from importlib import util
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -55,15 +55,16 @@ def examine() -> dict[str, Any]:
     """Collect the facts that `doctor` prints."""
     from camkit import __version__
     from camkit.bundle.reader import built_in_bundles
+    from camkit.report.bench.machine import memory_mb, package_version, processor_name
     from camkit.runtime.network.engine import available_threads, providers
 
     return {
         "camkit": __version__,
         "python": sys.version.split()[0],
         "platform": platform.platform(),
-        "processor": _processor(),
+        "processor": processor_name(),
         "threads": available_threads(None),
-        "memory_mb": _memory_mb(),
+        "memory_mb": memory_mb(),
         "providers": ", ".join(providers()),
         "onnxruntime_telemetry": (
             "off" if os.environ.get("ORT_DISABLE_TELEMETRY") == "1" else "not switched off"
@@ -73,7 +74,7 @@ def examine() -> dict[str, Any]:
             "ready" if util.find_spec("torch") else "not installed: pip install camkit[train]"
         ),
         "bundles": {name: str(path) for name, path in sorted(built_in_bundles().items())},
-        "packages": {name: _version(name) for name in PACKAGES},
+        "packages": {name: package_version(name) or "not installed" for name in PACKAGES},
     }
 
 
@@ -101,23 +102,3 @@ def _try_decoder() -> str:
         except (CamkitError, OSError) as error:
             return f"fails: {error}"
     return "works" if np.array_equal(capture.samples, mosaic) else "gives wrong samples"
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed"
-
-
-def _processor() -> str:
-    try:
-        with Path("/proc/cpuinfo").open(encoding="utf-8") as lines:
-            names = [line.split(":", 1)[1].strip() for line in lines if "model name" in line]
-    except OSError:
-        names = []
-    return names[0] if names else platform.processor() or platform.machine()
-
-
-def _memory_mb() -> int:
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 10**6

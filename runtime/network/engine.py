@@ -28,6 +28,14 @@ if _IMPORTED_BEFORE:
     )
 
 MINIMUM_VERSION: Final = (1, 24, 1)
+PROVIDER_NAMES: Final = {
+    "cpu": "CPUExecutionProvider",
+    "cuda": "CUDAExecutionProvider",
+    "tensorrt": "TensorrtExecutionProvider",
+    "openvino": "OpenVINOExecutionProvider",
+}
+"""What a caller may ask for, and what onnxruntime calls it."""
+_BEHIND: Final = {"tensorrt": ("cuda", "cpu"), "cuda": ("cpu",), "openvino": ("cpu",)}
 _CREATION: Final = threading.Lock()
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _ORT_ERRORS: Final = (
@@ -82,25 +90,33 @@ def providers() -> tuple[str, ...]:
     return tuple(ort.get_available_providers())
 
 
-class NetworkEngine:
-    """One network, ready to run: (1, channels, h, w) -> (1, 3, h, w), float32, on the CPU.
+def usable_providers() -> tuple[str, ...]:
+    """Name those of `PROVIDER_NAMES` that the installed onnxruntime was built with, cpu first."""
+    built = providers()
+    return tuple(name for name, full in PROVIDER_NAMES.items() if full in built)
 
-    The graph is optimised at level ALL, where every convolution takes the blocked path whose sums
-    do not depend on the window; nothing is cached on disk.
+
+class NetworkEngine:
+    """One network, ready to run: (1, channels, h, w) -> (1, 3, h, w), float32.
+
+    On the CPU the graph is optimised at level ALL, where every convolution takes the blocked path
+    whose sums do not depend on the window; other providers promise no equal bits. Nothing is
+    cached on disk.
     """
 
-    def __init__(self, model: bytes, *, threads: int) -> None:
+    def __init__(self, model: bytes, *, threads: int, provider: str = "cpu") -> None:
         """Load a model.
 
         Args:
             model: Serialised ONNX model with the weights inside; never a path.
             threads: Threads per run, from `available_threads`.
+            provider: Key of `PROVIDER_NAMES`; arrays stay in the memory of the CPU.
 
         Raises:
             ContractError: If `model` is not bytes or threads < 1.
             BundleError: If onnxruntime refuses the model or its inputs and outputs are not those
                 of a network.
-            UnsupportedError: If the installed onnxruntime is too old.
+            UnsupportedError: If the installed onnxruntime is too old or lacks the provider.
         """
         if not isinstance(model, bytes):
             raise ContractError(f"the model must be given as bytes; got {type(model).__name__}")
@@ -108,8 +124,9 @@ class NetworkEngine:
             raise ContractError(f"threads must be >= 1; got {threads}")
         _check_version(ort.__version__)
         with _CREATION:
-            self._session = _create_session(model, threads)
+            self._session = _create_session(model, threads, provider)
         self.threads = threads
+        self.provider = provider
         self.channels = _check_contract(self._session)
 
     def run(self, window: FloatArray, out: FloatArray | None = None) -> FloatArray:
@@ -189,7 +206,8 @@ def _check_version(version: str) -> None:
         )
 
 
-def _create_session(model: bytes, threads: int) -> Any:
+def _create_session(model: bytes, threads: int, provider: str = "cpu") -> Any:
+    chosen = _chosen_providers(provider)
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
@@ -200,9 +218,37 @@ def _create_session(model: bytes, threads: int) -> Any:
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4  # errors reach the caller as exceptions, not on stderr
     try:
-        return ort.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        session = ort.InferenceSession(model, options, providers=chosen)
     except _ORT_ERRORS as error:
         raise BundleError(f"onnxruntime refused the network: {error}; export it again") from error
+    # onnxruntime goes on without a provider whose libraries do not load.
+    if PROVIDER_NAMES[provider] not in session.get_providers():
+        raise UnsupportedError(
+            f"onnxruntime has the provider {provider}, but it does not start here; check its "
+            "driver and libraries, or use cpu"
+        )
+    return session
+
+
+def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
+    """Give the provider with those that take the nodes it does not know.
+
+    Raises:
+        UnsupportedError: If the installed onnxruntime lacks the provider.
+    """
+    usable = usable_providers()
+    if provider not in usable:
+        raise UnsupportedError(
+            f"the installed onnxruntime computes on {', '.join(usable)}; got {provider!r}: "
+            "install an onnxruntime built with it, or use one of these"
+        )
+    names = [name for name in (provider, *_BEHIND.get(provider, ())) if name in usable]
+    # TF32 would round float32 to 10 bits and still be called fp32.
+    settings = {"cuda": {"use_tf32": "0"}}
+    return [
+        (PROVIDER_NAMES[name], settings[name]) if name in settings else PROVIDER_NAMES[name]
+        for name in names
+    ]
 
 
 def _check_contract(session: Any) -> int:

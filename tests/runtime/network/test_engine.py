@@ -206,3 +206,33 @@ def test_onnxruntime_imported_before_camkit_is_told(tmp_path: Path) -> None:
     told = "onnxruntime was imported before camkit"
     assert told in _fresh(stand_in + "import camkit.runtime.network.engine", tmp_path).stderr
     assert told not in _fresh("import camkit.runtime.network.engine", tmp_path).stderr
+
+
+def test_providers_that_are_not_built_in_are_refused_with_those_that_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(engine_module, "providers", lambda: ("CPUExecutionProvider",))
+    with pytest.raises(UnsupportedError, match="computes on cpu; got 'cuda'"):
+        NetworkEngine(small_network(), threads=1, provider="cuda")
+
+
+def test_a_provider_that_does_not_start_is_an_error_and_no_silent_cpu(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[object] = []
+
+    class OnCpu:
+        def __init__(self, model: bytes, options: object, providers: list[object]) -> None:
+            asked.extend(providers)
+
+        def get_providers(self) -> list[str]:
+            return ["CPUExecutionProvider"]
+
+    names = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
+    monkeypatch.setattr(engine_module, "providers", lambda: names)
+    monkeypatch.setattr(engine_module.ort, "InferenceSession", OnCpu)
+    with pytest.raises(UnsupportedError, match="tensorrt, but it does not start"):
+        NetworkEngine(small_network(), threads=1, provider="tensorrt")
+    # what the first provider does not know falls to the next, in true float32
+    cuda = ("CUDAExecutionProvider", {"use_tf32": "0"})
+    assert asked == ["TensorrtExecutionProvider", cuda, "CPUExecutionProvider"]

@@ -1,0 +1,50 @@
+"""A bench on the disk: bench.json, bench.csv, bench.svg, bench.png and bench.html."""
+
+import base64
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+from camkit.report.bench.chart import draw_chart
+from camkit.report.bench.page import to_html
+from camkit.report.bench.row import Row
+from camkit.report.bench.run import Result
+
+NAME = "bench"
+
+
+def write_bench(result: Result, folder: Path) -> list[Path]:
+    """Write everything; an earlier bench in the folder is replaced.
+
+    Returns:
+        The files; without matplotlib or without PSNR there is no chart.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = {kind: folder / f"{NAME}.{kind}" for kind in ("json", "csv", "svg", "png", "html")}
+    text = json.dumps(result.report, indent=1, allow_nan=False)
+    paths["json"].write_text(text + "\n", encoding="utf-8")
+    write_csv(paths["csv"], result.report["rows"])
+    drawn = draw_chart(result.report, svg=paths["svg"], png=paths["png"])
+    if not drawn:
+        for kind in ("svg", "png"):
+            paths.pop(kind).unlink(missing_ok=True)
+    chart = base64.b64encode(paths["svg"].read_bytes()).decode("ascii") if drawn else None
+    paths["html"].write_text(to_html(result, chart), encoding="utf-8")
+    return list(paths.values())
+
+
+def write_csv(path: Path, rows: list[Row]) -> None:
+    """Write one line per row, the seconds of every stage in columns of their own."""
+    flat = [flatten(row) for row in rows]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, names, restval="")
+        writer.writeheader()
+        writer.writerows(flat)
+
+
+def flatten(row: Row) -> dict[str, Any]:
+    """Give a row without nesting: `stages` becomes columns `stage_NAME_s`."""
+    flat = {name: value for name, value in row.items() if name != "stages"}
+    return flat | {f"stage_{name}_s": value for name, value in row["stages"].items()}

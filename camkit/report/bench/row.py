@@ -1,0 +1,173 @@
+"""All that is known about a case as one flat record; unknown values are None."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from camkit.report.bench.accuracy import (
+    INPUT,
+    Key,
+    Scores,
+    mean_and_spread,
+    standard_error_of_gain,
+)
+from camkit.report.bench.case import Case
+from camkit.report.bench.metric import Metric
+from camkit.report.bench.process_run import Run
+from camkit.report.bench.timing import Spread, is_noisy, paired_ratio, quantile, spread_of
+
+Row = dict[str, Any]
+MP_OF_REFERENCE: Final = 24.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Facts:
+    """What a row takes from elsewhere.
+
+    Attributes:
+        size_px: (width, height) of the capture that is timed.
+        mac_per_px: Of the case's network.
+        gemm_gmac_per_s: Peak of the machine at the case's threads.
+        scores: Of all methods of the case's camera.
+        metrics: Of that camera.
+        base: Runs of the case that others are compared with.
+        base_label: Its label.
+    """
+
+    size_px: tuple[int, int]
+    mac_per_px: float | None
+    gemm_gmac_per_s: float | None
+    scores: dict[Key, Scores]
+    metrics: Sequence[Metric]
+    base: Sequence[Run]
+    base_label: str
+
+
+def make_row(case: Case, runs: Sequence[Run], facts: Facts) -> Row:
+    """Join what is known about a case.
+
+    Args:
+        case: The case.
+        runs: Its processes, in the order of the rounds.
+        facts: What is known from elsewhere.
+    """
+    width, height = facts.size_px
+    row: Row = {
+        "bundle": case.bundle,
+        "camera": case.camera,
+        "label": case.label,
+        "kind": case.kind,
+        "variant": case.is_variant,
+        "method": case.method,
+        "size": case.size,
+        "mode": case.mode,
+        "dtype": case.dtype,
+        "provider": case.provider,
+        "threads": case.threads,
+        "tile_px": case.tile_px,
+        "width": width,
+        "height": height,
+        **_seconds(runs, facts, width * height / 1e6),
+        **_network_share(case, runs, facts),
+        **_accuracy(case, facts),
+    }
+    failed = next((run.error for run in runs if run.error is not None), None)
+    scores = facts.scores.get(_key(case))
+    row["error"] = failed or (None if scores is None else scores.error)
+    return row
+
+
+def _seconds(runs: Sequence[Run], facts: Facts, megapixels: float) -> Row:
+    fresh = _known(run.seconds for run in runs)
+    spread = spread_of(fresh)
+    steady = spread_of([s for run in runs for s in run.steady_s])
+    load = _median(run.load_of_others for run in runs)
+    median = None if spread is None else spread.median
+    return {
+        "n": len(fresh),
+        **_spread_columns("seconds", spread),
+        "seconds_ratio": paired_ratio(fresh, _known(run.seconds for run in facts.base)),
+        "ratio_to": facts.base_label,
+        "cpu_seconds_median": _median(run.cpu_s for run in runs),
+        "steady_n": 0 if steady is None else steady.n,
+        **_spread_columns("steady_seconds", steady),
+        "steady_cpu_seconds_median": _median(s for run in runs for s in run.steady_cpu_s),
+        "stages": _stage_medians(runs),
+        "mp_per_s": None if median is None else megapixels / median,
+        "s_per_24mp": None if median is None else MP_OF_REFERENCE * median / megapixels,
+        "peak_rss_mb": _median(run.peak_rss_mb for run in runs),
+        "load_of_others": load,
+        "noisy": is_noisy(spread, load),
+    }
+
+
+def _spread_columns(name: str, spread: Spread | None) -> Row:
+    parts = ("first", "least", "median", "p90", "p99")
+    names = {"least": "min"}
+    return {
+        f"{name}_{names.get(part, part)}": None if spread is None else getattr(spread, part)
+        for part in parts
+    }
+
+
+def _network_share(case: Case, runs: Sequence[Run], facts: Facts) -> Row:
+    """Give the network's useful multiply-adds per second over the machine's peak (CPU only)."""
+    seconds = _stage_medians(runs).get("network")
+    share = None
+    known = facts.mac_per_px is not None and facts.gemm_gmac_per_s is not None
+    if known and seconds and case.provider == "cpu":
+        width, height = facts.size_px
+        assert facts.mac_per_px is not None
+        assert facts.gemm_gmac_per_s is not None
+        share = facts.mac_per_px * width * height / 1e9 / seconds / facts.gemm_gmac_per_s
+        if share > 1:  # others kept the matrix product from its peak: the share is unknown
+            share = None
+    return {"mac_per_px": facts.mac_per_px, "share_of_gemm_peak": share}
+
+
+def _accuracy(case: Case, facts: Facts) -> Row:
+    scores, of_input = facts.scores.get(_key(case)), facts.scores.get(INPUT)
+    lenses = set() if scores is None else scores.psf
+    row: Row = {
+        "psf": "+".join(sorted(lenses)) or None,
+        "images": 0 if scores is None else len(scores.by_picture),
+        "captures": 0,
+    }
+    for metric in facts.metrics:
+        for column in metric.columns:
+            name = column.name
+            mean, spread = _means(scores, name)
+            base, _ = _means(of_input, name)
+            row |= {name: mean, column.spread: spread, column.of_input: base}
+            both = scores is not None and of_input is not None and scores is not of_input
+            row[f"gain_se_{name}"] = (
+                standard_error_of_gain(scores, of_input, name)
+                if both and scores is not None and of_input is not None
+                else None
+            )
+            if scores is not None:
+                row["captures"] = sum(len(v.get(name, ())) for v in scores.by_picture.values())
+    return row
+
+
+def _key(case: Case) -> Key:
+    return INPUT if case.path is None else case.accuracy_key
+
+
+def _means(scores: Scores | None, column: str) -> tuple[float | None, float | None]:
+    return mean_and_spread([] if scores is None else scores.picture_means(column).values())
+
+
+def _stage_medians(runs: Sequence[Run]) -> dict[str, float]:
+    names = dict.fromkeys(name for run in runs for name in run.stages)
+    found = {name: _median(run.stages.get(name) for run in runs) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _known(values: Any) -> list[float]:
+    return [value for value in values if value is not None]
+
+
+def _median(values: Any) -> float | None:
+    known = _known(values)
+    return quantile(known, 0.5) if known else None

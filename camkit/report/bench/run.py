@@ -1,0 +1,280 @@
+"""The whole bench: cases made, timed in interleaved rounds, judged, and joined in rows."""
+
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.errors import ContractError
+from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy
+from camkit.report.bench.case import BASE_SIZE, Case, Entrant, Ground, Skip
+from camkit.report.bench.crops import MOST_SAMPLES, CropCollector, Patch
+from camkit.report.bench.gemm import gemm_peak_gmac_per_s
+from camkit.report.bench.machine import describe_machine, free_memory_bytes
+from camkit.report.bench.metric import Metric, registered_metrics
+from camkit.report.bench.process_run import Job, Run, run_job
+from camkit.report.bench.row import Facts, Row, make_row
+from camkit.report.bench.row_kind import make_cases
+from camkit.report.bench.samples import ISOS, Sample, golden_samples, picture_samples
+from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
+from camkit.report.bench.timed_capture import SCENE_TEXT, timed_capture
+from camkit.report.bench.timing import interleaved
+from camkit.report.quality import FIELD_SHARES, list_set
+from camkit.runtime.network.engine import available_threads, usable_providers
+from camkit.runtime.raw import read_capture
+
+REPORT_VERSION: Final = 1
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """What all entrants of one camera share.
+
+    Attributes:
+        entrant: The bundle that takes the captures.
+        capture: The file that is timed.
+        size_px: Its (width, height).
+        capture_text: What it shows.
+    """
+
+    entrant: Entrant
+    capture: Path
+    size_px: tuple[int, int]
+    capture_text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What a bench found.
+
+    Attributes:
+        report: Plain JSON values: machine, settings, cameras, rows, skipped.
+        patches: Camera -> the same patches of every method, by `Case.accuracy_key`.
+        names: `Case.accuracy_key` -> label.
+    """
+
+    report: dict[str, Any]
+    patches: dict[str, list[Patch]] = field(default_factory=dict)
+    names: dict[Key, str] = field(default_factory=dict)
+
+
+def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
+    """Run a bench.
+
+    Args:
+        settings: What to measure.
+        tell: Called with a line whenever something begins.
+
+    Raises:
+        ContractError: If bundles, methods or pictures do not fit each other.
+        BundleError: If a bundle is refused.
+        DecodeError: If the given capture cannot be read.
+    """
+    folder = settings.folder()
+    entrants = open_entrants(settings.bundles, settings.references)
+    ground = Ground(
+        threads=available_threads(None),
+        providers=usable_providers(),
+        free_bytes=free_memory_bytes(),
+    )
+    cases, skips = make_cases(entrants, settings.axes, ground)
+    if not cases:
+        raise ContractError(
+            f"nothing to measure: {'; '.join(f'{s.what}: {s.reason}' for s in skips)}"
+        )
+    cameras = {}
+    for entrant in entrants:
+        if not entrant.is_reference:
+            tell(f"{entrant.label}: preparing the capture")
+            cameras[entrant.label] = _camera(entrant, settings, folder)
+    machine = describe_machine()
+    peaks = {n: gemm_peak_gmac_per_s(n, settings.gemm_s) for n in {c.threads for c in cases}}
+    machine["gemm_gmac_per_s"] = {str(n): round(peak, 2) for n, peak in sorted(peaks.items())}
+    runs = time_cases(cases, cameras, settings.repeat, tell)
+    judged = {c.entrant.label: _judge(c, cases, settings, folder, tell) for c in cameras.values()}
+    return _join(cases, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
+
+
+def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Entrant]:
+    """Open all bundles; references follow the bundle of their camera.
+
+    Raises:
+        BundleError: If one is refused.
+        ContractError: If a reference is of no camera, or two have one label.
+    """
+    own = [open_bundle(find_bundle(name)) for name in bundles]
+    found = [Entrant(label=b.manifest.name, bundle=b, camera=b.manifest.name) for b in own]
+    for name in references:
+        bundle = open_bundle(find_bundle(name))
+        host = next((b for b in own if b.manifest.camera == bundle.manifest.camera), None)
+        if host is None:
+            raise ContractError(
+                f"{bundle.path.name} is the camera of none of the bundles; a reference must be of "
+                "the same camera as one of them"
+            )
+        found.append(Entrant(label=bundle.path.stem, bundle=bundle, camera=host.manifest.name))
+    labels = [entrant.label for entrant in found]
+    if len(set(labels)) != len(labels):
+        raise ContractError(f"two bundles have one name ({', '.join(labels)}); rename a file")
+    return found
+
+
+def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
+    if settings.capture is not None:
+        shot = read_capture(settings.capture)
+        return Camera(
+            entrant=entrant,
+            capture=settings.capture,
+            size_px=(shot.width, shot.height),
+            capture_text=settings.capture.name,
+        )
+    width, height = settings.width_px, settings.height_px
+    if settings.small:
+        sensor = entrant.bundle.manifest.camera
+        width = width or min(QUICK_SIZE_PX[0], sensor.width_px)
+        height = height or min(QUICK_SIZE_PX[1], sensor.height_px)
+    path, size = timed_capture(entrant.bundle, width, height, folder)
+    return Camera(entrant=entrant, capture=path, size_px=size, capture_text=SCENE_TEXT)
+
+
+def time_cases(
+    cases: Sequence[Case], cameras: dict[str, Camera], repeat: int, tell: Tell
+) -> dict[Case, list[Run]]:
+    """Run every case in fresh processes, all cases once per round; a case that fails drops out."""
+    runs: dict[Case, list[Run]] = {case: [] for case in cases}
+    with tempfile.TemporaryDirectory(prefix="camkit-bench-") as name:
+        folder = Path(name)
+        twins = {label: _twins(camera.capture, folder / label) for label, camera in cameras.items()}
+        for number, case in enumerate(interleaved(cases, repeat)):
+            if any(run.error is not None for run in runs[case]):
+                continue
+            step = f"{number + 1}/{repeat * len(cases)}"
+            tell(f"{case.camera}: timing {case.label} ({step})")
+            job = Job(
+                files=twins[case.camera],
+                bundle="none" if case.path is None else str(case.path.resolve()),
+                out_dir=folder / "out",
+                options=case.options(),
+            )
+            runs[case].append(run_job(job))
+    return runs
+
+
+def _twins(capture: Path, folder: Path) -> tuple[Path, ...]:
+    """Give the capture under two names: the first run of a process, and the steady one."""
+    folder.mkdir()
+    twins = tuple(folder / f"{name}{capture.suffix}" for name in ("first", "steady"))
+    for twin in twins:
+        shutil.copyfile(capture, twin)
+    return twins
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Judged:
+    scores: dict[Key, Scores]
+    patches: list[Patch]
+    metrics: tuple[Metric, ...]
+    text: str
+
+
+def _judge(
+    camera: Camera, cases: Sequence[Case], settings: Settings, folder: Path, tell: Tell
+) -> _Judged:
+    """Measure the accuracy of all methods of one camera."""
+    bundle, label = camera.entrant.bundle, camera.entrant.label
+    own = [case for case in cases if case.camera == label]
+    metrics = tuple(metric for metric in registered_metrics() if metric.applies(bundle))
+    samples, count, text = _samples(bundle, settings, folder)
+    plain = [case.accuracy_key for case in own if not case.is_variant]
+    collector = CropCollector(plain, every=max(1, count // MOST_SAMPLES))
+
+    def told(found: Iterable[Sample]) -> Iterable[Sample]:
+        for number, sample in enumerate(found, start=1):
+            tell(f"{label}: judging {sample.caption} ({number}/{count})")
+            yield sample
+
+    scores = measure_accuracy(
+        own, told(samples), Restorers(bundle, available_threads(None)), metrics, collector.take
+    )
+    return _Judged(scores=scores, patches=collector.patches, metrics=metrics, text=text)
+
+
+def _samples(bundle: Bundle, settings: Settings, folder: Path) -> tuple[Iterable[Sample], int, str]:
+    """Give the captures to judge on, how many there are, and what they are."""
+    if settings.data is None:
+        golden = golden_samples(bundle)
+        return golden, len(golden), f"{len(golden)} golden cases of the bundle"
+    pictures = len(list_set(settings.data, settings.images))
+    samples = picture_samples(bundle, settings.data, settings.images, folder / "psf")
+    text = (
+        f"{pictures} pictures of {settings.data.name}, {len(FIELD_SHARES)} field positions, "
+        f"ISO {' and '.join(f'{iso:g}' for iso in ISOS)}"
+    )
+    return samples, pictures * len(FIELD_SHARES) * len(ISOS), text
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    settings: Settings
+    machine: dict[str, Any]
+    peaks: dict[int, float]
+    skips: list[Skip]
+    entrants: list[Entrant]
+
+
+def _join(
+    cases: Sequence[Case],
+    runs: dict[Case, list[Run]],
+    cameras: dict[str, Camera],
+    judged: dict[str, _Judged],
+    found: _Found,
+) -> Result:
+    bundles = {entrant.label: entrant.bundle for entrant in found.entrants}
+    rows: list[Row] = []
+    for case in cases:
+        base = _base_of(case, cases)
+        mac = None
+        if case.size is not None:
+            mac = bundles[case.bundle].network_facts(case.size).mac_per_pixel
+        facts = Facts(
+            size_px=cameras[case.camera].size_px,
+            mac_per_px=mac,
+            gemm_gmac_per_s=found.peaks[case.threads],
+            scores=judged[case.camera].scores,
+            metrics=judged[case.camera].metrics,
+            base=runs[base],
+            base_label=base.label,
+        )
+        rows.append(make_row(case, runs[case], facts))
+    report = {
+        "report_version": REPORT_VERSION,
+        "machine": found.machine,
+        "repeat": found.settings.repeat,
+        "cameras": {
+            label: {
+                "width": camera.size_px[0],
+                "height": camera.size_px[1],
+                "capture": camera.capture_text,
+                "accuracy": judged[label].text,
+                "bundle_sha256": camera.entrant.bundle.sha256,
+            }
+            for label, camera in cameras.items()
+        },
+        "rows": rows,
+        "skipped": [{"what": skip.what, "reason": skip.reason} for skip in found.skips],
+    }
+    return Result(
+        report=report,
+        patches={label: judged[label].patches for label in cameras},
+        names={case.accuracy_key: case.label for case in reversed(cases)},
+    )
+
+
+def _base_of(case: Case, cases: Sequence[Case]) -> Case:
+    """Give the case that the others of its camera are compared with: size M, or the first."""
+    own = [other for other in cases if other.camera == case.camera]
+    return next((o for o in own if o.size == BASE_SIZE and o.bundle == o.camera), own[0])

@@ -1,0 +1,73 @@
+"""What a caller may ask of a bench, checked once."""
+
+import os
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from camkit.errors import ContractError
+from camkit.report.bench.case import Axes
+
+DEFAULT_REPEAT = 3
+QUICK_SIZE_PX = (512, 384)
+QUICK_METHODS = ("net", "wiener")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Everything that decides a bench.
+
+    Attributes:
+        bundles: Names or paths.
+        references: Names or paths of bundles that stand beside the one of the same camera.
+        axes: Which rows.
+        repeat: Fresh processes per row.
+        width_px: Of the capture that is timed; None for the sensor's.
+        height_px: Likewise.
+        small: A side that is not given is that of `QUICK_SIZE_PX`, if the sensor is larger.
+        capture: A capture to time instead of the procedural one.
+        data: Folder of sharp pictures to measure accuracy on; None for the golden cases.
+        images: Only the first N of them.
+        work_dir: Where captures and traced PSFs are kept between runs; None for a folder of this
+            user among the temporary files.
+        gemm_s: Seconds spent on the speed of the matrix product, per number of threads.
+    """
+
+    bundles: tuple[str, ...]
+    references: tuple[str, ...] = ()
+    axes: Axes = field(default_factory=Axes)
+    repeat: int = DEFAULT_REPEAT
+    width_px: int | None = None
+    height_px: int | None = None
+    small: bool = False
+    capture: Path | None = None
+    data: Path | None = None
+    images: int | None = None
+    work_dir: Path | None = None
+    gemm_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.bundles:
+            raise ContractError("a bench needs at least one bundle; give a NAME or PATH, or --all")
+        for name, value in (("repeat", self.repeat), ("images", self.images)):
+            if value is not None and value < 1:
+                raise ContractError(f"{name} must be >= 1; got {value}")
+        for name, side in (("width", self.width_px), ("height", self.height_px)):
+            if side is not None and (side < 64 or side % 2):
+                raise ContractError(f"{name} must be even and at least 64 px; got {side}")
+        if self.capture is not None and not self.capture.is_file():
+            raise ContractError(f"there is no capture {self.capture}")
+        if self.capture is not None and (self.width_px or self.height_px):
+            raise ContractError("a capture has its own size; leave out width and height")
+
+    def folder(self) -> Path:
+        """Give the folder for captures and PSFs, which only this user can read, and make it."""
+        if self.work_dir is not None:
+            self.work_dir.mkdir(parents=True, exist_ok=True)
+            return self.work_dir
+        user = os.getuid() if hasattr(os, "getuid") else os.getlogin()
+        folder = Path(tempfile.gettempdir()) / f"camkit-bench-{user}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+        if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
+            raise ContractError(f"{folder} belongs to another user; give another with --work-dir")
+        return folder

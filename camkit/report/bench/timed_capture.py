@@ -1,0 +1,58 @@
+"""The capture that is timed: a procedural scene photographed once by the bundle's camera."""
+
+import hashlib
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.reader import PSF, Bundle
+from camkit.errors import ContractError
+from camkit.runtime.network.engine import available_threads
+from camkit.runtime.simulate import SimulationOptions, simulate, write_capture
+from camkit.scenes import procedural_scene
+
+SCENE_SEED: Final = 7
+EXPOSURE: Final = 0.8
+SCENE_TEXT: Final = f"procedural scene {SCENE_SEED}, lights cut at white, exposure {EXPOSURE:g}"
+_VERSION: Final = 1
+
+
+def timed_capture(
+    bundle: Bundle, width_px: int | None, height_px: int | None, folder: Path
+) -> tuple[Path, tuple[int, int]]:
+    """Give a DNG of the bundle's camera, simulated now or by an earlier call.
+
+    The lights of the scene are cut at white: clipped blocks cost several times what others cost,
+    and how many there are is a matter of the scene.
+
+    Args:
+        bundle: The camera.
+        width_px: Of a centred crop; None for the sensor's.
+        height_px: Likewise.
+        folder: Where captures are kept.
+
+    Returns:
+        The file and its (width, height).
+
+    Raises:
+        ContractError: If the size does not fit the sensor.
+        UnsupportedError: If the camera cannot be simulated.
+    """
+    camera = bundle.manifest.camera
+    width, height = width_px or camera.width_px, height_px or camera.height_px
+    if width > camera.width_px or height > camera.height_px:
+        raise ContractError(
+            f"{bundle.path.name} has a sensor of {camera.width_px}x{camera.height_px} px; "
+            f"got {width}x{height}"
+        )
+    lens = bundle.manifest.members[PSF].sha256
+    parts = (camera.model_dump_json(), lens, width, height, SCENE_TEXT, _VERSION)
+    key = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+    path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}.dng"
+    if not path.is_file():
+        scene = np.minimum(procedural_scene(SCENE_SEED, height, width), np.float32(1))
+        options = SimulationOptions(exposure=EXPOSURE, workers=available_threads(None))
+        simulation = simulate(scene, camera, bundle.psf, options)
+        write_capture(path, simulation, camera, bundle.manifest.name)
+    return path, (width, height)

@@ -1,0 +1,52 @@
+"""The process whose time and memory are measured: files to pictures, as any user's program.
+
+    python -m camkit.report.bench.worker JOB     JOB is the JSON of a `process_run.Job`
+
+Prints one JSON line per file as soon as its picture lies on the disk. The first file pays for
+imports, bundle and session; the later ones find them ready.
+"""
+
+import json
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from camkit.runtime.development import FileResult
+
+
+def main(text: str) -> None:
+    """Do a job."""
+    import camkit
+
+    job: dict[str, Any] = json.loads(text)
+    camkit.process(
+        job["files"],
+        bundle=job["bundle"],
+        out_dir=job["out_dir"],
+        overwrite=True,
+        on_result=_tell,
+        **job["options"],
+    )
+
+
+def _tell(result: "FileResult") -> None:
+    times = os.times()
+    line = {
+        "status": result.status,
+        "error": result.error,
+        "seconds": result.seconds,
+        "peak_rss_mb": result.peak_rss_mb,
+        "cpu_s": times.user + times.system + times.children_user + times.children_system,
+    }
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    from camkit.errors import CamkitError
+
+    try:
+        main(sys.argv[1])
+    except CamkitError as error:
+        raise SystemExit(f"{error}") from error

@@ -1,0 +1,159 @@
+"""Accuracy: samples of both kinds, scores by the protocol, the input by the same pipeline."""
+
+import math
+from itertools import islice
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from camkit.bundle.golden import GoldenArrays, golden_to_bytes
+from camkit.bundle.manifest import GoldenCase
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.writer import write_bundle
+from camkit.colorimetry import decode_srgb
+from camkit.errors import ContractError
+from camkit.report.bench.accuracy import (
+    INPUT,
+    Restorers,
+    Scores,
+    mean_and_spread,
+    measure_accuracy,
+    standard_error_of_gain,
+)
+from camkit.report.bench.case import Case
+from camkit.report.bench.metric import registered_metrics
+from camkit.report.bench.samples import golden_samples, picture_samples, psf_kind
+from camkit.report.quality import Shot, bundle_restorer, expose, finish_planes, judge
+from tests.bundle_factory import tiny_manifest, tiny_members
+from tests.psf_factory import texture
+from tests.wide_bundle import write_wide_bundle
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    return write_wide_bundle(tmp_path_factory.mktemp("wide"))
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sharp")
+    for number, name in enumerate(("a", "b")):
+        values = np.rint(texture(112, 128, seed=number) * 255).astype(np.uint8)
+        cv2.imwrite(str(folder / f"{name}.png"), values[::-1].transpose(1, 2, 0))
+    return folder
+
+
+def make_case(bundle: Bundle, method: str, size: str | None = None) -> Case:
+    return Case(
+        camera="wide",
+        bundle="wide",
+        path=bundle.path,
+        kind="k",
+        method=method,
+        size=size,
+        threads=1,
+        base_threads=1,
+    )
+
+
+def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_path: Path) -> None:
+    cases = [make_case(bundle, "wiener"), make_case(bundle, "net", "M")]
+    scores = measure_accuracy(
+        cases,
+        picture_samples(bundle, pictures, 1, tmp_path),
+        Restorers(bundle, threads=1),
+        registered_metrics(),
+    )
+    shot = Shot(
+        set_name=pictures.name,
+        picture=pictures / "a.png",
+        number=0,
+        position=1,
+        iso=1600.0,
+        psf="bundle",
+    )
+    scene = cv2.imread(str(shot.picture))[..., ::-1].transpose(2, 0, 1) / np.float32(255)
+    exposed = expose(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.psf)
+    wanted = {
+        INPUT: finish_planes(exposed.local.planes, exposed, bundle),
+        cases[0].accuracy_key: bundle_restorer(bundle, method="wiener")(exposed),
+        cases[1].accuracy_key: bundle_restorer(bundle, size="M")(exposed),
+    }
+    for key, restored in wanted.items():
+        found = scores[key].by_picture["a.png"]
+        assert len(found["psnr_db"]) == 10  # five places, two sensitivities
+        score = judge(restored, exposed.sharp)
+        assert found["psnr_db"][3] == pytest.approx(score.psnr_db, abs=1e-3)
+        assert found["ssim"][3] == pytest.approx(score.ssim, abs=1e-4)
+    assert scores[INPUT].psf == {"bundle"}
+
+
+def test_without_a_prescription_the_lens_is_the_bundle_s_own(bundle: Bundle) -> None:
+    assert psf_kind(bundle) == "bundle"
+
+
+def test_a_method_that_fails_says_why_and_the_others_go_on(
+    bundle: Bundle, pictures: Path, tmp_path: Path
+) -> None:
+    cases = [make_case(bundle, "net", "L"), make_case(bundle, "wiener")]
+    scores = measure_accuracy(
+        cases,
+        islice(picture_samples(bundle, pictures, 1, tmp_path), 2),
+        Restorers(bundle, threads=1),
+        registered_metrics(),
+    )
+    assert "holds size" in str(scores[cases[0].accuracy_key].error)
+    assert scores[cases[1].accuracy_key].error is None
+
+
+def test_golden_cases_are_judged_against_their_stored_truth(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    arrays = GoldenArrays(
+        capture=rng.integers(64, 1024, (96, 128), dtype=np.uint16),
+        reference=rng.random((3, 96, 128), dtype=np.float32),
+    )
+    small = GoldenArrays(
+        capture=rng.integers(64, 1024, (32, 32), dtype=np.uint16),
+        reference=rng.random((3, 32, 32), dtype=np.float32),
+    )
+    cases = (
+        GoldenCase(name="large", iso=100, origin_px=(8, 6)),
+        GoldenCase(name="small", iso=100),
+    )
+    camera = tiny_manifest().camera.model_copy(update={"width_px": 320, "height_px": 240})
+    members = tiny_members() | {
+        "golden.safetensors": golden_to_bytes({"large": arrays, "small": small})
+    }
+    path = tmp_path / "g.camkit"
+    manifest = tiny_manifest().model_copy(update={"camera": camera, "golden": cases})
+    write_bundle(path, manifest, members)
+    bundle = open_bundle(path)
+    (sample,) = golden_samples(bundle)
+    assert (sample.picture, sample.origin_px, sample.undistort) == ("large", (8, 6), True)
+    np.testing.assert_allclose(decode_srgb(sample.sharp), arrays.reference, atol=1e-5)
+    assert Restorers(bundle, threads=1).restore(None, sample).shape == (3, 96, 128)
+
+
+def test_a_picture_too_small_to_be_judged_is_refused(bundle: Bundle, tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "small.png"), np.zeros((64, 200, 3), np.uint8))
+    with pytest.raises(ContractError, match="200x64 pixels"):
+        list(picture_samples(bundle, tmp_path, None, tmp_path))
+
+
+def make_scores(means: dict[str, list[float]]) -> Scores:
+    return Scores(by_picture={name: {"psnr_db": values} for name, values in means.items()})
+
+
+def test_the_error_of_the_gain_is_that_of_paired_differences() -> None:
+    base = make_scores({"a": [10.0], "b": [20.0], "c": [30.0, 32.0]})
+    better = make_scores({"a": [12.0], "b": [21.0], "c": [34.0]})  # gains 2, 1, 3
+    assert standard_error_of_gain(better, base, "psnr_db") == pytest.approx(1 / math.sqrt(3))
+    assert standard_error_of_gain(make_scores({"a": [12.0]}), base, "psnr_db") is None
+
+
+def test_spread_is_that_of_the_pictures_and_unknown_for_one() -> None:
+    assert mean_and_spread([1.0, 3.0]) == (2.0, pytest.approx(math.sqrt(2)))
+    assert mean_and_spread([1.0]) == (1.0, None)
+    assert mean_and_spread([]) == (None, None)

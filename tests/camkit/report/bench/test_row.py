@@ -1,0 +1,76 @@
+"""Rows: every column is there, what is unknown is None, and shares follow their definition."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from camkit.report.bench.process_run import Run
+from camkit.report.bench.row import make_row
+from tests.bench_factory import make_case, make_facts, make_run
+
+PROMISED = {
+    *("bundle", "method", "size", "mode", "dtype", "provider", "threads", "width", "height"),
+    *("n", "seconds_median", "seconds_p90", "peak_rss_mb", "psf", "psnr_db", "ssim"),
+    *("input_psnr_db", "images", "noisy", "stages", "mp_per_s", "s_per_24mp", "mac_per_px"),
+    *("share_of_gemm_peak", "seconds_first", "seconds_min", "seconds_p99", "error"),
+}
+
+
+def test_a_row_joins_seconds_memory_and_accuracy() -> None:
+    row = make_row(make_case(), [make_run(8.0), make_run(12.0)], make_facts())
+    assert set(row) >= PROMISED
+    assert (row["n"], row["seconds_first"], row["seconds_min"]) == (2, 8, 8)
+    assert row["seconds_median"] == 10
+    assert row["seconds_p90"] == pytest.approx(11.6)
+    assert row["seconds_p99"] is None
+    assert row["seconds_ratio"] == 2
+    assert row["steady_seconds_median"] == 9
+    assert row["mp_per_s"] == pytest.approx(1.2)
+    assert row["s_per_24mp"] == pytest.approx(20)
+    assert row["stages"] == {"network": 5.0, "write": 1.0}
+    # 10,000 MAC x 12 MP in 5 s are 24 GMAC/s of 100
+    assert row["share_of_gemm_peak"] == pytest.approx(0.24)
+    assert row["peak_rss_mb"] == 1000
+    assert row["noisy"] is True  # p90 is 1.16 times the median
+    assert (row["psf"], row["images"], row["captures"]) == ("fresh", 2, 4)
+    assert (row["psnr_db"], row["input_psnr_db"]) == (27, 21)
+    assert row["psnr_std_db"] == pytest.approx(8**0.5)
+    assert row["gain_se_psnr_db"] == pytest.approx(1.0)  # gains of 5 and 7
+    assert row["ssim"] == pytest.approx(0.6)
+    assert row["error"] is None
+    assert json.loads(json.dumps(row, allow_nan=False)) == row
+
+
+def test_a_failed_row_holds_its_reason_and_nothing_made_up() -> None:
+    facts = make_facts(scores={}, base=[])
+    row = make_row(make_case(), [Run(error="no memory")], facts)
+    assert set(row) >= PROMISED
+    assert row["error"] == "no memory"
+    assert row["n"] == row["images"] == 0
+    for name in ("seconds_median", "peak_rss_mb", "psnr_db", "input_psnr_db", "noisy", "psf"):
+        assert row[name] is None, name
+    assert row["share_of_gemm_peak"] is None
+
+
+def test_the_developed_row_has_the_accuracy_of_the_input() -> None:
+    case = make_case(path=None, kind="develop", method="develop", size=None, provider=None)
+    row = make_row(case, [make_run(1.0)], make_facts(mac_per_px=None))
+    assert row["psnr_db"] == row["input_psnr_db"] == 21
+    assert row["gain_se_psnr_db"] is None
+    assert row["share_of_gemm_peak"] is None
+
+
+def test_a_share_above_one_is_unknown() -> None:
+    row = make_row(make_case(), [make_run(1.0)], make_facts(gemm_gmac_per_s=1.0))
+    assert row["share_of_gemm_peak"] is None
+
+
+def test_speed_on_another_provider_is_not_held_against_the_cpu() -> None:
+    row = make_row(make_case(provider="cuda"), [make_run(1.0)], make_facts())
+    assert row["share_of_gemm_peak"] is None
+
+
+def test_cases_carry_no_paths_into_rows() -> None:
+    row = make_row(make_case(path=Path("/secret/duet.camkit")), [make_run(1.0)], make_facts())
+    assert "secret" not in json.dumps(row)
