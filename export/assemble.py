@@ -26,6 +26,7 @@ from camkit.bundle.manifest import (
     Manifest,
     Network,
     NetworkSize,
+    Threshold,
     Undistort,
     WhiteBalance,
     Wiener,
@@ -50,6 +51,7 @@ from camkit.runtime.check import check_bundle
 from camkit.runtime.golden_run import develop_case
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.loss import read_loss_model
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -68,6 +70,8 @@ class Parts:
         stress_psf: Kernels off the design point.
         prescription: The lens as designed.
         freeze: Report of `camkit freeze` (JSON), for the manifest.
+        plan: Calibration of `tools/plan_report.py` (JSON), for the manifest; measured with an
+            earlier export of the same networks.
         version: Semantic version of the bundle.
     """
 
@@ -76,6 +80,7 @@ class Parts:
     stress_psf: Path | None = None
     prescription: Path | None = None
     freeze: Path | None = None
+    plan: Path | None = None
     version: str = "0.1.0"
 
 
@@ -226,6 +231,7 @@ def _manifest(
         networks={size: network.facts for size, network in networks.items()},
         golden=tuple(case for case, _ in cases.values()),
         freeze=_freeze_facts(parts),
+        plan=_plan_entries(parts),
         exported_with={name: metadata.version(name) for name in PACKAGES},
     )
 
@@ -234,6 +240,25 @@ def _bank(recipe: Recipe, parts: Parts) -> Wiener:
     """Give the recipe's bank on the block grid that freezing chose by measured loss."""
     grid = {k: v for k, v in _freeze_facts(parts).items() if k in {"block_px", "overlap_px"}}
     return Wiener.model_validate({**recipe.wiener.model_dump(), **grid})
+
+
+def _plan_entries(parts: Parts) -> dict[str, Threshold] | None:
+    """Read a calibration.
+
+    Raises:
+        ContractError: If the file holds anything else.
+    """
+    if parts.plan is None:
+        return None
+    try:
+        entries = json.loads(parts.plan.read_text(encoding="utf-8"))
+        plan = {name: Threshold.model_validate(entry) for name, entry in entries.items()}
+    except (ValueError, AttributeError) as error:
+        raise ContractError(
+            f"{parts.plan} is no calibration; make it with tools/plan_report.py calibrate"
+        ) from error
+    read_loss_model(plan)
+    return plan
 
 
 def _freeze_facts(parts: Parts) -> dict[str, Any]:

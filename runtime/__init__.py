@@ -7,7 +7,9 @@
     geometry/                          place on the sensor, illumination, distortion
     color, output/                     camera colour to files and sidecars
 
-    rows, clock, memory                how stages pull rows, and what each costs
+    rows, slices, clock, memory        how stages pull rows, and what each costs
+    scene, plan/                       what a capture holds; no more work than it needs
+    envelope                           is a capture inside the bundle's measured ranges?
     options, reconstruction            the stages of one capture joined
     pipeline, development, batch       one capture in memory, one file, many files
     check, proofs, golden_run          a bundle proves itself

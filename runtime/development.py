@@ -10,6 +10,7 @@ from camkit.errors import ContractError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Cancel, Progress
+from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.linear_dng import LinearDngWriter
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
@@ -146,6 +147,7 @@ def develop_file(
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
     work = pipeline.start(capture, progress=progress, cancel=cancel)
+    estimate = work.explain()
     with atomic_output(target) as part:
         write_s = _write_picture(part, work, write)
         output_sha256 = file_sha256(part)
@@ -155,11 +157,14 @@ def develop_file(
         output=target,
         status="ok",
         bundle=_bundle_name(pipeline),
-        size=_size(pipeline),
+        size=work.size,
         seconds=seconds,
         peak_rss_mb=max(peak_rss_mb(), decoded_mb),
         warnings=work.warnings,
     )
+    if estimate is not None:
+        total_s = sum(seconds.values())
+        work.plan["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
     record = {
         **result.to_json(),
         **_identity(capture.sha256, pipeline, write, mosaic),
@@ -215,7 +220,7 @@ def _identity(
 
 
 def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> float:
-    """Stream the bands into the file; return the seconds of the writer alone."""
+    """Stream the bands into the file; return the seconds for which the writer was waited for."""
     picture = PictureFormat(
         width=work.capture.width,
         height=work.capture.height,
@@ -224,10 +229,10 @@ def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> flo
         tone="linear" if write.linear else "srgb",
     )
     seconds = 0.0
-    with _open(path, picture, work, write) as writer:
+    with _open(path, picture, work, write) as writer, BandQueue(writer) as queue:
         for band in work.bands():
             began = time.perf_counter()
-            writer.write(band)
+            queue.write(band)
             seconds += time.perf_counter() - began
         began = time.perf_counter()
     return seconds + time.perf_counter() - began
@@ -246,4 +251,4 @@ def _bundle_name(pipeline: Pipeline) -> str | None:
 
 
 def _size(pipeline: Pipeline) -> str | None:
-    return None if pipeline.engine is None else pipeline.options.size
+    return None if pipeline.engine is None else pipeline.size

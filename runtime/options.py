@@ -7,9 +7,13 @@ from camkit.errors import ContractError
 
 Method = Literal["net", "wiener", "rl", "admm-tv"]
 Mode = Literal["exact", "fast", "whole"]
+Dtype = Literal["fp32", "fp16"]
+Provider = Literal["cpu", "cuda", "tensorrt", "openvino"]
 OutputColor = Literal["rec709", "acescg", "camera"]
 DemosaicMethod = Literal["fast", "quality"]
 Assumption = Literal["centre", "scale"]
+Quality = Literal["exact", "best", "adaptive", "draft"]
+OnUnsafe = Literal["warn", "fallback", "fail"]
 
 SIZES: Final = ("S", "M", "L")
 DEFAULT_MAX_MEM_BYTES: Final = 1_120_000_000
@@ -21,7 +25,12 @@ class Options:
     """Everything that changes the pixels or the cost of a reconstruction.
 
     Attributes:
-        size: Network size held by the bundle: S, M or L.
+        size: Network size held by the bundle: S, M or L; None for that of the quality.
+        quality: exact (M, nothing skipped), best (the largest size, nothing skipped), adaptive
+            (no more than the capture needs) or draft; see camkit/runtime/plan.
+        max_seconds: Time that a capture may take on this machine; None for any.
+        max_error_db: Loss against `exact` that a capture may have at worst; None for that of the
+            quality.
         method: The network behind the Wiener bank, or a classical method alone.
         mode: Tiling: exact (bits of the whole picture), fast (smaller halo), whole (one window).
         demosaic: fast or quality; None for the method of the bundle, fast without one.
@@ -31,12 +40,21 @@ class Options:
         vignetting: Divide by the relative illumination.
         undistort: Undo the radial distortion.
         assume: What the caller vouches for where the capture's size does not match the sensor.
+        on_unsafe: What becomes of a capture outside the bundle's envelope, and of a tile whose
+            output is not finite or not bounded: warn (a bad tile is an error), fallback (the
+            Wiener result of capture or tile), fail (an error before work).
         max_mem_bytes: Memory the process may take; None for the default of 1.12 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
+        dtype: Which graph of the bundle: fp32, or fp16 where it holds one. A CPU computes the
+            latter in fp32 too, with weights rounded to fp16.
+        provider: What onnxruntime computes the network on.
     """
 
-    size: str = "M"
+    size: str | None = None
+    quality: Quality = "exact"
+    max_seconds: float | None = None
+    max_error_db: float | None = None
     method: Method = "net"
     mode: Mode = "exact"
     demosaic: DemosaicMethod | None = None
@@ -46,17 +64,28 @@ class Options:
     vignetting: bool = True
     undistort: bool = True
     assume: Assumption | None = None
+    on_unsafe: OnUnsafe = "warn"
     max_mem_bytes: int | None = None
     threads: int | None = None
     tile_px: int | None = None
+    dtype: Dtype = "fp32"
+    provider: Provider = "cpu"
 
     def __post_init__(self) -> None:
-        _check_choice("size", self.size, SIZES)
+        if self.size is not None:
+            _check_choice("size", self.size, SIZES)
+        _check_choice("quality", self.quality, get_args(Quality))
+        for name, value in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
+            if value is not None and not 0 < value < 1e6:
+                raise ContractError(f"the most {name} must be > 0; got {value}")
         _check_choice("method", self.method, get_args(Method))
         _check_choice("mode", self.mode, get_args(Mode))
+        _check_choice("dtype", self.dtype, get_args(Dtype))
+        _check_choice("provider", self.provider, get_args(Provider))
         if self.demosaic is not None:
             _check_choice("demosaic", self.demosaic, get_args(DemosaicMethod))
         _check_choice("color", self.color, get_args(OutputColor))
+        _check_choice("on_unsafe", self.on_unsafe, get_args(OnUnsafe))
         if self.assume is not None:
             _check_choice("assume", self.assume, get_args(Assumption))
         if self.white_balance is not None and not all(0 < g < 100 for g in self.white_balance):

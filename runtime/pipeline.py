@@ -7,8 +7,9 @@ A `Pipeline` is immutable and may serve many threads at once; each capture gets 
 `Reconstruction`.
 """
 
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.manifest import Wiener
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, UnsupportedError
@@ -24,6 +26,8 @@ from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.options import Options
+from camkit.runtime.plan.planner import default_size
+from camkit.runtime.plan.speed import Speed, measure_speed
 from camkit.runtime.raw import read_capture
 from camkit.runtime.reconstruction import Reconstruction, Setup
 
@@ -70,9 +74,39 @@ class Pipeline:
         self.bundle = bundle
         self.options = options
         self.threads = available_threads(options.threads)
+        self.size = None if bundle is None else default_size(bundle, options)
+        self._lock = threading.Lock()
+        self._engines: dict[str, NetworkEngine] = {}
+        self._speeds: dict[str, float] = {}
+        self._speed: Speed | None = None
         self.engine = None
-        if bundle is not None and options.method == "net":
-            self.engine = _engine(bundle, options.size, self.threads)
+        if self.size is not None and options.method == "net":
+            self.engine = self.network(self.size)
+
+    def network(self, size: str) -> NetworkEngine:
+        """Give the network of a size, made when first asked for.
+
+        Raises:
+            ContractError: If there is no bundle, or it lacks the size.
+        """
+        if self.bundle is None:
+            raise ContractError("without a bundle there is no network")
+        with self._lock:
+            if size not in self._engines:
+                options = replace(self.options, size=size)
+                self._engines[size] = _engine(self.bundle, options, self.threads)
+            return self._engines[size]
+
+    def speed(self, sizes: Sequence[str]) -> Speed:
+        """Give how fast this machine is; networks and bank are timed once per pipeline."""
+        new = {size: self.network(size) for size in sizes if size not in self._speeds}
+        with self._lock:
+            if self._speed is None or new:
+                stage = None if self.bundle is None else self.bundle.manifest.stage(Wiener)
+                made = measure_speed(new, stage, threads=self.threads)
+                self._speeds.update(made.network_s_per_mp)
+                self._speed = self._speed or made
+            return replace(self._speed, network_s_per_mp=dict(self._speeds))
 
     def start(
         self,
@@ -87,7 +121,12 @@ class Pipeline:
             ContractError: If capture and bundle do not fit each other.
         """
         setup = Setup(
-            bundle=self.bundle, options=self.options, engine=self.engine, threads=self.threads
+            bundle=self.bundle,
+            options=self.options,
+            engine=self.engine,
+            networks=self.network,
+            speed=self.speed,
+            threads=self.threads,
         )
         return Reconstruction(setup, capture, progress=progress, cancel=cancel)
 
@@ -283,7 +322,8 @@ def load(
     return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
 
 
-def _engine(bundle: Bundle, size: str, threads: int) -> NetworkEngine:
+def _engine(bundle: Bundle, options: Options, threads: int) -> NetworkEngine:
+    size = options.size or "M"
     networks = bundle.manifest.networks
     if bundle.manifest.border != "edge":
         raise UnsupportedError(
@@ -295,6 +335,6 @@ def _engine(bundle: Bundle, size: str, threads: int) -> NetworkEngine:
             f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(networks))}; "
             f"asked for {size}"
         )
-    data = bundle.network_bytes(size)
+    data = bundle.network_bytes(size, fp16=options.dtype == "fp16")
     check_graph(data, networks[size])
-    return NetworkEngine(data, threads=threads)
+    return NetworkEngine(data, threads=threads, provider=options.provider)

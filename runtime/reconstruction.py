@@ -6,43 +6,45 @@
 Nothing is computed before the first band is asked for; a `Reconstruction` serves one thread, once.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from camkit.bundle.manifest import Demosaic, HaloError, Illumination, Network, Undistort, Wiener
+from camkit.bundle.manifest import Demosaic, Illumination, Network, Undistort, Wiener
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.bank.baselines import restoration_bank
-from camkit.runtime.bank.blocks import BlockBank, LocalPsf
+from camkit.runtime.bank.blocks import BlockBank, LocalPsf, PlainBlock
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock, TimedRows
 from camkit.runtime.color import color_stage, recover_highlights, to_output
-from camkit.runtime.geometry.illumination import divide_illumination
+from camkit.runtime.envelope import findings, observe, verdict
+from camkit.runtime.geometry.illumination import IlluminationGain
 from camkit.runtime.geometry.placement import Placement, place, scale_kernels
 from camkit.runtime.geometry.warp import undistort_bands
 from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.network.tiling import (
-    Cancel,
-    Progress,
-    TileLimits,
-    TilePlan,
-    infer_bands,
-    plan_windows,
-)
+from camkit.runtime.network.guard import TileGuard
+from camkit.runtime.network.stage import NetworkStage, SizedNetwork, StageLimits, plan_stage
+from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, DemosaicMethod, Options
+from camkit.runtime.plan.blocks import plain_blocks
+from camkit.runtime.plan.decision import Case, Labels
+from camkit.runtime.plan.estimate import Estimate, estimate_seconds
+from camkit.runtime.plan.planner import Plan, make_plan, needs_scene, sizes_by_work
+from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
+from camkit.runtime.scene import CELL_PX, Scene, measure_scene
 from camkit.runtime.signal.front_rows import FrontRows
 from camkit.runtime.signal.noise import measure_noise
 from camkit.runtime.signal.stabilise import stabilise, unstabilise
 
 BAND_ROWS: Final = 128
 STAGE_ORDER: Final = (
-    *("noise", "demosaic", "wiener", "rl", "admm-tv", "stabilise", "network"),
+    *("noise", "envelope", "scene", "demosaic", "wiener", "rl", "admm-tv", "stabilise", "network"),
     *("illumination", "undistort", "color"),
 )
 FIXED_BYTES: Final = 260_000_000
@@ -59,12 +61,16 @@ class Setup:
         bundle: The camera; None develops only.
         options: What the caller chose.
         engine: The network; None for the classical methods.
+        networks: Gives the network of a size.
+        speed: Gives how fast this machine is with the networks of some sizes.
         threads: Threads to compute with.
     """
 
     bundle: Bundle | None
     options: Options
     engine: NetworkEngine | None
+    networks: Callable[[str], NetworkEngine]
+    speed: Callable[[Sequence[str]], Speed]
     threads: int
 
 
@@ -101,12 +107,34 @@ class Reconstruction:
         )
         self._placement = self._place()
         self._noise = self._choose_noise()
-        self._tiles = self._plan_tiles()
+        self._guard = TileGuard(fallback=setup.options.on_unsafe == "fallback")
+        self._decided = self._decide(falls_back=self._falls_back())
+        self._stage = self._plan_network()
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Give (3, h, w) of the picture."""
         return 3, self.capture.height, self.capture.width
+
+    @property
+    def size(self) -> str | None:
+        """Give the size of network in use; None if none runs."""
+        sizes = () if self._decided is None else self._decided.work.sizes()
+        return sizes[0] if sizes else None
+
+    @property
+    def labels(self) -> Labels | None:
+        """Give the tier of every lattice cell; None where all get the network."""
+        return None if self._decided is None else self._decided.work.labels
+
+    @property
+    def stage(self) -> NetworkStage | None:
+        """Give the planned windows of the networks; None if none runs."""
+        return self._stage
+
+    def measured_speed(self, sizes: Sequence[str]) -> Speed:
+        """Give how fast this machine is with the networks of some sizes."""
+        return self._setup.speed(sizes)
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -115,11 +143,17 @@ class Reconstruction:
         return {name: spent[name] for name in sorted(spent, key=STAGE_ORDER.index)}
 
     @property
+    def clock(self) -> StageClock:
+        """Give the clock of the stages, for profiles."""
+        return self._clock
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Give what the user should know; complete once the last band is out."""
         found = list(self._warnings)
         if self._front is not None and self._front.repaired:
             found.append(f"{self._front.repaired} dead or invalid pixels were repaired")
+        found += [f"the Wiener result was taken in {tile}" for tile in self._guard.replaced]
         return tuple(found)
 
     @property
@@ -133,8 +167,17 @@ class Reconstruction:
         rows = self._front_rows()
         if bundle is not None:
             rows = self._restored_rows(bundle, rows)
+        return self._finished_bands(rows)
+
+    def fill_plain(self) -> FloatArray:
+        """Give (3, h, w) developed without bank and network, all corrections applied."""
+        return np.concatenate(list(self._finished_bands(self._front_rows())), axis=1)
+
+    def _finished_bands(self, rows: RowSource) -> Iterator[FloatArray]:
+        """Yield the bands behind the restoration: highlights, corrections, colour."""
+        bundle = self._setup.bundle
         if self.capture.cfa is not None:
-            rows = MappedRows(rows, lambda band, _: recover_highlights(band, self.white_balance), 3)
+            rows = self._mapped(rows, lambda band, _: recover_highlights(band, self.white_balance))
         if bundle is not None:
             rows = self._corrected_rows(bundle, rows)
         _, height, _ = self.shape
@@ -224,40 +267,106 @@ class Reconstruction:
             "shot": noise.shot,
             "read_variance": noise.read_variance,
         }
+        self._sensor_noise = noise
         return noise.with_gains(self.white_balance)
 
-    def _plan_tiles(self) -> TilePlan | None:
-        engine, bundle = self._setup.engine, self._setup.bundle
-        if engine is None or bundle is None:
+    def _falls_back(self) -> bool:
+        """Compare the capture with the bundle's envelope; tell whether the network is left out."""
+        bundle, options = self._setup.bundle, self._setup.options
+        if self._setup.engine is None or bundle is None or bundle.manifest.envelope is None:
+            return False
+        with self._clock.stage("envelope"):
+            seen = observe(self.capture, self._sensor_noise)
+        found = findings(bundle.manifest.envelope, seen)
+        warning = verdict(found, bundle.manifest.name, options.on_unsafe)
+        falls_back = warning is not None and options.on_unsafe == "fallback"
+        self.plan["envelope"] = {"seen": seen, "outside": found, "fallback": falls_back}
+        if warning is not None:
+            self._warnings.append(warning)
+        return falls_back
+
+    def _decide(self, *, falls_back: bool) -> Plan | None:
+        """Plan no more than the capture needs; without a bundle there is nothing to plan."""
+        bundle, options = self._setup.bundle, self._setup.options
+        if bundle is None or self._placement is None or self._noise is None:
+            return None
+        if falls_back:
+            options = replace(options, method="wiener")
+        case = Case(
+            bundle=bundle,
+            options=options,
+            height_px=self.capture.height,
+            width_px=self.capture.width,
+            placement=self._placement,
+            scene=self._measure_scene() if needs_scene(options) else None,
+        )
+        plan = make_plan(case, lambda: self._setup.speed(sizes_by_work(bundle)))
+        if plan.note:
+            self._warnings.append(plan.note)
+        self.plan["quality"] = options.quality
+        self.plan["decisions"] = [decision.to_json() for decision in plan.decisions()]
+        return plan
+
+    def _measure_scene(self) -> Scene:
+        if self._placement is None or self._noise is None:
+            raise ContractError("a scene is measured for a bundle")
+        with self._clock.stage("scene"):
+            scene = measure_scene(
+                self.capture, self._noise, self.white_balance, self._placement.window
+            )
+        self.plan["scene"] = scene.to_json()
+        return scene
+
+    def explain(self) -> Estimate | None:
+        """Complete the plan by what every decision saves, and give what the work will take.
+
+        Times the machine for a moment when first asked. None without a bundle.
+        """
+        made = self._decided
+        if made is None:
+            return None
+        if made.case.scene is None:
+            made = replace(made, case=replace(made.case, scene=self._measure_scene()))
+        speed = self._setup.speed(made.sizes())
+        self.plan["decisions"] = [decision.to_json() for decision in made.decisions(speed)]
+        window_mp = {} if self._stage is None else self._stage.window_mp()
+        stage = 0 if self._stage is None else self._stage.needed_bytes()
+        estimate = Estimate(
+            seconds=estimate_seconds(made.case, made.work, speed, window_mp),
+            peak_mb=(self._other_bytes() + stage) / 1e6,
+        )
+        self.plan["estimate"] = estimate.to_json()
+        return estimate
+
+    def _other_bytes(self) -> int:
+        """Give the memory of everything but the networks."""
+        rows = ROW_BYTES_PER_COLUMN * self.capture.width
+        return FIXED_BYTES + rows + self.capture.resident_bytes
+
+    def _plan_network(self) -> NetworkStage | None:
+        """Plan the windows of the networks that were decided for."""
+        work = None if self._decided is None else self._decided.work
+        bundle = self._setup.bundle
+        if work is None or bundle is None or not work.sizes():
             return None
         options = self._setup.options
-        facts = bundle.network_facts(options.size)
-        halo = facts.reach_px if options.mode != "fast" else fast_halo_px(facts.halo_error)
-        memory = options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
-        rows = ROW_BYTES_PER_COLUMN * self.capture.width
-        limits = TileLimits(
-            stride_px=facts.stride_px,
-            halo_px=halo,
-            bytes_per_px=facts.bytes_per_pixel,
-            max_bytes=max(memory - FIXED_BYTES - rows - self.capture.samples.nbytes, 1),
+        limits = StageLimits(
+            cap_bytes=options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES,
+            spent_bytes=self._other_bytes(),
+            mode=work.mode,
+            cell_px=CELL_PX,
             tile_px=options.tile_px,
-            whole=options.mode == "whole",
         )
-        try:
-            plan = plan_windows(self.capture.height, self.capture.width, limits)
-        except ContractError as error:
-            spent = (FIXED_BYTES + rows + self.capture.samples.nbytes) // 10**6
-            raise ContractError(
-                f"of the cap of {memory // 10**6} MB everything but the network takes {spent} MB; "
-                f"{error}"
-            ) from error
-        self.plan["tiles"] = {
-            "mode": options.mode,
-            "halo_px": halo,
-            "windows": plan.window_count,
-            "work_ratio": round(plan.work_ratio, 3),
-        }
-        return plan
+        networks = [
+            SizedNetwork(
+                size=size, run=self._setup.networks(size).run, facts=bundle.network_facts(size)
+            )
+            for size in work.sizes()
+        ]
+        size_px = self.capture.height, self.capture.width
+        stage = plan_stage(size_px, networks, limits, work.network_labels())
+        self.plan["tiles"] = stage.to_json()
+        return stage
 
     # The stages, each reading rows from the one before it.
 
@@ -267,6 +376,7 @@ class Reconstruction:
             self.white_balance,
             method=self._demosaic_method(),
             repair=self._setup.bundle is not None,
+            threads=self._setup.threads,
         )
         return TimedRows(self._front, self._clock, "demosaic")
 
@@ -291,24 +401,22 @@ class Reconstruction:
         return source.read(0, self.capture.height)
 
     def _restored_rows(self, bundle: Bundle, front: RowSource) -> RowSource:
-        engine, stage, noise = self._setup.engine, bundle.manifest.stage(Network), self._noise
-        with_network = self._tiles is not None and stage is not None
+        run, stage, noise = self._stage, bundle.manifest.stage(Network), self._noise
+        with_network = run is not None and stage is not None
         restored, source = self._bank_rows(
             bundle, front, stage.scale if with_network and stage is not None else None
         )
-        if self._tiles is None or engine is None or stage is None or noise is None:
+        if run is None or stage is None or noise is None:
             return restored
-        bands = infer_bands(
-            engine.run,
+        bands = run.bands(
             TimedRows(source, self._clock, "stabilise"),
-            self._tiles,
             progress=self._progress,
             cancel=self._cancel,
+            guard=self._guard,
         )
-        linear = MappedRows(
+        linear = self._mapped(
             self._rolled("network", bands),
             lambda rows, _: unstabilise(rows, noise, scale=stage.scale),
-            3,
         )
         return TimedRows(linear, self._clock, "stabilise")
 
@@ -327,19 +435,26 @@ class Reconstruction:
         bank_reader = planes.reader()
         restored = self._rolled(
             "wiener" if method == "net" else method,
-            bank.restore_bands(bank_reader, self.capture.saturated_rows),
+            bank.restore_bands(bank_reader, self.capture.saturated_rows, self._plain_blocks()),
         )
         if scale is None:
             return restored, restored
         both = StackedRows(planes.reader(), restored)
-        source = MappedRows(
+        source = self._mapped(
             both,
             lambda rows, _: np.concatenate(
                 [stabilise(part, noise, scale=scale) for part in (rows[:3], rows[3:])]
             ),
-            6,
         )
         return restored, source
+
+    def _plain_blocks(self) -> PlainBlock | None:
+        """Give the test for blocks that nothing but plain cells read."""
+        work = None if self._decided is None else self._decided.work
+        if work is None or work.labels is None:
+            return None
+        reach = 0 if self._stage is None else self._stage.halo_px
+        return plain_blocks(work.labels, reach)
 
     def _bank(self, bundle: Bundle) -> BlockBank | None:
         stage = bundle.manifest.stage(Wiener)
@@ -368,28 +483,25 @@ class Reconstruction:
         window = self._placement.window
         if options.vignetting and manifest.stage(Illumination) is not None:
             rows = TimedRows(
-                MappedRows(rows, lambda band, top: divide_illumination(band, top, psf, window), 3),
+                self._mapped(rows, IlluminationGain(psf, window).divide),
                 self._clock,
                 "illumination",
             )
-        if options.undistort and manifest.stage(Undistort) is not None:
-            rows = self._rolled("undistort", undistort_bands(rows, psf.distortion, window))
+        wanted = options.undistort if self._decided is None else self._decided.work.undistort
+        if wanted and manifest.stage(Undistort) is not None:
+            rows = self._rolled(
+                "undistort",
+                undistort_bands(rows, psf.distortion, window, threads=self._setup.threads),
+            )
         return rows
+
+    def _mapped(
+        self, rows: RowSource, function: Callable[[FloatArray, int], FloatArray]
+    ) -> RowSource:
+        return MappedRows(rows, function, rows.shape[0], threads=self._setup.threads)
 
     def _rolled(self, name: str, bands: Iterator[FloatArray]) -> RowSource:
         return RollingRows(self.shape, self._clock.bands(name, bands)).reader()
-
-
-def fast_halo_px(curve: tuple[HaloError, ...], least_db: float = 80.0) -> int:
-    """Give the smallest halo of a measured error curve that keeps `least_db`.
-
-    Raises:
-        ContractError: If the bundle carries no curve.
-    """
-    good = [e.halo_px for e in curve if e.psnr_db is None or e.psnr_db >= least_db]
-    if not good:
-        raise ContractError("the bundle has no measured halo for mode fast; use mode exact")
-    return min(good)
 
 
 def _read_bands(source: RowSource) -> Iterator[FloatArray]:

@@ -108,6 +108,8 @@ def simulate(
     margin = psf.kernels.shape[-1] // 2
     extended = sensor_scene(scene, matrix * options.exposure, psf, window, options, margin)
     planes = scatter(extended, kernels_at, window, margin_px=margin, workers=options.workers)
+    # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
+    np.maximum(planes, 0, out=planes)
     height, width = scene.shape[1:]
     clean = extended[:, margin : margin + height, margin : margin + width].copy()
     del extended

@@ -9,14 +9,17 @@ from typing import Annotated
 
 import typer
 
+from camkit.cli.bench import bench
 from camkit.cli.check import check
 from camkit.cli.doctor import doctor
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.export import export
 from camkit.cli.freeze import freeze
 from camkit.cli.info import info
+from camkit.cli.plan import plan
 from camkit.cli.process import process
 from camkit.cli.simulate import simulate
+from camkit.cli.stress import stress
 from camkit.cli.train import train
 from camkit.errors import CamkitError
 
@@ -29,7 +32,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (process, info, check, simulate, doctor, freeze, train, export):
+for command in (process, plan, info, check, simulate, stress, doctor, bench, freeze, train, export):
     app.command()(command)
 
 

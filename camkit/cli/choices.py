@@ -10,3 +10,14 @@ Debug = Annotated[
 """Read by `camkit.cli.app.run`, which sees all arguments; commands only declare it."""
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")]
+Quality = Annotated[
+    str,
+    typer.Option(help="exact (M, skips nothing), best (largest size), adaptive or draft."),
+]
+MaxSeconds = Annotated[
+    float | None, typer.Option(help="The best plan that should take no longer on this machine.")
+]
+MaxErrorDb = Annotated[
+    float | None,
+    typer.Option(help="The cheapest plan that should lose no more against exact, in dB."),
+]

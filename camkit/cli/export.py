@@ -10,6 +10,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 PSF_NAME = "psf.safetensors"
 STRESS_NAME = "stress_psf.safetensors"
 REPORT_NAME = "freeze.json"
+PLAN_NAME = "plan.json"
 
 
 def export(
@@ -28,6 +29,10 @@ def export(
     freeze: Annotated[
         Path | None,
         typer.Option(help=f"Report of `camkit freeze`; default: {REPORT_NAME} there, if any."),
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(help=f"Calibration of `adaptive`; default: {PLAN_NAME} there, if any."),
     ] = None,
     prescription: Annotated[
         Path | None, typer.Option(help="The lens (TOML); default: the one the recipe names.")
@@ -58,6 +63,7 @@ def export(
             stress_psf=stress_psf or _beside(folder, STRESS_NAME),
             prescription=prescription or _named_prescription(checkpoints[0]),
             freeze=freeze or _beside(folder, REPORT_NAME),
+            plan=plan or _beside(folder, PLAN_NAME),
             version=version,
         ),
         out,

@@ -1,20 +1,13 @@
 """`camkit process`: captures in, pictures and sidecars out."""
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug
+from camkit.cli.choices import Debug, MaxErrorDb, MaxSeconds, Quality
 from camkit.cli.exit_code import ExitCode
-from camkit.errors import BundleError, CamkitError, ContractError
-
-if TYPE_CHECKING:
-    from camkit.runtime.capture import MosaicOptions
-    from camkit.runtime.development import WriteOptions
-    from camkit.runtime.options import Options
-    from camkit.runtime.pipeline import Pipeline
+from camkit.errors import ContractError
 
 Files = Annotated[list[str], typer.Argument(help="Captures, folders or globs.", metavar="FILES...")]
 
@@ -25,7 +18,12 @@ def process(
         str | None,
         typer.Option(help="Bundle NAME or PATH; 'none' only develops. Default: the file's own."),
     ] = None,
-    size: Annotated[str, typer.Option(help="Size of the network: S, M or L.")] = "M",
+    size: Annotated[
+        str | None, typer.Option(help="Size of the network: S, M or L. Default: the quality's.")
+    ] = None,
+    quality: Quality = "exact",
+    max_seconds: MaxSeconds = None,
+    max_error_db: MaxErrorDb = None,
     out_dir: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path(),
     format_: Annotated[str, typer.Option("--format", help="exr, tiff, png or dng.")] = "exr",
     color: Annotated[
@@ -49,6 +47,10 @@ def process(
     assume: Annotated[
         str | None, typer.Option(help="centre or scale, for a picture that is no full frame.")
     ] = None,
+    on_unsafe: Annotated[
+        str,
+        typer.Option(help="Outside the bundle's measured range: warn, fallback (Wiener) or fail."),
+    ] = "warn",
     max_mem: Annotated[str | None, typer.Option(help="Memory cap, such as 2G or 900M.")] = None,
     threads: Annotated[int | None, typer.Option(help="Threads in all.")] = None,
     jobs: Annotated[int, typer.Option(help="Captures at once.")] = 1,
@@ -70,6 +72,9 @@ def process(
 
     options = Options(
         size=size,
+        quality=quality,  # type: ignore[arg-type]
+        max_seconds=max_seconds,
+        max_error_db=max_error_db,
         method=method,  # type: ignore[arg-type]  # checked by Options
         mode=mode,  # type: ignore[arg-type]
         demosaic=demosaic,  # type: ignore[arg-type]
@@ -79,6 +84,7 @@ def process(
         vignetting=vignetting,
         undistort=undistort,
         assume=assume,  # type: ignore[arg-type]
+        on_unsafe=on_unsafe,  # type: ignore[arg-type]
         max_mem_bytes=None if max_mem is None else parse_memory(max_mem),
         threads=threads,
     )
@@ -96,7 +102,9 @@ def process(
         raise typer.Exit(ExitCode.NOTHING_MATCHED)
     headerless = mosaic_options(mosaic, black_level, white_level)
     if dry_run:
-        done = _print_plans(sources, bundle, options, write, headerless, as_json=json_)
+        from camkit.cli.plan_text import print_plans
+
+        done = print_plans(sources, bundle, options, write, headerless, as_json=json_)
     else:
         with TileProgress() as progress:
             results = run(
@@ -124,42 +132,3 @@ def _gains(text: str) -> tuple[float, float, float] | None:
     if not g > 0:
         raise ContractError(f"--wb gains must be > 0; got {text!r}")
     return r / g, 1.0, b / g
-
-
-def _print_plans(
-    sources: list[Path],
-    bundle: str | None,
-    options: "Options",
-    write: "WriteOptions",
-    headerless: "MosaicOptions | None",
-    *,
-    as_json: bool,
-) -> bool:
-    """Say what would be done with every input; give whether all of it could be."""
-    from camkit.runtime.batch import plan_tasks
-    from camkit.runtime.pipeline import load
-    from camkit.runtime.raw import read_capture
-
-    made: dict[str, Pipeline] = {}
-    done = True
-    for task in plan_tasks(sources, bundle=bundle, write=write):
-        facts: dict[str, object] = {"input": str(task.source), "output": str(task.target)}
-        try:
-            if task.refusal is not None:
-                raise ContractError(task.refusal)
-            if task.bundle not in made:
-                made[task.bundle] = load(task.bundle, options=options)
-            work = made[task.bundle].start(read_capture(task.source, mosaic=headerless))
-            facts |= {"status": "planned", "bundle": task.bundle, "plan": work.plan}
-            facts["warnings"] = list(work.warnings)
-        except CamkitError as error:
-            if bundle is not None and isinstance(error, BundleError):
-                raise
-            facts |= {"status": "failed", "error": str(error)}
-            done = False
-        typer.echo(json.dumps(facts) if as_json else _lines(facts))
-    return done
-
-
-def _lines(facts: dict[str, object]) -> str:
-    return "\n".join(f"{key}: {value}" for key, value in facts.items())

@@ -7,6 +7,12 @@
     measurement      the journal of single measurements, which may be resumed
     comparison       the rows of the comparison
     quality_table    means, gains and the page
+    bench/           speed against accuracy
+    stress/          where methods fail
+    plan_cells       what each lattice cell loses with less than the exact result
+    plan_fit         the loss model fitted to them
+    plan_scenes      scenes of the proof: night, bokeh, texture, sky, text
+    plan_proof       what `--quality adaptive` saves and loses on them
 
 Test pictures are only ever measured on.
 """

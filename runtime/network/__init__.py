@@ -3,6 +3,9 @@
 operators, graph_walk   what a tensor depends on, by walking the graph
 graph                   the only door to onnx: refusals and facts
 engine                  the only door to onnxruntime: one session per model
-tiling                  windows over a picture with the bits of the whole
+tiling, row_buffer      windows over a picture with the bits of the whole
+guard                   every tile finite and bounded, else replaced or refused
+cell_windows            networks on some lattice cells only, the bits there unchanged
+stage                   one or the other, within the memory cap
 probe, ranges           reach, halo error and activations, found by running
 """

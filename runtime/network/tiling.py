@@ -17,6 +17,7 @@ of the untiled run bit for bit. Nothing is blended.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Final, Protocol
 
@@ -24,11 +25,12 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
+from camkit.runtime.network.guard import TileGuard, is_finite
+from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.rows import RowSource
 
 DEFAULT_MAX_BYTES: Final = 640 * 2**20
 _FLOAT_BYTES: Final = 4
-_READ_ROWS: Final = 64
 _MOST_COUNTS: Final = 64
 
 Run = Callable[[FloatArray], FloatArray]
@@ -274,6 +276,7 @@ def infer_bands(
     *,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
+    guard: TileGuard | None = None,
 ) -> Iterator[FloatArray]:
     """Run a network over a picture and yield its rows from top to bottom.
 
@@ -283,6 +286,7 @@ def infer_bands(
         plan: From `plan_windows`, for the size of the source.
         progress: Called as progress(done, total) after each window.
         cancel: Asked before each window.
+        guard: Looks at every tile; None refuses NaN and inf only.
 
     Yields:
         (3, rows, w) float32 bands, consecutive, together the whole picture.
@@ -298,17 +302,21 @@ def infer_bands(
         )
     shape = (1, channels, plan.window_height_px, plan.window_width_px)
     window = np.empty(shape, np.float32) if len(plan.columns) > 1 else None
-    buffer = _RowBuffer(source, plan)
+    padded = plan.padded_height_px, plan.padded_width_px
+    buffer = RowBuffer(source, plan.window_height_px, padded)
     done = 0
     for i, row in enumerate(plan.rows):
         held = buffer.move_to(row.origin_px)
         band = np.empty((3, min(row.stop_px, height) - row.start_px, width), np.float32)
         for j, column in enumerate(plan.columns):
-            if _is_cancelled(cancel):
+            if is_cancelled(cancel):
                 raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
             filled = _filled(window, held, column.origin_px)
             kept = _kept(run(filled), row, column, (height, width))
-            if not (np.isfinite(kept.min()) and np.isfinite(kept.max())):
+            if guard is not None:
+                given = _kept(filled, row, column, (height, width))
+                kept = guard.check(kept, given, partial(_describe, i, j, row, column))
+            elif not is_finite(kept):
                 raise ContractError(_not_finite_message(i, j, row, column))
             band[:, :, column.start_px : min(column.stop_px, width)] = kept
             done += 1
@@ -333,7 +341,8 @@ def _kept(output: FloatArray, row: Span, column: Span, size: tuple[int, int]) ->
     return output[0, :, top:bottom, left:right]
 
 
-def _is_cancelled(cancel: Cancel | None) -> bool:
+def is_cancelled(cancel: Cancel | None) -> bool:
+    """Tell whether the caller asked to stop."""
     if cancel is None:
         return False
     return cancel() if callable(cancel) else cancel.is_set()
@@ -341,38 +350,13 @@ def _is_cancelled(cancel: Cancel | None) -> bool:
 
 def _not_finite_message(i: int, j: int, row: Span, column: Span) -> str:
     return (
-        f"the network gave NaN or inf in tile (row {i}, column {j}), pixels x "
-        f"{column.start_px}..{column.stop_px}, y {row.start_px}..{row.stop_px}; "
+        f"the network gave NaN or inf in {_describe(i, j, row, column)}; "
         "the input must be finite: repair dead pixels first"
     )
 
 
-class _RowBuffer:
-    """The padded rows of the current window row; rows are read from the source once."""
-
-    def __init__(self, source: RowSource, plan: TilePlan) -> None:
-        self._source = source
-        self._plan = plan
-        shape = (source.shape[0], plan.window_height_px, plan.padded_width_px)
-        self._rows = np.empty(shape, np.float32)
-        self._top = 0
-        self._end = 0
-
-    def move_to(self, top: int) -> FloatArray:
-        """Give rows top .. top + window height of the padded picture, (c, rows, padded w)."""
-        kept = self._end - top
-        if 0 < kept < self._rows.shape[1]:
-            self._rows[:, :kept] = self._rows[:, top - self._top : self._end - self._top]
-        self._top = top
-        bottom = top + self._rows.shape[1]
-        height, width = self._plan.height_px, self._plan.width_px
-        while self._end < min(bottom, height):
-            stop = min(self._end + _READ_ROWS, bottom, height)
-            target = self._rows[:, self._end - top : stop - top]
-            target[:, :, :width] = self._source.read(self._end, stop)
-            target[:, :, width:] = target[:, :, width - 1 : width]
-            self._end = stop
-        if bottom > self._end:
-            self._rows[:, self._end - top :] = self._rows[:, self._end - top - 1, None]
-            self._end = bottom
-        return self._rows
+def _describe(i: int, j: int, row: Span, column: Span) -> str:
+    return (
+        f"tile (row {i}, column {j}), pixels x {column.start_px}..{column.stop_px}, "
+        f"y {row.start_px}..{row.stop_px}"
+    )

@@ -129,6 +129,14 @@ def test_same_seed_gives_the_same_noise_and_another_does_not() -> None:
     assert (one != other).mean() > 0.5
 
 
+def test_black_beside_light_is_photographed() -> None:
+    # The blur by FFT leaves the black part some 1e-8 below zero.
+    picture = np.zeros((3, 64, 96), np.float32)
+    picture[:, 20:30, 20:30] = 1.0
+    found = simulate(picture, CAMERA, make_psf(CAMERA), SimulationOptions(seed=1))
+    assert abs(signal(found)[50:, 80:].mean()) < ONE_DN
+
+
 def test_light_beyond_white_saturates() -> None:
     bright = np.full((20, 20), 3.0, dtype=np.float32)
     assert (expose(bright, CAMERA, SimulationOptions(iso=800)) == 4095).all()

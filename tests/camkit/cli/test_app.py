@@ -13,14 +13,22 @@ from camkit.errors import BundleError, ContractError, DecodeError, ParityError, 
 
 HEAVY = {"numpy", "cv2", "onnxruntime", "onnx", "torch", "scipy", "pydantic", "rawpy", "OpenEXR"}
 OPTIONS = {
-    "process": "--bundle --size --out-dir --format --color --wb --exposure --demosaic --linear "
+    "process": "--bundle --size --quality --max-seconds --max-error-db --out-dir --format --color "
+    "--wb --exposure --demosaic --linear "
     "--no-vignetting --no-undistort --mosaic --black-level --white-level --method --mode --assume "
     "--max-mem --threads --jobs --resume --overwrite --json --dry-run --debug",
+    "plan": "--bundle --size --quality --max-seconds --max-error-db --out-dir --method --mode "
+    "--assume --max-mem --threads --json --debug",
     "info": "--schema --json --debug",
     "check": "--level --json --debug",
     "simulate": "--bundle --iso --seed --origin-px -o --debug",
     "freeze": "-o --stress-out --report --debug",
-    "train": "--size --data --max-minutes --resume --debug",
+    "bench": "--all --data --images --out-dir --sizes --methods --modes --dtypes --providers "
+    "--threads --tile --reference --capture --width --height --repeat --quick --work-dir --json "
+    "--debug",
+    "stress": "--scenarios --quick --data --sizes --scenes --compare --out-dir --write --list "
+    "--json --debug",
+    "train": "--size --data --steps --max-minutes --resume --debug",
     "export": "-o --psf --stress-psf --prescription --debug",
     "doctor": "--json --debug",
 }

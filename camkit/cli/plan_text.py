@@ -1,0 +1,89 @@
+"""Plans of captures as JSON or as lines for people, for `plan` and `process --dry-run`."""
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from camkit.errors import BundleError, CamkitError, ContractError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from camkit.runtime.batch import Task
+    from camkit.runtime.capture import MosaicOptions
+    from camkit.runtime.development import WriteOptions
+    from camkit.runtime.options import Options
+    from camkit.runtime.pipeline import Pipeline
+
+
+def print_plans(
+    sources: "list[Path]",
+    bundle: str | None,
+    options: "Options",
+    write: "WriteOptions",
+    headerless: "MosaicOptions | None",
+    *,
+    as_json: bool,
+) -> bool:
+    """Say what would be done with every input; give whether all of it could be.
+
+    Raises:
+        BundleError: If the bundle that was named is refused.
+    """
+    from camkit.runtime.batch import plan_tasks
+    from camkit.runtime.pipeline import load
+
+    made: dict[str, Pipeline] = {}
+    done = True
+    for task in plan_tasks(sources, bundle=bundle, write=write):
+        facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
+        try:
+            if task.refusal is not None:
+                raise ContractError(task.refusal)
+            if task.bundle not in made:
+                made[task.bundle] = load(task.bundle, options=options)
+            facts |= _planned(task, made[task.bundle], headerless)
+        except CamkitError as error:
+            if bundle is not None and isinstance(error, BundleError):
+                raise
+            facts |= {"status": "failed", "error": str(error)}
+            done = False
+        typer.echo(json.dumps(facts) if as_json else "\n".join(plan_lines(facts)))
+    return done
+
+
+def _planned(
+    task: "Task", pipeline: "Pipeline", headerless: "MosaicOptions | None"
+) -> dict[str, Any]:
+    from camkit.runtime.raw import read_capture
+
+    work = pipeline.start(read_capture(task.source, mosaic=headerless))
+    work.explain()
+    details = dict(work.plan)
+    return {
+        "status": "planned",
+        "bundle": task.bundle,
+        "size": work.size,
+        "decisions": details.pop("decisions", []),
+        "estimate": details.pop("estimate", None),
+        "plan": details,
+        "warnings": list(work.warnings),
+    }
+
+
+def plan_lines(facts: dict[str, Any]) -> list[str]:
+    """Give a plan as lines for people."""
+    lines = [f"{facts['input']} -> {facts['output']}"]
+    if facts["status"] == "failed":
+        return [*lines, f"  failed: {facts['error']}"]
+    lines.append(f"  status: planned, bundle {facts['bundle']}")
+    for decision in facts["decisions"]:
+        saving = decision["saving_s"] or 0.0
+        lines.append(f"  {decision['what']}: {decision['choice']} ({decision['reason']})")
+        if saving or decision["cost_db"]:
+            lines.append(f"    saves {saving:.2f} s, costs {decision['cost_db']:.3f} dB")
+    estimate = facts["estimate"]
+    if estimate is not None:
+        lines.append(f"  about {estimate['seconds']:.1f} s, {estimate['peak_mb']:.0f} MB")
+    return [*lines, *(f"  note: {warning}" for warning in facts["warnings"])]

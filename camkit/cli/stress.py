@@ -1,0 +1,97 @@
+"""`camkit stress`: where a bundle's networks stop helping."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug
+from camkit.errors import ContractError
+
+
+def stress(
+    bundle: Annotated[str, typer.Argument(help="Bundle NAME or PATH.", metavar="BUNDLE")],
+    scenarios: Annotated[
+        str | None, typer.Option(help="Some scenarios, NAME,NAME; default: all. See --list.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Few values and two scenes.")] = False,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of sharp pictures instead of procedural scenes.")
+    ] = None,
+    sizes: Annotated[str | None, typer.Option(help="Sizes of the network, such as S,M.")] = None,
+    scenes: Annotated[int | None, typer.Option(min=1, help="Number of scenes.")] = None,
+    compare: Annotated[
+        str | None, typer.Option(help="Another bundle of this camera: the curves before.")
+    ] = None,
+    out_dir: Annotated[
+        Path | None, typer.Option(help="Folder for page, results and the journal (resumes).")
+    ] = None,
+    write: Annotated[
+        bool, typer.Option("--write", help="Store the measured ranges in the bundle.")
+    ] = False,
+    list_: Annotated[bool, typer.Option("--list", help="Name the scenarios and stop.")] = False,
+    json_: Annotated[
+        bool, typer.Option("--json", help="Print the results as one JSON list.")
+    ] = False,
+    _debug: Debug = False,
+) -> None:
+    """Turn one knob after the other until the networks no longer help, and say where that is."""
+    from camkit.bundle.reader import find_bundle, open_bundle
+    from camkit.report.stress.run import StressOptions, run_stress, write_envelope
+    from camkit.report.stress.scenario import choose
+
+    chosen = choose(scenarios)
+    if list_:
+        for scenario in chosen:
+            typer.echo(f"{scenario.name:20} {scenario.title}")
+        return
+    if write and (quick or data is not None):
+        raise ContractError(
+            "--write stores ranges that captures are judged by: leave out --quick and --data"
+        )
+    opened = open_bundle(find_bundle(bundle))
+    options = StressOptions(
+        scenarios=chosen,
+        sizes=() if sizes is None else tuple(s.strip() for s in sizes.split(",")),
+        scenes=scenes,
+        quick=quick,
+        data_folder=data,
+        out_dir=out_dir,
+    )
+    before = None if compare is None else open_bundle(find_bundle(compare))
+    result = run_stress(opened, options, before=before, progress=_progress)
+    if write:
+        write_envelope(opened, result.envelope)
+    if json_:
+        typer.echo(json.dumps(result.rows))
+        return
+    for row in result.rows:
+        typer.echo(_line(row))
+    if result.page is not None:
+        typer.echo(f"page: {result.page}")
+    for name, found in result.envelope.items():
+        typer.echo(f"{name}: {found.low:.4g} to {found.high:.4g}{' (stored)' if write else ''}")
+
+
+def _line(row: dict[str, object]) -> str:
+    """Say where one scenario broke."""
+    head = f"{row['scenario']:20} "
+    if row["skipped"]:
+        return f"{head}left out: {row['skipped']}"
+    if row["break_point"] is None:
+        return f"{head}{row['method']} sound over the range"
+    low, high = ("beyond" if end is None else f"{end:g}" for end in row["ci"])  # type: ignore[attr-defined]
+    if row["labels"]:
+        name = row["labels"][row["values"].index(row["break_point"])]  # type: ignore[index,attr-defined]
+        return f"{head}{row['method']} breaks at {name}: {row['break_reason']}"
+    point = f"{row['break_point']:.3g} {row['unit']}".rstrip()
+    return f"{head}{row['method']} breaks at {point} [{low} to {high}]: {row['break_reason']}"
+
+
+def _progress(scenario: str, done: int, total: int) -> None:
+    """Show the progress on stderr, on a terminal only."""
+    if sys.stderr.isatty():
+        end = "\n" if done == total else ""
+        typer.echo(f"\r{done}/{total} {scenario:24}{end}", nl=False, err=True)

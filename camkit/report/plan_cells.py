@@ -1,0 +1,140 @@
+"""What every lattice cell of a simulated capture would lose with less than the exact result.
+
+    picture -> capture -> scene, and per cell the squared sRGB error of exact, bank, development and
+                          every other size of network
+
+The captures go through the bundle's own PSF; `tools/plan_report.py` fits the loss model to them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.reader import Bundle
+from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
+from camkit.contracts import FloatArray
+from camkit.report.quality import BORDER_PX, FIELD_SHARES, QUADRANTS, crop_origin
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.loss import EXACT
+from camkit.runtime.plan.rules.size import REFERENCE
+from camkit.runtime.reconstruction import Reconstruction
+from camkit.runtime.scene import CELL_PX, CellArray, Scene, lattice_shape, measure_scene
+from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+
+PLAIN_TARGET: Final = "plain"
+WIENER_TARGET: Final = "wiener"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaptureCells:
+    """One capture, measured cell by cell.
+
+    Attributes:
+        name: Picture and ISO.
+        scene: What the runtime sees of it.
+        pixels: (row, column) pixels that count; a border of BORDER_PX does not.
+        errors: Target -> (row, column) squared sRGB error summed over pixels and colours / 3.
+    """
+
+    name: str
+    scene: Scene
+    pixels: CellArray
+    errors: dict[str, CellArray]
+
+
+def photograph(
+    bundle: Bundle, scene: FloatArray, *, number: int, iso: float, exposure: float = 1.0
+) -> Simulation:
+    """Photograph a picture at a place of the sensor that its number chooses.
+
+    Args:
+        bundle: The camera.
+        scene: (3, h, w) linear Rec.709.
+        number: Decides field position, quadrant and noise.
+        iso: Sensitivity.
+        exposure: Factor on the scene.
+    """
+    camera = bundle.manifest.camera
+    size = (scene.shape[2], scene.shape[1])
+    sensor = (camera.width_px, camera.height_px)
+    share = FIELD_SHARES[number % len(FIELD_SHARES)]
+    origin = crop_origin(size, sensor, share, QUADRANTS[number % len(QUADRANTS)])
+    options = SimulationOptions(
+        iso=iso, seed=1000 * number + int(iso), origin_px=origin, exposure=exposure
+    )
+    return simulate(scene, camera, bundle.psf, options)
+
+
+def sharp_of(simulation: Simulation, bundle: Bundle) -> FloatArray:
+    """Give (3, h, w) sRGB values of the sharp picture in sensor geometry."""
+    matrix = rec709_from_camera(np.array(bundle.manifest.camera.color_matrix, dtype=np.float64))
+    return encode_srgb(apply_matrix(matrix, simulation.clean))
+
+
+def start(pipeline: Pipeline, simulation: Simulation) -> Reconstruction:
+    """Plan the reconstruction of a simulated capture."""
+    x, y = (int(v) for v in simulation.window.origin_px)
+    capture = pipeline.capture_of(
+        simulation.mosaic,
+        iso=simulation.iso,
+        white_balance=simulation.white_balance,
+        origin_px=(x, y),
+    )
+    return pipeline.start(capture)
+
+
+def cell_sums(squares: FloatArray) -> CellArray:
+    """Sum (h, w) over the lattice cells, without a border of BORDER_PX."""
+    kept = np.zeros(squares.shape, dtype=np.float64)
+    inside = np.s_[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
+    kept[inside] = squares[inside]
+    rows = np.add.reduceat(kept, np.arange(0, squares.shape[0], CELL_PX), axis=0)
+    sums = np.add.reduceat(rows, np.arange(0, squares.shape[1], CELL_PX), axis=1)
+    return np.asarray(sums.reshape(lattice_shape(*squares.shape)))
+
+
+def cell_errors(restored: FloatArray, sharp: FloatArray) -> CellArray:
+    """Give the squared sRGB error per cell of linear Rec.709 against sRGB values."""
+    return cell_sums(np.square(encode_srgb(restored) - sharp).mean(axis=0))
+
+
+def pipelines(bundle: Bundle) -> Mapping[str, Pipeline]:
+    """Give a pipeline per target, in sensor geometry, on one thread."""
+    made = {
+        EXACT: Pipeline(bundle, Options(size=REFERENCE, undistort=False, threads=1)),
+        WIENER_TARGET: Pipeline(bundle, Options(method="wiener", undistort=False, threads=1)),
+    }
+    for size in bundle.manifest.networks:
+        if size != REFERENCE:
+            made[size] = Pipeline(bundle, Options(size=size, undistort=False, threads=1))
+    return made
+
+
+def measure_cells(
+    bundle: Bundle, targets: Mapping[str, Pipeline], name: str, simulation: Simulation
+) -> CaptureCells:
+    """Reconstruct a capture by every target and measure the errors per cell.
+
+    Args:
+        bundle: The camera.
+        targets: From `pipelines`.
+        name: Of the capture.
+        simulation: The capture and the truth.
+    """
+    sharp = sharp_of(simulation, bundle)
+    errors = {}
+    for target, pipeline in targets.items():
+        errors[target] = cell_errors(start(pipeline, simulation).fill(None), sharp)
+    work = start(targets[WIENER_TARGET], simulation)
+    errors[PLAIN_TARGET] = cell_errors(work.fill_plain(), sharp)
+    noise = bundle.manifest.camera.noise_at(simulation.iso).with_gains(simulation.white_balance)
+    scene = measure_scene(work.capture, noise, simulation.white_balance, simulation.window)
+    return CaptureCells(
+        name=name,
+        scene=scene,
+        pixels=cell_sums(np.ones(sharp.shape[1:], np.float32)),
+        errors=errors,
+    )

@@ -1,0 +1,78 @@
+"""One picture per scenario: PSNR of every method over the knob, chi^2 below, breaks marked."""
+
+import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from camkit.report.stress.break_point import Break, Grid
+from camkit.report.stress.consistency import LIMIT
+from camkit.report.stress.curve import Curve
+from camkit.report.stress.rig import BEFORE, INPUT, WIENER
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLOURS: Final = {
+    INPUT: "#888888",
+    WIENER: "#d08a00",
+    "S": "#5aa9e6",
+    "M": "#1f4e9c",
+    "L": "#7b2d8b",
+}
+OTHER: Final = "#2a9d5c"
+
+
+def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
+    """Draw a scenario as PNG; the band is the standard error over the scenes."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.6), layout="constrained")
+    rows = [(curve.psnr_db, "PSNR (dB)"), (curve.chi2, "chi² per pixel")]
+    rows = [row for row in rows if any(np.isfinite(g).any() for g in row[0].values())]
+    rows += [(grids, name.replace("_", " ")) for name, grids in curve.extra.items()]
+    axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (grids, label) in zip(axes, rows, strict=True):
+        for method, grid in grids.items():
+            _line(axis, curve, method, grid)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.25)
+        for found in breaks:
+            if found.point is not None and found.method in ("S", "M", "L"):
+                place = _position(curve, found.point)
+                axis.axvline(place, color=COLOURS[found.method], lw=1, ls=":")
+    if len(rows) > 1 and rows[1][0] is curve.chi2:
+        axes[1].axhline(LIMIT, color="#b00020", lw=0.8)
+    axes[0].legend(fontsize=8, ncols=3)
+    _ticks(axes[-1], curve)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def _line(axis: "Axes", curve: Curve, method: str, grid: Grid) -> None:
+    known = np.isfinite(grid).any(axis=1)
+    if not known.any():
+        return
+    x = np.arange(len(curve.values))[known]
+    rows = [row[np.isfinite(row)] for row in grid[known]]
+    mean = np.array([row.mean() for row in rows])
+    error = np.array([row.std() / np.sqrt(row.size) for row in rows])
+    name = method.split(" ", maxsplit=1)[0]
+    dashed = BEFORE in method
+    colour = COLOURS.get(name, OTHER)
+    axis.plot(x, mean, "o--" if dashed else "o-", ms=3, lw=1.4, color=colour, label=method)
+    axis.fill_between(x, mean - error, mean + error, color=colour, alpha=0.12, lw=0)
+
+
+def _position(curve: Curve, value: float) -> float:
+    """Give where a value lies between the evenly spaced values."""
+    return float(np.interp(value, np.array(curve.values), np.arange(len(curve.values))))
+
+
+def _ticks(axis: "Axes", curve: Curve) -> None:
+    labels = [curve.label(v) if curve.scenario.labels else f"{v:g}" for v in curve.values]
+    turn = 25 if curve.scenario.labels else 0
+    axis.set_xticks(range(len(curve.values)), labels, fontsize=8, rotation=turn)
+    axis.set_xlabel(f"{curve.scenario.knob} ({curve.scenario.unit})".replace(" ()", ""))

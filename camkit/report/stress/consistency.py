@@ -1,0 +1,157 @@
+"""Does a restoration explain its capture? chi^2 per pixel of the residual after blurring again.
+
+    restored planes -> blur by the bundle's PSF -> mosaic -> (capture - mosaic)^2 / variance
+
+The variance is that of the noise that the twin added, plus that of the model: demosaicking and
+regularisation leave residuals at edges that no photon explains, in proportion to the contrast
+around a sample. Its strength is one number per method and scene, the `model error`, found on the
+nominal capture so that chi^2 is 1 there (`calibrate`). What lies above 1 is then unexplained:
+detail that was invented, or light that was lost.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import scipy.ndimage
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray, NoiseModel
+from camkit.report.stress.twin import Lens, Shot
+from camkit.runtime.geometry.scatter import scatter
+from camkit.runtime.simulate import sample_mosaic
+
+LIMIT: Final = 1.3
+"""chi^2 per pixel above which a restoration no longer fits its capture."""
+BORDER_PX: Final = 32
+CLIPPED_REACH_PX: Final = 24
+"""What lies this near to a clipped sample is left out."""
+SPOILED_REACH_PX: Final = 3
+"""The same for samples that a scenario broke: their repair reaches the demosaicking, no further."""
+CONTRAST_PX: Final = 5
+MIDDLE_PX: Final = 256
+"""Only the middle of a picture is judged: blurring is what a sweep spends its time on."""
+BLUR_STEP_PX: Final = 256
+MOST_MODEL_ERROR: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Residual:
+    """Samples of a capture against a restoration blurred again, judged samples only.
+
+    Attributes:
+        squared: (n,) squared difference, 1.0 = white level squared.
+        noise_variance: (n,) variance of photons, amplifier and converter.
+        contrast: (n,) variance of the blurred picture around the sample.
+    """
+
+    squared: NDArray[np.float64]
+    noise_variance: NDArray[np.float64]
+    contrast: NDArray[np.float64]
+
+    def chi2(self, model_error: float) -> float:
+        """Give chi^2 per sample.
+
+        Args:
+            model_error: Deviation of the model as a share of the contrast.
+        """
+        variance = self.noise_variance + model_error**2 * self.contrast
+        return float(np.mean(self.squared / variance))
+
+
+def residual(planes: FloatArray, shot: Shot, lens: Lens) -> Residual | None:
+    """Blur the middle of a restoration and compare it with its capture.
+
+    Args:
+        planes: (3, h, w) restored, white-balanced camera space, vignetting still in.
+        shot: The capture.
+        lens: As the bundle knows it.
+
+    Returns:
+        None where fewer than a tenth of the samples can be judged.
+    """
+    rows, columns = (_middle(side) for side in planes.shape[1:])
+    judged = judged_samples(shot)[rows, columns]
+    if judged.size == 0 or judged.mean() < 0.1:
+        return None
+    blurred = _blur(planes, shot, lens, (rows, columns))
+    cfa, gains, capture = shot.cfa, shot.light.gains, shot.capture
+    assert cfa is not None
+    predicted = sample_mosaic(blurred, cfa, gains).astype(np.float64)[judged]
+    contrast = sample_mosaic(_contrast(blurred), cfa, gains)[judged].astype(np.float64)
+    captured = capture.linear_rows(rows.start, rows.stop)[:, columns][judged].astype(np.float64)
+    step = 1 / (capture.white_level - float(capture.black_level.max()))
+    return Residual(
+        squared=np.square(captured - predicted),
+        noise_variance=_variance(shot.noise, predicted) + step * step / 12,
+        contrast=np.square(contrast),
+    )
+
+
+def _middle(side_px: int) -> slice:
+    """Give the middle of an axis, from an even pixel so that the mosaic keeps its phase."""
+    length = min(MIDDLE_PX, side_px)
+    start = (side_px - length) // 2 // 2 * 2
+    return slice(start, start + length)
+
+
+def _blur(planes: FloatArray, shot: Shot, lens: Lens, part: tuple[slice, slice]) -> FloatArray:
+    """Blur a part of a picture with the light from around it."""
+    margin, (rows, columns) = lens.margin_px, part
+    pad = ((0, 0), (margin, margin), (margin, margin))
+    extended = np.pad(np.maximum(planes, 0), pad, mode="symmetric")
+    around = (slice(s.start, s.stop + 2 * margin) for s in part)
+    x, y = shot.light.window.origin_px
+    window = replace(
+        shot.light.window,
+        size_px=(columns.stop - columns.start, rows.stop - rows.start),
+        origin_px=(x + columns.start, y + rows.start),
+    )
+    return scatter(
+        extended[:, *around], lens.kernels_at, window, margin_px=margin, step_px=BLUR_STEP_PX
+    )
+
+
+def judged_samples(shot: Shot) -> NDArray[np.bool_]:
+    """Give (h, w), true away from the border and from clipped and spoiled samples."""
+    capture = shot.capture
+    clipped = capture.saturated_rows(0, capture.height)
+    if shot.spoiled is not None:
+        clipped &= ~shot.spoiled
+    judged = ~near(clipped, CLIPPED_REACH_PX)
+    if shot.spoiled is not None:
+        judged &= ~near(shot.spoiled, SPOILED_REACH_PX)
+    judged[:BORDER_PX] = judged[-BORDER_PX:] = False
+    judged[:, :BORDER_PX] = judged[:, -BORDER_PX:] = False
+    return judged
+
+
+def near(mask: NDArray[np.bool_], reach_px: int) -> NDArray[np.bool_]:
+    """Give what lies within a square of `reach_px` around true samples."""
+    if not mask.any():
+        return mask.copy()
+    return np.asarray(scipy.ndimage.maximum_filter(mask, 2 * reach_px + 1, mode="constant"))
+
+
+def calibrate(nominal: Residual) -> float:
+    """Give the model error for which chi^2 of a nominal capture is 1; 0 if it is less without."""
+    low, high = 0.0, MOST_MODEL_ERROR
+    if nominal.chi2(low) <= 1:
+        return 0.0
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (middle, high) if nominal.chi2(middle) > 1 else (low, middle)
+    return high
+
+
+def _variance(noise: NoiseModel, signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the variance of green samples; the twin's noise is alike in all colours."""
+    return noise.shot[1] * np.maximum(signal, 0) + noise.read_variance[1]
+
+
+def _contrast(planes: FloatArray) -> FloatArray:
+    """Give the standard deviation within a small square around every pixel, (3, h, w)."""
+    size = (1, CONTRAST_PX, CONTRAST_PX)
+    mean = scipy.ndimage.uniform_filter(planes, size)
+    square = scipy.ndimage.uniform_filter(np.square(planes), size)
+    return np.asarray(np.sqrt(np.maximum(square - np.square(mean), 0)), dtype=np.float32)

@@ -1,0 +1,143 @@
+"""The points of one scenario as arrays over value and scene, and where its methods break."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camkit.report.stress.break_point import Break, Grid, Margins, find_break, margins_of
+from camkit.report.stress.rig import INPUT, WIENER
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.score import Outcome
+from camkit.report.stress.sweep import Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """What one scenario measured.
+
+    Attributes:
+        scenario: The scenario.
+        values: (n,) of the knob.
+        scenes: Names.
+        psnr_db: Method -> (n, scenes), NaN where unknown.
+        chi2: Method -> (n, scenes), NaN where unknown.
+        extra: Name -> method -> (n, scenes).
+        seen: Quantity of the runtime -> (n, scenes).
+        outcomes: (value index, scene index) -> method -> outcome.
+    """
+
+    scenario: Scenario
+    values: tuple[float, ...]
+    scenes: tuple[str, ...]
+    psnr_db: Mapping[str, Grid]
+    chi2: Mapping[str, Grid]
+    extra: Mapping[str, Mapping[str, Grid]]
+    seen: Mapping[str, Grid]
+    outcomes: Mapping[tuple[int, int], Mapping[str, Outcome]]
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Name the methods that were measured."""
+        return tuple(self.psnr_db)
+
+    @property
+    def networks(self) -> tuple[str, ...]:
+        """Name the methods that may break: the networks, or the Wiener bank without any."""
+        found = tuple(m for m in self.methods if m not in (INPUT, WIENER))
+        return found or tuple(m for m in self.methods if m != INPUT)
+
+    @property
+    def nominal(self) -> int:
+        """Give the index of the nominal value."""
+        return self.values.index(self.scenario.nominal)
+
+    def label(self, value: float) -> str:
+        """Give a value for people."""
+        if self.scenario.labels:
+            return self.scenario.labels[self.scenario.values.index(value)]
+        return f"{value:g} {self.scenario.unit}".rstrip()
+
+
+def curve_of(scenario: Scenario, points: Iterable[Point]) -> Curve:
+    """Collect the points of one scenario."""
+    mine = [p for p in points if p.scenario == scenario.name]
+    values = tuple(sorted({p.value for p in mine}))
+    scenes = tuple(dict.fromkeys(p.scene for p in mine))
+    outcomes = {(values.index(p.value), scenes.index(p.scene)): p.verdict.outcomes for p in mine}
+    methods = tuple(dict.fromkeys(m for found in outcomes.values() for m in found))
+    shape = (len(values), len(scenes))
+    extras = dict.fromkeys(n for o in outcomes.values() for m in o.values() for n in m.extra)
+    seen = {(values.index(p.value), scenes.index(p.scene)): p.verdict.seen for p in mine}
+    quantities = dict.fromkeys(name for found in seen.values() for name in found)
+
+    def grid(method: str, name: str) -> Grid:
+        cells = {
+            at: getattr(found[method], name) for at, found in outcomes.items() if method in found
+        }
+        return _fill(shape, cells)
+
+    def extra_grid(method: str, name: str) -> Grid:
+        cells = {at: o[method].extra.get(name) for at, o in outcomes.items() if method in o}
+        return _fill(shape, cells)
+
+    return Curve(
+        scenario=scenario,
+        values=values,
+        scenes=scenes,
+        psnr_db={m: grid(m, "psnr_db") for m in methods},
+        chi2={m: grid(m, "chi2") for m in methods},
+        extra={name: {m: extra_grid(m, name) for m in methods} for name in extras},
+        seen={q: _fill(shape, {at: s.get(q) for at, s in seen.items()}) for q in quantities},
+        outcomes=outcomes,
+    )
+
+
+def _fill(shape: tuple[int, int], cells: Mapping[tuple[int, int], float | None]) -> Grid:
+    grid = np.full(shape, np.nan)
+    for at, value in cells.items():
+        grid[at] = np.nan if value is None else value
+    return grid
+
+
+def margins(curve: Curve, method: str) -> Margins:
+    """Give how far a method is from breaking."""
+    rivals: Sequence[str] = (INPUT, WIENER) if curve.scenario.rival else ()
+    faults = np.zeros((len(curve.values), len(curve.scenes)), dtype=bool)
+    for at, found in curve.outcomes.items():
+        faults[at] = method in found and found[method].fault is not None
+    known = {m: grid for m, grid in curve.psnr_db.items() if m == method or m in rivals}
+    return Margins(
+        values=np.array(curve.values),
+        nominal=curve.nominal,
+        gains=margins_of(
+            known, curve.chi2[method], method=method, rivals=[r for r in rivals if r in known]
+        ),
+        faults=faults,
+        log=curve.scenario.log,
+        ordered=not curve.scenario.labels,
+    )
+
+
+def breaks_of(curve: Curve) -> tuple[Break, ...]:
+    """Find the break points of every network, on every side of the nominal that was swept."""
+    found = []
+    for method in curve.networks:
+        margin = margins(curve, method)
+        if curve.nominal > 0:
+            found.append(find_break(margin, method, "down"))
+        if curve.nominal < len(curve.values) - 1:
+            found.append(find_break(margin, method, "up"))
+    return tuple(found)
+
+
+def nearest_break(curve: Curve, breaks: Sequence[Break], method: str) -> Break | None:
+    """Give the break of a method that is the fewest steps from the nominal value; None if none."""
+    values, nominal = np.array(curve.values), curve.nominal
+
+    def steps(found: Break) -> float:
+        assert found.point is not None
+        return abs(float(np.interp(found.point, values, np.arange(values.size))) - nominal)
+
+    mine = [b for b in breaks if b.method == method and b.point is not None]
+    return min(mine, key=steps) if mine else None

@@ -1,0 +1,121 @@
+"""What the runtime may rely on: ranges of what it sees of a capture, from the sound values.
+
+A scenario bounds some quantities of `camkit.runtime.envelope`. Over its sound values, from the
+nominal outwards, the quantity took a range. Where the scenario broke beyond an end, that end holds
+for all scenarios; an end beyond which none broke is the farthest that was tested.
+
+To be sound here is to help: to beat the input and the Wiener bank without a fault. chi^2 is left
+to the report: where a clipped light leaves glare unexplained, the Wiener bank, to which a capture
+outside the ranges falls back, explains it no better.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.manifest import Range
+from camkit.report.stress.break_point import CHI2, sound_values
+from camkit.report.stress.curve import Curve, margins
+
+OPEN_LOW: Final = 0.0
+OPEN_HIGH: Final = 1e9
+"""Ends that a scenario does not bound; the manifest takes no infinity."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """What one scenario knows of one quantity.
+
+    Attributes:
+        low: Least value at which the method was sound.
+        high: Largest.
+        low_broken: Whether it broke below.
+        high_broken: Whether it broke above.
+    """
+
+    low: float
+    high: float
+    low_broken: bool
+    high_broken: bool
+
+
+def measured_ranges(curves: Iterable[Curve], method: str) -> dict[str, Range]:
+    """Give the envelope of a method.
+
+    Args:
+        curves: Of the scenarios that were swept; those that bound nothing are passed over.
+        method: The one whose soundness counts.
+
+    Returns:
+        Quantity -> range. A quantity that broke at its nominal value is left out: there is no
+        range in which the method helps, and every capture would be outside.
+    """
+    found: dict[str, list[tuple[str, Seen]]] = {}
+    for curve in curves:
+        if method not in curve.methods:
+            continue
+        for quantity, end in curve.scenario.bounds.items():
+            seen = _seen(curve, quantity, method)
+            if seen is not None:
+                found.setdefault(quantity, []).append((end, seen))
+    ranges = {}
+    for quantity, entries in found.items():
+        lows = [s for end, s in entries if end in ("low", "both")]
+        highs = [s for end, s in entries if end in ("high", "both")]
+        low, high = _low(lows), _high(highs)
+        if low <= high:
+            ranges[quantity] = Range(low=low, high=high)
+    return ranges
+
+
+def _seen(curve: Curve, quantity: str, method: str) -> Seen | None:
+    """Give what a curve says of a quantity; None without a sound value."""
+    if quantity not in curve.seen:
+        return None
+    grid = curve.seen[quantity]
+    sound, broken = _helps(curve, method)
+    known = np.isfinite(grid)
+    if not (sound[:, None] & known).any():
+        return None
+    inside = grid[sound][known[sound]]
+    low, high = float(inside.min()), float(inside.max())
+    outside = [float(grid[i][known[i]].mean()) for i in np.flatnonzero(broken) if known[i].any()]
+    middle = float(grid[curve.nominal][known[curve.nominal]].mean())
+    return Seen(
+        low=low,
+        high=high,
+        low_broken=any(value < middle for value in outside),
+        high_broken=any(value > middle for value in outside),
+    )
+
+
+def _helps(curve: Curve, method: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell for each value whether the method was shown to help, and whether it was shown not to.
+
+    Where nothing could be compared, all being clipped say, neither was shown.
+    """
+    margin = margins(curve, method)
+    gains = {rule: gain for rule, gain in margin.gains.items() if rule != CHI2}
+    sound = sound_values(replace(margin, gains=gains))
+    known = np.isfinite(curve.psnr_db[method]).any(axis=1)
+    faulty = margin.faults.any(axis=1)
+    return sound & known, ~sound & (known | faulty)
+
+
+def _low(entries: Sequence[Seen]) -> float:
+    """Join the lower ends: where one broke, the highest of those; else the least tested."""
+    broken = [seen.low for seen in entries if seen.low_broken]
+    if broken:
+        return max(broken)
+    return min((seen.low for seen in entries), default=OPEN_LOW)
+
+
+def _high(entries: Sequence[Seen]) -> float:
+    """Join the upper ends: where one broke, the least of those; else the largest tested."""
+    broken = [seen.high for seen in entries if seen.high_broken]
+    if broken:
+        return min(broken)
+    return max((seen.high for seen in entries), default=OPEN_HIGH)

@@ -1,0 +1,130 @@
+"""What a scenario is: a knob, its values, and how one value is measured on one scene.
+
+A scenario is one file in a folder of `scenarios/` that defines `SCENARIO`; nothing else has to
+know of it. One that photographs says how in `shoot`, and gets PSNR, chi^2 and patches for every
+method of the rig. Another kind of camera, or of judgement, brings its own `measure`, and says in
+`applies` for which bundles it is meant.
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+from camkit.bundle.reader import Bundle
+from camkit.errors import ContractError
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge, Verdict
+from camkit.report.stress.twin import Shot
+
+End = Literal["low", "high", "both"]
+Shoot = Callable[[Judge, Scene, float], Shot]
+Measure = Callable[[Judge, Scene, float], Verdict]
+Applies = Callable[[Bundle], str | None]
+
+
+def photographs(bundle: Bundle) -> str | None:
+    """Say why a bundle cannot take scenarios that photograph; None if it can."""
+    if bundle.manifest.input_contract == "raw_bayer_v1":
+        return None
+    return f"it takes {bundle.manifest.input_contract}, the scenario a Bayer mosaic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """A stress and its range.
+
+    Attributes:
+        name: Of the scenario, as `--scenarios` takes it.
+        title: For people.
+        knob: What is turned.
+        unit: Of the knob; empty for a bare number.
+        values: Increasing.
+        nominal: The value of an undisturbed capture, one of `values`.
+        quick: A subset that holds `nominal`.
+        shoot: Takes the capture of one value.
+        measure: Measures one value; None scores what `shoot` gives.
+        labels: Names of the values, where they have no order that could be interpolated.
+        log: Break points are interpolated over the logarithm.
+        bounds: Quantities of the runtime's envelope that this scenario limits, and at which end.
+        applies: Says why a bundle cannot take part; None if it can.
+        rival: Whether being below the input or the Wiener bank breaks a method here.
+        note: What a reader of the page should know.
+    """
+
+    name: str
+    title: str
+    knob: str
+    unit: str
+    values: tuple[float, ...]
+    nominal: float
+    quick: tuple[float, ...]
+    shoot: Shoot | None = None
+    measure: Measure | None = None
+    labels: tuple[str, ...] = ()
+    log: bool = False
+    bounds: Mapping[str, End] = field(default_factory=dict)
+    applies: Applies = photographs
+    rival: bool = True
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        values = self.values
+        if list(values) != sorted(set(values)) or self.nominal not in values:
+            raise ContractError(
+                f"{self.name}: values must increase and hold the nominal {self.nominal}; "
+                f"got {values}"
+            )
+        if not {self.nominal} <= set(self.quick) <= set(values):
+            raise ContractError(f"{self.name}: quick must lie in values and hold the nominal")
+        if self.labels and len(self.labels) != len(values):
+            raise ContractError(f"{self.name}: {len(values)} values need as many labels")
+        if self.shoot is None and self.measure is None:
+            raise ContractError(f"{self.name}: a scenario shoots or measures")
+
+    def take(self, judge: Judge, scene: Scene, value: float) -> Verdict:
+        """Measure one value on one scene."""
+        if self.measure is not None:
+            return self.measure(judge, scene, value)
+        assert self.shoot is not None
+        return judge.score(self.shoot(judge, scene, value))
+
+    def chosen(self, *, quick: bool) -> tuple[float, ...]:
+        """Give the values to sweep."""
+        return tuple(v for v in self.values if v in self.quick) if quick else self.values
+
+
+SCENARIO: Final = "SCENARIO"
+"""Name of the global that every module of `scenarios/` defines."""
+SCENARIOS: Final = "camkit.report.stress.scenarios"
+"""Named, not imported: its modules import this one."""
+
+
+def all_scenarios() -> tuple[Scenario, ...]:
+    """Give every scenario, by folder and file."""
+    from camkit.report.bench.discovery import discover
+
+    places = importlib.import_module(SCENARIOS).__path__
+    folders = sorted(m.name for m in pkgutil.iter_modules(places) if m.ispkg)
+    packages = [f"{SCENARIOS}.{name}" for name in folders]
+    return tuple(s for package in packages for s in discover(package, SCENARIO, Scenario))
+
+
+def choose(names: str | None) -> tuple[Scenario, ...]:
+    """Give the scenarios that a comma-separated list names; all without one.
+
+    Raises:
+        ContractError: If one is unknown.
+    """
+    known = {scenario.name: scenario for scenario in all_scenarios()}
+    if names is None:
+        return tuple(known.values())
+    wanted = [name.strip() for name in names.split(",") if name.strip()]
+    unknown = [name for name in wanted if name not in known]
+    if unknown or not wanted:
+        raise ContractError(
+            f"unknown scenario(s) {', '.join(unknown) or 'none given'}; there are: "
+            f"{', '.join(known)}"
+        )
+    return tuple(known[name] for name in wanted)

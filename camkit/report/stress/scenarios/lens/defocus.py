@@ -1,0 +1,61 @@
+"""Nearer than the focus: the kernels of other object distances from the bundle."""
+
+import numpy as np
+
+from camkit.bundle.reader import Bundle
+from camkit.report.stress.scenario import Scenario, photographs
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
+from camkit.report.stress.twin import Lens, Setting, Shot, photograph
+from camkit.runtime.bank.psf import color_kernels, kernel_at
+
+MM_PER_M = 1000.0
+
+
+def _applies(bundle: Bundle) -> str | None:
+    psf = bundle.stress_psf()
+    if psf is None:
+        return "it holds no stress_psf.safetensors"
+    if not np.isinf(psf.depths_mm[-1]):
+        return "its stress PSF does not reach infinity"
+    return photographs(bundle)
+
+
+def _lens_at(bundle: Bundle, inverse_m: float) -> Lens:
+    """Give the lens for one object distance, linear between the stored ones over 1 / distance."""
+    psf = bundle.stress_psf()
+    assert psf is not None
+    camera = bundle.manifest.camera
+    response = camera.channel_response.to_arrays()
+    inverses = MM_PER_M / psf.depths_mm[::-1]
+    at = float(np.interp(inverse_m, inverses, np.arange(inverses.size)))
+    low = min(int(at), inverses.size - 2)
+    deep, near = (
+        color_kernels(psf, *response, depth_index=inverses.size - 1 - i) for i in (low, low + 1)
+    )
+    kernels = (deep + np.float32(at - low) * (near - deep)).astype(np.float32)
+    return Lens(
+        psf=bundle.psf,
+        kernels_at=lambda x, y: kernel_at(kernels, psf.field_heights_mm, x, y),
+        margin_px=kernels.shape[-1] // 2,
+    )
+
+
+def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
+    rig = judge.rig
+    light = rig.light(scene, _lens_at(rig.bundle, value))
+    return photograph(light, rig.bundle.manifest.camera, Setting())
+
+
+SCENARIO = Scenario(
+    name="defocus",
+    title="Object distance",
+    knob="inverse_distance",
+    unit="1/m",
+    values=(0.0, 0.02, 0.05, 0.1, 0.2),
+    nominal=0.0,
+    quick=(0.0, 0.2),
+    shoot=_shoot,
+    applies=_applies,
+    note="0 is infinity, 0.2 is 5 m; kernels from the bundle's stress PSF, which has fewer fields.",
+)

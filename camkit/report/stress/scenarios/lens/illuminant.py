@@ -1,0 +1,93 @@
+"""The spectrum of the light: each lamp weights the wavelengths of the PSF in its own way."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.report.stress.rig import Rig
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
+from camkit.report.stress.twin import Lens, Setting, Shot, photograph
+from camkit.runtime.bank.psf import color_kernels, kernel_at
+
+Spectrum = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+SECOND_RADIATION_UM_K = 14387.77
+"""hc / k (CODATA 2018)."""
+GRID_UM = np.linspace(0.40, 0.70, 301)
+
+
+def planck(kelvin: float) -> Spectrum:
+    """Give the radiance of a black body over wavelength, 1 at 0.56 um.
+
+    References: Planck's law.
+    """
+
+    def radiance(um: NDArray[np.float64]) -> NDArray[np.float64]:
+        return um**-5 / np.expm1(SECOND_RADIATION_UM_K / (um * kelvin))
+
+    return lambda um: radiance(um) / radiance(np.array(0.56))
+
+
+def bands(*peaks: tuple[float, float, float]) -> Spectrum:
+    """Give Gaussian bands (centre_um, full width at half maximum in um, height)."""
+
+    def spectrum(um: NDArray[np.float64]) -> NDArray[np.float64]:
+        parts = [h * np.exp(-4 * np.log(2) * ((um - c) / w) ** 2) for c, w, h in peaks]
+        return np.asarray(np.sum(parts, axis=0))
+
+    return spectrum
+
+
+LIGHTS: dict[str, Spectrum] = {
+    "as frozen": np.ones_like,
+    "D65 (6504 K)": planck(6504),
+    "shade (12000 K)": planck(12000),
+    "A (2856 K)": planck(2856),
+    "white LED": bands((0.452, 0.022, 1.0), (0.555, 0.120, 0.75)),
+    "RGB LED": bands((0.460, 0.022, 1.0), (0.525, 0.032, 1.0), (0.630, 0.018, 1.0)),
+    "RGB lasers": bands((0.450, 0.004, 1.0), (0.532, 0.004, 1.0), (0.638, 0.004, 1.0)),
+    "deep RGB LED": bands((0.425, 0.015, 1.0), (0.500, 0.015, 1.0), (0.670, 0.015, 1.0)),
+}
+"""From the light that the bundle's kernels are weighted for to the farthest from it."""
+
+
+def lens_under(rig: Rig, spectrum: Spectrum) -> Lens:
+    """Give the lens and white balance under a light, the frozen response being that at 1."""
+    wavelengths_um, response = rig.bundle.manifest.camera.channel_response.to_arrays()
+    fine = np.stack([np.interp(GRID_UM, wavelengths_um, r, 0, 0) for r in response])
+    lit = fine * spectrum(GRID_UM)
+    kernels = color_kernels(rig.bundle.psf, GRID_UM, lit)
+    heights_mm = rig.bundle.psf.field_heights_mm
+    red, green, blue = fine.sum(axis=1) / lit.sum(axis=1)
+    return replace(
+        rig.lens,
+        kernels_at=lambda x, y: kernel_at(kernels, heights_mm, x, y),
+        gains=(float(red / green), 1.0, float(blue / green)),
+    )
+
+
+def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
+    rig = judge.rig
+    lens = lens_under(rig, list(LIGHTS.values())[round(value)])
+    r, g, b = rig.light(scene).gains
+    red, _, blue = lens.gains or (1.0, 1.0, 1.0)
+    light = rig.light(scene, replace(lens, gains=(r * red, g, b * blue)))
+    return photograph(light, rig.bundle.manifest.camera, Setting())
+
+
+SCENARIO = Scenario(
+    name="illuminant",
+    title="Spectrum of the light",
+    knob="illuminant",
+    unit="",
+    values=tuple(float(i) for i in range(len(LIGHTS))),
+    nominal=0.0,
+    quick=(0.0, 6.0),
+    shoot=_shoot,
+    labels=tuple(LIGHTS),
+    note="Kernels and white balance change, the colours of the scene stay: colour errors of the "
+    "matrix are another matter. The lights have no order; a break point names the first.",
+)

@@ -1,0 +1,34 @@
+"""A lens copy, refocusing or heat: all kernels a little smaller or larger than frozen."""
+
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
+from camkit.report.stress.twin import (
+    Setting,
+    Shot,
+    photograph,
+    transform_kernels,
+    with_kernels,
+)
+
+
+def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
+    rig = judge.rig
+    ratio = 1 + value / 100
+    lens = None
+    if value:
+        lens = with_kernels(rig.lens, lambda k: transform_kernels(k, ratio, 0.0))
+    return photograph(rig.light(scene, lens), rig.bundle.manifest.camera, Setting())
+
+
+SCENARIO = Scenario(
+    name="psf_scale",
+    title="Size of the PSF",
+    knob="psf_scale_percent",
+    unit="%",
+    values=(-20.0, -10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0, 20.0),
+    nominal=0.0,
+    quick=(-5.0, 0.0, 5.0),
+    shoot=_shoot,
+    note="The lens's kernels against the bundle's.",
+)

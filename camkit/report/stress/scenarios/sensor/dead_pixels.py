@@ -1,0 +1,38 @@
+"""Sensor defects: samples stuck at black or at white."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
+from camkit.report.stress.twin import Setting, Shot, photograph
+
+
+def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
+    rig = judge.rig
+    shot = photograph(rig.light(scene), rig.bundle.manifest.camera, Setting())
+    rng = np.random.default_rng(7_200 + scene.number)
+    samples = shot.capture.samples.copy()
+    chance = rng.random(samples.shape)
+    spoiled = chance < value / 100
+    samples[spoiled] = np.floor(shot.capture.white_level)
+    samples[chance < value / 200] = 0
+    capture = replace(shot.capture, samples=samples)
+    return replace(shot, capture=capture, spoiled=spoiled if value else None)
+
+
+SCENARIO = Scenario(
+    name="dead_pixels",
+    title="Dead and hot pixels",
+    knob="dead_percent",
+    unit="%",
+    values=(0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0),
+    nominal=0.0,
+    quick=(0.0, 1.0),
+    shoot=_shoot,
+    log=True,
+    bounds={"broken_fraction": "high"},
+    note="Half of them stuck at black, half at white.",
+)

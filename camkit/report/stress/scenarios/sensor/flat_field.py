@@ -1,0 +1,33 @@
+"""Nothing to see: constant coloured fields down to black, on which some networks explode."""
+
+import numpy as np
+
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
+from camkit.report.stress.twin import Setting, Shot, photograph
+
+COLOUR = (0.9, 0.5, 0.4)
+
+
+def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
+    rig = judge.rig
+    field = np.ones_like(scene.linear) * np.array(COLOUR, np.float32)[:, None, None]
+    flat = Scene(name=f"flat/{scene.name}", number=scene.number, linear=field)
+    setting = Setting(exposure=2.0**value)
+    return photograph(rig.light(flat), rig.bundle.manifest.camera, setting)
+
+
+SCENARIO = Scenario(
+    name="flat_field",
+    title="Constant fields, down to black",
+    knob="level_ev",
+    unit="EV",
+    values=(-14.0, -10.0, -8.0, -6.0, -4.0, -2.0, 0.0),
+    nominal=0.0,
+    quick=(-14.0, 0.0),
+    shoot=_shoot,
+    rival=False,
+    note="A field of one colour with noise. Blur does no harm here, so doing nothing wins; a "
+    "method breaks if what it gives does not explain the capture, or is not bounded.",
+)

@@ -1,0 +1,51 @@
+"""Lamps that clip: more and more of the picture under small discs far above white."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
+from camkit.report.stress.twin import Setting, Shot, photograph
+
+RADIUS_PX = 8.0
+POWER = 8.0
+
+
+def with_discs(scene: Scene, radius_px: float, count: int) -> Scene:
+    """Give a scene with soft-edged white discs of `POWER` times white at random places."""
+    rng = np.random.default_rng(7_100 + scene.number)
+    height, width = scene.linear.shape[1:]
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    cover = np.zeros((height, width), np.float32)
+    for _ in range(count):
+        cy, cx = rng.random() * height, rng.random() * width
+        cover = np.maximum(cover, np.clip(radius_px + 0.5 - np.hypot(y - cy, x - cx), 0, 1))
+    linear = scene.linear + cover * (np.float32(POWER) - scene.linear)
+    return Scene(name=f"{scene.name}+{count}x{radius_px:g}", number=scene.number, linear=linear)
+
+
+def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
+    rig = judge.rig
+    area = scene.size_px[0] * scene.size_px[1]
+    count = round(value / 100 * area / (np.pi * RADIUS_PX**2))
+    lit = scene if count == 0 else with_discs(scene, RADIUS_PX, count)
+    light = rig.light(lit, rig.lens if count else None)
+    light = replace(light, scene=scene)
+    shot = photograph(light, rig.bundle.manifest.camera, Setting())
+    return replace(shot, away_from_clipped=True)
+
+
+SCENARIO = Scenario(
+    name="saturated_area",
+    title="Saturated area",
+    knob="saturated_percent",
+    unit="%",
+    values=(0.0, 0.3, 1.0, 3.0, 6.0, 10.0),
+    nominal=0.0,
+    quick=(0.0, 3.0),
+    shoot=_shoot,
+    bounds={"clipped_fraction": "high"},
+    note="Discs of 8 px radius, 8 times white; judged away from what clipped.",
+)

@@ -1,0 +1,96 @@
+"""Sharp scenes for the sweeps: procedural ones with seeds of their own, or a user's pictures."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.report.quality import FIELD_SHARES, QUADRANTS, crop_origin, list_set, read_picture
+from camkit.scenes import procedural_scene
+
+SCENE_SEED: Final = 9_000_000
+"""Training and validation draw their scenes around 7,000,000 (models_def/training/pictures.py)."""
+SIDE_PX: Final = 512
+WHITE: Final = 0.9
+"""Scenes end here, so that nothing clips unless a scenario makes it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """A sharp scene and its place on the sensor.
+
+    Attributes:
+        name: For reports and journals.
+        number: Decides place and noise.
+        linear: (3, h, w) float32 linear Rec.709, 0..`WHITE`.
+    """
+
+    name: str
+    number: int
+    linear: FloatArray
+
+    @property
+    def field_share(self) -> float:
+        """Give the place between the middle of the sensor (0) and its corner (1)."""
+        return FIELD_SHARES[self.number % len(FIELD_SHARES)]
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Give (width, height)."""
+        return self.linear.shape[2], self.linear.shape[1]
+
+    def origin_px(self, sensor_size_px: tuple[int, int]) -> tuple[int, int]:
+        """Give the even (x, y) of the scene on a sensor.
+
+        Raises:
+            ContractError: If the scene is larger than the sensor.
+        """
+        quadrant = QUADRANTS[self.number % len(QUADRANTS)]
+        return crop_origin(self.size_px, sensor_size_px, self.field_share, quadrant)
+
+
+def stress_scenes(
+    count: int, sensor_size_px: tuple[int, int], *, folder: Path | None = None
+) -> tuple[Scene, ...]:
+    """Give the scenes of a sweep.
+
+    Args:
+        count: How many.
+        sensor_size_px: (width, height); scenes are at most as large.
+        folder: Pictures to take instead of procedural scenes; their middle is used.
+
+    Raises:
+        ContractError: If `count` < 1 or the folder holds too few pictures of the size.
+    """
+    if count < 1:
+        raise ContractError(f"a sweep needs at least one scene; got {count}")
+    width, height = (min(SIDE_PX, side // 2 * 2) for side in sensor_size_px)
+    if folder is not None:
+        return _from_folder(folder, count, (width, height))
+    return tuple(
+        Scene(
+            name=f"procedural:{SCENE_SEED + i}",
+            number=i,
+            linear=np.minimum(procedural_scene(SCENE_SEED + i, height, width), WHITE),
+        )
+        for i in range(count)
+    )
+
+
+def _from_folder(folder: Path, count: int, size_px: tuple[int, int]) -> tuple[Scene, ...]:
+    width, height = size_px
+    found: list[Scene] = []
+    for path in list_set(folder):
+        linear = read_picture(path, max(size_px))[:, :height, :width]
+        if linear.shape[1:] == (height, width):
+            scaled = np.ascontiguousarray(linear * np.float32(WHITE))
+            found.append(Scene(name=path.name, number=len(found), linear=scaled))
+        if len(found) == count:
+            return tuple(found)
+    raise ContractError(
+        f"{folder} holds {len(found)} picture(s) of at least {width}x{height} px, {count} are "
+        "needed; add pictures or lower --scenes"
+    )

@@ -1,0 +1,138 @@
+"""Values x scenes, one after the other, journalled so that a run may be stopped and resumed."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from camkit.errors import ContractError
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge, Outcome, Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """One scenario at one value on one scene.
+
+    Attributes:
+        scenario: Name.
+        value: Of the knob.
+        scene: Name.
+        verdict: All methods.
+    """
+
+    scenario: str
+    value: float
+    scene: str
+    verdict: Verdict
+
+    @property
+    def key(self) -> tuple[str, float, str]:
+        """Give what names the point."""
+        return self.scenario, self.value, self.scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """What is to be measured.
+
+    Attributes:
+        scenarios: In order.
+        scenes: On which.
+        quick: Only the quick values.
+    """
+
+    scenarios: tuple[Scenario, ...]
+    scenes: tuple[Scene, ...]
+    quick: bool = False
+
+    def tasks(self) -> list[tuple[Scenario, float, Scene]]:
+        """Give scenario, value and scene of every point, scenario by scenario."""
+        return [
+            (scenario, value, scene)
+            for scenario in self.scenarios
+            for scene in self.scenes
+            for value in scenario.chosen(quick=self.quick)
+        ]
+
+
+def run_sweep(sweep: Sweep, judge: Judge, journal: Path | None) -> Iterator[Point]:
+    """Measure what the journal does not hold yet, and give all points of the sweep in order.
+
+    Args:
+        sweep: What is to be measured.
+        judge: The rig and its calibration.
+        journal: One JSON line per finished point; None keeps none.
+
+    Raises:
+        ContractError: If the journal is damaged.
+    """
+    done = {} if journal is None else {p.key: p for p in read_points(journal)}
+    for scenario, value, scene in sweep.tasks():
+        key = (scenario.name, value, scene.name)
+        point = done.get(key)
+        if point is None:
+            verdict = scenario.take(judge, scene, value)
+            point = Point(scenario=key[0], value=value, scene=key[2], verdict=verdict)
+            if journal is not None:
+                append_point(journal, point)
+        yield point
+
+
+def sweep_identity(judge: Judge) -> str:
+    """Give a short hash of the bundles and methods that decide the points of a journal."""
+    rig = judge.rig
+    before = None if rig.before is None else rig.before.sha256
+    parts = [rig.bundle.sha256, before, rig.methods]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
+
+
+def append_point(path: Path, point: Point) -> None:
+    """Add a finished point to a journal."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(asdict(point)) + "\n")
+
+
+def read_points(path: Path) -> list[Point]:
+    """Read a journal; a last line that was cut off is left out.
+
+    Raises:
+        ContractError: If another line is damaged.
+    """
+    if not path.exists():
+        return []
+    lines = path.read_text(encoding="utf-8").splitlines()
+    found = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            found.append(_to_point(json.loads(line)))
+        except (json.JSONDecodeError, TypeError, KeyError) as error:
+            if number == len(lines):
+                break
+            raise ContractError(
+                f"{path} line {number} is no point of a sweep; remove the file and start over"
+            ) from error
+    return found
+
+
+def _to_point(record: Mapping[str, object]) -> Point:
+    verdict = record["verdict"]
+    if not isinstance(verdict, dict):
+        raise TypeError("a verdict is an object")
+    outcomes = {
+        name: Outcome(**{**entry, "patch_px": _pair(entry["patch_px"])})
+        for name, entry in verdict["outcomes"].items()
+    }
+    return Point(
+        scenario=str(record["scenario"]),
+        value=float(str(record["value"])),
+        scene=str(record["scene"]),
+        verdict=Verdict(outcomes=outcomes, seen=verdict["seen"]),
+    )
+
+
+def _pair(values: Sequence[int] | None) -> tuple[int, int] | None:
+    return None if values is None else (values[0], values[1])

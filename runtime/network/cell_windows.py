@@ -1,0 +1,427 @@
+"""Networks on some lattice cells only: each chosen cell gets the bits of the untiled network.
+
+    labels (row, column): 0 no network, n the n-th network
+    strip of k cell rows -> rectangles of cells -> windows with halo -> kept cells
+    elsewhere the Wiener planes, which the network's input holds anyway
+
+       no network | network            inside a network's cell, over RAMP_PX from the border, the
+                  |ramp|               result passes from the Wiener planes to the network's
+
+A window reaches a halo beyond its cells (or to the picture's border) and reads the true input
+there, so the pixels of its cells are those of the untiled run whatever rectangle they lie in; the
+ramp depends on the labels alone. Strips and rectangles only decide what it costs.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.network.guard import TileGuard, is_finite
+from camkit.runtime.network.row_buffer import RowBuffer
+from camkit.runtime.network.tiling import Cancel, Cancelled, Progress, Run, is_cancelled
+from camkit.runtime.rows import RowSource
+
+RAMP_PX: Final = 32
+_CALL_PX: Final = 20_000
+"""What starting a window costs, in pixels."""
+_END_BYTES: Final = 36
+"""Input and output of a network per pixel: nine float32."""
+_MOST_STRIP_CELLS: Final = 8
+_WIENER: Final = slice(3, 6)
+
+Labels = NDArray[np.integer]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellNetwork:
+    """One of the networks.
+
+    Attributes:
+        run: (1, c, h, w) float32 -> (1, 3, h, w) float32.
+        stride_px: Sides of windows and their origins are multiples of it.
+        halo_px: Its reach, or less in fast mode.
+        bytes_per_px: Peak of its live activations per window pixel.
+    """
+
+    run: Run
+    stride_px: int
+    halo_px: int
+    bytes_per_px: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellLimits:
+    """What a plan must respect.
+
+    Attributes:
+        cell_px: Side of a lattice cell.
+        max_bytes: Cap on the rows held, one output strip and the largest window of every network.
+        tile_px: Force strips and windows of about this size (tests); None takes what fits.
+    """
+
+    cell_px: int
+    max_bytes: int
+    tile_px: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellWindow:
+    """One run of a network.
+
+    Attributes:
+        network: Which, from 0.
+        cells: Rows and columns of the lattice that it covers: (top, left, bottom, right).
+        pixels: The window on the padded picture: (top, left, bottom, right).
+    """
+
+    network: int
+    cells: tuple[int, int, int, int]
+    pixels: tuple[int, int, int, int]
+
+    @property
+    def area_px(self) -> int:
+        """Give the pixels computed."""
+        top, left, bottom, right = self.pixels
+        return (bottom - top) * (right - left)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellPlan:
+    """Windows for the cells of a picture.
+
+    Attributes:
+        size_px: (height, width) of the picture.
+        padded_px: The same after padding to the strides.
+        cell_px: Side of a cell.
+        labels: (row, column), 0 none, n the n-th network.
+        strip_cells: Cell rows per strip.
+        halo_px: Rows held above and below a strip.
+        strips: Windows of every strip, from top to bottom.
+    """
+
+    size_px: tuple[int, int]
+    padded_px: tuple[int, int]
+    cell_px: int
+    labels: Labels
+    strip_cells: int
+    halo_px: int
+    strips: tuple[tuple[CellWindow, ...], ...]
+
+    @property
+    def window_count(self) -> int:
+        """How often networks run."""
+        return sum(len(windows) for windows in self.strips)
+
+    @property
+    def buffer_rows(self) -> int:
+        """Rows of the padded picture held at a time."""
+        return min(self.padded_px[0], self.strip_cells * self.cell_px + 2 * self.halo_px)
+
+    def needed_bytes(self, bytes_per_px: Sequence[float]) -> int:
+        """Estimate the memory: rows held, one output strip, every network's largest window."""
+        width = self.padded_px[1]
+        held = (24 * self.buffer_rows + 12 * self.strip_cells * self.cell_px) * width
+        largest = [0] * len(bytes_per_px)
+        for windows in self.strips:
+            for window in windows:
+                largest[window.network] = max(largest[window.network], window.area_px)
+        arenas = zip(largest, bytes_per_px, strict=True)
+        return held + int(sum(area * (per_px + _END_BYTES) for area, per_px in arenas))
+
+    def area_px(self, network: int) -> int:
+        """Give the pixels that one network computes."""
+        return sum(w.area_px for ws in self.strips for w in ws if w.network == network)
+
+
+def plan_cells(
+    size_px: tuple[int, int],
+    labels: Labels,
+    networks: Sequence[CellNetwork],
+    limits: CellLimits,
+) -> CellPlan:
+    """Plan the windows for the chosen cells, the least computation that fits in the cap.
+
+    Args:
+        size_px: (height, width) of the picture.
+        labels: (row, column) of its lattice: 0 none, n the n-th of `networks`.
+        networks: Strides, halos and memory.
+        limits: Cell side and memory.
+
+    Raises:
+        ContractError: If the labels do not fit the picture, or the cap is too small for one cell.
+    """
+    cell = limits.cell_px
+    wanted = tuple(-(-side // cell) for side in size_px)
+    if labels.shape != wanted or labels.min() < 0 or labels.max() > len(networks):
+        raise ContractError(
+            f"a picture of {size_px} px has {wanted} cells with labels 0..{len(networks)}; "
+            f"got {labels.shape}"
+        )
+    stride = int(np.lcm.reduce([n.stride_px for n in networks] or [1]))
+    halo = max((_ceil_to(n.halo_px, stride) for n in networks), default=0)
+    padded = _ceil_to(size_px[0], stride), _ceil_to(size_px[1], stride)
+    frame = _Frame(cell=cell, stride=stride, padded=padded)
+    strip, most_px = _strip_cells(frame, networks, halo, limits)
+    strips = []
+    for top in range(0, wanted[0], strip):
+        part = labels[top : top + strip]
+        windows = [
+            frame.window(i, (top + a, b, top + c, d), _ceil_to(network.halo_px, stride))
+            for i, network in enumerate(networks)
+            for a, b, c, d in _cover(
+                part == i + 1, cell, _ceil_to(network.halo_px, stride), most_px
+            )
+        ]
+        strips.append(tuple(windows))
+    return CellPlan(
+        size_px=size_px,
+        padded_px=padded,
+        cell_px=cell,
+        labels=labels,
+        strip_cells=strip,
+        halo_px=halo if cell % stride == 0 else halo + stride,
+        strips=tuple(strips),
+    )
+
+
+def infer_cells(
+    networks: Sequence[CellNetwork],
+    source: RowSource,
+    plan: CellPlan,
+    *,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+    guard: TileGuard | None = None,
+) -> Iterator[FloatArray]:
+    """Run the networks on their cells and yield the rows of the picture from top to bottom.
+
+    Args:
+        networks: Those of the plan.
+        source: (6, h, w) picture, stabilised planes and Wiener planes; rows are read once.
+        plan: From `plan_cells`.
+        progress: Called as progress(done, total) after each window.
+        cancel: Asked before each window.
+        guard: Looks at every window; None refuses NaN and inf only.
+
+    Yields:
+        (3, rows, w) float32, consecutive.
+
+    Raises:
+        ContractError: If plan and source differ in size, or a network gives NaN or inf.
+        Cancelled: If `cancel` said so.
+    """
+    _, height, width = source.shape
+    if (height, width) != plan.size_px:
+        raise ContractError(f"the plan is for {plan.size_px}, the picture {height, width}")
+    buffer = RowBuffer(source, plan.buffer_rows, plan.padded_px)
+    done = 0
+    for number, windows in enumerate(plan.strips):
+        top = number * plan.strip_cells * plan.cell_px
+        bottom = min(top + plan.strip_cells * plan.cell_px, height)
+        first = max(0, min(top - plan.halo_px, plan.padded_px[0] - plan.buffer_rows))
+        held = buffer.move_to(first)
+        band = held[_WIENER, top - first : bottom - first, :width].copy()
+        for window in windows:
+            if is_cancelled(cancel):
+                raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
+            y0, x0, y1, x1 = window.pixels
+            given = np.ascontiguousarray(held[None, :, y0 - first : y1 - first, x0:x1])
+            made = _checked(networks[window.network].run(given), given, window, guard)
+            _place(made, window, plan, band, top)
+            done += 1
+            if progress is not None:
+                progress(done, plan.window_count)
+        yield band
+
+
+def _checked(
+    made: FloatArray, given: FloatArray, window: CellWindow, guard: TileGuard | None
+) -> FloatArray:
+    """Give (3, h, w) of a window's output if it is sound."""
+    describe = partial(_describe, window)
+    if guard is not None:
+        return guard.check(made[0], given[0], describe)
+    if not is_finite(made[0]):
+        raise ContractError(
+            f"the network gave NaN or inf in {describe()}; the input must be finite: repair dead "
+            "pixels first"
+        )
+    return np.asarray(made[0])
+
+
+def _describe(window: CellWindow) -> str:
+    top, left, bottom, right = window.pixels
+    return f"window x {left}..{right}, y {top}..{bottom}"
+
+
+def _place(
+    made: FloatArray, window: CellWindow, plan: CellPlan, band: FloatArray, band_top: int
+) -> None:
+    """Put the cells of a window into the band, with a ramp where a neighbour has no network."""
+    top, left, bottom, right = window.cells
+    cell, (height, width) = plan.cell_px, plan.size_px
+    origin_y, origin_x = window.pixels[:2]
+    active = np.pad(plan.labels > 0, 1, mode="edge")
+    for i in range(top, bottom):
+        for j in range(left, right):
+            if plan.labels[i, j] != window.network + 1:
+                continue
+            y0, x0 = i * cell, j * cell
+            y1, x1 = min(y0 + cell, height), min(x0 + cell, width)
+            new = made[:, y0 - origin_y : y1 - origin_y, x0 - origin_x : x1 - origin_x]
+            old = band[:, y0 - band_top : y1 - band_top, x0:x1]
+            around = active[i : i + 3, j : j + 3]
+            if around.all():
+                old[...] = new
+                continue
+            weight = _ramp(tuple(map(bool, around.ravel())), cell)[: y1 - y0, : x1 - x0]
+            # Where the weight is 1 the network's own bits are kept.
+            old[...] = np.where(weight < 1, old + weight * (new - old), new)
+
+
+@lru_cache(maxsize=256)
+def _ramp(around: tuple[bool, ...], cell_px: int) -> FloatArray:
+    """Give (cell, cell) weights: distance to the nearest cell without network over RAMP_PX.
+
+    Args:
+        around: Which of the 3x3 cells have a network, in reading order.
+        cell_px: Side of a cell.
+    """
+    at = np.arange(cell_px, dtype=np.float32) + np.float32(0.5)
+    away = {-1: at, 0: np.zeros_like(at), 1: at[::-1]}
+    distance = np.full((cell_px, cell_px), np.inf, dtype=np.float32)
+    for index, has_network in enumerate(around):
+        dy, dx = index // 3 - 1, index % 3 - 1
+        if not has_network:
+            distance = np.minimum(distance, np.maximum(away[dy][:, None], away[dx]))
+    ramp = np.clip(distance / np.float32(RAMP_PX), 0, 1)
+    weights = np.asarray(ramp * ramp * (3 - 2 * ramp), dtype=np.float32)
+    weights.flags.writeable = False
+    return weights
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Frame:
+    """The lattice on the padded picture."""
+
+    cell: int
+    stride: int
+    padded: tuple[int, int]
+
+    def window(self, network: int, cells: tuple[int, int, int, int], halo: int) -> CellWindow:
+        """Give the window that serves a rectangle of cells."""
+        top, left, bottom, right = (edge * self.cell for edge in cells)
+        height, width = self.padded
+        return CellWindow(
+            network=network,
+            cells=cells,
+            pixels=(
+                max(_floor_to(top - halo, self.stride), 0),
+                max(_floor_to(left - halo, self.stride), 0),
+                min(_ceil_to(bottom + halo, self.stride), height),
+                min(_ceil_to(right + halo, self.stride), width),
+            ),
+        )
+
+
+def _strip_cells(
+    frame: _Frame, networks: Sequence[CellNetwork], halo: int, limits: CellLimits
+) -> tuple[int, int]:
+    """Give cell rows per strip and the most pixels of a window, by the memory cap."""
+    cell, (height, width) = frame.cell, frame.padded
+    rows = -(-height // cell)
+    per_px = sum(n.bytes_per_px + _END_BYTES for n in networks)
+    if limits.tile_px is not None:
+        cells = min(max(1, -(-limits.tile_px // cell)), rows)
+        return cells, _padded_px(cell, cells, cells, halo)
+    for cells in range(min(_MOST_STRIP_CELLS, rows), 0, -1):
+        held = min(height, cells * cell + 2 * halo) * width * 24 + cells * cell * width * 12
+        most_px = int((limits.max_bytes - held) / max(per_px, 1))
+        if most_px >= _padded_px(cell, cells, min(2, cells), halo):
+            return cells, most_px
+    need = (cell + 2 * halo) * width * 24 + _padded_px(cell, 1, 1, halo) * per_px
+    raise ContractError(
+        f"{width}x{height} pixels with a halo of {halo} need at least {need / 2**20:.0f} MiB for "
+        f"one cell; got {limits.max_bytes / 2**20:.0f} MiB: raise --max-mem"
+    )
+
+
+def _padded_px(cell: int, rows: int, columns: int, halo: int) -> int:
+    return (rows * cell + 2 * halo) * (columns * cell + 2 * halo)
+
+
+def _cover(
+    mask: NDArray[np.bool_], cell: int, halo: int, most_px: int
+) -> list[tuple[int, int, int, int]]:
+    """Cover the chosen cells by rectangles (top, left, bottom, right), cut where it saves most."""
+    box = _box(mask, (0, 0, *mask.shape))
+    if box is None:
+        return []
+    done, open_boxes = [], [box]
+    while open_boxes:
+        box = open_boxes.pop()
+        parts = _best_cut(mask, box, cell, halo, most_px)
+        if parts:
+            open_boxes.extend(reversed(parts))
+        else:
+            done.append(box)
+    return done
+
+
+def _best_cut(
+    mask: NDArray[np.bool_], box: tuple[int, int, int, int], cell: int, halo: int, most_px: int
+) -> list[tuple[int, int, int, int]]:
+    """Give the parts of the cheapest cut of a rectangle, nothing if it is best left whole."""
+    top, left, bottom, right = box
+    whole = _work_px(box, cell, halo)
+    must = whole - _CALL_PX > most_px
+    if not must and mask[top:bottom, left:right].all():
+        return []
+    cuts = [((top, left, y, right), (y, left, bottom, right)) for y in range(top + 1, bottom)]
+    cuts += [((top, left, bottom, x), (top, x, bottom, right)) for x in range(left + 1, right)]
+    best: tuple[int, int, list[tuple[int, int, int, int]]] | None = None
+    for pair in cuts:
+        parts = [part for half in pair if (part := _box(mask, half)) is not None]
+        sizes = [_work_px(part, cell, halo) for part in parts]
+        # Of equal cuts the one into equal halves, so that few shapes occur.
+        rated = (sum(sizes), max(sizes), parts)
+        if best is None or rated[:2] < best[:2]:
+            best = rated
+    if best is None or not (must or best[0] < whole):
+        return []
+    return best[2]
+
+
+def _box(
+    mask: NDArray[np.bool_], box: tuple[int, int, int, int]
+) -> tuple[int, int, int, int] | None:
+    """Give the smallest rectangle around the chosen cells of a rectangle."""
+    top, left, bottom, right = box
+    rows, columns = np.nonzero(mask[top:bottom, left:right])
+    if rows.size == 0:
+        return None
+    return (
+        top + int(rows.min()),
+        left + int(columns.min()),
+        top + int(rows.max()) + 1,
+        left + int(columns.max()) + 1,
+    )
+
+
+def _work_px(box: tuple[int, int, int, int], cell: int, halo: int) -> int:
+    top, left, bottom, right = box
+    return _padded_px(cell, bottom - top, right - left, halo) + _CALL_PX
+
+
+def _ceil_to(value: int, step: int) -> int:
+    return -(-value // step) * step
+
+
+def _floor_to(value: int, step: int) -> int:
+    return value // step * step

@@ -1,0 +1,79 @@
+"""Every tile of a network's output looked at: finite and bounded, else replaced or refused."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+
+BOUND_FACTOR: Final = 4.0
+BOUND_OFFSET: Final = 1.0
+"""An output may reach BOUND_FACTOR times its tile's largest input plus this, in stabilised units:
+sixteen times the light. A restored lamp stays far below; networks that explode go far beyond."""
+
+_WIENER: Final = slice(3, 6)
+
+
+class TileGuard:
+    """Looks at the tiles of one picture; serves one thread.
+
+    Attributes:
+        replaced: Tiles that took the Wiener planes instead, in words.
+    """
+
+    def __init__(self, *, fallback: bool) -> None:
+        """Choose what becomes of a bad tile.
+
+        Args:
+            fallback: Give the tile its Wiener planes instead of an error.
+        """
+        self._fallback = fallback
+        self.replaced: list[str] = []
+
+    def check(
+        self, output: FloatArray, given: FloatArray, describe: Callable[[], str]
+    ) -> FloatArray:
+        """Give the output of a tile if it is sound, else its Wiener planes.
+
+        Args:
+            output: (3, h, w) float32 that the network made of the tile, stabilised.
+            given: (6, h, w) float32 that it got: capture, then Wiener planes.
+            describe: Names the tile; called only when it is bad.
+
+        Raises:
+            ContractError: If the tile is bad and there is no fallback, or the Wiener planes are
+                not finite either.
+        """
+        trouble = _trouble(output, given)
+        if trouble is None:
+            return output
+        tile = describe()
+        if not self._fallback:
+            raise ContractError(
+                f"the network gave {trouble} in {tile}; say --on-unsafe fallback for the Wiener "
+                "result there, or --method wiener for the whole picture"
+            )
+        wiener = given[_WIENER]
+        if not is_finite(wiener):
+            raise ContractError(
+                f"the network gave {trouble} in {tile}, and the Wiener result there is not finite "
+                "either; the capture holds what no repair found"
+            )
+        self.replaced.append(f"{tile}: {trouble}")
+        return wiener
+
+
+def is_finite(planes: FloatArray) -> bool:
+    """Tell whether no sample is NaN or inf; both survive a minimum and a maximum."""
+    return bool(np.isfinite(planes.min()) and np.isfinite(planes.max()))
+
+
+def _trouble(output: FloatArray, given: FloatArray) -> str | None:
+    """Say what is wrong with a tile; None if nothing is."""
+    if not is_finite(output):
+        return "NaN or inf"
+    bound = BOUND_FACTOR * float(np.abs(given).max()) + BOUND_OFFSET
+    largest = max(float(output.max()), -float(output.min()))
+    return f"values up to {largest:.3g}, beyond {bound:.3g}," if largest > bound else None

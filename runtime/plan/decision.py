@@ -1,0 +1,127 @@
+"""What one rule decided, the work that results, and what rules may look at."""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.reader import Bundle
+from camkit.errors import ContractError
+from camkit.runtime.geometry.placement import Placement
+from camkit.runtime.options import Method, Mode, Options
+from camkit.runtime.scene import Scene
+
+Labels = NDArray[np.int8]
+
+PLAIN: Final = 0
+WIENER: Final = 1
+SMALL: Final = 2
+FULL: Final = 3
+TIER_NAMES: Final = ("plain", "wiener", "small", "full")
+"""What a lattice cell gets: its developed samples, the bank, the smaller network, the network."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """What rules may look at.
+
+    Attributes:
+        bundle: The camera.
+        options: What the caller chose.
+        height_px: Rows of the capture.
+        width_px: Columns of the capture.
+        placement: Where the capture lies on the sensor.
+        scene: What was measured; None where nothing may be skipped.
+        loss_db: Predicted loss that the rules may spend, in dB against `exact`.
+    """
+
+    bundle: Bundle
+    options: Options
+    height_px: int
+    width_px: int
+    placement: Placement
+    scene: Scene | None = None
+    loss_db: float = 0.0
+
+    @property
+    def megapixels(self) -> float:
+        """Give the size of the capture."""
+        return self.height_px * self.width_px / 1e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What will be done to a capture.
+
+    Attributes:
+        method: The network behind the bank, or a classical method alone.
+        size: Size of network that cells of tier FULL get.
+        small: Size that cells of tier SMALL get; None without one.
+        mode: Tiling.
+        labels: (row, column) tier of every lattice cell; None for FULL everywhere.
+        undistort: Undo the distortion.
+    """
+
+    method: Method = "net"
+    size: str = "M"
+    small: str | None = None
+    mode: Mode = "exact"
+    labels: Labels | None = None
+    undistort: bool = True
+
+    def __post_init__(self) -> None:
+        if self.labels is None:
+            return
+        if self.labels.ndim != 2 or not np.isin(self.labels, (PLAIN, WIENER, SMALL, FULL)).all():
+            raise ContractError("labels must be a 2-D array of tiers 0..3")
+        if self.small is None and (self.labels == SMALL).any():
+            raise ContractError("cells of tier SMALL need a smaller size of network")
+
+    def sizes(self) -> tuple[str, ...]:
+        """Name the networks that will run."""
+        if self.method != "net":
+            return ()
+        if self.labels is None:
+            return (self.size,)
+        both = ((FULL, self.size), (SMALL, self.small))
+        return tuple(s for tier, s in both if s is not None and (self.labels == tier).any())
+
+    def network_labels(self) -> Labels | None:
+        """Give (row, column): 0 no network, n the n-th of `sizes`; None for one everywhere."""
+        if self.labels is None:
+            return None
+        numbers = np.zeros(self.labels.shape, np.int8)
+        for number, size in enumerate(self.sizes(), start=1):
+            tier = FULL if size == self.size else SMALL
+            numbers[self.labels == tier] = number
+        return numbers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """What one rule decided.
+
+    Attributes:
+        what: Name of the rule.
+        choice: What will be done.
+        reason: Why.
+        cost_db: Expected loss against `exact` in dB; negative where it should be better.
+        saving_s: Expected seconds saved against not deciding so; None until estimated.
+    """
+
+    what: str
+    choice: str
+    reason: str
+    cost_db: float = 0.0
+    saving_s: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the decision as plain JSON values."""
+        return {
+            "what": self.what,
+            "choice": self.choice,
+            "reason": self.reason,
+            "saving_s": None if self.saving_s is None else round(self.saving_s, 3),
+            "cost_db": round(self.cost_db, 4),
+        }

@@ -1,0 +1,192 @@
+"""Quality and budgets -> rules -> work and decisions.
+
+exact      M, nothing skipped            best     the largest size, nothing skipped
+adaptive   M, within adaptive.loss_db    draft    the smallest size, within draft.loss_db
+--max-error-db   the cheapest of all sizes whose predicted worst loss stays below
+--max-seconds    the best of a ladder from exact to the bank alone that fits
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from camkit.bundle.reader import Bundle
+from camkit.errors import ContractError
+from camkit.runtime.options import Options
+from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.estimate import estimate_seconds, tier_work_of
+from camkit.runtime.plan.loss import LossModel, read_loss_model
+from camkit.runtime.plan.rule import apply_rules
+from camkit.runtime.plan.rules.size import REFERENCE, size_cost_db
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.plan.tiers import work_shares
+
+LADDER: Final = (0.0, 1.0, 3.0, 10.0, 30.0)
+"""Losses tried for --max-seconds, in units of that of `adaptive`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What will be done to a capture, and why.
+
+    Attributes:
+        case: What the rules looked at.
+        work: The result.
+        steps: (work before, decision, work after) of every rule.
+        note: What the caller should be warned of; empty if nothing.
+    """
+
+    case: Case
+    work: Work
+    steps: tuple[tuple[Work, Decision, Work], ...]
+    note: str = ""
+
+    @property
+    def cost_db(self) -> float:
+        """Give the predicted loss against `exact`."""
+        return sum(decision.cost_db for _, decision, _ in self.steps)
+
+    def sizes(self) -> list[str]:
+        """Name the networks whose speed the savings need."""
+        works = [self.work, *(w for before, _, after in self.steps for w in (before, after))]
+        named = {size for work in works for size in (work.size, work.small)}
+        return [s for s in sizes_by_work(self.case.bundle) if s in named | {REFERENCE}]
+
+    def decisions(self, speed: Speed | None = None) -> list[Decision]:
+        """Give the decisions; with a speed, with the seconds they save."""
+        if speed is None:
+            return [decision for _, decision, _ in self.steps]
+        return [
+            replace(decision, saving_s=self._saving_s(before, after, speed))
+            for before, decision, after in self.steps
+        ]
+
+    def _saving_s(self, before: Work, after: Work, speed: Speed) -> float:
+        """Give the seconds between two works; the size is compared with the reference."""
+        chosen = before is after is self.steps[0][2] and after.size != REFERENCE
+        if chosen and REFERENCE in speed.network_s_per_mp:
+            before = replace(before, size=REFERENCE)
+        if before is after:
+            return 0.0
+        return estimate_seconds(self.case, before, speed) - estimate_seconds(
+            self.case, after, speed
+        )
+
+
+def default_size(bundle: Bundle, options: Options) -> str:
+    """Give the size that a pipeline gets ready: --size, or that of the quality."""
+    if options.size is not None:
+        return options.size
+    sizes = sizes_by_work(bundle)
+    if not sizes:
+        return REFERENCE
+    if options.quality == "best":
+        return sizes[-1]
+    return sizes[0] if options.quality == "draft" else REFERENCE
+
+
+def sizes_by_work(bundle: Bundle) -> list[str]:
+    """Give the sizes of a bundle from the cheapest on."""
+    return sorted(
+        bundle.manifest.networks, key=lambda size: bundle.network_facts(size).mac_per_pixel
+    )
+
+
+def needs_scene(options: Options) -> bool:
+    """Tell whether the choice depends on the capture."""
+    budgets = options.max_seconds is not None or options.max_error_db is not None
+    return budgets or options.quality in {"adaptive", "draft"}
+
+
+def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
+    """Decide what to do.
+
+    Args:
+        case: The capture; its scene must be measured where `needs_scene`.
+        speed: Gives how fast the machine is; only called for --max-seconds.
+    """
+    options = case.options
+    model = read_loss_model(case.bundle.manifest.plan)
+    work = _first_work(case, default_size(case.bundle, options))
+    if work.method != "net":
+        return _ruled(case, work)
+    if options.max_seconds is not None:
+        return _within_seconds(case, work, model, speed())
+    if options.max_error_db is not None:
+        return _within_error(case, work, model)
+    if model is None or options.quality in {"exact", "best"}:
+        return _ruled(case, work)
+    spend = model.adaptive_db if options.quality == "adaptive" else model.draft_db
+    if options.quality == "draft":
+        spend += size_cost_db(case, work.size)
+    return _ruled(replace(case, loss_db=spend), work)
+
+
+def _first_work(case: Case, size: str) -> Work:
+    options = case.options
+    has_networks = bool(case.bundle.manifest.networks)
+    method = "wiener" if options.method == "net" and not has_networks else options.method
+    return Work(method=method, size=size, mode=options.mode, undistort=options.undistort)
+
+
+def _ruled(case: Case, work: Work, note: str = "") -> Plan:
+    steps = apply_rules(case, work)
+    last = steps[-1][2] if steps else work
+    return Plan(case=case, work=last, steps=tuple(steps), note=note)
+
+
+def _sizes(case: Case) -> list[str]:
+    """Give the sizes to choose from, from the best on; never above the reference."""
+    if case.options.size is not None:
+        return [case.options.size]
+    sizes = sizes_by_work(case.bundle)[::-1]
+    return sizes[sizes.index(REFERENCE) :] if REFERENCE in sizes else sizes
+
+
+def _within_error(case: Case, work: Work, model: LossModel | None) -> Plan:
+    """Give the cheapest plan whose predicted loss stays below the limit."""
+    limit = case.options.max_error_db
+    if limit is None or model is None:
+        return _ruled(case, work, "the bundle carries no calibrated plan: nothing is skipped")
+    spend = model.budget_db(limit)
+    plans = [
+        _ruled(replace(case, loss_db=spend), replace(work, size=size))
+        for size in _sizes(case)
+        if size == _sizes(case)[0] or size_cost_db(case, size) <= spend
+    ]
+    return min(plans, key=_nominal_work)
+
+
+def _nominal_work(plan: Plan) -> float:
+    """Give the work of the networks and the bank of a plan, in multiplications per pixel."""
+    tiers = tier_work_of(plan.case, plan.work)
+    per_px = tiers.per_px()
+    if plan.work.labels is None or plan.case.scene is None:
+        return float(per_px[3])
+    bank, network = work_shares(plan.work.labels, plan.case.scene.cell_px, tiers)
+    return float(bank * per_px[1] + network * (per_px[3] - per_px[1]))
+
+
+def _within_seconds(case: Case, work: Work, model: LossModel | None, speed: Speed) -> Plan:
+    """Give the first plan of the ladder that fits the time."""
+    limit = case.options.max_seconds
+    if limit is None:
+        raise ContractError("a plan within a time needs max_seconds")
+    unit = 0.0 if model is None else model.adaptive_db
+    most_db = case.options.max_error_db
+    plans = []
+    for size in _sizes(case):
+        for factor in LADDER if model is not None else LADDER[:1]:
+            spend = 0.0 if factor == 0 else size_cost_db(case, size) + factor * unit
+            plans.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
+    plans.append(_ruled(case, replace(work, method="wiener")))
+    # The bank alone is the last resort: what it costs is not bounded by any prediction.
+    ordered = sorted(plans[:-1], key=lambda plan: plan.cost_db) + plans[-1:]
+    fitting = (p for p in ordered if estimate_seconds(p.case, p.work, speed) <= limit)
+    chosen = next(fitting, ordered[-1])
+    note = ""
+    if estimate_seconds(chosen.case, chosen.work, speed) > limit:
+        note = f"even the bank alone is expected to take more than {limit:g} s"
+    elif most_db is not None and model is not None and chosen.cost_db > model.budget_db(most_db):
+        note = f"{limit:g} s allow no plan within {most_db:g} dB"
+    return replace(chosen, note=note)

@@ -1,0 +1,57 @@
+"""Rules found in `rules/`: one module each, with ORDER and `decide`; a new file is a new rule."""
+
+import pkgutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+
+from camkit.errors import ContractError
+from camkit.runtime.plan import rules
+from camkit.runtime.plan.decision import Case, Decision, Work
+
+Decide = Callable[[Case, Work], tuple[Work, Decision | None]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """One rule.
+
+    Attributes:
+        name: Of its module.
+        order: Rules run by increasing order.
+        decide: Gives the work as the rule wants it, and what it decided; None where the rule
+            does not apply.
+    """
+
+    name: str
+    order: int
+    decide: Decide
+
+
+@cache
+def find_rules() -> tuple[Rule, ...]:
+    """Give the rules in their order.
+
+    Raises:
+        ContractError: If a module of `rules/` has no ORDER or no `decide`.
+    """
+    found = []
+    for module in pkgutil.iter_modules(rules.__path__):
+        loaded = import_module(f"{rules.__name__}.{module.name}")
+        order, decide = getattr(loaded, "ORDER", None), getattr(loaded, "decide", None)
+        if not isinstance(order, int) or not callable(decide):
+            raise ContractError(f"the rule {module.name} needs an int ORDER and a function decide")
+        found.append(Rule(name=module.name, order=order, decide=decide))
+    return tuple(sorted(found, key=lambda rule: (rule.order, rule.name)))
+
+
+def apply_rules(case: Case, work: Work) -> list[tuple[Work, Decision, Work]]:
+    """Apply all rules; give (work before, decision, work after) of those that apply."""
+    steps = []
+    for rule in find_rules():
+        after, decision = rule.decide(case, work)
+        if decision is not None:
+            steps.append((work, decision, after))
+        work = after
+    return steps

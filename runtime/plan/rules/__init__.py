@@ -1,0 +1,9 @@
+"""One module per rule: ORDER and `decide(case, work) -> (work, decision or None)`.
+
+size           which network
+cells          which lattice cells get it, a smaller one, the bank alone, or nothing
+blocks         which blocks of the bank are filtered
+wavelengths    how many wavelengths the bank uses
+halo           how far windows look beyond their cells
+undistortion   whether the picture is warped
+"""

@@ -1,0 +1,78 @@
+"""Which lattice cells get the network, a smaller one, the bank alone, or only development."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from camkit.runtime.plan.decision import (
+    FULL,
+    PLAIN,
+    SMALL,
+    TIER_NAMES,
+    WIENER,
+    Case,
+    Decision,
+    Work,
+)
+from camkit.runtime.plan.estimate import tier_work_of
+from camkit.runtime.plan.loss import CellLosses, read_loss_model
+from camkit.runtime.plan.tiers import FloatGrid, choose_tiers
+
+ORDER: Final = 20
+
+
+def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+    """Share the cells among the tiers within the loss that may be spent."""
+    if work.method != "net":
+        return work, None
+    model = read_loss_model(case.bundle.manifest.plan)
+    if case.scene is None:
+        reason = f"quality {case.options.quality} skips nothing"
+        return work, Decision(what="cells", choice="all full", reason=reason)
+    if model is None:
+        reason = "the bundle carries no calibrated plan (tools/plan_report.py calibrate writes it)"
+        return work, Decision(what="cells", choice="all full", reason=reason)
+    if case.loss_db <= 0:
+        return work, Decision(what="cells", choice="all full", reason="no loss may be spent")
+    losses = model.predict(case.scene)
+    small = _smaller(case, work, losses)
+    with_small = replace(work, small=small)
+    grid = _losses(losses, work.size, small, case.scene.shape)
+    base = losses.extra.get(work.size)
+    spent = 0.0 if base is None else float(base.sum())
+    allowed = losses.allowed(case.loss_db) - spent
+    labels = None
+    if allowed > 0:
+        labels = choose_tiers(case.scene.cell_px, grid, allowed, tier_work_of(case, with_small))
+    if labels is None:
+        reason = f"nothing can be skipped within {case.loss_db:.3f} dB"
+        return work, Decision(what="cells", choice="all full", reason=reason)
+    added = float(np.take_along_axis(grid, labels[None].astype(np.intp), axis=0).sum())
+    counts = [f"{int((labels == t).sum())} {TIER_NAMES[t]}" for t in (FULL, SMALL, WIENER, PLAIN)]
+    return replace(with_small, labels=labels), Decision(
+        what="cells",
+        choice=", ".join(c for c in counts if not c.startswith("0 ")),
+        reason=f"flat, dark or out of focus; predicted within {case.loss_db:.3f} dB",
+        cost_db=losses.loss_db(spent + added) - losses.loss_db(spent),
+    )
+
+
+def _smaller(case: Case, work: Work, losses: CellLosses) -> str | None:
+    """Give the smallest calibrated size below the one in use."""
+    networks = case.bundle.manifest.networks
+    mac: dict[str, float] = {size: facts.mac_per_pixel for size, facts in networks.items()}
+    known = [size for size in mac if size in losses.extra and mac[size] < mac[work.size]]
+    return min(known, key=lambda size: mac[size]) if known else None
+
+
+def _losses(losses: CellLosses, size: str, small: str | None, shape: tuple[int, int]) -> FloatGrid:
+    """Give (tier, row, column): what each tier adds to the error of the size in use."""
+    grid = np.full((4, *shape), np.inf)
+    grid[FULL] = 0.0
+    base = losses.extra.get(size, np.zeros(shape))
+    targets = ((PLAIN, "plain"), (WIENER, "wiener"), (SMALL, small))
+    for tier, name in targets:
+        if name is not None and name in losses.extra:
+            grid[tier] = np.maximum(losses.extra[name] - base, 0.0)
+    return grid

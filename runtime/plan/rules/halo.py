@@ -1,0 +1,27 @@
+"""How far windows look beyond what they keep."""
+
+from typing import Final
+
+from camkit.runtime.plan.decision import Case, Decision, Work
+
+ORDER: Final = 50
+
+
+def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+    """Keep the network's reach unless the caller chose otherwise.
+
+    With less, pixels near a window's border would depend on where the windows lie, that is on tile
+    size and memory cap; for a few percent of the network's time that promise is not given up.
+    """
+    if work.method != "net":
+        return work, None
+    facts = case.bundle.network_facts(work.size)
+    shorter = [e for e in facts.halo_error if e.psnr_db is not None and e.psnr_db >= 80.0]
+    if work.mode != "exact":
+        reason = f"--mode {work.mode} says so"
+        return work, Decision(what="halo", choice=work.mode, reason=reason)
+    reason = "results must not depend on tile size and memory cap"
+    if shorter:
+        least = min(shorter, key=lambda entry: entry.halo_px)
+        reason += f"; --mode fast takes {least.halo_px} px at {least.psnr_db:.0f} dB of the exact"
+    return work, Decision(what="halo", choice=f"{facts.reach_px} px", reason=reason)

@@ -1,0 +1,36 @@
+"""Which size of network."""
+
+from typing import Final
+
+from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.loss import read_loss_model
+
+ORDER: Final = 10
+REFERENCE: Final = "M"
+"""The size that `exact` takes and losses are measured against."""
+
+
+def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+    """Report the size that quality, budgets or --size asked for, and what it costs."""
+    if work.method != "net":
+        return work, None
+    options = case.options
+    if options.size is not None:
+        reason = "--size says so"
+    elif options.max_seconds is not None or options.max_error_db is not None:
+        reason = "the most that the budget allows"
+    else:
+        reason = f"quality {options.quality}"
+    return work, Decision(
+        what="size", choice=work.size, reason=reason, cost_db=size_cost_db(case, work.size)
+    )
+
+
+def size_cost_db(case: Case, size: str) -> float:
+    """Give the predicted loss of a size on this capture; 0 where nothing was calibrated."""
+    model = read_loss_model(case.bundle.manifest.plan)
+    if model is None or case.scene is None or size == REFERENCE:
+        return 0.0
+    losses = model.predict(case.scene)
+    extra = losses.extra.get(size)
+    return 0.0 if extra is None else losses.loss_db(float(extra.sum()))

@@ -1,0 +1,47 @@
+"""Whether the picture is warped."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.stages import Undistort
+from camkit.runtime.geometry.warp import Warp
+from camkit.runtime.plan.decision import Case, Decision, Work
+
+ORDER: Final = 60
+LEAST_SHIFT_PX: Final = 0.5
+_NODES: Final = 33
+
+
+def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+    """Skip undistortion that would move no pixel by half a pixel."""
+    stage = case.bundle.manifest.stage(Undistort)
+    if stage is None or not work.undistort:
+        return work, None
+    if case.scene is None:
+        reason = f"quality {case.options.quality} skips nothing"
+        return work, Decision(what="undistortion", choice="yes", reason=reason)
+    shift_px = largest_shift_px(case)
+    if shift_px >= LEAST_SHIFT_PX:
+        reason = f"pixels move by up to {shift_px:.1f} px"
+        return work, Decision(what="undistortion", choice="yes", reason=reason)
+    return replace(work, undistort=False), Decision(
+        what="undistortion",
+        choice="skipped",
+        reason=f"no pixel would move by more than {shift_px:.2f} px (limit {LEAST_SHIFT_PX} px); "
+        "a shift is not counted in dB",
+    )
+
+
+def largest_shift_px(case: Case) -> float:
+    """Give how far undistortion moves a pixel of the capture at most."""
+    warp = Warp(case.bundle.psf.distortion, case.placement.window, to_sensor=False)
+    x, y = np.meshgrid(
+        np.linspace(0, case.width_px - 1, _NODES), np.linspace(0, case.height_px - 1, _NODES)
+    )
+    moved = [
+        np.hypot(*np.moveaxis(warp.positions(c, x, y) - np.stack([x, y], -1), -1, 0))
+        for c in range(3)
+    ]
+    return float(np.max(moved))

@@ -1,0 +1,20 @@
+"""How many wavelengths the bank uses."""
+
+from typing import Final
+
+from camkit.bundle.stages import Wiener
+from camkit.runtime.plan.decision import Case, Decision, Work
+
+ORDER: Final = 40
+
+
+def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+    """Keep all: they are folded into one kernel per colour once, so fewer would save nothing."""
+    if case.bundle.manifest.stage(Wiener) is None:
+        return work, None
+    count = case.bundle.psf.wavelengths_um.size
+    return work, Decision(
+        what="wavelengths",
+        choice=f"all {count}",
+        reason="folded into one kernel per colour before the work; fewer would save nothing",
+    )

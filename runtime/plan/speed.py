@@ -1,0 +1,93 @@
+"""How fast this machine is: one window of each network and one block of the bank, timed."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.stages import Wiener
+from camkit.contracts import NoiseModel
+from camkit.errors import ContractError
+from camkit.runtime.bank.blocks import Block, taper_edges
+from camkit.runtime.bank.wiener import wiener_filter
+from camkit.runtime.network.engine import NetworkEngine
+
+WINDOW_PX: Final = 320
+"""Side of the timed window; sides of networks' strides up to 64 divide it."""
+ROUNDS: Final = 3
+REST_BLOCKS_PER_MP: Final = 10.0
+"""Everything but bank and network, per megapixel, in blocks of REFERENCE_BLOCK_PX (measured)."""
+REFERENCE_BLOCK_PX: Final = 384
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Speed:
+    """Seconds of the parts of a reconstruction.
+
+    Attributes:
+        network_s_per_mp: Size -> seconds per computed megapixel, on the engine's threads.
+        block_s: Seconds of one block of the bank on one thread.
+        rest_s_per_mp: Seconds per megapixel of everything else.
+        threads: Threads that restore blocks.
+    """
+
+    network_s_per_mp: Mapping[str, float] = field(default_factory=dict)
+    block_s: float
+    rest_s_per_mp: float
+    threads: int
+
+    def __post_init__(self) -> None:
+        values = [*self.network_s_per_mp.values(), self.block_s, self.rest_s_per_mp]
+        if min(values) <= 0 or self.threads < 1:
+            raise ContractError("a speed needs seconds > 0 and at least one thread")
+
+
+def measure_speed(
+    engines: Mapping[str, NetworkEngine], stage: Wiener | None, *, threads: int
+) -> Speed:
+    """Time one window of every network and one block, the best of ROUNDS each.
+
+    Args:
+        engines: Networks by size.
+        stage: The bank; None times the block of the default one.
+        threads: Threads that restore blocks.
+    """
+    block_px = REFERENCE_BLOCK_PX if stage is None else stage.block_px
+    settings = stage or Wiener(prior_scale=1e-3, prior_exponent=2.0)
+    block_s = _block_seconds(settings, block_px)
+    scale = (REFERENCE_BLOCK_PX / block_px) ** 2
+    return Speed(
+        network_s_per_mp={
+            size: _window_seconds(engine) / (WINDOW_PX**2 / 1e6) for size, engine in engines.items()
+        },
+        block_s=block_s,
+        rest_s_per_mp=REST_BLOCKS_PER_MP * block_s * scale,
+        threads=threads,
+    )
+
+
+def _window_seconds(engine: NetworkEngine) -> float:
+    window = np.full((1, engine.channels, WINDOW_PX, WINDOW_PX), 0.1, np.float32)
+    return _best(lambda: engine.run(window))
+
+
+def _block_seconds(settings: Wiener, block_px: int) -> float:
+    noise = NoiseModel(shot=(1e-4,) * 3, read_variance=(1e-6,) * 3)
+    restore = wiener_filter(settings, noise)
+    samples = np.full((3, block_px, block_px), 0.1, np.float32)
+    otf = np.full((3, block_px, block_px // 2 + 1), 0.5, np.complex64)
+    ring = settings.overlap_px // 4
+    return _best(
+        lambda: restore(Block(samples=taper_edges(samples, otf, ring), otf=otf, unknown=None))
+    )
+
+
+def _best(call: Callable[[], object]) -> float:
+    taken = []
+    for _ in range(ROUNDS):
+        began = time.perf_counter()
+        call()
+        taken.append(time.perf_counter() - began)
+    return max(min(taken), 1e-6)

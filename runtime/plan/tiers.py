@@ -1,0 +1,160 @@
+"""Cells shared among the tiers: the least work within a loss, borders between tiers counted.
+
+    work = sum over cells of area * work(tier) + sum over borders of CELL_PX * halo * work(network)
+
+Where a network's cells end, its windows reach a halo further; a lone cell of 256 px with a halo of
+96 costs three cells. The least of work + weight * loss is sought cell by cell in a checkerboard
+(iterated conditional modes), for a row of weights; the cheapest result within the loss is taken.
+Everything is in multiplications, none of it depends on the machine.
+
+References: Besag 1986 (iterated conditional modes).
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.errors import ContractError
+from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER, Labels
+from camkit.runtime.scene import CELL_PX, CellArray
+
+BANK_MAC: Final = 11_000.0
+"""Work of the bank per pixel, in multiplications of a network that take as long (measured)."""
+NETWORK_FIXED_MAC: Final = 5_700.0
+"""What a network costs per pixel besides its multiplications, in the same unit (measured)."""
+LEAST_SAVING: Final = 0.05
+"""Below this share of the work nothing is skipped."""
+_BANK_REACH_PX: Final = 256
+_WEIGHTS: Final = 48
+_SWEEPS: Final = 6
+
+FloatGrid = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TierWork:
+    """Work per pixel and reach of the networks.
+
+    Attributes:
+        full_mac: Multiplications per pixel of the network.
+        full_halo_px: Its halo.
+        small_mac: Those of the smaller network; None without one.
+        small_halo_px: Its halo.
+    """
+
+    full_mac: float
+    full_halo_px: int
+    small_mac: float | None = None
+    small_halo_px: int = 0
+
+    def per_px(self) -> FloatGrid:
+        """Give the work per pixel of every tier, the bank included."""
+        small = np.inf if self.small_mac is None else BANK_MAC + self._network(self.small_mac)
+        return np.array([0.0, BANK_MAC, small, BANK_MAC + self._network(self.full_mac)])
+
+    def borders(self) -> FloatGrid:
+        """Give (tier, tier): work per border of one cell's side between two tiers."""
+        ring = np.zeros(4)
+        ring[FULL] = self._network(self.full_mac) * self.full_halo_px * CELL_PX
+        if self.small_mac is not None:
+            ring[SMALL] = self._network(self.small_mac) * self.small_halo_px * CELL_PX
+        table = ring[:, None] + ring
+        bank = BANK_MAC * _BANK_REACH_PX * CELL_PX
+        table[PLAIN, 1:] += bank
+        table[1:, PLAIN] += bank
+        np.fill_diagonal(table, 0.0)
+        return np.asarray(table)
+
+    @staticmethod
+    def _network(mac: float) -> float:
+        return NETWORK_FIXED_MAC + mac
+
+
+def choose_tiers(
+    area_px: CellArray, losses: FloatGrid, allowed: float, work: TierWork
+) -> Labels | None:
+    """Give the tier of every cell, the least work within a loss.
+
+    Args:
+        area_px: (row, column) pixels of every cell.
+        losses: (tier, row, column) loss of every tier >= 0, FULL = 0; inf where a tier is not to
+            be had.
+        allowed: Loss of all cells together.
+        work: What the tiers cost.
+
+    Returns:
+        (row, column) int8, or None where skipping saves less than LEAST_SAVING.
+
+    Raises:
+        ContractError: If the shapes disagree.
+    """
+    if losses.shape != (4, *area_px.shape) or (losses < 0).any() or np.isnan(losses).any():
+        raise ContractError(f"losses must be >= 0 and (4, {area_px.shape}); got {losses.shape}")
+    per_px = work.per_px()
+    usable = np.isfinite(per_px)[:, None, None] & np.isfinite(losses)
+    costs = np.where(usable, np.where(np.isfinite(per_px), per_px, 0)[:, None, None] * area_px, 0)
+    bounded = np.where(usable, losses, 0)
+    forbidden = np.where(usable, 0, np.inf)
+    borders = work.borders()
+    everything = total_work(np.full(area_px.shape, FULL, np.int8), costs, borders)
+    best, least = None, everything * (1 - LEAST_SAVING)
+    unit = everything / max(allowed, 1e-30)
+    for weight in unit * np.logspace(3, -3, _WEIGHTS):
+        labels = _settle(costs + weight * bounded + forbidden, borders)
+        spent = float(np.take_along_axis(bounded, labels[None], axis=0).sum())
+        made = total_work(labels, costs, borders)
+        if spent <= allowed and made <= least:
+            best, least = labels, made
+    return None if best is None else best.astype(np.int8)
+
+
+def total_work(labels: NDArray[np.integer], costs: FloatGrid, borders: FloatGrid) -> float:
+    """Give the work of a labelling: cells and borders."""
+    cells = np.take_along_axis(costs, labels[None].astype(np.intp), axis=0).sum()
+    across = borders[labels[:, :-1], labels[:, 1:]].sum()
+    down = borders[labels[:-1], labels[1:]].sum()
+    return float(cells + across + down)
+
+
+def work_shares(labels: Labels, area_px: CellArray, work: TierWork) -> tuple[float, float]:
+    """Give the work of (bank, networks) as shares of doing everything; borders included."""
+    per_px = work.per_px()
+    per_px[~np.isfinite(per_px)] = 0
+    network = per_px - np.where(np.arange(4) >= WIENER, BANK_MAC, 0)
+    borders = work.borders()
+    bank_border = np.zeros((4, 4))
+    bank_border[PLAIN, 1:] = bank_border[1:, PLAIN] = BANK_MAC * _BANK_REACH_PX * CELL_PX
+    bank = np.where(np.arange(4) >= WIENER, BANK_MAC, 0.0)
+    shares = []
+    for cells, edges in ((bank, bank_border), (network, borders - bank_border)):
+        costs = cells[:, None, None] * area_px
+        shares.append(min(total_work(labels, costs, edges) / costs[FULL].sum(), 1.0))
+    return shares[0], shares[1]
+
+
+def _settle(unary: FloatGrid, borders: FloatGrid) -> NDArray[np.intp]:
+    """Give labels that no single cell can better; from the best single cells onwards."""
+    labels = unary.argmin(axis=0)
+    rows, columns = np.indices(labels.shape)
+    parity = (rows + columns) % 2
+    for _ in range(_SWEEPS):
+        before = labels.copy()
+        for turn in (0, 1):
+            energy = unary + _pull(labels, borders)
+            labels = np.where(parity == turn, energy.argmin(axis=0), labels)
+        if (labels == before).all():
+            break
+    return np.asarray(labels)
+
+
+def _pull(labels: NDArray[np.intp], borders: FloatGrid) -> FloatGrid:
+    """Give (tier, row, column): work of the borders that a tier would have to its neighbours."""
+    to = borders[:, labels]
+    pull = np.zeros_like(to)
+    pull[:, 1:] += to[:, :-1]
+    pull[:, :-1] += to[:, 1:]
+    pull[:, :, 1:] += to[:, :, :-1]
+    pull[:, :, :-1] += to[:, :, 1:]
+    return pull

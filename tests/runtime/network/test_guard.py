@@ -1,0 +1,82 @@
+"""No bad tile reaches a picture: it is named, and refused or replaced by its Wiener planes."""
+
+import numpy as np
+import pytest
+
+from camkit.errors import ContractError
+from camkit.runtime.network.guard import BOUND_FACTOR, BOUND_OFFSET, TileGuard
+from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.rows import ArrayRows
+
+RNG = np.random.default_rng
+
+
+def _planes(height: int = 32, width: int = 32) -> np.ndarray:
+    return RNG(0).uniform(0, 1, (6, height, width)).astype(np.float32)
+
+
+def _bands(planes: np.ndarray, spoil: float, guard: TileGuard | None) -> np.ndarray:
+    """Run a 'network' that copies the capture and spoils tiles with a sample above 2."""
+
+    def run(window: np.ndarray) -> np.ndarray:
+        out = window[:, :3].copy()
+        out[window[:, :3] > 2] = spoil
+        return out
+
+    limits = TileLimits(stride_px=2, halo_px=0, tile_px=16)
+    plan = plan_windows(planes.shape[1], planes.shape[2], limits)
+    bands = infer_bands(run, ArrayRows(planes), plan, guard=guard)
+    return np.concatenate(list(bands), axis=1)
+
+
+def test_sound_tiles_pass_untouched() -> None:
+    planes, guard = _planes(), TileGuard(fallback=True)
+    np.testing.assert_array_equal(_bands(planes, np.nan, guard), planes[:3])
+    assert guard.replaced == []
+
+
+@pytest.mark.parametrize("spoil", [np.nan, np.inf, -np.inf, 1e4])
+def test_a_bad_tile_takes_its_wiener_planes_and_only_it(spoil: float) -> None:
+    planes, guard = _planes(), TileGuard(fallback=True)
+    planes[1, 20, 5] = 3.0
+    got = _bands(planes, spoil, guard)
+    expected = planes[:3].copy()
+    expected[:, 16:, :16] = planes[3:, 16:, :16]
+    np.testing.assert_array_equal(got, expected)
+    assert len(guard.replaced) == 1
+    assert "tile (row 1, column 0), pixels x 0..16, y 16..32" in guard.replaced[0]
+
+
+@pytest.mark.parametrize(("spoil", "what"), [(np.nan, "NaN or inf"), (1e4, "values up to 1e")])
+def test_without_fallback_the_tile_is_named_in_the_error(spoil: float, what: str) -> None:
+    planes = _planes()
+    planes[0, 3, 30] = 3.0
+    with pytest.raises(ContractError, match=rf"{what}.*tile \(row 0, column 1\).*x 16..32, y 0"):
+        _bands(planes, spoil, TileGuard(fallback=False))
+
+
+def test_without_a_guard_nan_is_still_refused_and_large_values_pass() -> None:
+    planes = _planes()
+    planes[0, 3, 30] = 3.0
+    with pytest.raises(ContractError, match=r"NaN or inf in tile \(row 0, column 1\)"):
+        _bands(planes, np.nan, None)
+    assert _bands(planes, 1e4, None).max() == np.float32(1e4)
+
+
+def test_wiener_planes_that_are_not_finite_cannot_stand_in() -> None:
+    planes, guard = _planes(), TileGuard(fallback=True)
+    planes[0, 3, 30], planes[4, 0, 31] = 3.0, np.nan
+    with pytest.raises(ContractError, match="not finite either"):
+        _bands(planes, np.nan, guard)
+
+
+def test_the_bound_grows_with_the_input() -> None:
+    guard = TileGuard(fallback=False)
+    for level in (0.1, 1.0, 50.0):
+        given = np.full((6, 4, 4), level, np.float32)
+        bound = BOUND_FACTOR * level + BOUND_OFFSET
+        inside = np.full((3, 4, 4), 0.999 * bound, np.float32)
+        assert guard.check(inside, given, lambda: "tile") is inside
+        for sign in (1, -1):
+            with pytest.raises(ContractError, match="beyond"):
+                guard.check(sign * 1.01 * inside, given, lambda: "tile")

@@ -1,0 +1,61 @@
+"""Undistortion is skipped where it would move nothing by half a pixel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from camkit.bundle.reader import Bundle
+from camkit.runtime.geometry.placement import place
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.rules.undistortion import decide, largest_shift_px
+from tests.plan_factory import RADIUS_MM, made_scene, write_planned_bundle
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    """Give a bundle whose distortion is that of the tiny lens."""
+    return write_planned_bundle(tmp_path_factory.mktemp("planned"))
+
+
+def _case(bundle: Bundle, side_px: int) -> Case:
+    pipeline = Pipeline(bundle, Options(method="wiener"))
+    origin = (1024 - side_px) // 4 * 2, (768 - side_px) // 4 * 2
+    capture = pipeline.capture_of(
+        np.zeros((side_px, side_px), np.uint16), iso=100, white_balance=None, origin_px=origin
+    )
+    cells = side_px // 256
+    placement = place(capture, bundle.manifest.camera, None)
+    return Case(
+        bundle=bundle,
+        options=Options(quality="adaptive"),
+        height_px=side_px,
+        width_px=side_px,
+        placement=placement,
+        scene=made_scene(np.full((cells, cells), 1e-3)),
+    )
+
+
+def test_shift_is_that_of_the_radial_model(bundle: Bundle) -> None:
+    case = _case(bundle, 768)
+    corner_mm = np.hypot(383.5, 383.5) * 6e-3
+    closed = corner_mm * 0.01 * (corner_mm / RADIUS_MM) ** 2 / 6e-3
+    assert largest_shift_px(case) == pytest.approx(closed, rel=0.05)
+
+
+def test_a_small_crop_in_the_middle_is_not_warped(bundle: Bundle) -> None:
+    small, large = _case(bundle, 256), _case(bundle, 768)
+    assert largest_shift_px(small) < 0.5 < largest_shift_px(large)
+    work, decision = decide(small, Work())
+    assert not work.undistort
+    assert decision is not None
+    assert decision.choice == "skipped"
+    assert decide(large, Work())[0].undistort
+
+
+def test_exact_skips_nothing_and_no_undistortion_stays_none(bundle: Bundle) -> None:
+    small = _case(bundle, 256)
+    assert decide(replace(small, scene=None), Work())[0].undistort
+    assert decide(small, Work(undistort=False))[1] is None

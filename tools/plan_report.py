@@ -1,0 +1,205 @@
+"""Calibrate what `--quality adaptive` may skip, and prove it on scenes it never saw.
+
+    python tools/plan_report.py calibrate --bundle duet --data DATA/train_open --out plan.json
+    python tools/plan_report.py calibrate ... --write camkit/bundles/duet.camkit
+    python tools/plan_report.py report --bundle duet --data DATA --out-dir out/plan
+    python tools/plan_report.py overhead --bundle duet
+
+`calibrate` simulates captures of pictures and procedural scenes, measures per lattice cell what
+less than the exact result loses, fits the loss model and writes it as the manifest's `plan`:
+into a JSON file, which `camkit export --plan` takes, and with --write into a bundle.
+`report` measures saving and loss on the scenes of camkit/report/plan_scenes.py.
+"""
+
+import argparse
+import itertools
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from camkit.bundle.manifest import Threshold
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.writer import write_bundle
+from camkit.contracts import FloatArray
+from camkit.report.plan_cells import CaptureCells, measure_cells, photograph, pipelines, start
+from camkit.report.plan_fit import Calibration, fit_model
+from camkit.report.plan_scenes import GENERATORS, proof_scenes
+from camkit.report.quality import list_set, read_picture
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.loss import plan_entries
+from camkit.runtime.plan.rules.size import REFERENCE
+from camkit.runtime.plan.tiers import TierWork
+
+ISOS = (100.0, 400.0, 1600.0)
+SIDE_PX = 1280
+PROCEDURAL_SEED = 8_000_000
+"""Seeds from here on are used by no training and by no report."""
+
+
+def main() -> int:
+    """Run one of the commands."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    calibrate = commands.add_parser("calibrate", help="fit and store the loss model")
+    calibrate.add_argument("--bundle", default="duet", help="name or path")
+    calibrate.add_argument("--data", type=Path, help="folder of sharp pictures (train_open)")
+    calibrate.add_argument("--pictures", type=int, default=24, help="how many of them")
+    calibrate.add_argument("--procedural", type=int, default=5, help="generated scenes besides")
+    calibrate.add_argument("--out", type=Path, help="JSON file for `camkit export --plan`")
+    calibrate.add_argument("--write", type=Path, help="bundle to store the plan in")
+    report = commands.add_parser("report", help="saving and loss on unseen scenes")
+    report.add_argument("--bundle", default="duet", help="name or path")
+    report.add_argument(
+        "--data", type=Path, help="folder with valid_open and hdr; none: procedural"
+    )
+    report.add_argument("--out-dir", type=Path, default=Path("out/plan"))
+    report.add_argument("--quality", default="adaptive", choices=("adaptive", "draft"))
+    report.add_argument("--width", type=int, default=2048, help="of procedural scenes")
+    report.add_argument("--height", type=int, default=1536, help="of procedural scenes")
+    report.add_argument("--limit", type=int, default=0, help="only so many scenes")
+    report.add_argument("--kinds", default="", help="only these kinds, with commas")
+    report.add_argument("--runs", type=int, default=1, help="timed runs per capture and quality")
+    overhead = commands.add_parser("overhead", help="CPU seconds where nothing can be skipped")
+    overhead.add_argument("--bundle", default="duet", help="name or path")
+    overhead.add_argument("--runs", type=int, default=20, help="interleaved runs of both")
+    overhead.add_argument("--width", type=int, default=1536)
+    overhead.add_argument("--height", type=int, default=1024)
+    options = parser.parse_args()
+    return {"calibrate": _calibrate, "report": _report, "overhead": _overhead}[options.command](
+        options
+    )
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    bundle = open_bundle(find_bundle(options.bundle))
+    began = time.process_time()
+    captures = []
+    targets = pipelines(bundle)
+    for number, (name, scene) in enumerate(_scenes(options)):
+        iso = ISOS[number % len(ISOS)]
+        simulation = photograph(bundle, scene, number=number, iso=iso)
+        captures.append(measure_cells(bundle, targets, f"{name} ISO {iso:g}", simulation))
+        spent = time.process_time() - began
+        print(f"{number + 1:3d} {captures[-1].name}: {spent:.0f} CPU s", file=sys.stderr)
+    made = fit_model(captures, *_work(bundle))
+    entries = plan_entries(
+        made.model, adaptive_cost_db=made.adaptive[0], draft_cost_db=made.draft[0]
+    )
+    _print_calibration(made, captures)
+    if options.out is not None:
+        text = json.dumps({k: v.model_dump() for k, v in sorted(entries.items())}, indent=2)
+        options.out.parent.mkdir(parents=True, exist_ok=True)
+        options.out.write_text(text + "\n", encoding="utf-8")
+    if options.write is not None:
+        _store(options.write, entries)
+    return 0
+
+
+def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
+    """Give names and (3, h, w) scenes with even sides, pictures spread over the folder."""
+    if options.data is not None:
+        paths = list_set(options.data)
+        chosen = np.unique(np.linspace(0, len(paths) - 1, options.pictures).astype(int))
+        for index in chosen:
+            picture = read_picture(paths[index], SIDE_PX)
+            height, width = (side // 2 * 2 for side in picture.shape[1:])
+            yield paths[index].name, np.ascontiguousarray(picture[:, :height, :width])
+    for index in range(options.procedural):
+        kind, generator = list(GENERATORS.items())[index % len(GENERATORS)]
+        seed = PROCEDURAL_SEED + index
+        yield f"{kind}:{seed}", generator(seed, 1024, 1024)
+
+
+def _work(bundle: Bundle) -> tuple[TierWork, str | None]:
+    """Give what the tiers cost in this bundle, and its smallest size below the reference."""
+    networks = bundle.manifest.networks
+    full = bundle.network_facts(REFERENCE)
+    below = [s for s in networks if networks[s].mac_per_pixel < full.mac_per_pixel]
+    small = min(below, key=lambda size: networks[size].mac_per_pixel) if below else None
+    facts = None if small is None else bundle.network_facts(small)
+    work = TierWork(
+        full_mac=full.mac_per_pixel,
+        full_halo_px=full.reach_px,
+        small_mac=None if facts is None else facts.mac_per_pixel,
+        small_halo_px=0 if facts is None else facts.reach_px,
+    )
+    return work, small
+
+
+def _store(path: Path, entries: dict[str, Threshold]) -> None:
+    """Write the plan into a bundle; every other byte of its content stays."""
+    bundle = open_bundle(path)
+    members = {name: bundle.member(name) for name in bundle.names}
+    write_bundle(path, bundle.manifest.model_copy(update={"plan": entries}), members)
+    print(f"wrote the plan into {path}")
+
+
+def _print_calibration(made: Calibration, captures: list[CaptureCells]) -> None:
+    print(f"{len(captures)} captures, {made.cells} cells")
+    for target, line in made.model.lines.items():
+        level, detail, noise, field = line
+        print(
+            f"{target:8s} level {level:7.2f}  detail {detail:5.2f}  noise {noise:5.2f}  "
+            f"field {field:5.2f}  spread {made.spread[target]:.2f}"
+        )
+    for name, value, (mean, worst) in (
+        ("adaptive", made.model.adaptive_db, made.adaptive),
+        ("draft", made.model.draft_db, made.draft),
+    ):
+        print(f"{name}: predicted {value:.3f} dB, lost {mean:.3f} dB mean, {worst:.3f} dB worst")
+
+
+def _report(options: argparse.Namespace) -> int:
+    from camkit.report.plan_proof import prove, write_report
+
+    bundle = open_bundle(find_bundle(options.bundle))
+    kinds = tuple(kind for kind in options.kinds.split(",") if kind)
+    rows = []
+    scenes = proof_scenes(options.height, options.width, options.data, kinds)
+    if options.limit:
+        scenes = itertools.islice(scenes, options.limit)
+    for row in prove(bundle, scenes, quality=options.quality, runs=options.runs):
+        rows.append(row)
+        print(row.line(), flush=True)
+    for line in write_report(rows, bundle, options.out_dir):
+        print(line)
+    return 0
+
+
+def _overhead(options: argparse.Namespace) -> int:
+    """Compare the CPU seconds of adaptive and exact, in turn, where all is texture."""
+    bundle = open_bundle(find_bundle(options.bundle))
+    rng = np.random.default_rng(PROCEDURAL_SEED)
+    scene = rng.uniform(0.05, 0.9, (3, options.height, options.width)).astype(np.float32)
+    simulation = photograph(bundle, scene, number=0, iso=100.0)
+    made = {
+        quality: Pipeline(bundle, Options(quality=quality, undistort=False, threads=1))
+        for quality in ("exact", "adaptive")
+    }
+    seconds: dict[str, list[float]] = {quality: [] for quality in made}
+    for _ in range(options.runs):
+        for quality, pipeline in made.items():
+            began = time.process_time()
+            work = start(pipeline, simulation)
+            work.fill(None)
+            seconds[quality].append(time.process_time() - began)
+            if work.labels is not None:
+                print("something was skipped here: not a case for this command", file=sys.stderr)
+                return 1
+    ratios = np.array(seconds["adaptive"]) / np.array(seconds["exact"])
+    print(
+        f"{options.runs} runs in turn: exact {np.median(seconds['exact']):.2f} CPU s, adaptive "
+        f"{np.median(seconds['adaptive']):.2f} CPU s, median ratio {np.median(ratios):.4f}"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
