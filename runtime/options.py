@@ -16,7 +16,7 @@ Quality = Literal["exact", "best", "adaptive", "draft"]
 OnUnsafe = Literal["warn", "fallback", "fail"]
 
 SIZES: Final = ("S", "M", "L")
-DEFAULT_MAX_MEM_BYTES: Final = 1_120_000_000
+DEFAULT_MAX_MEM_BYTES: Final = 930_000_000
 LEAST_MAX_MEM_BYTES: Final = 400_000_000
 
 
@@ -43,7 +43,7 @@ class Options:
         on_unsafe: What becomes of a capture outside the bundle's envelope, and of a tile whose
             output is not finite or not bounded: warn (a bad tile is an error), fallback (the
             Wiener result of capture or tile), fail (an error before work).
-        max_mem_bytes: Memory the process may take; None for the default of 1.12 GB.
+        max_mem_bytes: Memory the process may take; None for the default of 0.93 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
         dtype: Which graph of the bundle: fp32, or fp16 where it holds one. A CPU computes the

@@ -36,11 +36,11 @@ from camkit.runtime.plan.decision import Case, Labels
 from camkit.runtime.plan.estimate import Estimate, estimate_seconds
 from camkit.runtime.plan.planner import Plan, make_plan, needs_scene, sizes_by_work
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.rows import MappedRows, RollingRows, RowSource, StackedRows
+from camkit.runtime.rows import MappedRows, RollingRows, RowSource
 from camkit.runtime.scene import CELL_PX, Scene, measure_scene
 from camkit.runtime.signal.front_rows import FrontRows
 from camkit.runtime.signal.noise import measure_noise
-from camkit.runtime.signal.stabilise import stabilise, unstabilise
+from camkit.runtime.signal.stabilise import NetworkRows, unstabilise
 
 BAND_ROWS: Final = 128
 STAGE_ORDER: Final = (
@@ -439,12 +439,8 @@ class Reconstruction:
         )
         if scale is None:
             return restored, restored
-        both = StackedRows(planes.reader(), restored)
-        source = self._mapped(
-            both,
-            lambda rows, _: np.concatenate(
-                [stabilise(part, noise, scale=scale) for part in (rows[:3], rows[3:])]
-            ),
+        source = NetworkRows(
+            planes.reader(), restored, noise, scale=scale, threads=self._setup.threads
         )
         return restored, source
 

@@ -13,10 +13,7 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.slices import run_slices
-
-CHUNK_SAMPLES: Final = 1 << 18
-"""Samples of one channel that a pointwise function gets at once: what it makes stays in cache."""
+from camkit.runtime.slices import run_chunks
 
 STALE_ROWS: Final = 128
 """Rows of a band that may wait for their successors after their last reader has passed."""
@@ -95,34 +92,12 @@ class MappedRows:
         rows = self._source.read(top, bottom)
         width = rows.shape[2]
         mapped = np.empty((self._channels, bottom - top, width), dtype=np.float32)
-        chunk = max(1, CHUNK_SAMPLES // width)
 
         def fill(first: int, last: int) -> None:
-            for start in range(first, last, chunk):
-                part = slice(start, min(start + chunk, last))
-                mapped[:, part] = self._function(rows[:, part], top + start)
+            mapped[:, first:last] = self._function(rows[:, first:last], top + first)
 
-        run_slices(fill, bottom - top, threads=self._threads)
+        run_chunks(fill, bottom - top, width, threads=self._threads)
         return mapped
-
-
-class StackedRows:
-    """Several sources of one size as one source, channels one after the other."""
-
-    def __init__(self, *sources: RowSource) -> None:
-        if len({s.shape[1:] for s in sources}) != 1:
-            raise ContractError(f"sources differ in size: {[s.shape for s in sources]}")
-        self._sources = sources
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the whole picture."""
-        _, h, w = self._sources[0].shape
-        return sum(s.shape[0] for s in self._sources), h, w
-
-    def read(self, top: int, bottom: int) -> FloatArray:
-        """Give the rows of all sources, stacked along the channels."""
-        return np.concatenate([s.read(top, bottom) for s in self._sources])
 
 
 class RollingRows:

@@ -2,11 +2,36 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Final
 
 from camkit.errors import ContractError
 
-LEAST_ROWS = 8
+LEAST_ROWS: Final = 8
 """A thread is not worth its start for fewer rows."""
+
+
+CHUNK_SAMPLES: Final = 1 << 18
+"""Samples of one channel that a pointwise function gets at once: what it makes stays in cache."""
+
+
+def run_chunks(work: Callable[[int, int], None], rows: int, width: int, *, threads: int) -> None:
+    """Call `work(first, last)` for pieces of rows that stay in cache, shared among threads.
+
+    As `run_slices`; for pointwise work, whose bits no cut can change.
+
+    Args:
+        work: Fills rows first..last.
+        rows: Number of rows.
+        width: Samples in a row of one channel.
+        threads: Threads at most.
+    """
+    chunk = max(1, CHUNK_SAMPLES // width)
+
+    def pieces(first: int, last: int) -> None:
+        for start in range(first, last, chunk):
+            work(start, min(start + chunk, last))
+
+    run_slices(pieces, rows, threads=threads)
 
 
 def run_slices(

@@ -7,11 +7,19 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.rows import RowSource
+from camkit.runtime.slices import run_chunks
 
 DEFAULT_SCALE: Final = 64.0
 
 
-def stabilise(planes: FloatArray, noise: NoiseModel, *, scale: float = DEFAULT_SCALE) -> FloatArray:
+def stabilise(
+    planes: FloatArray,
+    noise: NoiseModel,
+    *,
+    scale: float = DEFAULT_SCALE,
+    out: FloatArray | None = None,
+) -> FloatArray:
     """Give s = sqrt(max(x / shot + read_variance / shot^2, 0)) / scale.
 
     The noise of s has the standard deviation 0.5 / scale at any gain.
@@ -20,6 +28,7 @@ def stabilise(planes: FloatArray, noise: NoiseModel, *, scale: float = DEFAULT_S
         planes: (3, h, w) float32, linear, white balanced.
         noise: Noise after white balance; shot > 0.
         scale: Divisor behind the square root.
+        out: (3, h, w) float32 to fill; a new array when None.
 
     Returns:
         (3, h, w) float32 >= 0.
@@ -29,7 +38,7 @@ def stabilise(planes: FloatArray, noise: NoiseModel, *, scale: float = DEFAULT_S
     References: Wang et al. 2020 (k-sigma); Anscombe 1948.
     """
     slope, offset = _line(planes, noise, scale)
-    stable = planes * slope
+    stable = np.multiply(planes, slope, out=out)
     stable += offset
     np.maximum(stable, 0, out=stable)
     return np.asarray(np.sqrt(stable, out=stable))
@@ -57,6 +66,62 @@ def unstabilise(
     planes -= offset
     planes /= slope
     return planes
+
+
+class NetworkRows:
+    """What a network is given: the stabilised capture and, below it, the stabilised Wiener planes.
+
+    Equal to stacking both sources and mapping them, with two copies of every sample fewer.
+    """
+
+    def __init__(
+        self,
+        planes: RowSource,
+        restored: RowSource,
+        noise: NoiseModel,
+        *,
+        scale: float,
+        threads: int = 1,
+    ) -> None:
+        """Name the sources.
+
+        Args:
+            planes: (3, h, w) linear, white balanced.
+            restored: (3, h, w) likewise, of the Wiener bank.
+            noise: Noise after white balance.
+            scale: Divisor behind the square root.
+            threads: Threads that share the rows of one read; no influence on the bits.
+
+        Raises:
+            ContractError: If the sources differ in size.
+        """
+        if planes.shape != restored.shape:
+            raise ContractError(
+                f"capture and Wiener planes must have one size; got {planes.shape}, "
+                f"{restored.shape}"
+            )
+        self._sources = planes, restored
+        self._noise, self._scale, self._threads = noise, scale, threads
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (6, h, w)."""
+        channels, height, width = self._sources[0].shape
+        return 2 * channels, height, width
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give the rows top..bottom, (6, rows, w)."""
+        halves = [source.read(top, bottom) for source in self._sources]
+        width = halves[0].shape[2]
+        stable = np.empty((6, bottom - top, width), dtype=np.float32)
+
+        def fill(first: int, last: int) -> None:
+            for half, out in zip(halves, (stable[:3], stable[3:]), strict=True):
+                rows = np.s_[:, first:last]
+                stabilise(half[rows], self._noise, scale=self._scale, out=out[rows])
+
+        run_chunks(fill, bottom - top, width, threads=self._threads)
+        return stable
 
 
 def _line(planes: FloatArray, noise: NoiseModel, scale: float) -> tuple[FloatArray, FloatArray]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.rows import STALE_ROWS, ArrayRows, MappedRows, RollingRows, StackedRows
+from camkit.runtime.rows import STALE_ROWS, ArrayRows, MappedRows, RollingRows
 
 
 def _picture(height: int) -> FloatArray:
@@ -72,23 +72,17 @@ def test_rows_outside_the_picture_are_refused(top: int, bottom: int) -> None:
         rolling.reader().read(top, bottom)
 
 
-def test_stacked_and_mapped_rows_act_on_the_same_rows() -> None:
+def test_mapped_rows_get_the_rows_and_the_first_of_them() -> None:
     picture = _picture(6)
-    both = StackedRows(ArrayRows(picture), ArrayRows(2 * picture))
     tops: list[int] = []
 
     def keep_top(rows: FloatArray, top: int) -> FloatArray:
         tops.append(top)
-        return rows[:1] + rows[2:3]
+        return rows[:1] + rows[1:2]
 
-    mapped = MappedRows(both, keep_top, 1)
-    np.testing.assert_array_equal(mapped.read(1, 4), 3 * picture[:1, 1:4])
-    assert (both.shape, mapped.shape, tops) == ((4, 6, 3), (1, 6, 3), [1])
-
-
-def test_sources_of_different_size_cannot_be_stacked() -> None:
-    with pytest.raises(ContractError, match="differ in size"):
-        StackedRows(ArrayRows(_picture(4)), ArrayRows(_picture(6)))
+    mapped = MappedRows(ArrayRows(picture), keep_top, 1)
+    np.testing.assert_array_equal(mapped.read(1, 4), picture[:1, 1:4] + picture[1:2, 1:4])
+    assert (mapped.shape, tops) == ((1, 6, 3), [1])
 
 
 def test_array_rows_need_channels() -> None:
