@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Demosaic, Illumination, Network, Undistort, Wiener
 from camkit.bundle.reader import Bundle
@@ -435,7 +436,7 @@ class Reconstruction:
         bank_reader = planes.reader()
         restored = self._rolled(
             "wiener" if method == "net" else method,
-            bank.restore_bands(bank_reader, self.capture.saturated_rows, self._plain_blocks()),
+            bank.restore_bands(bank_reader, self._unknown_rows, self._plain_blocks()),
         )
         if scale is None:
             return restored, restored
@@ -443,6 +444,10 @@ class Reconstruction:
             planes.reader(), restored, noise, scale=scale, threads=self._setup.threads
         )
         return restored, source
+
+    def _unknown_rows(self, top: int, bottom: int) -> NDArray[np.bool_]:
+        source = self.capture.saturated_rows if self._front is None else self._front.unknown_rows
+        return source(top, bottom)
 
     def _plain_blocks(self) -> PlainBlock | None:
         """Give the test for blocks that nothing but plain cells read."""

@@ -296,7 +296,8 @@ class BlockBank:
 
         Args:
             source: (3, h, w) rows, linear, of the size the bank was planned for.
-            saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (3, rows, w).
+            saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (3, rows, w);
+                asked after those rows were read.
             plain: Tells which blocks, given as (row span, column span), stay as they are.
 
         Yields:
@@ -313,8 +314,9 @@ class BlockBank:
         done = 0
         for i, span in enumerate(self._rows):
             top, bottom = min(tops[i:]), int(span.index.max()) + 1
+            rows = source.read(top, bottom)
             mask = None if saturated is None else saturated(top, bottom)
-            strip = _Strip(source.read(top, bottom), mask, top, span, plain)
+            strip = _Strip(rows, mask, top, span, plain)
             total = _lengthened(total, span.start + span.inner.stop - done)
             self._add_blocks(strip, total[:, span.start + span.inner.start - done :])
             last = i + 1 == len(self._rows)
@@ -322,7 +324,7 @@ class BlockBank:
             finished, total = total[:, : ready - done].copy(), total[:, ready - done :].copy()
             done = ready
             # What is not needed again must not wait here while the network works.
-            del strip, mask
+            del strip, rows, mask
             yield finished
             del finished
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Demosaic, Network, Wiener
 from camkit.bundle.reader import Bundle
@@ -148,17 +149,24 @@ class Rig:
             self._lights[scene.name] = light_of(scene, self.bundle, self.lens)
         return self._lights[scene.name]
 
-    def front(self, capture: Capture) -> tuple[FloatArray, NoiseModel]:
-        """Give repaired, balanced, demosaicked (3, h, w) planes and their noise."""
+    def front(self, capture: Capture) -> tuple[FloatArray, NDArray[np.bool_], NoiseModel]:
+        """Give repaired, balanced, demosaicked (3, h, w) planes, unknown samples and the noise."""
         gains = capture.white_balance or (1.0, 1.0, 1.0)
         camera = self.bundle.manifest.camera
         noise = capture.noise or camera.noise_at(capture.iso or 100.0)
         demosaic = self.bundle.manifest.stage(Demosaic)
         method = "fast" if demosaic is None else demosaic.method
         rows = FrontRows(capture, gains, method=method, repair=True)
-        return rows.read(0, capture.height), noise.with_gains(gains)
+        planes = rows.read(0, capture.height)
+        return planes, rows.unknown_rows(0, capture.height), noise.with_gains(gains)
 
-    def deconvolve(self, capture: Capture, planes: FloatArray, noise: NoiseModel) -> FloatArray:
+    def deconvolve(
+        self,
+        capture: Capture,
+        planes: FloatArray,
+        unknown: NDArray[np.bool_],
+        noise: NoiseModel,
+    ) -> FloatArray:
         """Give the Wiener planes of a capture's planes."""
         window = place(capture, self.bundle.manifest.camera, None).window
         local = LocalPsf(
@@ -167,8 +175,7 @@ class Rig:
             window=window,
         )
         bank = restoration_bank(local, self._stage, noise)
-        bands = bank.restore_bands(ArrayRows(planes), capture.saturated_rows)
-        return np.concatenate(list(bands), axis=1)
+        return bank.restore_array(planes, unknown)
 
     def restore(self, shot: Shot) -> Restored:
         """Let every method restore a capture; what fails is a fault of the method.
@@ -180,8 +187,8 @@ class Rig:
         return self._last[1]
 
     def _restore(self, shot: Shot) -> Restored:
-        planes, noise = self.front(shot.capture)
-        wiener = self.deconvolve(shot.capture, planes, noise)
+        planes, unknown, noise = self.front(shot.capture)
+        wiener = self.deconvolve(shot.capture, planes, unknown, noise)
         found, faults = {INPUT: planes, WIENER: wiener}, {}
         for network in self.networks:
             try:

@@ -54,3 +54,21 @@ def test_without_repair_the_front_is_balance_and_demosaic() -> None:
     )
     assert front.repaired == 0
     assert front.clipped > 0
+
+
+@pytest.mark.parametrize(("threads", "step"), [(1, 70), (2, 33)])
+def test_a_hot_pixel_is_known_from_its_neighbours_and_a_clipped_light_is_not(
+    threads: int, step: int
+) -> None:
+    capture = bayer_capture()
+    capture.samples[46:55, 15:26] = 400
+    capture.samples[50, 20] = 1023  # clipped and alone
+    front = FrontRows(capture, GAINS, method="fast", repair=True, threads=threads)
+    for top in range(0, 70, step):
+        front.read(top, min(top + step, 70))
+    clipped, unknown = (rows(0, 70) for rows in (capture.saturated_rows, front.unknown_rows))
+    assert clipped[50, 20]
+    assert not unknown[50, 20]
+    assert unknown[32:38, 32:38].all()
+    np.testing.assert_array_equal(np.argwhere(clipped & ~unknown), [[50, 20]])
+    np.testing.assert_array_equal(front.unknown_rows(45, 60), unknown[45:60])

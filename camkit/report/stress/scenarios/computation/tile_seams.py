@@ -22,7 +22,7 @@ def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:
     shot = _shot(rig, scene)
     verdict, restored = judge.score(shot), rig.restore(shot)
     outcomes = dict(verdict.outcomes)
-    planes, noise = rig.front(shot.capture)
+    planes, _, noise = rig.front(shot.capture)
     for network in rig.networks:
         whole = restored.planes.get(network.name)
         if whole is None or value >= WHOLE:
