@@ -114,15 +114,17 @@ def kernel_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Ten
     x, y = x_mm.to(torch.float64), y_mm.to(torch.float64)
     height = torch.hypot(x, y)
     blended = _blend(kernels, field_heights_mm.to(torch.float64), height)
-    on_axis = (height == 0) | (field_heights_mm.numel() == 1)
+    has_direction = field_heights_mm.numel() > 1
+    on_axis = (height == 0) | (not has_direction)
     safe = torch.where(on_axis, torch.ones_like(height), height)
     out_x = torch.where(on_axis, torch.zeros_like(height), x.abs() / safe)
     out_y = torch.where(on_axis, torch.ones_like(height), y.abs() / safe)
     turned = _turn(blended, out_x, out_y).clamp(min=0)
     # Float64 sums: a sum in another order must not move the result.
     turned = turned / turned.sum(dim=(-2, -1), keepdim=True, dtype=torch.float64)
-    turned = torch.where((x < 0)[:, None, None, None], turned.flip(-1), turned)
-    turned = torch.where((y < 0)[:, None, None, None], turned.flip(-2), turned)
+    if has_direction:
+        turned = torch.where((x < 0)[:, None, None, None], turned.flip(-1), turned)
+        turned = torch.where((y < 0)[:, None, None, None], turned.flip(-2), turned)
     return turned.to(torch.float32)
 
 

@@ -345,13 +345,17 @@ class BlockBank:
         filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
         keys = sorted({(abs(x_mm), abs(y_mm)) for x_mm, y_mm in filtered})
         otfs = dict(zip(keys, run(self._otf, keys), strict=True))
+        # One PSF for all places has no direction that a quadrant could mirror.
+        turns = self._psf.field_heights_mm.size > 1
 
         def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
             window = strip.span.weights[:, None] * column.weights
             if strip.is_plain(column):
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
             x_mm, y_mm = place_mm
-            otf = mirror_otf(otfs[abs(x_mm), abs(y_mm)], flip_x=x_mm < 0, flip_y=y_mm < 0)
+            otf = mirror_otf(
+                otfs[abs(x_mm), abs(y_mm)], flip_x=turns and x_mm < 0, flip_y=turns and y_mm < 0
+            )
             samples, unknown = strip.cut(column)
             samples = taper_edges(samples, otf, self._guard_px)
             block = Block(samples=samples, otf=otf, unknown=unknown)

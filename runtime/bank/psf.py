@@ -122,15 +122,16 @@ def kernel_at(
         )
     height_mm = float(np.hypot(x_mm, y_mm))
     kernel = _blend(kernels, field_heights_mm, height_mm)
-    if x_mm != 0.0 and field_heights_mm.size > 1:
+    has_direction = field_heights_mm.size > 1
+    if x_mm != 0.0 and has_direction:
         kernel = _turn(kernel, abs(x_mm) / height_mm, abs(y_mm) / height_mm)
     np.maximum(kernel, 0, out=kernel)
     # Float64 sums: a sum in another order must not move the result.
     kernel = (kernel / kernel.sum(axis=(-2, -1), keepdims=True, dtype=np.float64)).astype(
         np.float32
     )
-    kernel = kernel[:, :, ::-1] if x_mm < 0 else kernel
-    kernel = kernel[:, ::-1] if y_mm < 0 else kernel
+    kernel = kernel[:, :, ::-1] if x_mm < 0 and has_direction else kernel
+    kernel = kernel[:, ::-1] if y_mm < 0 and has_direction else kernel
     return np.ascontiguousarray(kernel)
 
 

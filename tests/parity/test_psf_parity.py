@@ -40,10 +40,10 @@ def test_kernels_of_image_points_agree():
 
 def test_one_field_agrees():
     batch = torch_psf.kernel_at(
-        torch.from_numpy(KERNELS[:1]), torch.zeros(1), torch.ones(1), torch.ones(1)
+        torch.from_numpy(KERNELS[-1:]), torch.zeros(1), -torch.ones(1), torch.ones(1)
     )
     np.testing.assert_allclose(
         batch[0].numpy(),
-        numpy_psf.kernel_at(KERNELS[:1], np.zeros(1), 1.0, 1.0),
+        numpy_psf.kernel_at(KERNELS[-1:], np.zeros(1), -1.0, 1.0),
         atol=LOOKUP_TOLERANCE,
     )

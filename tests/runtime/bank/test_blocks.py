@@ -141,6 +141,26 @@ def test_every_block_gets_the_psf_of_its_own_place():
         assert np.hypot(*shift) > 0.8
 
 
+def test_one_psf_for_all_places_is_mirrored_in_no_quadrant():
+    size = 192
+    points = np.zeros((3, size, size), dtype=np.float32)
+    places = [(40, 40), (40, 150), (150, 40), (150, 150)]
+    for row, col in places:
+        points[:, row, col] = 1
+    seen = []
+
+    def keep_otf(block):
+        seen.append(block.otf)
+        return block.samples
+
+    kernels, _ = coma_kernels(radius_px=10, tail_px=8)
+    psf = local_psf(kernels[-1:], np.zeros(1), (size, size))
+    BlockBank(psf, keep_otf, block_px=64, overlap_px=32).restore_array(points)
+    wanted = to_otf(kernels[-1], 64)
+    assert np.abs(wanted - mirror_otf(wanted, flip_x=False, flip_y=True)).max() > 1e-2
+    assert all(np.abs(otf - wanted).max() < 1e-6 for otf in seen)
+
+
 def test_saturated_samples_reach_the_block_they_lie_in():
     saturated = np.zeros((70, 90), dtype=bool)
     saturated[60, 80] = True

@@ -104,9 +104,11 @@ def test_beyond_the_last_height_its_kernel_holds():
     np.testing.assert_allclose(kernel_at(KERNELS, HEIGHTS_MM, 0.0, 99.0), KERNELS[-1], atol=1e-7)
 
 
-def test_one_field_serves_every_place():
-    single = KERNELS[:1]
-    np.testing.assert_allclose(kernel_at(single, np.zeros(1), 0.0, 1.0), single[0], atol=1e-7)
+@pytest.mark.parametrize("place_mm", [(0.0, 1.0), (-1.0, 0.5), (0.3, -1.0), (-1.0, -1.0)])
+def test_one_field_serves_every_place_as_it_is(place_mm):
+    single = KERNELS[-1:]
+    assert np.abs(single[0] - single[0, :, ::-1]).max() > 1e-3
+    np.testing.assert_allclose(kernel_at(single, np.zeros(1), *place_mm), single[0], atol=1e-7)
 
 
 def test_a_quarter_turn_is_a_transposition():
