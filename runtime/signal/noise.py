@@ -24,7 +24,8 @@ BoolArray = NDArray[np.bool_]
 REPAIR_MARGIN_PX: Final = 2
 """Rows of context that a band needs above and below for the same repair as the whole."""
 
-_OUTLIER_SPREADS: Final = 8.0
+_OUTLIER_SPREADS: Final = 2.0
+"""Of pure noise one sample in a hundred thousand is replaced by the median around it."""
 _OUTLIER_LEAST: Final = 0.02
 _GLOW_SHARE: Final = 0.1
 

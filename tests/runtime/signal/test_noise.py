@@ -148,3 +148,20 @@ def test_repair_of_six_megapixels_in_bands_is_quick():
     for _ in range(8):
         repair_mosaic(band)
     assert time.process_time() - start < 1.0
+
+
+def test_of_pure_noise_about_one_sample_in_a_hundred_thousand_is_replaced():
+    rng = np.random.default_rng(5)
+    flat = (0.3 + 0.02 * rng.standard_normal((1000, 1000))).astype(np.float32)
+    assert repair_mosaic(flat)[1].mean() < 3e-5
+
+
+def test_a_stuck_sample_in_soft_texture_is_found():
+    y, x = np.mgrid[:64, :64]
+    texture = (0.4 + 0.1 * np.sin(x / 6) * np.cos(y / 7)).astype(np.float32)
+    for value in (0.0, 1.0):
+        spoiled = texture.copy()
+        spoiled[30, 31] = value
+        repaired, mask = repair_mosaic(spoiled)
+        assert np.argwhere(mask).tolist() == [[30, 31]]
+        assert abs(repaired[30, 31] - texture[30, 31]) < 0.03
