@@ -10,7 +10,7 @@
     rows, slices, clock, memory        how stages pull rows, and what each costs
     scene, plan/                       what a capture holds; no more work than it needs
     envelope                           is a capture inside the bundle's measured ranges?
-    options, reconstruction            the stages of one capture joined
+    options, job/                      one capture: what is decided, then the stages joined
     pipeline, development, batch       one capture in memory, one file, many files
     check, proofs, golden_run          a bundle proves itself
     simulate                           the digital twin: a scene becomes a RAW file

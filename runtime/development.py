@@ -8,6 +8,7 @@ from typing import Any, Literal, Self, get_args
 
 from camkit.errors import ContractError
 from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.output.band_queue import BandQueue
@@ -18,7 +19,6 @@ from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_side
 from camkit.runtime.output.writer import SUFFIXES, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256, read_capture
-from camkit.runtime.reconstruction import Reconstruction
 
 FileFormat = Literal["exr", "tiff", "png", "dng"]
 Status = Literal["ok", "failed", "skipped"]

@@ -22,6 +22,8 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.job.reconstruction import Reconstruction
+from camkit.runtime.job.setup import Setup
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Cancel, Progress
@@ -29,7 +31,6 @@ from camkit.runtime.options import Options
 from camkit.runtime.plan.planner import default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
 from camkit.runtime.raw import read_capture
-from camkit.runtime.reconstruction import Reconstruction, Setup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,12 +34,12 @@ from camkit.report.measurement import (
     COLUMNS,
     Measurement,
     Row,
-    append_journal,
+    append_measurements,
     finished_rows,
     latest,
     measure_all,
     open_rows,
-    read_journal,
+    read_measurements,
 )
 from camkit.report.peers import PEERS
 from camkit.report.quality import (
@@ -193,7 +193,9 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     measure_missing(arguments, bundle, rows, journal)
     current = {(row.name, row.identity) for row in rows}
     # what an earlier run measured counts too, as long as nothing that decides it has changed
-    measurements = latest(m for m in read_journal(journal) if (m.method, m.identity) in current)
+    measurements = latest(
+        m for m in read_measurements(journal) if (m.method, m.identity) in current
+    )
     commands = report.get("commands", []) if arguments.resume else []
     command = f"python {shlex.join(sys.argv)}"
     names = [row.name for row in rows]
@@ -223,14 +225,14 @@ def measure_missing(
 ) -> None:
     """Measure what the journal lacks and add it there."""
     shots = list_shots(arguments)
-    done = finished_rows(read_journal(journal))
+    done = finished_rows(read_measurements(journal))
     work = [(shot, left) for shot in shots if (left := open_rows(shot, rows, done))]
     print(f"{len(shots)} captures, {len(work)} to do, {len(rows)} methods", flush=True)
     photograph = photographer(arguments, bundle)
     began = time.perf_counter()
     finished = measure_all(work, photograph, jobs=arguments.jobs, limit_s=arguments.limit_seconds)
     for number, found in enumerate(finished, start=1):
-        append_journal(journal, found)
+        append_measurements(journal, found)
         if number in (3, 10) or number % 25 == 0 or number == len(work):
             show_pace(found, number, len(work), time.perf_counter() - began)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError
+from camkit.report.journal import append_journal, read_journal
 from camkit.report.quality import Exposed, PsfKind, Restorer, Shot, judge
 
 COLUMNS: Final = (
@@ -95,33 +95,18 @@ def shot_key(shot: Shot) -> tuple[str, str, str, int, float]:
     return shot.psf, shot.set_name, shot.picture.name, shot.position, shot.iso
 
 
-def read_journal(path: Path) -> list[Measurement]:
-    """Read the measurements of an earlier run; a last line that was cut off is left out.
+def read_measurements(path: Path) -> list[Measurement]:
+    """Read the measurements of an earlier run.
 
     Raises:
-        ContractError: If another line is damaged.
+        ContractError: If the journal is damaged.
     """
-    if not path.exists():
-        return []
-    lines = path.read_text(encoding="utf-8").splitlines()
-    found = []
-    for number, line in enumerate(lines, start=1):
-        try:
-            found.append(Measurement(**json.loads(line)))
-        except (json.JSONDecodeError, TypeError) as error:
-            if number == len(lines):
-                break
-            raise ContractError(
-                f"{path} line {number} is no measurement; remove the file and start over"
-            ) from error
-    return found
+    return read_journal(path, lambda entry: Measurement(**entry), "measurement")
 
 
-def append_journal(path: Path, measurements: Iterable[Measurement]) -> None:
-    """Add finished measurements, one line each."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", encoding="utf-8") as file:
-        file.writelines(json.dumps(asdict(m)) + "\n" for m in measurements)
+def append_measurements(path: Path, measurements: Iterable[Measurement]) -> None:
+    """Add finished measurements to a journal."""
+    append_journal(path, (asdict(m) for m in measurements))
 
 
 def open_rows(

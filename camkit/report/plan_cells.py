@@ -16,11 +16,11 @@ from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.report.quality import BORDER_PX, FIELD_SHARES, QUADRANTS, crop_origin
+from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.loss import EXACT
 from camkit.runtime.plan.rules.size import REFERENCE
-from camkit.runtime.reconstruction import Reconstruction
 from camkit.runtime.scene import CELL_PX, CellArray, Scene, lattice_shape, measure_scene
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
 

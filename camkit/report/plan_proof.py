@@ -15,12 +15,12 @@ from camkit.contracts import FloatArray
 from camkit.report.plan_cells import cell_errors, photograph, sharp_of, start
 from camkit.report.plan_scenes import ProofScene
 from camkit.runtime.bank.blocks import plan_spans
+from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options, Quality
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.blocks import plain_share
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.reconstruction import Reconstruction
 from camkit.runtime.simulate import Simulation
 
 ISOS: Final = (100.0, 800.0)

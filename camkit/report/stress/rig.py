@@ -1,7 +1,7 @@
 """Every method on one capture: the input, the Wiener bank and the networks behind it.
 
-The stages are those of `camkit.runtime.reconstruction`, joined so that the Wiener bank, which all
-methods share, is computed once; a test holds both to the same bits.
+The stages are those of `camkit.runtime.job.reconstruction`, joined so that the Wiener bank, which
+all methods share, is computed once; a test holds both to the same bits.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,15 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.twin import Lens, Light, Shot, light_of, nominal_lens
+from camkit.report.stress.twin import (
+    Lens,
+    Light,
+    Setting,
+    Shot,
+    light_of,
+    nominal_lens,
+    photograph,
+)
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.psf import color_kernels
@@ -148,6 +156,14 @@ class Rig:
         if scene.name not in self._lights:
             self._lights[scene.name] = light_of(scene, self.bundle, self.lens)
         return self._lights[scene.name]
+
+    def shoot(self, scene: Scene, lens: Lens | None = None, setting: Setting | None = None) -> Shot:
+        """Record a scene through a lens (None: the nominal one) with a setting of the camera."""
+        return self.record(self.light(scene, lens), setting)
+
+    def record(self, light: Light, setting: Setting | None = None) -> Shot:
+        """Record light with a setting of the camera."""
+        return photograph(light, self.bundle.manifest.camera, setting or Setting())
 
     def front(self, capture: Capture) -> tuple[FloatArray, NDArray[np.bool_], NoiseModel]:
         """Give repaired, balanced, demosaicked (3, h, w) planes, unknown samples and the noise."""

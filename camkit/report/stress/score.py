@@ -24,7 +24,7 @@ from camkit.report.stress.consistency import (
 )
 from camkit.report.stress.rig import INPUT, Restored, Rig
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Shot
 from camkit.runtime.color import recover_highlights
 from camkit.runtime.envelope import observe
 from camkit.runtime.geometry.illumination import divide_illumination
@@ -109,7 +109,7 @@ class Judge:
     def model_error(self, method: str, scene: Scene) -> float:
         """Give the model error of a method on a scene, from its nominal capture."""
         if (method, scene.name) not in self._model_errors:
-            shot = photograph(self.rig.light(scene), self.rig.bundle.manifest.camera, Setting())
+            shot = self.rig.shoot(scene)
             for name, planes in self.rig.restore(shot).planes.items():
                 nominal = residual(planes, shot, self.rig.lens) if name != INPUT else None
                 error = 0.0 if nominal is None else calibrate(nominal)

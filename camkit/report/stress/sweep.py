@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from camkit.errors import ContractError
+from camkit.report.journal import append_journal, read_journal
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge, Outcome, Verdict
@@ -77,7 +77,7 @@ def run_sweep(sweep: Sweep, judge: Judge, journal: Path | None) -> Iterator[Poin
             verdict = scenario.take(judge, scene, value)
             point = Point(scenario=key[0], value=value, scene=key[2], verdict=verdict)
             if journal is not None:
-                append_point(journal, point)
+                append_journal(journal, [asdict(point)])
         yield point
 
 
@@ -89,33 +89,13 @@ def sweep_identity(judge: Judge) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
 
-def append_point(path: Path, point: Point) -> None:
-    """Add a finished point to a journal."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(asdict(point)) + "\n")
-
-
-def read_points(path: Path) -> list[Point]:
-    """Read a journal; a last line that was cut off is left out.
+def read_points(journal: Path) -> list[Point]:
+    """Read the points of an earlier sweep.
 
     Raises:
-        ContractError: If another line is damaged.
+        ContractError: If the journal is damaged.
     """
-    if not path.exists():
-        return []
-    lines = path.read_text(encoding="utf-8").splitlines()
-    found = []
-    for number, line in enumerate(lines, start=1):
-        try:
-            found.append(_to_point(json.loads(line)))
-        except (json.JSONDecodeError, TypeError, KeyError) as error:
-            if number == len(lines):
-                break
-            raise ContractError(
-                f"{path} line {number} is no point of a sweep; remove the file and start over"
-            ) from error
-    return found
+    return read_journal(journal, _to_point, "point of a sweep")
 
 
 def _to_point(record: Mapping[str, object]) -> Point:

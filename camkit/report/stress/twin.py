@@ -223,6 +223,28 @@ def photograph(light: Light, camera: Camera, setting: Setting) -> Shot:
     return Shot(capture=capture, light=light, exposure=setting.exposure, noise=noise)
 
 
+def spoil(shot: Shot, percent: float, values: tuple[float, ...], seed: int) -> Shot:
+    """Give a capture some of whose samples hold another value.
+
+    Args:
+        shot: The capture.
+        percent: Of the samples, at random places.
+        values: What stands there instead: the last value in the rarest places, each one before it
+            twice as often (half the rest in the end). Values that are not finite make the samples
+            float.
+        seed: Of the places, together with the number of the scene.
+    """
+    chance = np.random.default_rng(seed + shot.light.scene.number).random(
+        shot.capture.samples.shape
+    )
+    kind = np.uint16 if np.isfinite(values).all() else np.float32
+    samples = shot.capture.samples.astype(kind)
+    for number, value in enumerate(values):
+        samples[chance < percent / 100 / 2**number] = value
+    capture = replace(shot.capture, samples=samples)
+    return replace(shot, capture=capture, spoiled=chance < percent / 100 if percent else None)
+
+
 def crop_light(light: Light, size_px: tuple[int, int]) -> Light:
     """Give the top left part of a light, as a smaller capture at the same place."""
     width, height = size_px

@@ -12,13 +12,13 @@ from camkit.errors import ContractError
 from camkit.report.measurement import (
     Measurement,
     Row,
-    append_journal,
+    append_measurements,
     finished_rows,
     identity_of,
     latest,
     measure_all,
     open_rows,
-    read_journal,
+    read_measurements,
 )
 from camkit.report.quality import Exposed, Shot, expose, finish_planes
 from tests.psf_factory import texture
@@ -75,24 +75,24 @@ def developer(bundle: Bundle) -> Callable[[Exposed], FloatArray]:
 def test_a_journal_reads_back_what_was_written(tmp_path: Path) -> None:
     path = tmp_path / "new" / "run.jsonl"
     written = [make_measurement(), make_measurement(method="S", seed=None, psf="bundle")]
-    append_journal(path, written[:1])
-    append_journal(path, written[1:])
-    assert read_journal(path) == written
+    append_measurements(path, written[:1])
+    append_measurements(path, written[1:])
+    assert read_measurements(path) == written
 
 
 def test_a_journal_that_was_cut_off_loses_its_last_line_only(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
-    append_journal(path, [make_measurement(), make_measurement(method="S")])
+    append_measurements(path, [make_measurement(), make_measurement(method="S")])
     path.write_text(path.read_text()[:-30])
-    assert read_journal(path) == [make_measurement()]
+    assert read_measurements(path) == [make_measurement()]
 
 
 def test_a_journal_damaged_in_the_middle_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
-    append_journal(path, [make_measurement()] * 2)
+    append_measurements(path, [make_measurement()] * 2)
     path.write_text("{" + path.read_text())
     with pytest.raises(ContractError, match="line 1"):
-        read_journal(path)
+        read_measurements(path)
 
 
 def test_of_two_measurements_of_the_same_the_last_counts() -> None:

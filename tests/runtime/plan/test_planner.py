@@ -9,13 +9,13 @@ import pytest
 
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
+from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import FULL, WIENER
 from camkit.runtime.plan.estimate import estimate_seconds
 from camkit.runtime.plan.planner import Plan, default_size, make_plan, needs_scene
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.reconstruction import Reconstruction
 from tests.plan_factory import MODEL, half_textured_mosaic, write_planned_bundle
 
 SPEED = Speed(network_s_per_mp={"M": 2.0, "S": 1.0}, block_s=0.005, rest_s_per_mp=0.1, threads=1)
@@ -31,7 +31,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 def plan_with(bundle: Bundle) -> Callable[..., Plan]:
     """Give a function from options to the plan of the half textured capture."""
     work = _start(bundle, quality="adaptive")
-    decided = work._decided
+    decided = work.prepared.decided
     assert decided is not None
     case = decided.case
 

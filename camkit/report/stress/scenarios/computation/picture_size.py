@@ -5,7 +5,7 @@ from dataclasses import replace
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, crop_light, photograph
+from camkit.report.stress.twin import Shot, crop_light
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
@@ -13,7 +13,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     height = round(value)
     width = min(height + height // 2, scene.size_px[0]) | 1 if height < 400 else scene.size_px[0]
     light = crop_light(rig.light(scene), (width, min(height, scene.size_px[1])))
-    shot = photograph(light, rig.bundle.manifest.camera, Setting())
+    shot = rig.record(light)
     return replace(shot, border_px=0)
 
 

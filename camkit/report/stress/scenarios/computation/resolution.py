@@ -8,7 +8,7 @@ from camkit.contracts import FloatArray
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge, Verdict, see
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Shot
 
 MOST_MTF = 1.1
 """Contrast above the scene's own is invented."""
@@ -39,7 +39,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     chart = grating(scene, value)
     light = replace(rig.light(chart, rig.lens), scene=scene)
-    return photograph(light, rig.bundle.manifest.camera, Setting())
+    return rig.record(light)
 
 
 def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:

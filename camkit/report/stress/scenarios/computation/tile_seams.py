@@ -8,13 +8,13 @@ from camkit.report.stress.rig import Rig
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge, Verdict
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Shot
 
 WHOLE = 1024.0
 
 
 def _shot(rig: Rig, scene: Scene) -> Shot:
-    return photograph(rig.light(scene), rig.bundle.manifest.camera, Setting())
+    return rig.shoot(scene)
 
 
 def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:

@@ -3,13 +3,13 @@
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph, with_axis_moved
+from camkit.report.stress.twin import Shot, with_axis_moved
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     lens = with_axis_moved(rig.lens, 0.6 * value, 0.8 * value) if value else None
-    return photograph(rig.light(scene, lens), rig.bundle.manifest.camera, Setting())
+    return rig.shoot(scene, lens)
 
 
 SCENARIO = Scenario(

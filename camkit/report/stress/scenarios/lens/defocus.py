@@ -6,7 +6,7 @@ from camkit.bundle.reader import Bundle
 from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Lens, Setting, Shot, photograph
+from camkit.report.stress.twin import Lens, Shot
 from camkit.runtime.bank.psf import color_kernels, kernel_at
 
 MM_PER_M = 1000.0
@@ -44,7 +44,7 @@ def _lens_at(bundle: Bundle, inverse_m: float) -> Lens:
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     light = rig.light(scene, _lens_at(rig.bundle, value))
-    return photograph(light, rig.bundle.manifest.camera, Setting())
+    return rig.record(light)
 
 
 SCENARIO = Scenario(

@@ -6,7 +6,7 @@ from camkit.contracts import FloatArray
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph, with_kernels
+from camkit.report.stress.twin import Shot, with_kernels
 
 HAZE_SIGMA_PX = 15.0
 
@@ -22,7 +22,7 @@ def add_haze(kernels: FloatArray, share: float) -> FloatArray:
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     lens = with_kernels(rig.lens, lambda k: add_haze(k, value / 100)) if value else None
-    return photograph(rig.light(scene, lens), rig.bundle.manifest.camera, Setting())
+    return rig.shoot(scene, lens)
 
 
 SCENARIO = Scenario(

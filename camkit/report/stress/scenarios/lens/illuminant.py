@@ -10,7 +10,7 @@ from camkit.report.stress.rig import Rig
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Lens, Setting, Shot, photograph
+from camkit.report.stress.twin import Lens, Shot
 from camkit.runtime.bank.psf import color_kernels, kernel_at
 
 Spectrum = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -75,7 +75,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     r, g, b = rig.light(scene).gains
     red, _, blue = lens.gains or (1.0, 1.0, 1.0)
     light = rig.light(scene, replace(lens, gains=(r * red, g, b * blue)))
-    return photograph(light, rig.bundle.manifest.camera, Setting())
+    return rig.record(light)
 
 
 SCENARIO = Scenario(

@@ -6,9 +6,7 @@ from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.twin import (
-    Setting,
     Shot,
-    photograph,
     transform_kernels,
     with_kernels,
 )
@@ -20,7 +18,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     lens = None
     if value:
         lens = with_kernels(rig.lens, lambda k: transform_kernels(k, 1.0, angle_rad))
-    return photograph(rig.light(scene, lens), rig.bundle.manifest.camera, Setting())
+    return rig.shoot(scene, lens)
 
 
 SCENARIO = Scenario(

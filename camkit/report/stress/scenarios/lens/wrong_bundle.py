@@ -6,7 +6,7 @@ from camkit.contracts import FloatArray
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Lens, Setting, Shot, photograph
+from camkit.report.stress.twin import Lens, Shot
 
 
 def other_lens(lens: Lens, share: float) -> Lens:
@@ -26,7 +26,7 @@ def other_lens(lens: Lens, share: float) -> Lens:
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     lens = other_lens(rig.lens, value / 100) if value else None
-    return photograph(rig.light(scene, lens), rig.bundle.manifest.camera, Setting())
+    return rig.shoot(scene, lens)
 
 
 SCENARIO = Scenario(

@@ -6,13 +6,13 @@ from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scenarios.sensor.saturated_area import with_discs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Shot
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     light = replace(rig.light(with_discs(scene, value, 1), rig.lens), scene=scene)
-    shot = photograph(light, rig.bundle.manifest.camera, Setting())
+    shot = rig.record(light)
     return replace(shot, away_from_clipped=True)
 
 

@@ -1,26 +1,16 @@
 """Sensor defects: samples stuck at black or at white."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Shot, spoil
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
-    rig = judge.rig
-    shot = photograph(rig.light(scene), rig.bundle.manifest.camera, Setting())
-    rng = np.random.default_rng(7_200 + scene.number)
-    samples = shot.capture.samples.copy()
-    chance = rng.random(samples.shape)
-    spoiled = chance < value / 100
-    samples[spoiled] = np.floor(shot.capture.white_level)
-    samples[chance < value / 200] = 0
-    capture = replace(shot.capture, samples=samples)
-    return replace(shot, capture=capture, spoiled=spoiled if value else None)
+    shot = judge.rig.shoot(scene)
+    return spoil(shot, value, (np.floor(shot.capture.white_level), 0), seed=7_200)
 
 
 SCENARIO = Scenario(

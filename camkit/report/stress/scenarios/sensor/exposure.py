@@ -5,13 +5,13 @@ from dataclasses import replace
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Setting, Shot
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     setting = Setting(exposure=2.0**value)
-    shot = photograph(rig.light(scene), rig.bundle.manifest.camera, setting)
+    shot = rig.shoot(scene, setting=setting)
     return replace(shot, away_from_clipped=True)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Setting, Shot
 
 COLOUR = (0.9, 0.5, 0.4)
 
@@ -15,7 +15,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     field = np.ones_like(scene.linear) * np.array(COLOUR, np.float32)[:, None, None]
     flat = Scene(name=f"flat/{scene.name}", number=scene.number, linear=field)
     setting = Setting(exposure=2.0**value)
-    return photograph(rig.light(flat), rig.bundle.manifest.camera, setting)
+    return rig.shoot(flat, setting=setting)
 
 
 SCENARIO = Scenario(

@@ -1,27 +1,16 @@
 """NaN and infinities in a float capture: one of them must not turn a picture black."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Shot, spoil
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
-    rig = judge.rig
-    shot = photograph(rig.light(scene), rig.bundle.manifest.camera, Setting())
-    rng = np.random.default_rng(7_300 + scene.number)
-    samples = shot.capture.samples.astype(np.float32)
-    chance = rng.random(samples.shape)
-    spoiled = chance < value / 100
-    samples[spoiled] = np.nan
-    samples[chance < value / 200] = np.inf
-    samples[chance < value / 400] = -np.inf
-    capture = replace(shot.capture, samples=samples)
-    return replace(shot, capture=capture, spoiled=spoiled if value else None)
+    shot = judge.rig.shoot(scene)
+    return spoil(shot, value, (np.nan, np.inf, -np.inf), seed=7_300)
 
 
 SCENARIO = Scenario(

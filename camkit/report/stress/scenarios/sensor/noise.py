@@ -3,12 +3,12 @@
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Setting, Shot
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
-    return photograph(rig.light(scene), rig.bundle.manifest.camera, Setting(iso=value))
+    return rig.shoot(scene, setting=Setting(iso=value))
 
 
 SCENARIO = Scenario(

@@ -3,13 +3,13 @@
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Setting, Shot
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     setting = Setting(iso=400.0, noise_factor=value)
-    return photograph(rig.light(scene), rig.bundle.manifest.camera, setting)
+    return rig.shoot(scene, setting=setting)
 
 
 SCENARIO = Scenario(

@@ -7,7 +7,7 @@ import numpy as np
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot, photograph
+from camkit.report.stress.twin import Shot
 
 RADIUS_PX = 8.0
 POWER = 8.0
@@ -33,7 +33,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     lit = scene if count == 0 else with_discs(scene, RADIUS_PX, count)
     light = rig.light(lit, rig.lens if count else None)
     light = replace(light, scene=scene)
-    shot = photograph(light, rig.bundle.manifest.camera, Setting())
+    shot = rig.record(light)
     return replace(shot, away_from_clipped=True)
 
 
