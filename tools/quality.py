@@ -11,7 +11,6 @@ or what has changed, so rows, captures and kinds of PSF may be measured in sever
 import argparse
 import csv
 import json
-import os
 import shlex
 import sys
 import threading
@@ -28,6 +27,7 @@ import cv2
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import CamkitError, ContractError
+from camkit.report.bench.machine import processor_name
 from camkit.report.comparison import DEFAULT_METHODS, Rival, make_rows, protocol_text
 from camkit.report.fabricated_psf import fabricated_psf, lens_text
 from camkit.report.measurement import (
@@ -53,6 +53,7 @@ from camkit.report.quality import (
 )
 from camkit.report.quality_table import seconds_per_megapixel, summarise, to_markdown
 from camkit.report.tuning import at_edge, choose, try_peers, tuned_from_json, tuned_to_json
+from camkit.runtime.network.engine import available_threads
 
 TUNING_SIDE_PX = 272
 SIZES = ("S", "M", "L")
@@ -202,7 +203,7 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     report |= {
         "commands": [*(c for c in commands if c != command), command],
         "json_name": arguments.out.name,
-        "machine": machine(),
+        "machine": {"cpu": processor_name(), "cores": available_threads()},
         "bundle": {"name": bundle.manifest.name, "sha256": bundle.sha256},
         "rivals": {rival.label: rival.bundle.sha256 for rival in rivals},
         "tuned": tuned,
@@ -282,17 +283,6 @@ def show_result(report: dict[str, Any]) -> None:
         print(f"\n{psf}: " + json.dumps(summary["gain_of_m"]))
         for name, mean in summary["overall"].items():
             print(f"  {name:>16} {mean['psnr_db']:7.2f} dB  {mean['ssim']:.4f}  n {mean['n']}")
-
-
-def machine() -> dict[str, Any]:
-    """Name the processor and the cores in use."""
-    cpu = "unknown processor"
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        lines = info.read_text(encoding="utf-8").splitlines()
-        names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-        cpu = names[0] if names else cpu
-    return {"cpu": cpu, "cores": len(os.sched_getaffinity(0))}
 
 
 def read_report(path: Path) -> dict[str, Any]:

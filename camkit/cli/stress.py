@@ -12,7 +12,10 @@ from camkit.errors import ContractError
 
 
 def stress(
-    bundle: Annotated[str, typer.Argument(help="Bundle NAME or PATH.", metavar="BUNDLE")],
+    bundle: Annotated[
+        str | None,
+        typer.Argument(help="Bundle NAME or PATH; --list needs none.", metavar="BUNDLE"),
+    ] = None,
     scenarios: Annotated[
         str | None, typer.Option(help="Some scenarios, NAME,NAME; default: all. See --list.")
     ] = None,
@@ -47,6 +50,8 @@ def stress(
         for scenario in chosen:
             typer.echo(f"{scenario.name:20} {scenario.title}")
         return
+    if bundle is None:
+        raise ContractError("stress tests a bundle: give a NAME or PATH, or --list")
     if write and (quick or data is not None):
         raise ContractError(
             "--write stores ranges that captures are judged by: leave out --quick and --data"

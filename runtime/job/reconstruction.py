@@ -37,7 +37,7 @@ from camkit.runtime.plan.estimate import Estimate
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import MappedRows, RollingRows, RowSource
 from camkit.runtime.signal.front_rows import FrontRows
-from camkit.runtime.signal.stabilise import NetworkRows, unstabilise
+from camkit.runtime.signal.stabilise import NetworkRows, unstabilise_bands
 
 BAND_ROWS: Final = 128
 STAGE_ORDER: Final = (
@@ -232,11 +232,13 @@ class Reconstruction:
             cancel=self._cancel,
             guard=self._guard,
         )
-        linear = self._mapped(
-            self._rolled("network", bands),
-            lambda rows, _: unstabilise(rows, noise, scale=stage.scale),
+        linear = unstabilise_bands(
+            self._clock.bands("network", bands),
+            noise,
+            scale=stage.scale,
+            threads=self._setup.threads,
         )
-        return TimedRows(linear, self._clock, "stabilise")
+        return self._rolled("stabilise", linear)
 
     def _bank_rows(
         self, bundle: Bundle, front: RowSource, scale: float | None

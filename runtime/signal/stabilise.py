@@ -1,5 +1,6 @@
 """The noise-stabilising transform before and behind the network: k-sigma, then square root."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -45,7 +46,11 @@ def stabilise(
 
 
 def unstabilise(
-    stable: FloatArray, noise: NoiseModel, *, scale: float = DEFAULT_SCALE
+    stable: FloatArray,
+    noise: NoiseModel,
+    *,
+    scale: float = DEFAULT_SCALE,
+    out: FloatArray | None = None,
 ) -> FloatArray:
     """Undo `stabilise`: x = shot * ((max(s, 0) * scale)^2 - read_variance / shot^2).
 
@@ -53,6 +58,7 @@ def unstabilise(
         stable: (3, h, w) float32 of `stabilise`.
         noise: Noise after white balance; shot > 0.
         scale: Divisor behind the square root.
+        out: (3, h, w) float32 to fill, may be `stable`; a new array when None.
 
     Returns:
         (3, h, w) float32, linear.
@@ -61,11 +67,33 @@ def unstabilise(
         ContractError: If the noise has no shot part or the shapes disagree.
     """
     slope, offset = _line(stable, noise, scale)
-    planes = np.maximum(stable, 0)
+    planes = np.maximum(stable, 0, out=out)
     np.square(planes, out=planes)
     planes -= offset
     planes /= slope
-    return planes
+    return np.asarray(planes)
+
+
+def unstabilise_bands(
+    bands: Iterator[FloatArray], noise: NoiseModel, *, scale: float, threads: int = 1
+) -> Iterator[FloatArray]:
+    """Undo `stabilise` band by band, in place: readers of the rows overlap, bands do not.
+
+    Args:
+        bands: (3, rows, w) float32, each an array of its own that nobody else reads.
+        noise: Noise after white balance; shot > 0.
+        scale: Divisor behind the square root.
+        threads: Threads that share the rows of a band; no influence on the bits.
+    """
+    for band in bands:
+
+        def undo(first: int, last: int, whole: FloatArray = band) -> None:
+            rows = whole[:, first:last]
+            unstabilise(rows, noise, scale=scale, out=rows)
+
+        run_chunks(undo, band.shape[1], band.shape[2], threads=threads)
+        yield band
+        del band, undo  # nothing may hold a band while the next one is made
 
 
 class NetworkRows:

@@ -1,5 +1,6 @@
 """A checkpoint becomes a bundle that proves itself, or nothing is written."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from camkit.export.network_facts import MeasuredNetwork
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
 from camkit.runtime.golden_run import develop_case
+from camkit.runtime.plan.loss import plan_entries
+from tests.plan_factory import MODEL
 
 _MEASURED: dict[str, MeasuredNetwork] = {}
 
@@ -171,3 +174,18 @@ def test_a_size_that_no_bundle_holds_must_be_alone(parts: Parts, tmp_path: Path)
 def test_no_checkpoint_is_refused(parts: Parts, tmp_path: Path) -> None:
     with pytest.raises(ContractError, match="at least one"):
         export_bundle(replace(parts, checkpoints=()), tmp_path / "x.camkit")
+
+
+def test_a_calibration_becomes_the_plan_of_the_bundle(parts: Parts, tmp_path: Path) -> None:
+    entries = plan_entries(MODEL, adaptive_cost_db=0.05, draft_cost_db=0.3)
+    text = json.dumps({name: entry.model_dump() for name, entry in entries.items()})
+    (tmp_path / "plan.json").write_text(text, encoding="utf-8")
+    export_bundle(replace(parts, plan=tmp_path / "plan.json"), tmp_path / "planned.camkit")
+    assert open_bundle(tmp_path / "planned.camkit").manifest.plan == entries
+
+
+@pytest.mark.parametrize("text", ["no JSON", "[]", '{"exact.level": 3}'])
+def test_what_is_no_calibration_is_refused(parts: Parts, tmp_path: Path, text: str) -> None:
+    (tmp_path / "plan.json").write_text(text, encoding="utf-8")
+    with pytest.raises(ContractError, match=r"plan\.json is no calibration"):
+        export_bundle(replace(parts, plan=tmp_path / "plan.json"), tmp_path / "x.camkit")

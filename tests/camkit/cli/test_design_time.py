@@ -99,7 +99,7 @@ def test_a_missing_recipe_is_a_usage_error(camkit_command, tmp_path) -> None:
 
 def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monkeypatch) -> None:
     from camkit.models_def.optics import freeze as module
-    from camkit.models_def.optics import prescription
+    from camkit.models_def.optics.lens_file import lens_file
     from tests.bundle_factory import tiny_psf
 
     report = module.FreezeReport(
@@ -127,7 +127,7 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
     monkeypatch.setattr(
         module, "freeze_stress", lambda *_: module.Frozen(psf=tiny_psf(), energy_kept=1.0)
     )
-    monkeypatch.setattr(prescription, "read_prescription", lambda path: path)
+    monkeypatch.setattr(lens_file, "read_lens", lambda path: path)
     folder = tmp_path / "new"
     outcome = camkit_command(
         *("freeze", "lens.toml", "-o", folder / "psf.safetensors"),
@@ -164,7 +164,7 @@ def test_export_finds_what_lies_beside_the_checkpoint(
         optimizer={},
     )
     write_checkpoint(tmp_path / "one.pt", checkpoint)
-    for name in ("psf.safetensors", "freeze.json"):
+    for name in ("psf.safetensors", "freeze.json", "plan.json"):
         (tmp_path / name).write_bytes(b"{}")
     seen = []
 
@@ -173,9 +173,12 @@ def test_export_finds_what_lies_beside_the_checkpoint(
         return {"bundle": str(out)}
 
     monkeypatch.setattr(assemble, "export_bundle", fake)
-    outcome = camkit_command("export", tmp_path / "one.pt", "-o", tmp_path / "one.camkit")
-    assert outcome.code == 0, outcome.err
-    (parts,) = seen
+    call = ("export", tmp_path / "one.pt", "-o", tmp_path / "one.camkit")
+    for chosen in ((), ("--plan", tmp_path / "other.json")):
+        outcome = camkit_command(*call, *chosen)
+        assert outcome.code == 0, outcome.err
+    parts, other = seen
     assert (parts.psf, parts.freeze) == (tmp_path / "psf.safetensors", tmp_path / "freeze.json")
+    assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
     assert parts.stress_psf is None
     assert parts.prescription.name == "duet.toml", "the lens that the recipe names"

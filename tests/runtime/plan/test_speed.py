@@ -1,0 +1,77 @@
+"""The speed of the machine: the best of some rounds, per megapixel, refused when it is none."""
+
+from dataclasses import replace
+
+import pytest
+
+from camkit.bundle.stages import Wiener
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.plan.speed import ROUNDS, WINDOW_PX, Speed, measure_speed
+from tests.bundle_factory import tiny_network
+
+STAGE = Wiener(block_px=64, overlap_px=16, prior_scale=1e-3, prior_exponent=2.0)
+
+
+class _Clock:
+    """Time that passes only when a network lets it."""
+
+    now_s = 0.0
+
+    def perf_counter(self) -> float:
+        return self.now_s
+
+
+class _Network:
+    """Takes the seconds it is told to, run by run."""
+
+    channels = 6
+
+    def __init__(self, clock: _Clock, *seconds: float) -> None:
+        self.clock, self.seconds = clock, list(seconds)
+        self.shapes: list[tuple[int, ...]] = []
+
+    def run(self, window: FloatArray) -> FloatArray:
+        self.shapes.append(window.shape)
+        self.clock.now_s += self.seconds.pop(0)
+        return window[:, :3]
+
+
+def test_a_window_counts_with_its_best_round_per_megapixel(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = _Clock()
+    monkeypatch.setattr("camkit.runtime.plan.speed.time", clock)
+    engines = {"M": _Network(clock, 0.9, 0.6, 0.7), "S": _Network(clock, 0.2, 0.3, 0.4)}
+    speed = measure_speed(engines, STAGE, threads=2)  # type: ignore[arg-type]
+    megapixels = WINDOW_PX**2 / 1e6
+    assert speed.network_s_per_mp["M"] == pytest.approx(0.6 / megapixels)
+    assert speed.network_s_per_mp["S"] == pytest.approx(0.2 / megapixels)
+    assert engines["M"].shapes == [(1, 6, WINDOW_PX, WINDOW_PX)] * ROUNDS
+    assert speed.threads == 2
+
+
+def test_a_real_network_and_the_default_block_are_timed() -> None:
+    engine = NetworkEngine(tiny_network(), threads=1)
+    speed = measure_speed({"M": engine}, None, threads=1)
+    assert speed.network_s_per_mp["M"] > 0
+    assert speed.block_s > 1e-5
+
+
+def test_the_rest_is_given_in_blocks_of_one_size_whatever_the_bank_has() -> None:
+    small = measure_speed({}, STAGE, threads=1)
+    large = measure_speed({}, STAGE.model_copy(update={"block_px": 256}), threads=1)
+    assert large.block_s > small.block_s
+    assert small.rest_s_per_mp / small.block_s == pytest.approx(10 * (384 / 64) ** 2)
+    assert large.rest_s_per_mp / large.block_s == pytest.approx(10 * (384 / 256) ** 2)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"block_s": 0.0}, {"rest_s_per_mp": -1.0}, {"threads": 0}, {"network_s_per_mp": {"M": 0.0}}],
+)
+def test_a_speed_without_time_or_threads_is_refused(wrong: dict[str, object]) -> None:
+    sound = Speed(network_s_per_mp={"M": 1.0}, block_s=0.01, rest_s_per_mp=0.1, threads=1)
+    with pytest.raises(ContractError, match="seconds > 0"):
+        replace(sound, **wrong)  # type: ignore[arg-type]
