@@ -45,6 +45,8 @@ from camkit.export.golden_cases import (
     photograph,
 )
 from camkit.export.network_facts import MeasuredNetwork, measure_network
+from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.prescription import format_prescription
 from camkit.models_def.training.checkpoint import Checkpoint, load_network, read_checkpoint
 from camkit.models_def.training.recipe import Recipe, differing_camera, to_recipe
 from camkit.runtime.check import check_bundle
@@ -198,7 +200,8 @@ def _members(parts: Parts) -> dict[str, bytes]:
     if parts.stress_psf is not None:
         members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
     if parts.prescription is not None:
-        members[PRESCRIPTION] = parts.prescription.read_bytes()
+        # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
+        members[PRESCRIPTION] = format_prescription(read_lens(parts.prescription)).encode()
     return members
 
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from camkit.models_def.optics.optimize import design
 from camkit.models_def.optics.prescription import write_prescription
-from camkit.models_def.optics.recipe import read_recipe
+from camkit.models_def.optics.search.design import design
+from camkit.models_def.optics.search.recipe import read_recipe
 
 MODELS = Path(__file__).resolve().parents[1] / "models_def"
 

@@ -11,11 +11,13 @@ import typer
 
 from camkit.cli.bench import bench
 from camkit.cli.check import check
+from camkit.cli.design import design
 from camkit.cli.doctor import doctor
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.export import export
 from camkit.cli.freeze import freeze
 from camkit.cli.info import info
+from camkit.cli.lens.app import lens_app
 from camkit.cli.plan import plan
 from camkit.cli.process import process
 from camkit.cli.simulate import simulate
@@ -32,8 +34,22 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (process, plan, info, check, simulate, stress, doctor, bench, freeze, train, export):
+for command in (
+    process,
+    plan,
+    info,
+    check,
+    simulate,
+    stress,
+    doctor,
+    bench,
+    design,
+    freeze,
+    train,
+    export,
+):
     app.command()(command)
+app.add_typer(lens_app)
 
 
 @app.callback(invoke_without_command=True)

@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -20,4 +21,8 @@ MaxSeconds = Annotated[
 MaxErrorDb = Annotated[
     float | None,
     typer.Option(help="The cheapest plan that should lose no more against exact, in dB."),
+]
+GlassFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--glass", help="A glass catalogue (.agf) of yours; may be given again."),
 ]

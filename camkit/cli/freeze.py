@@ -10,7 +10,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 
 
 def freeze(
-    prescription: Annotated[Path, typer.Argument(help="The lens (TOML).")],
+    prescription: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The frozen PSF (.safetensors).")],
     recipe: Annotated[
         Path | None,
@@ -33,7 +33,7 @@ def freeze(
     refuse_existing([out, stress_out, report], overwrite=overwrite)
     from camkit.bundle.psf_file import write_psf
     from camkit.models_def.optics.freeze import freeze_prescription, freeze_stress
-    from camkit.models_def.optics.prescription import read_prescription
+    from camkit.models_def.optics.lens_file.lens_file import read_lens
     from camkit.models_def.training.recipe import read_recipe
 
     plan = read_recipe(_default_recipe() if recipe is None else recipe)
@@ -41,7 +41,7 @@ def freeze(
     found = freeze_prescription(prescription, out, camera=plan.camera, settings=plan.wiener)
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
-        write_psf(stress_out, freeze_stress(read_prescription(prescription), plan.camera).psf)
+        write_psf(stress_out, freeze_stress(read_lens(prescription), plan.camera).psf)
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
         report.write_text(json.dumps(found.to_json(), indent=2) + "\n", encoding="utf-8")

@@ -2,11 +2,15 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.models_def.training.trainer import Stage
 
 
 def train(
@@ -28,6 +32,16 @@ def train(
     out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint, log and samples.")] = Path(
         "runs"
     ),
+    final: Annotated[
+        Path | None,
+        typer.Option(help="Final stage: fine-tune this checkpoint against two discriminators."),
+    ] = None,
+    vgg: Annotated[
+        Path | None, typer.Option(help="With --final: VGG-19 weights (.pth or .safetensors).")
+    ] = None,
+    pairs: Annotated[
+        Path | None, typer.Option(help="With --final: folder of real pairs to fine-tune on.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
     threads: Annotated[int, typer.Option(help="Threads of torch.")] = 1,
     workers: Annotated[int, typer.Option(help="Processes that make samples.")] = 1,
@@ -42,6 +56,11 @@ def train(
     from camkit.models_def.training.trainer import TrainOptions
     from camkit.models_def.training.trainer import train as run
 
+    stage: Stage | None = None
+    if final is not None:
+        stage = _final_stage(recipe, final, vgg, pairs, device)
+    elif vgg is not None or pairs is not None:
+        raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM.pt too")
     result = run(
         recipe,
         TrainOptions(
@@ -56,6 +75,19 @@ def train(
             workers=workers,
             device=device,
         ),
+        stage=stage,
     )
     plain = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(result).items()}
     print_report(plain, json_)
+
+
+def _final_stage(
+    recipe: Path, start: Path, vgg: Path | None, pairs: Path | None, device: str
+) -> "Stage":
+    from camkit.models_def.training.final.stage import WITHOUT_VGG, FinalOptions, make_stage
+    from camkit.models_def.training.recipe import read_recipe
+
+    if vgg is None:
+        typer.echo(f"camkit: {WITHOUT_VGG}", err=True)
+    options = FinalOptions(start=start, vgg=vgg, pairs=pairs, device=device)
+    return make_stage(read_recipe(recipe), options)

@@ -9,6 +9,7 @@
     quality_table    means, gains and the page
     bench/           speed against accuracy
     stress/          where methods fail
+    lens/            one lens on one page
     plan_cells       what each lattice cell loses with less than the exact result
     plan_fit         the loss model fitted to them
     plan_scenes      scenes of the proof: night, bokeh, texture, sky, text

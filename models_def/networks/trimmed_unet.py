@@ -35,7 +35,8 @@ class TrimmedConfig:
             raise ContractError(f"in_channels must be 3 or 6; got {self.in_channels}")
 
 
-def _double_conv(inputs: int, outputs: int) -> nn.Sequential:
+def double_conv(inputs: int, outputs: int) -> nn.Sequential:
+    """Give two 3x3 convolutions, a PReLU behind each."""
     return nn.Sequential(
         nn.Conv2d(inputs, outputs, 3, padding=1),
         nn.PReLU(),
@@ -53,13 +54,13 @@ class TrimmedUnet(nn.Module):
         self.in_channels = self.config.in_channels
         self.stride_px = 4
         a, b, c = self.config.widths
-        self.encode_fine = _double_conv(self.in_channels, a)
-        self.encode_half = _double_conv(a, b)
-        self.bottleneck = _double_conv(b, c)
+        self.encode_fine = double_conv(self.in_channels, a)
+        self.encode_half = double_conv(a, b)
+        self.bottleneck = double_conv(b, c)
         self.up_half = nn.ConvTranspose2d(c, b, 2, stride=2)
-        self.merge_half = _double_conv(2 * b, b)
+        self.merge_half = double_conv(2 * b, b)
         self.up_fine = nn.ConvTranspose2d(b, a, 2, stride=2)
-        self.merge_fine = _double_conv(2 * a, a)
+        self.merge_fine = double_conv(2 * a, a)
         self.out = nn.Conv2d(a, 3, 3, padding=1)
 
     def forward(self, planes: Tensor) -> Tensor:
@@ -71,10 +72,19 @@ class TrimmedUnet(nn.Module):
         Returns:
             (b, 3, h, w) float32, stabilised.
         """
-        fine = self.encode_fine(planes)
-        half = self.encode_half(nn.functional.max_pool2d(fine, 2))
-        x = self.bottleneck(nn.functional.max_pool2d(half, 2))
-        x = self.merge_half(torch.cat((self.up_half(x), half), dim=1))
+        fine, half, quarter = self.encode(planes)
+        return self.decode(planes, fine, half, quarter)
+
+    def encode(self, planes: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Give the features (b, widths[i], h / 2^i, w / 2^i) of the three scales."""
+        fine: Tensor = self.encode_fine(planes)
+        half: Tensor = self.encode_half(nn.functional.max_pool2d(fine, 2))
+        quarter: Tensor = self.bottleneck(nn.functional.max_pool2d(half, 2))
+        return fine, half, quarter
+
+    def decode(self, planes: Tensor, fine: Tensor, half: Tensor, quarter: Tensor) -> Tensor:
+        """Give (b, 3, h, w) from the input and the features of `encode`."""
+        x = self.merge_half(torch.cat((self.up_half(quarter), half), dim=1))
         x = self.merge_fine(torch.cat((self.up_fine(x), fine), dim=1))
         restored: Tensor = self.out(x)
         return planes[:, -3:] + restored if self.config.residual else restored

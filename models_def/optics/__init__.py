@@ -2,11 +2,16 @@
 
 In the order in which data flows:
 
-- `glass`: refractive indices by strict name
+- `glass`: catalogues, refractive indices by strict name
 - `prescription`: lenses as dataclasses, TOML files, fabrication errors
-- `paraxial`: focal lengths, pupils, focus
-- `trace`: rays through surfaces, differentiable, with a fate for each ray
+- `lens_file`: lenses from and to files, TOML or .zmx
+- `tracing/`, `trace`: rays through surfaces, differentiable, with a fate for each ray
+- `reverse`: rays from the sensor to the scene
+- `paraxial`: focal lengths, pupils, images
+- `scaling`: a lens larger or smaller, faster or slower
+- `penalty`: what keeps a design where rays pass
 - `pupil`: which rays: samples of the stop, aiming
+- `focus`: where the sensor should lie
 - `spot`: where they land: chief rays, spots, relative illumination
 - `distortion`: the radial polynomial of eq. (6.10)
 - `psf`: rays splatted into kernels
@@ -14,5 +19,6 @@ In the order in which data flows:
 - `frozen`: a `FrozenPsf` on a grid of fields, depths and wavelengths
 - `sampling`: what coarse samples and blocks cost, in dB
 - `freeze`: the least samples within a stated loss; the file and its report
-- `recipe`, `optimize`: how a lens is found: damped least squares on spots
+- `analysis/`: spots, MTF, curves, third order and wavefronts for people
+- `search/`: how a lens is found and improved: free numbers, merits, damped least squares
 """

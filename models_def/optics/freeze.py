@@ -19,8 +19,9 @@ from camkit.models_def.optics.frozen import (
     freeze_at,
     freeze_stress,
 )
+from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens, read_prescription
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.sampling import Bench, Loss, block_loss, frozen_loss, make_bench
 from camkit.models_def.sensors.wiener import PRIOR_EXPONENT, PRIOR_SCALE
 
@@ -161,7 +162,7 @@ def freeze_prescription(
     """
     from camkit.bundle.psf_file import write_psf
 
-    lens = read_prescription(path)
+    lens = read_lens(path)
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     rays = (grid or FreezeGrid()).rays
     bench = make_bench(lens, camera, chosen, rays=rays)

@@ -1,11 +1,14 @@
-"""Exact paraxial data: EFL, BFL, pupils, focus (the r^2 aspheric term included)."""
+"""Exact paraxial data: EFL, BFL, pupils, focus, images (the r^2 aspheric term included)."""
 
+import math
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
+from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.reverse import reverse
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
 
 
@@ -70,18 +73,6 @@ def focal_lengths(tensors: SurfaceTensors) -> tuple[Tensor, Tensor]:
     return -1 / slope, -height / slope
 
 
-def _reversed(tensors: SurfaceTensors) -> SurfaceTensors:
-    gaps = tensors.thickness_mm.flip(0)
-    return replace(
-        tensors,
-        curvature_per_mm=-tensors.curvature_per_mm.flip(0),
-        even_asphere=-tensors.even_asphere.flip(0),
-        thickness_mm=torch.cat([gaps[1:], gaps[:1]]),
-        index=tensors.index.flip(0),
-        aspheric=tensors.aspheric[::-1],
-    )
-
-
 def _image_of_stop(tensors: SurfaceTensors, stop: int) -> tuple[float, float]:
     """Give position (after the last vertex) and magnification of the stop seen from behind."""
     count = len(tensors.aspheric)
@@ -106,7 +97,7 @@ def paraxial_data(lens: Lens, wavelength_um: float | None = None) -> Paraxial:
     """
     wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
     tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
-    back = _reversed(tensors)
+    back = reverse(tensors)
     efl, bfl = (float(v) for v in focal_lengths(tensors))
     ffl = -float(focal_lengths(back)[1])
     # a stop at a surface: rays in front of it see it through the surfaces before it only
@@ -134,7 +125,55 @@ def _stop_semi_diameter(lens: Lens, efl_mm: float, pupil_scale: float) -> float:
     return diameter_mm / 2 / abs(pupil_scale)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Image:
+    """The paraxial image of the object plane.
+
+    Attributes:
+        distance_mm: From the last vertex; the BFL for an object at infinity.
+        magnification: Image height / object height, negative if inverted; 0 at infinity.
+        working_f_number: 1 / (2 n' u'), u' the slope of the paraxial marginal ray at the image;
+            at infinity EFL / entrance pupil diameter.
+    """
+
+    distance_mm: float
+    magnification: float
+    working_f_number: float
+
+
+def paraxial_image(lens: Lens, wavelength_um: float | None = None) -> Image:
+    """Give where the object plane of a lens is imaged, how large, and how fast.
+
+    Args:
+        lens: The prescription.
+        wavelength_um: The reference wavelength by default.
+
+    Raises:
+        ContractError: If the light leaves the lens parallel: there is no image.
+    """
+    wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
+    tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
+    data = paraxial_data(lens, wave)
+    edge_mm, distance_mm = data.entrance_pupil_diameter_mm / 2, lens.object_distance_mm
+    if math.isinf(distance_mm):
+        start, lean = edge_mm, 0.0
+    else:
+        lean = edge_mm / (distance_mm + data.entrance_pupil_mm)
+        start = distance_mm * lean
+    column = torch.tensor([start, lean], dtype=torch.float64)
+    surfaces = range(len(tensors.aspheric))
+    height, slope = (float(v) for v in trace_paraxial(tensors, column[0], column[1], surfaces))
+    if slope == 0:
+        raise ContractError(f"{lens.name} has no image: the light leaves it parallel")
+    before, after = float(tensors.index[0]), float(tensors.index[-1])
+    return Image(
+        distance_mm=-height / slope,
+        magnification=before * lean / (after * slope),
+        working_f_number=1 / (2 * after * abs(slope)),
+    )
+
+
 def with_paraxial_focus(lens: Lens) -> Lens:
-    """Give the lens with its sensor at the paraxial focus of the reference wavelength."""
-    last = replace(lens.surfaces[-1], thickness_mm=paraxial_data(lens).bfl_mm)
+    """Give the lens with its sensor at the paraxial image of its object, reference wavelength."""
+    last = replace(lens.surfaces[-1], thickness_mm=paraxial_image(lens).distance_mm)
     return replace(lens, surfaces=(*lens.surfaces[:-1], last))

@@ -6,7 +6,7 @@ Thickness and glass are those after a surface; the last thickness leads to the s
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
@@ -14,10 +14,15 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.glass import find_glass
+from camkit.models_def.optics.glass.agf import read_agf
+from camkit.models_def.optics.glass.catalogue import GlassCatalogue, find_glass, own_glass
+from camkit.models_def.optics.glass.material import Glass
+from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
 from camkit.units import to_degrees, to_radians
 
 ApertureKind = Literal["f_number", "entrance_pupil_diameter_mm", "stop_semi_diameter_mm"]
+Vary = Literal["curvature", "conic", "thickness", "even_asphere"]
+VARY: Final[tuple[Vary, ...]] = get_args(Vary)
 APERTURE_KINDS: Final[tuple[ApertureKind, ...]] = get_args(ApertureKind)
 
 _SURFACE_KEYS: Final = {
@@ -27,6 +32,7 @@ _SURFACE_KEYS: Final = {
     "semi_diameter_mm",
     "conic",
     "even_asphere",
+    "vary",
 }
 _LENS_KEYS: Final = {
     "name",
@@ -36,6 +42,8 @@ _LENS_KEYS: Final = {
     "field_angles_deg",
     "wavelengths_um",
     "reference_wavelength_um",
+    "glass_catalogues",
+    "glass",
     "surface",
     *APERTURE_KINDS,
 }
@@ -48,11 +56,14 @@ class Surface:
     Attributes:
         curvature_per_mm: 1 / radius; 0 is a plane.
         thickness_mm: Distance along the axis to the next surface or the sensor.
-        glass: Strict name of the medium after the surface ("air" or see `glass`).
+        glass: Strict name of the medium after the surface ("air" or see `glass`); a trade name
+            that one catalogue has becomes the strict one.
         semi_diameter_mm: Rays further out are vignetted; inf for no limit.
         conic: 0 sphere, -1 paraboloid.
         even_asphere: Coefficients of r^2, r^4, r^6, ... (mm^-1, mm^-3, ...).
         index_offset: Added to the index after the surface (fabrication error).
+        material: The glass itself where it comes from a user's catalogue; its name is `glass`.
+        vary: What an optimisation may change.
     References: Sun 2021, eq. (2.2).
     """
 
@@ -63,14 +74,28 @@ class Surface:
     conic: float = 0.0
     even_asphere: tuple[float, ...] = ()
     index_offset: float = 0.0
+    material: Glass | None = None
+    vary: tuple[Vary, ...] = ()
 
     def __post_init__(self) -> None:
-        find_glass(self.glass)
+        if not set(self.vary) <= set(VARY):
+            raise ContractError(f"vary names some of {', '.join(VARY)}; got {self.vary}")
+        if self.material is None:
+            object.__setattr__(self, "glass", find_glass(self.glass).name)
+        elif self.material.name != self.glass:
+            raise ContractError(
+                f"glass and material must have one name; got {self.glass}, {self.material.name}"
+            )
         numbers = (self.curvature_per_mm, self.thickness_mm, self.conic, self.index_offset)
         if not all(map(math.isfinite, (*numbers, *self.even_asphere))):
             raise ContractError(f"a surface needs finite numbers; got {self}")
         if not self.semi_diameter_mm > 0:
             raise ContractError(f"semi_diameter_mm must be > 0; got {self.semi_diameter_mm}")
+
+    @property
+    def medium(self) -> Glass:
+        """The glass after the surface."""
+        return self.material or find_glass(self.glass)
 
     @property
     def radius_mm(self) -> float:
@@ -180,16 +205,24 @@ def perturb(lens: Lens, errors: FabricationErrors, rng: np.random.Generator) -> 
     return replace(lens, surfaces=tuple(copies))
 
 
-def read_prescription(path: Path) -> Lens:
+def read_prescription(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> Lens:
     """Read a lens from a TOML file.
+
+    Args:
+        path: The file; its `glass_catalogues` are .agf files relative to it.
+        catalogues: More glasses, asked after those that the file brings along.
 
     Raises:
         ContractError: If the file is not TOML, or a key is unknown, missing or of a wrong type.
+        DecodeError: If a glass catalogue is damaged.
     """
-    return parse_prescription(path.read_text(encoding="utf-8"))
+    text = path.read_text(encoding="utf-8")
+    return parse_prescription(text, catalogues, folder=path.parent)
 
 
-def parse_prescription(text: str) -> Lens:
+def parse_prescription(
+    text: str, catalogues: Sequence[GlassCatalogue] = (), *, folder: Path | None = None
+) -> Lens:
     """Read a lens from TOML text; see `read_prescription`."""
     try:
         table = tomllib.loads(text)
@@ -214,7 +247,7 @@ def parse_prescription(text: str) -> Lens:
     return Lens(
         name=_text(table["name"], "name"),
         note=_text(table.get("note", ""), "note"),
-        surfaces=_parse_surfaces(table["surface"]),
+        surfaces=_parse_surfaces(table["surface"], (*_own_catalogues(table, folder), *catalogues)),
         stop=stop,
         aperture_kind=kinds[0],
         aperture_value=_number(table[kinds[0]], kinds[0]),
@@ -222,11 +255,24 @@ def parse_prescription(text: str) -> Lens:
     )
 
 
+def _own_catalogues(table: Mapping[str, Any], folder: Path | None) -> list[GlassCatalogue]:
+    """Give the glasses that a prescription brings along: its own tables, then its .agf files."""
+    tables = _tables(table.get("glass", []), "[[glass]]")
+    own = GlassCatalogue(name=table["name"], glasses=tuple(map(parse_glass_table, tables)))
+    names = table.get("glass_catalogues", [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ContractError(f"glass_catalogues must be a list of .agf files; got {names!r}")
+    if names and folder is None:
+        raise ContractError("glass_catalogues are relative to a file; this prescription is none")
+    return [own, *(read_agf((folder or Path()) / name) for name in names)]
+
+
 def write_prescription(lens: Lens, path: Path) -> None:
     """Write a lens as TOML.
 
     `read_prescription` gives it back to the last bit, if its curvatures are inverses of radii
-    (as they are in a lens that was read); others come back within 1e-15 of themselves.
+    (as they are in a lens that was read); others come back within 1e-15 of themselves. Glasses of
+    a user's catalogue are written into the file, which needs no other file then.
 
     Raises:
         ContractError: If the lens is a fabricated copy (index offsets are not written).
@@ -238,7 +284,7 @@ def format_prescription(lens: Lens) -> str:
     """Give the TOML text of a lens; see `write_prescription`."""
     if any(surface.index_offset for surface in lens.surfaces):
         raise ContractError("a prescription holds no index offsets; write the nominal lens")
-    angles = ", ".join(repr(round(to_degrees(a), 12)) for a in lens.field_angles_rad)
+    angles = ", ".join(degrees_text(angle) for angle in lens.field_angles_rad)
     lines = [
         f"name = {_quote(lens.name)}",
         f"note = {_quote(lens.note)}",
@@ -249,6 +295,8 @@ def format_prescription(lens: Lens) -> str:
         f"wavelengths_um = [{', '.join(map(repr, lens.wavelengths_um))}]",
         f"reference_wavelength_um = {lens.reference_wavelength_um!r}",
     ]
+    for glass in {s.material: None for s in lens.surfaces if s.material is not None}:
+        lines += ["", "[[glass]]", *(_key_line(k, v) for k, v in glass_table(glass).items())]
     for surface in lens.surfaces:
         lines += ["", "[[surface]]", *_surface_lines(surface)]
     return "\n".join(lines) + "\n"
@@ -264,8 +312,27 @@ def _surface_lines(surface: Surface) -> list[str]:
     if surface.conic:
         lines.append(f"conic = {surface.conic!r}")
     if surface.even_asphere:
-        lines.append(f"even_asphere = [{', '.join(map(repr, surface.even_asphere))}]")
+        lines.append(_key_line("even_asphere", surface.even_asphere))
+    if surface.vary:
+        lines.append(f"vary = [{', '.join(map(_quote, surface.vary))}]")
     return lines
+
+
+def _key_line(key: str, value: str | tuple[float, ...]) -> str:
+    text = _quote(value) if isinstance(value, str) else f"[{', '.join(map(repr, value))}]"
+    return f"{key} = {text}"
+
+
+def degrees_text(angle_rad: float) -> str:
+    """Give the shortest number of degrees that becomes this angle again, to the last bit."""
+    angle_deg = to_degrees(angle_rad)
+    neighbours = (angle_deg, math.nextafter(angle_deg, 0), math.nextafter(angle_deg, 90))
+    for digits in range(1, 18):
+        for value in neighbours:
+            rounded = float(f"{value:.{digits}g}")
+            if to_radians(rounded) == angle_rad:
+                return repr(rounded)
+    return repr(angle_deg)
 
 
 def _radius_text(curvature_per_mm: float) -> str:
@@ -288,28 +355,44 @@ def _quote(text: str) -> str:
     return f'"{escaped}"'
 
 
-def _parse_surfaces(tables: object) -> tuple[Surface, ...]:
-    if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
-        raise ContractError("surfaces must be written as [[surface]] tables")
-    return tuple(_parse_surface(table, i) for i, table in enumerate(tables))
+def _parse_surfaces(value: object, catalogues: Sequence[GlassCatalogue]) -> tuple[Surface, ...]:
+    tables = _tables(value, "[[surface]]")
+    return tuple(_parse_surface(table, i, catalogues) for i, table in enumerate(tables))
 
 
-def _parse_surface(table: Mapping[str, Any], number: int) -> Surface:
+def _tables(value: object, kind: str) -> list[dict[str, Any]]:
+    if not isinstance(value, list) or not all(isinstance(t, dict) for t in value):
+        raise ContractError(f"write {kind} tables; got {value!r:.80}")
+    return value
+
+
+def _parse_surface(
+    table: Mapping[str, Any], number: int, catalogues: Sequence[GlassCatalogue]
+) -> Surface:
     where = f"surface {number}"
     _check_keys(table, allowed=_SURFACE_KEYS, needed={"radius_mm", "thickness_mm"}, where=where)
     radius_mm = _number(table["radius_mm"], f"{where}: radius_mm")
     if radius_mm == 0 or math.isnan(radius_mm):
         raise ContractError(f"{where}: radius_mm must not be 0 (a plane is inf)")
+    glass = find_glass(_text(table.get("glass", "air"), f"{where}: glass"), catalogues)
     return Surface(
         curvature_per_mm=1 / radius_mm,
         thickness_mm=_number(table["thickness_mm"], f"{where}: thickness_mm"),
-        glass=_text(table.get("glass", "air"), f"{where}: glass"),
+        glass=glass.name,
+        material=own_glass(glass, catalogues),
         semi_diameter_mm=_number(
             table.get("semi_diameter_mm", math.inf), f"{where}: semi_diameter_mm"
         ),
         conic=_number(table.get("conic", 0.0), f"{where}: conic"),
         even_asphere=_numbers(table.get("even_asphere", []), f"{where}: even_asphere"),
+        vary=_names(table.get("vary", []), f"{where}: vary"),
     )
+
+
+def _names(value: object, where: str) -> Any:
+    if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
+        raise ContractError(f"{where} must be a list of names; got {value!r:.80}")
+    return tuple(value)
 
 
 def _check_keys(

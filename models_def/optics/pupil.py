@@ -1,26 +1,38 @@
 """Which rays: pupil samples, launching, aiming.
 
-Definition used for every PSF, spot and relative illumination of camkit ("aimed"): each ray
-passes the stop surface at its own sample point; samples have equal areas of the stop, and a
-ray's weight is the area of the beam in the entrance plane (the vertex plane of the first
-surface) that belongs to it. This is what a real stop does, so vignetting and pupil aberration
-come out right. The other definition ("paraxial") spreads rays evenly over the paraxial entrance
-pupil; it exists to compare with other programs.
+Three definitions of the pupil; spots and PSFs differ by them, so each states its own.
+
+- `stop`: each ray passes the stop surface at its own sample point, and a ray's weight is the area
+  of the beam in the entrance plane (the vertex plane of the first surface) that belongs to it.
+  This is what a real stop does, so vignetting and pupil aberration come out right; every frozen
+  PSF and relative illumination of camkit uses it. The stop's radius is the height of the paraxial
+  marginal ray there, or, asked for by `real_stop_radius_mm`, of the real one.
+- `chief`: the ray through the middle is aimed at the middle of the stop; around it the rays fill
+  a disc of the entrance pupil's diameter.
+- `paraxial`: the rays fill the paraxial entrance pupil.
 """
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, refract, trace
+from camkit.models_def.optics.trace import (
+    Fate,
+    Rays,
+    SurfaceTensors,
+    refract,
+    surface_tensors,
+    trace,
+)
 
-PupilDefinition = Literal["aimed", "paraxial"]
+PupilDefinition = Literal["paraxial", "chief", "stop"]
+PUPIL_DEFINITIONS: Final[tuple[PupilDefinition, ...]] = get_args(PupilDefinition)
 
 AIM_STEPS: Final = 8
 AIM_TOLERANCE_MM: Final = 1e-8
@@ -30,10 +42,17 @@ _GOLDEN_ANGLE_RAD: Final = math.pi * (3 - math.sqrt(5))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PupilSamples:
-    """Points of the unit disc with equal areas; x, y are (rays,) float64."""
+    """Points of the unit disc.
+
+    Attributes:
+        x: (rays,) float64.
+        y: (rays,) float64.
+        weight: (rays,), share of the disc that a point stands for; equal shares if None.
+    """
 
     x: Tensor
     y: Tensor
+    weight: Tensor | None = None
 
 
 def half_disc(rays: int) -> PupilSamples:
@@ -127,11 +146,10 @@ def aim(
     wanted_x, wanted_y, slope = target.x + blank, target.y + blank, slope + blank
     if stop == 0 and not bool(tensors.curvature_per_mm[0].any()) and not tensors.aspheric[0]:
         return Aim(x=wanted_x, y=wanted_y, weight=torch.ones_like(wanted_x))
-    open_tensors = replace(
-        tensors, semi_diameter_mm=torch.full_like(tensors.semi_diameter_mm, math.inf)
-    )
     with torch.no_grad():
-        return _newton_aim(open_tensors, stop, (wanted_x, wanted_y), slope, distance_mm)
+        return _newton_aim(
+            with_open_apertures(tensors), stop, (wanted_x, wanted_y), slope, distance_mm
+        )
 
 
 def _newton_aim(
@@ -166,13 +184,56 @@ def _newton_aim(
     return Aim(x=x, y=y, weight=torch.where(found, 1 / torch.abs(determinant), 0.0))
 
 
+def real_stop_radius_mm(lens: Lens) -> float:
+    """Give the height at the stop of the real marginal ray of the reference wavelength.
+
+    The ray starts on the axis and meets the edge of the paraxial entrance pupil; a lens that
+    states its stop keeps that.
+
+    Raises:
+        ContractError: If that ray is lost before the stop.
+    """
+    if lens.aperture_kind == "stop_semi_diameter_mm":
+        return lens.aperture_value
+    wave = torch.tensor(lens.reference_wavelength_um, dtype=torch.float64)
+    tensors = with_open_apertures(surface_tensors(lens, wave))
+    zero = torch.zeros((), dtype=torch.float64)
+    rays = launch(zero, zero + beam_radius_mm(lens), zero, lens.object_distance_mm)
+    met = refract(tensors, trace(tensors, rays, surfaces=range(lens.stop)), lens.stop)
+    if not bool(met.valid):
+        raise ContractError(
+            "the real marginal ray is lost before the stop; make the aperture smaller or state "
+            "stop_semi_diameter_mm"
+        )
+    return abs(float(met.y))
+
+
+def with_open_apertures(tensors: SurfaceTensors) -> SurfaceTensors:
+    """Give the lens without the limits of its surfaces."""
+    return replace(tensors, semi_diameter_mm=torch.full_like(tensors.semi_diameter_mm, math.inf))
+
+
+def beam_radius_mm(lens: Lens) -> float:
+    """Give the radius in the first vertex plane of the axial beam into the entrance pupil."""
+    data = paraxial_data(lens)
+    return data.entrance_pupil_diameter_mm / 2 * _vertex_scale(lens, data)
+
+
+def _vertex_scale(lens: Lens, data: Paraxial) -> float:
+    """Give the height in the first vertex plane of an axial ray of height 1 in the pupil."""
+    if math.isinf(lens.object_distance_mm):
+        return 1.0
+    return lens.object_distance_mm / (lens.object_distance_mm + data.entrance_pupil_mm)
+
+
 def pupil_rays(
     lens: Lens,
     tensors: SurfaceTensors,
     samples: PupilSamples,
     slope: Tensor,
     *,
-    definition: PupilDefinition = "aimed",
+    definition: PupilDefinition = "stop",
+    stop_radius_mm: float | None = None,
 ) -> tuple[Rays, Tensor]:
     """Give launched rays and their weights.
 
@@ -182,21 +243,38 @@ def pupil_rays(
         samples: Of the unit disc, (rays,).
         slope: tan of the field angle, (..., 1).
         definition: See the module.
+        stop_radius_mm: For the definition `stop`; that of the paraxial marginal ray by default.
 
     Returns:
-        Rays (..., rays) at the first vertex plane, and weights of the same shape; rays that
-        cannot be aimed have weight 0 and fate MISSED.
+        Rays (..., rays) at the first vertex plane, and the areas of their beams there in equal
+        units, of the same shape; rays that cannot be aimed have weight 0 and fate MISSED.
     """
     data = paraxial_data(lens)
-    if definition == "paraxial":
-        radius = data.entrance_pupil_diameter_mm / 2
+    share = 1.0 if samples.weight is None else samples.weight * len(samples.weight)
+    if definition == "stop":
+        radius = data.stop_semi_diameter_mm if stop_radius_mm is None else stop_radius_mm
+        aimed = _aim_at(lens, tensors, samples, slope, radius)
+        x, y, weight = aimed.x, aimed.y, aimed.weight * share
+    else:
+        scale = _vertex_scale(lens, data)
+        radius = data.entrance_pupil_diameter_mm / 2 * scale
         x = samples.x * radius + torch.zeros_like(slope)
-        y = samples.y * radius - data.entrance_pupil_mm * slope
-        rays = launch(x, y, slope, lens.object_distance_mm)
-        return rays, torch.ones_like(rays.x)
-    radius = data.stop_semi_diameter_mm
-    target = PupilSamples(x=samples.x * radius, y=samples.y * radius)
-    aimed = aim(tensors, lens.stop, target, slope, lens.object_distance_mm)
-    rays = launch(aimed.x, aimed.y, slope, lens.object_distance_mm)
-    lost = torch.where(aimed.weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
-    return replace(rays, fate=lost), aimed.weight
+        middle = -data.entrance_pupil_mm * scale * slope
+        weight = torch.ones_like(x) * share
+        if definition == "chief":
+            centre = PupilSamples(x=torch.zeros_like(samples.x[:1]), y=torch.zeros_like(x[..., :1]))
+            chief = _aim_at(lens, tensors, centre, slope, 1.0)
+            middle, weight = chief.y, torch.where(chief.weight > 0, weight, 0.0)
+        y = samples.y * radius + middle
+    rays = launch(x, y, slope, lens.object_distance_mm)
+    if definition == "paraxial":
+        return rays, torch.ones_like(rays.x) * share
+    lost = torch.where(weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
+    return replace(rays, fate=lost), weight
+
+
+def _aim_at(
+    lens: Lens, tensors: SurfaceTensors, samples: PupilSamples, slope: Tensor, radius_mm: float
+) -> Aim:
+    target = PupilSamples(x=samples.x * radius_mm, y=samples.y * radius_mm)
+    return aim(tensors, lens.stop, target, slope, lens.object_distance_mm)

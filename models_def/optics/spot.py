@@ -19,6 +19,7 @@ from camkit.models_def.optics.trace import surface_tensors, trace
 _SLOPE_STEPS: Final = 12
 _SLOPE_TOLERANCE_MM: Final = 1e-9
 _SLOPE_DIFFERENCE: Final = 1e-6
+ANGLE_STEP_RAD: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +95,7 @@ def trace_spots(
     wavelengths_um: Tensor,
     samples: PupilSamples,
     *,
-    definition: PupilDefinition = "aimed",
+    definition: PupilDefinition = "stop",
 ) -> Spots:
     """Trace the pupil at every field and wavelength.
 
@@ -130,11 +131,7 @@ def rms_radius(spots: Spots) -> Tensor:
 def relative_illumination(lens: Lens, heights_mm: Tensor, rays: int = 2048) -> Tensor:
     """Give the light (field,) of a uniform scene at sensor heights, 1 on the axis.
 
-    A distant scene of radiance L sends L * A cos(angle) dOmega through a beam of area A in the
-    entrance plane; dOmega falls on h dh dphi of the sensor. So
-    E(h) ~ A(angle) cos(angle) sin(angle) d(angle) / (h dh): vignetting, pupil aberration and
-    distortion included; for A constant and h = f tan(angle) it is the cos^4 law. Losses of
-    coating and bulk are not counted.
+    Every ray is aimed at the stop. Losses of coating and bulk are not counted.
     """
     with torch.no_grad():
         heights = heights_mm.to(torch.float64)
@@ -146,7 +143,25 @@ def relative_illumination(lens: Lens, heights_mm: Tensor, rays: int = 2048) -> T
         spots = trace_spots(lens, slopes, wave, half_disc(rays))
         area = spots.weight.sum((-2, -1))
         angle = torch.atan(slopes)
-        ahead = chief_heights(lens, torch.tan(angle + 1e-6))
-        behind = chief_heights(lens, torch.tan(angle - 1e-6))
-        light = area * torch.cos(angle) * torch.sin(angle) * 2e-6 / (near * (ahead - behind))
+        ahead = chief_heights(lens, torch.tan(angle + ANGLE_STEP_RAD))
+        behind = chief_heights(lens, torch.tan(angle - ANGLE_STEP_RAD))
+        light = field_light(area, angle, near, ahead - behind)
     return light[1:] / light[0]
+
+
+def field_light(area: Tensor, angle_rad: Tensor, heights_mm: Tensor, growth_mm: Tensor) -> Tensor:
+    """Give the light of a uniform scene, in equal units, where fields land.
+
+    A distant scene of radiance L sends L * A cos(angle) dOmega through a beam of area A in the
+    entrance plane; dOmega falls on h dh dphi of the sensor. So
+    E(h) ~ A(angle) cos(angle) sin(angle) d(angle) / (h dh): vignetting, pupil aberration and
+    distortion included; for A constant and h = f tan(angle) it is the cos^4 law.
+
+    Args:
+        area: Of the beams in the entrance plane.
+        angle_rad: Field angles > 0.
+        heights_mm: Where their chief rays land.
+        growth_mm: How much the heights grow over 2 `ANGLE_STEP_RAD`.
+    """
+    light = area * torch.cos(angle_rad) * torch.sin(angle_rad)
+    return light * (2 * ANGLE_STEP_RAD) / (heights_mm * growth_mm)

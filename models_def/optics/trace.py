@@ -5,29 +5,31 @@ as their first dimension; the rest broadcasts against the rays, so that waveleng
 whole lenses are traced together.
 """
 
+import functools
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Final
+from typing import Self
 
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.glass import find_glass, refractive_index
+from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.optics.prescription import Lens
-
-NEWTON_STEPS: Final = 4
-NEWTON_TOLERANCE_MM: Final = 1e-7
-_MIN_COSINE: Final = 1e-6
+from camkit.models_def.optics.tracing import kernel
+from camkit.models_def.optics.tracing.compilation import compiled_engine
+from camkit.models_def.optics.tracing.gradient import Eager, trace_tensors
+from camkit.models_def.optics.tracing.kernel import LensTensors, Plan, State
+from camkit.models_def.optics.tracing.profile import TINY, profile
 
 
 class Fate(IntEnum):
     """What became of a ray; the first failure is kept."""
 
     VALID = 0
-    MISSED = 1
-    TOTAL_REFLECTION = 2
-    VIGNETTED = 3
-    NOT_CONVERGED = 4
+    MISSED = kernel.MISSED
+    TOTAL_REFLECTION = kernel.TOTAL_REFLECTION
+    VIGNETTED = kernel.VIGNETTED
+    NOT_CONVERGED = kernel.NOT_CONVERGED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +54,18 @@ class SurfaceTensors:
     index: Tensor
     aspheric: tuple[bool, ...]
 
+    def to(self, target: torch.dtype | torch.device) -> Self:
+        """Give the same lens in another type or on another device."""
+        return replace(
+            self,
+            curvature_per_mm=self.curvature_per_mm.to(target),
+            conic=self.conic.to(target),
+            even_asphere=self.even_asphere.to(target),
+            thickness_mm=self.thickness_mm.to(target),
+            semi_diameter_mm=self.semi_diameter_mm.to(target),
+            index=self.index.to(target),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rays:
@@ -62,6 +76,7 @@ class Rays:
         l, m, n: Direction cosines, n > 0.
         fate: int8, see `Fate`. A ray that is not valid rests on the axis with finite values and
             zero gradients.
+        path_mm: Optical path, if asked for; of lost rays it means nothing.
     """
 
     x: Tensor
@@ -71,6 +86,7 @@ class Rays:
     m: Tensor
     n: Tensor
     fate: Tensor
+    path_mm: Tensor | None = None
 
     @property
     def valid(self) -> Tensor:
@@ -89,7 +105,7 @@ def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
     terms = max(len(s.even_asphere) for s in surfaces)
     padded = [[*s.even_asphere, *[0.0] * (terms - len(s.even_asphere))] for s in surfaces]
     waves = wavelengths_um.to(torch.float64)
-    glass = [refractive_index(find_glass(s.glass), waves) + s.index_offset for s in surfaces]
+    glass = [refractive_index(s.medium, waves) + s.index_offset for s in surfaces]
 
     def column(values: list[float]) -> Tensor:
         return torch.tensor(values, dtype=torch.float64)
@@ -105,34 +121,33 @@ def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
     )
 
 
+def count_fates(fate: Tensor) -> dict[Fate, int]:
+    """Count the rays of each fate; every fate has an entry."""
+    counts = torch.bincount(fate.flatten().to(torch.int64), minlength=len(Fate)).tolist()
+    return {kind: int(counts[kind]) for kind in Fate}
+
+
 def sag(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
     """Give the height h(rho) of a surface, rho = r^2 in mm^2 (eq. 2.2, plus an r^2 term).
 
     Where (1 + conic) c^2 rho > 1 there is no surface: the value is finite but meaningless.
     """
-    root = _safe_root(1 - (1 + conic) * curvature**2 * rho)
-    return curvature * rho / (1 + root) + rho * _polynomial(even_asphere, rho)
+    return _profile(curvature, conic, even_asphere, rho)[0]
 
 
 def sag_slope(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
     """Give dh/d rho (eq. 2.3, in the form c / (2 s), s the root, plus the polynomial)."""
-    root = _safe_root(1 - (1 + conic) * curvature**2 * rho)
-    orders = range(1, even_asphere.shape[0] + 1)
-    scaled = [even_asphere[i - 1] * i for i in orders]
-    polynomial = _polynomial(torch.stack(scaled), rho) if scaled else torch.zeros_like(rho)
-    return curvature / (2 * root) + polynomial
+    return _profile(curvature, conic, even_asphere, rho)[1] / 2
 
 
-def _safe_root(square: Tensor) -> Tensor:
-    positive = square > 1e-12
-    return torch.sqrt(torch.where(positive, square, 1.0))
-
-
-def _polynomial(coefficients: Tensor, rho: Tensor) -> Tensor:
-    total = torch.zeros_like(rho)
-    for a in reversed(coefficients.unbind(0)):
-        total = total * rho + a
-    return total
+def _profile(
+    curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor
+) -> tuple[Tensor, Tensor]:
+    square = 1 - (1 + conic) * curvature**2 * rho
+    root = torch.sqrt(torch.where(square > TINY, square, 1.0))
+    terms = even_asphere.unbind(0)
+    slopes = [a * (2 * j) for j, a in enumerate(terms, start=1)]
+    return profile(curvature, root, terms, slopes, rho)
 
 
 def trace(
@@ -141,140 +156,71 @@ def trace(
     *,
     surfaces: range | None = None,
     seen: list[Rays] | None = None,
+    path: bool = False,
+    compiled: bool = False,
 ) -> Rays:
     """Trace rays to the plane after the last surface (the sensor, if all are traced).
+
+    The computation is done in the widest type of its inputs, in blocks; the gradient is exact
+    and needs 24 (float32) or 48 bytes per ray and surface, or as much per ray for large bundles
+    (see `tracing.gradient`). Second derivatives and forward mode are not available.
 
     Args:
         tensors: The lens.
         rays: At the vertex plane of the first surface to be traced (any z is taken along).
         surfaces: Which surfaces, in order; all by default.
         seen: Receives the rays on each surface, after refraction, relative to its vertex.
+        path: Whether `path_mm` of the result is the optical path: that of the given rays (or 0)
+            plus the sum of index times way up to the final plane.
+        compiled: Fuse the lens into one loop by `torch.compile`: worth its minute of compilation
+            for many rays. Without a C++ compiler, or with `seen`, this is the plain trace.
 
     Returns:
         Rays on the plane that lies the last thickness after the last surface (z = 0 there).
     """
-    for i in surfaces if surfaces is not None else range(len(tensors.aspheric)):
-        rays = refract(tensors, rays, i)
-        if seen is not None:
-            seen.append(rays)
-        rays = _to_plane(rays, tensors.thickness_mm[i])
-    return rays
+    chosen = surfaces if surfaces is not None else range(len(tensors.aspheric))
+    if not chosen:
+        return rays
+    result = _trace(tensors, rays, chosen, seen=seen, path=path, compiled=compiled)
+    return replace(result, z=torch.zeros_like(result.z))
 
 
 def refract(tensors: SurfaceTensors, rays: Rays, i: int) -> Rays:
-    """Carry rays onto surface i, judge them, and bend them (Snell)."""
-    hit, alive = _intersect(tensors, rays, i)
-    outside = hit.x**2 + hit.y**2 > tensors.semi_diameter_mm[i] ** 2
-    fate = _first(rays.fate, alive)
-    fate = _first(fate, torch.where(outside, int(Fate.VIGNETTED), 0))
-    normal = _normal(tensors, hit, i)
-    cosine = hit.l * normal[0] + hit.m * normal[1] + hit.n * normal[2]
-    fate = _first(fate, torch.where(cosine <= _MIN_COSINE, int(Fate.MISSED), 0))
-    ratio = tensors.index[i] / tensors.index[i + 1]
-    square = 1 - ratio**2 * (1 - cosine**2)
-    fate = _first(fate, torch.where(square <= 1e-12, int(Fate.TOTAL_REFLECTION), 0))
-    bend = _safe_root(square) - ratio * cosine
-    n = ratio * hit.n + bend * normal[2]
-    fate = _first(fate, torch.where(n <= _MIN_COSINE, int(Fate.MISSED), 0))
-    bent = replace(
-        hit, l=ratio * hit.l + bend * normal[0], m=ratio * hit.m + bend * normal[1], n=n, fate=fate
+    """Carry rays onto surface i, judge them, and bend them (Snell); they stay on it."""
+    seen: list[Rays] = []
+    _trace(tensors, rays, range(i, i + 1), seen=seen)
+    return seen[0]
+
+
+def _trace(
+    tensors: SurfaceTensors,
+    rays: Rays,
+    surfaces: range,
+    *,
+    seen: list[Rays] | None = None,
+    path: bool = False,
+    compiled: bool = False,
+) -> Rays:
+    first, end = surfaces.start, surfaces.stop
+    plan = Plan(aspheric=tensors.aspheric[first:end], path=path)
+    lens = LensTensors(
+        tensors.curvature_per_mm[first:end],
+        tensors.conic[first:end],
+        tensors.even_asphere[first:end],
+        tensors.thickness_mm[first:end],
+        tensors.semi_diameter_mm[first:end],
+        tensors.index[first : end + 1],
     )
-    return _rest_invalid(bent)
-
-
-def _first(fate: Tensor, new: Tensor) -> Tensor:
-    return torch.where(fate == Fate.VALID, new.to(torch.int8), fate)
-
-
-def _rest_invalid(rays: Rays) -> Rays:
-    ok = rays.valid
-    return Rays(
-        x=torch.where(ok, rays.x, 0.0),
-        y=torch.where(ok, rays.y, 0.0),
-        z=torch.where(ok, rays.z, 0.0),
-        l=torch.where(ok, rays.l, 0.0),
-        m=torch.where(ok, rays.m, 0.0),
-        n=torch.where(ok, rays.n, 1.0),
-        fate=rays.fate,
-    )
-
-
-def _to_plane(rays: Rays, distance_mm: Tensor) -> Rays:
-    way = (distance_mm - rays.z) / rays.n
-    return replace(
-        rays, x=rays.x + way * rays.l, y=rays.y + way * rays.m, z=torch.zeros_like(rays.z)
-    )
-
-
-def _intersect(tensors: SurfaceTensors, rays: Rays, i: int) -> tuple[Rays, Tensor]:
-    """Give the rays on surface i and a fate (0 or why there is no intersection)."""
-    at = _to_plane(rays, torch.zeros_like(rays.z))
-    c, k = tensors.curvature_per_mm[i], tensors.conic[i]
-    # |o + s d|^2 form of the conic: a s^2 - 2 b s + g = 0, the root next to the vertex
-    a = c * (1 + k * at.n**2)
-    b = at.n - c * (at.x * at.l + at.y * at.m)
-    g = c * (at.x**2 + at.y**2)
-    square = b**2 - a * g
-    root = _safe_root(square)
-    sum_ = b + root
-    usable = (square > 1e-12) & (sum_ > 1e-9)
-    way = torch.where(usable, g / torch.where(usable, sum_, 1.0), 0.0)
-    if tensors.aspheric[i]:
-        return _newton(tensors, at, way, i)
-    hit = _along(at, way)
-    usable = usable & (1 - (1 + k) * c * hit.z > 1e-9)
-    return hit, torch.where(usable, 0, int(Fate.MISSED))
-
-
-def _along(rays: Rays, way: Tensor) -> Rays:
-    x, y, z = rays.x + way * rays.l, rays.y + way * rays.m, rays.z + way * rays.n
-    return replace(rays, x=x, y=y, z=z)
-
-
-def _newton(tensors: SurfaceTensors, at: Rays, way: Tensor, i: int) -> tuple[Rays, Tensor]:
-    """Newton's method from the conic (eq. 6.6); the last step alone carries the gradient.
-
-    That step has a detached denominator: by the implicit function theorem its derivative with
-    respect to every parameter is exact at the root.
-    """
-    way = way.detach()
-    with torch.no_grad():
-        for _ in range(NEWTON_STEPS):
-            gap, slope = _gap(tensors, at, way, i)
-            way = way - gap / slope
-            way = torch.where(torch.isfinite(way), way, 0.0)
-    gap, slope = _gap(tensors, at, way, i)
-    way = way - gap / slope.detach()
-    hit = _along(at, way)
-    inside = _has_surface(tensors, hit, i)
-    converged = torch.abs(gap.detach()) < NEWTON_TOLERANCE_MM
-    fate = torch.where(converged, 0, int(Fate.NOT_CONVERGED))
-    return hit, torch.where(inside, fate, int(Fate.MISSED))
-
-
-def _has_surface(tensors: SurfaceTensors, hit: Rays, i: int) -> Tensor:
-    c, k = tensors.curvature_per_mm[i], tensors.conic[i]
-    return 1 - (1 + k) * c**2 * (hit.x**2 + hit.y**2) > 1e-12
-
-
-def _gap(tensors: SurfaceTensors, at: Rays, way: Tensor, i: int) -> tuple[Tensor, Tensor]:
-    c, k, a = tensors.curvature_per_mm[i], tensors.conic[i], tensors.even_asphere[i]
-    point = _along(at, way)
-    rho = point.x**2 + point.y**2
-    gap = sag(c, k, a, rho) - point.z
-    slope = 2 * sag_slope(c, k, a, rho) * (point.x * at.l + point.y * at.m) - at.n
-    away = torch.abs(slope) > 1e-6
-    return gap, torch.where(away, slope, -1.0)
-
-
-def _normal(tensors: SurfaceTensors, hit: Rays, i: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Give the unit normal towards +z."""
-    c, k = tensors.curvature_per_mm[i], tensors.conic[i]
-    if tensors.aspheric[i]:
-        slope = sag_slope(c, k, tensors.even_asphere[i], hit.x**2 + hit.y**2)
-        x, y, z = -2 * slope * hit.x, -2 * slope * hit.y, torch.ones_like(hit.z)
-    else:
-        x, y, z = -c * hit.x, -c * hit.y, 1 - (1 + k) * c * hit.z
-    square = x**2 + y**2 + z**2
-    length = torch.sqrt(torch.where(square > 1e-18, square, 1.0))
-    return x / length, y / length, z / length
+    state = State(rays.x, rays.y, rays.z, rays.l, rays.m, rays.n)
+    dtype = functools.reduce(torch.promote_types, (v.dtype for v in (*lens, *state)))
+    lens = LensTensors(*(v.to(dtype) for v in lens))
+    state = State(*(v.to(dtype) for v in state))
+    engine = compiled_engine() if compiled and seen is None else Eager()
+    result = trace_tensors(plan, engine, lens, state, rays.fate, with_seen=seen is not None)
+    if seen is not None:
+        states = zip(result.kept.seen, result.kept.fates, strict=True)
+        seen += [Rays(**on._asdict(), fate=fate) for on, fate in states]
+    length = result.path
+    if length is not None and rays.path_mm is not None:
+        length = length + rays.path_mm
+    return Rays(**result.end._asdict(), fate=result.kept.fate, path_mm=length)

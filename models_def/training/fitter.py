@@ -1,6 +1,6 @@
 """What changes during training: weights, their average, the optimiser; one step at a time."""
 
-from typing import Any
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor, nn
@@ -12,6 +12,38 @@ from camkit.models_def.training.recipe import NetworkRecipe
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
 
 State = dict[str, Tensor]
+
+
+class Fits(Protocol):
+    """What a run asks of a fitter."""
+
+    def fit(self, batch: Batch, step: int, progress: float) -> float:
+        """Make one step and give its loss."""
+        ...
+
+    def restore(self, planes: Tensor) -> Tensor:
+        """Run the averaged network on (1, 6, h, w) planes."""
+        ...
+
+    def weights(self) -> State:
+        """Give the weights being trained."""
+        ...
+
+    def average(self) -> State:
+        """Give the averaged weights."""
+        ...
+
+    def optimizer_state(self) -> dict[str, Any]:
+        """Give everything else that a step changes: tensors and plain numbers."""
+        ...
+
+    def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
+        """Go back to a saved state."""
+        ...
+
+    def notes(self) -> dict[str, float]:
+        """Give what else the log should hold since the last call."""
+        ...
 
 
 class Fitter:
@@ -39,21 +71,35 @@ class Fitter:
             step: Steps done before this one.
             progress: How much of the schedule lies behind, 0..1.
         """
+        output = self.run(batch.planes, progress)
+        target, weight = batch.target.to(self.device), batch.weight.to(self.device)
+        loss = training_loss(self.schedule.loss, patch_errors(output, target, weight))
+        self.descend(loss, step, progress)
+        return float(loss.detach())
+
+    def run(self, planes: Tensor, progress: float) -> Tensor:
+        """Run the network that is being trained; float32 on its device comes back."""
+        plan = self.schedule
+        half = plan.precision == "bfloat16" and progress < 1 - plan.float32_share
+        planes = planes.to(self.device, memory_format=torch.channels_last)
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=half):
+            output: Tensor = self.network(planes)
+        return output.float()
+
+    def descend(self, loss: Tensor, step: int, progress: float) -> None:
+        """Move the weights down a scalar loss of `run`, and their average after them."""
         plan = self.schedule
         for group in self._optimizer.param_groups:
             group["lr"] = learning_rate(plan, step, progress)
-        half = plan.precision == "bfloat16" and progress < 1 - plan.float32_share
-        planes = batch.planes.to(self.device, memory_format=torch.channels_last)
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=half):
-            output = self.network(planes)
-        target, weight = batch.target.to(self.device), batch.weight.to(self.device)
-        loss = training_loss(plan.loss, patch_errors(output.float(), target, weight))
         self._optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(self.network.parameters(), plan.gradient_clip)
         self._optimizer.step()
         update_average(self._average, self.network.parameters(), ema_decay(plan, step))
-        return float(loss.detach())
+
+    def notes(self) -> dict[str, float]:
+        """Give what else the log should hold; nothing."""
+        return {}
 
     def restore(self, planes: Tensor) -> Tensor:
         """Run the averaged network on (1, 6, h, w) planes; float32 on the CPU comes back."""

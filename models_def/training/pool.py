@@ -50,6 +50,17 @@ class Batch:
     weight: Tensor
 
 
+def cut_patch(
+    rng: np.random.Generator, planes: NDArray[np.float16], patch_px: int
+) -> NDArray[np.float16]:
+    """Cut a (9, p, p) patch from the (9, s, s) planes of a sample: random place, turn and flip."""
+    room = planes.shape[-1] - patch_px
+    y, x = (2 * int(v) for v in rng.integers(0, room // 2 + 1, 2))
+    patch = planes[:, y : y + patch_px, x : x + patch_px]
+    turned = np.rot90(patch, int(rng.integers(4)), axes=(1, 2))
+    return turned[:, :, ::-1] if rng.random() < 0.5 else turned
+
+
 class SampleMaker:
     """Makes sample i of a recipe; a worker process holds one."""
 
@@ -177,15 +188,11 @@ class SamplePool:
         low, end = self.span(step)
         self._ensure(low, end)
         rng = np.random.default_rng((self._seed, 1, step))
-        room = self._files.side_px - patch_px
         stack = np.empty((batch, PLANES, patch_px, patch_px), dtype=np.float32)
         weights = np.empty((batch, 3), dtype=np.float32)
         for k in range(batch):
             slot = int(rng.integers(low, end)) % self._files.size
-            y, x = (2 * int(v) for v in rng.integers(0, room // 2 + 1, 2))
-            patch = self._files.planes[slot, :, y : y + patch_px, x : x + patch_px]
-            turned = np.rot90(patch, int(rng.integers(4)), axes=(1, 2))
-            stack[k] = turned[:, :, ::-1] if rng.random() < 0.5 else turned
+            stack[k] = cut_patch(rng, self._files.planes[slot], patch_px)
             weights[k] = self._files.weights[slot]
         planes = torch.from_numpy(stack)
         return Batch(planes=planes[:, :6], target=planes[:, 6:], weight=torch.from_numpy(weights))

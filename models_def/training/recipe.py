@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, Final, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ValidationError
 
@@ -23,6 +23,11 @@ PRECISIONS = ("float32", "bfloat16")
 
 T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)
+
+
+def _check_share(where: str, value: float) -> None:
+    if not 0 <= value <= 1:
+        raise ContractError(f"{where} must lie in 0..1; got {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,6 +175,52 @@ class NetworkRecipe:
     schedule: ScheduleRecipe = field(default_factory=ScheduleRecipe)
 
 
+FINAL_SCHEDULE: Final = ScheduleRecipe(
+    steps=20_000, batch=4, patch_px=256, learning_rate=1e-4, final_rate=0.0, precision="float32"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FinalRecipe:
+    """The final stage: a trained network against two discriminators (Sun 2021, section 6.2.2).
+
+    Attributes:
+        schedule: Of this stage.
+        perceptual_weight: nu1 of eq. (6.12), on the features.
+        pixel_weight: nu2, on the pixels. The thesis prints 0.5 and 0.006 for the two; these
+            defaults are the order of the source it cites (Kupyn et al. 2019).
+        global_weight: sigma_g of eq. (6.14), on the global discriminator.
+        local_weight: sigma_l, on the local one.
+        global_layers: Strided layers of the global discriminator.
+        local_layers: Of the local one.
+        discriminator_width: Channels of their first layer.
+        discriminator_rate: Learning rate of both, with the decay of the schedule.
+        pair_share: Share of a batch drawn from real pairs, where there are any.
+        pair_samples: Samples cut from each real pair.
+    """
+
+    schedule: ScheduleRecipe = FINAL_SCHEDULE
+    perceptual_weight: float = 0.006
+    pixel_weight: float = 0.5
+    global_weight: float = 0.01
+    local_weight: float = 0.01
+    global_layers: int = 5
+    local_layers: int = 3
+    discriminator_width: int = 64
+    discriminator_rate: float = 1e-4
+    pair_share: float = 0.5
+    pair_samples: int = 32
+
+    def __post_init__(self) -> None:
+        weights = self.perceptual_weight, self.pixel_weight, self.global_weight, self.local_weight
+        if min(weights) < 0 or self.pixel_weight + self.perceptual_weight == 0:
+            raise ContractError("final needs weights >= 0, and one of perceptual and pixel > 0")
+        counts = self.global_layers, self.local_layers, self.discriminator_width, self.pair_samples
+        if min(counts) < 1 or self.discriminator_rate <= 0:
+            raise ContractError("final needs layers, width, pair_samples, discriminator_rate > 0")
+        _check_share("final.pair_share", self.pair_share)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
     """A camera and how its networks are trained.
@@ -189,6 +240,7 @@ class Recipe:
     lens: LensRecipe
     data: DataRecipe
     networks: Mapping[str, NetworkRecipe]
+    final: FinalRecipe = field(default_factory=FinalRecipe)
 
     def network(self, size: str) -> NetworkRecipe:
         """Give the network of a size, or raise ContractError naming the sizes there are."""
@@ -217,7 +269,7 @@ def read_recipe(path: Path) -> Recipe:
 def to_recipe(table: Mapping[str, Any]) -> Recipe:
     """Turn a parsed TOML table into a recipe; raises ContractError as `read_recipe` does."""
     known = {"name", "object_distance_mm", "scale", "camera", "wiener", "lens"}
-    _check_keys("recipe", table, known | {"data", "schedule", "networks"})
+    _check_keys("recipe", table, known | {"data", "schedule", "networks", "final"})
     schedule = _section("schedule", ScheduleRecipe, table.get("schedule", {}))
     networks = table.get("networks")
     if not isinstance(networks, Mapping) or not networks:
@@ -231,6 +283,7 @@ def to_recipe(table: Mapping[str, Any]) -> Recipe:
         lens=_section("lens", LensRecipe, table.get("lens", {})),
         data=_section("data", DataRecipe, table.get("data", {})),
         networks={size: _network(size, entry, schedule) for size, entry in networks.items()},
+        final=_final(table.get("final", {})),
     )
 
 
@@ -243,6 +296,14 @@ def _network(size: str, entry: Mapping[str, Any], schedule: ScheduleRecipe) -> N
         config=dict(entry.get("config", {})),
         schedule=_section(f"{where}.schedule", ScheduleRecipe, changed),
     )
+
+
+def _final(table: Any) -> FinalRecipe:
+    if not isinstance(table, Mapping):
+        raise ContractError(f"final must be a table; got {table!r}")
+    changed = asdict(FINAL_SCHEDULE) | dict(table.get("schedule", {}))
+    schedule = _section("final.schedule", ScheduleRecipe, changed)
+    return _section("final", FinalRecipe, {**table, "schedule": schedule})
 
 
 def differing_camera(one: Recipe, other: Recipe) -> str | None:
@@ -300,11 +361,6 @@ def _check_keys(where: str, table: Mapping[str, Any], known: set[str]) -> None:
         raise ContractError(
             f"{where}: unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}"
         )
-
-
-def _check_share(where: str, value: float) -> None:
-    if not 0 <= value <= 1:
-        raise ContractError(f"{where} must lie in 0..1; got {value}")
 
 
 def _typed(where: str, value: Any, kind: type[T]) -> T:

@@ -82,6 +82,23 @@ class Sample:
     illumination: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circumstances:
+    """What the front end knows of a sample.
+
+    Attributes:
+        noise: After white balance.
+        gains: White balance (R, G, B).
+        frozen: (1, 3, kh, kw) kernels of the block that the place belongs to.
+        illumination: Relative illumination of the place.
+    """
+
+    noise: NoiseModel
+    gains: tuple[float, float, float]
+    frozen: Tensor
+    illumination: float
+
+
 def scene_side_px(recipe: Recipe, bank: PsfBank) -> int:
     """Give the side of the sharp crop that a sample needs."""
     return recipe.data.sample_px + 2 * (recipe.data.margin_px + bank.radius_px)
@@ -163,23 +180,48 @@ def make_sample(
     blurred = _blur(sharp, kernels, bank.radius_px) * illumination
     capture, saturated = _expose(blurred, gains, recipe, exposure.iso, rng)
     noise = camera.noise_at(exposure.iso).with_gains(gains)
-    shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     planes, unknown = _develop(capture, saturated, gains, recipe, exposure.borders)
-    frozen = bank.frozen_kernels(exposure.block_x_mm, exposure.block_y_mm)
-    restored = wiener_restore(planes, frozen, shot, read, recipe.wiener, unknown)
+    return finish_sample(
+        planes,
+        unknown,
+        _cut(sharp, data.sample_px) * illumination,
+        Circumstances(
+            noise=noise,
+            gains=gains,
+            frozen=bank.frozen_kernels(exposure.block_x_mm, exposure.block_y_mm),
+            illumination=illumination,
+        ),
+        recipe,
+    )
+
+
+def finish_sample(
+    planes: Tensor, unknown: Tensor, true: Tensor, given: Circumstances, recipe: Recipe
+) -> Sample:
+    """Filter and stabilise developed planes, as the runtime does.
+
+    Args:
+        planes: (1, 3, S, S) linear, white balanced, with surroundings of `margin_px`.
+        unknown: (1, 1, S, S) bool, where the sensor clipped.
+        true: (1, 3, s, s) sharp light of the middle, illumination contained.
+        given: Noise, gains, kernels and light.
+        recipe: Camera and sample sizes.
+    """
+    data, noise = recipe.data, given.noise
+    shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
+    restored = wiener_restore(planes, given.frozen, shot, read, recipe.wiener, unknown)
     stable = [
         stabilise(_cut(x, data.sample_px), shot, read, scale=recipe.scale)
         for x in (planes, restored)
     ]
-    true = _cut(sharp, data.sample_px) * illumination
     target = stabilise(true.clamp(max=data.target_max), shot, read, scale=recipe.scale)
-    lost = _lost(true, _cut(unknown, data.sample_px), gains)
+    lost = _lost(true, _cut(unknown, data.sample_px), given.gains)
     return Sample(
         planes=torch.cat(stable, dim=1)[0],
         target=torch.where(lost, torch.tensor(NOT_JUDGED), target)[0],
         weight=recipe.scale * shot.sqrt(),
         noise=noise,
-        illumination=illumination,
+        illumination=given.illumination,
     )
 
 

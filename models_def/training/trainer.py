@@ -5,7 +5,8 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
 """
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,13 +15,13 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from camkit.models_def.training.credits import describe_data
-from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.fitter import Fits, Fitter
 from camkit.models_def.training.lens_bank import build_lens_bank
 from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.progress import TrainingBar
 from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.recipe import Recipe, read_recipe
+from camkit.models_def.training.recipe import NetworkRecipe, Recipe, ScheduleRecipe, read_recipe
 from camkit.models_def.training.schedule import progress_of
 from camkit.models_def.training.validation import (
     Case,
@@ -106,7 +107,30 @@ class TrainResult:
     valid_db: float
 
 
-def train(recipe_path: Path, options: TrainOptions, *, bank: PsfBank | None = None) -> TrainResult:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """A later stage of training, with its own files, schedule and fitter.
+
+    Attributes:
+        name: Behind the size in the names of its files.
+        schedule: Used instead of the network's.
+        make_fitter: From the network's entry, with that schedule, and the kernels.
+        credit: What the stage adds to the training data, for the card.
+    """
+
+    name: str
+    schedule: ScheduleRecipe
+    make_fitter: Callable[[NetworkRecipe, PsfBank], Fits]
+    credit: str = ""
+
+
+def train(
+    recipe_path: Path,
+    options: TrainOptions,
+    *,
+    bank: PsfBank | None = None,
+    stage: Stage | None = None,
+) -> TrainResult:
     """Train one network of a recipe.
 
     Args:
@@ -114,6 +138,7 @@ def train(recipe_path: Path, options: TrainOptions, *, bank: PsfBank | None = No
         options: Where, how long and with what.
         bank: Kernels to train with; None traces the recipe's lens (about a minute, kept in
             `out_dir`).
+        stage: A later stage; None fits a new network to the recipe's loss.
 
     Raises:
         ContractError: If recipe, options or the checkpoint to resume do not fit.
@@ -130,7 +155,7 @@ def train(recipe_path: Path, options: TrainOptions, *, bank: PsfBank | None = No
     with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
         pool.start_workers(options.workers)
         cases = make_cases(recipe, bank, options.valid_folder)
-        run = _Run(recipe_path, bank.digest(), cases, options)
+        run = _Run(recipe_path, bank, cases, options, stage)
         run.loop(pool, bar)
         return run.result()
 
@@ -139,15 +164,26 @@ class _Run:
     """A run in time: the loop with its clock, log, validation and checkpoints."""
 
     def __init__(
-        self, recipe_path: Path, bank_digest: str, cases: list[Case], options: TrainOptions
+        self,
+        recipe_path: Path,
+        bank: PsfBank,
+        cases: list[Case],
+        options: TrainOptions,
+        stage: Stage | None,
     ) -> None:
-        self.options, self.cases, self.bank_digest = options, cases, bank_digest
+        self.options, self.cases, self.bank_digest = options, cases, bank.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
+        name, self.credit = f"{self.recipe.name}_{options.size}", ""
+        if stage is None:
+            self.fitter: Fits = Fitter(self.entry, options.device)
+        else:
+            name, self.credit = f"{name}_{stage.name}", stage.credit
+            self.entry = replace(self.entry, schedule=stage.schedule)
+            self.fitter = stage.make_fitter(self.entry, bank)
         self.steps = options.steps or self.entry.schedule.steps
-        self.path = options.out_dir / f"{self.recipe.name}_{options.size}.pt"
-        self.fitter = Fitter(self.entry, options.device)
+        self.path = options.out_dir / f"{name}.pt"
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
         if options.resume:
@@ -214,7 +250,7 @@ class _Run:
         bar.show(progress, self.step, loss, valid_db)
         clock = {"seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
         waited = {"waited_s": pool.waited_s, "progress": progress}
-        self.log.write({"step": self.step, "loss": loss} | clock | waited)
+        self.log.write({"step": self.step, "loss": loss} | self.fitter.notes() | clock | waited)
 
     def _validate(self, pool: SamplePool) -> None:
         self.valid = score(self.cases, self.recipe, self.fitter.restore)
@@ -237,7 +273,7 @@ class _Run:
             network=self.entry.network,
             config=dict(self.entry.config),
             bank_digest=self.bank_digest,
-            training_data=describe_data(self.recipe, self.options.data_folder),
+            training_data=describe_data(self.recipe, self.options.data_folder) + self.credit,
             step=self.step,
             elapsed_s=self.elapsed_s(),
             cpu_s=self.cpu_s(pool),

@@ -8,6 +8,7 @@ import torch
 from camkit.models_def.optics.paraxial import focal_lengths
 from camkit.models_def.optics.pupil import launch
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
+from tests.physics.printed_lenses import lens_tensors, rays_at
 
 EXACT_MM = 2e-13
 
@@ -93,3 +94,18 @@ def test_refraction_keeps_n_sine_of_a_ray_at_a_plane() -> None:
     zero = torch.zeros_like(slope)
     landed = trace(tensors, launch(zero, zero, slope, math.inf))
     assert torch.allclose(1.62 * landed.m, torch.sin(torch.atan(slope)), rtol=0, atol=1e-15)
+
+
+def test_aspheric_singlet_focuses_where_its_r2_term_says() -> None:
+    """R 20 with terms in r^2, r^4, r^6; the index follows from the published EFL without r^2."""
+    index = 1 + 20 / 25.484006
+    lens = lens_tensors(
+        [1 / 20, 0.0],
+        [7.0, 20.0],
+        [1, index, 1],
+        even_asphere=[[-2.248851e-4, -4.690412e-6, -6.404376e-8], [0.0, 0.0, 0.0]],
+    )
+    assert float(focal_lengths(lens)[0]) == pytest.approx(25.7153, abs=5e-5)
+    low = torch.tensor([0.01], dtype=torch.float64)
+    landed = trace(lens, rays_at(torch.zeros_like(low), low, 0.0))
+    assert float(-0.01 * landed.n / landed.m) == pytest.approx(25.7153229, abs=2e-6)

@@ -53,7 +53,10 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
 
     seen = []
 
-    def fake(recipe: Path, options: trainer.TrainOptions) -> trainer.TrainResult:
+    def fake(
+        recipe: Path, options: trainer.TrainOptions, *, stage: trainer.Stage | None
+    ) -> trainer.TrainResult:
+        assert stage is None
         seen.append((recipe, options))
         return trainer.TrainResult(
             checkpoint=options.out_dir / "x.pt",
@@ -182,3 +185,9 @@ def test_export_finds_what_lies_beside_the_checkpoint(
     assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
     assert parts.stress_psf is None
     assert parts.prescription.name == "duet.toml", "the lens that the recipe names"
+
+
+def test_files_of_the_final_stage_need_a_checkpoint_to_start_from(camkit_command) -> None:
+    outcome = camkit_command("train", RECIPE, "--vgg", "vgg19.pth")
+    assert outcome.code == ExitCode.USAGE
+    assert "say --final FROM.pt too" in outcome.err

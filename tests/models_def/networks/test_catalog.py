@@ -13,10 +13,11 @@ COSTS = {
     "lean_m": (285_824, 16.50, 16),
     "lean_l": (586_944, 34.49, 16),
     "trimmed_unet": (468_237, 98.85, 4),
+    "full_unet": (33_608_861, 236.70, 64),
 }
 
 
-def _kmac_per_px(network: nn.Module, side: int = 32) -> float:
+def _kmac_per_px(network: nn.Module, side: int = 64) -> float:
     macs = 0
 
     def count(layer: nn.Module, inputs: tuple[torch.Tensor], output: torch.Tensor) -> None:
@@ -43,7 +44,7 @@ def test_every_name_has_its_stated_cost() -> None:
 @pytest.mark.parametrize("name", NETWORK_NAMES)
 def test_three_channel_network_maps_a_picture_to_a_picture(name: str) -> None:
     network = build_network(name, in_channels=3)
-    assert network(torch.rand(1, 3, 32, 48)).shape == (1, 3, 32, 48)
+    assert network(torch.rand(1, 3, 64, 128)).shape == (1, 3, 64, 128)
 
 
 def test_lists_of_a_recipe_are_taken_for_tuples() -> None:
@@ -52,7 +53,9 @@ def test_lists_of_a_recipe_are_taken_for_tuples() -> None:
 
 
 def test_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(ContractError, match="lean_s, lean_m, lean_l, trimmed_unet; got 'unet'"):
+    with pytest.raises(
+        ContractError, match="lean_s, lean_m, lean_l, trimmed_unet, full_unet; got 'unet'"
+    ):
         build_network("unet")
 
 

@@ -12,6 +12,7 @@ from camkit.models_def.optics.prescription import (
     FabricationErrors,
     Lens,
     Surface,
+    degrees_text,
     format_prescription,
     parse_prescription,
     perturb,
@@ -105,6 +106,67 @@ def test_files_round_trip(tmp_path: Path) -> None:
 def test_wrong_prescription_is_refused(change: tuple[str, str], message: str) -> None:
     with pytest.raises(ContractError, match=message):
         parse_prescription(GOOD.replace(*change, 1))
+
+
+GLASS = """
+[[glass]]
+name = "Q1-mine"
+formula = "cauchy"
+coefficients = [1.6, 0.005]
+range_um = [0.4, 0.8]
+source = "my own"
+"""
+AGF = "NM FOO 2 0 1.6 50\nCD 1.4 0.01\nLD 0.3 2\n"
+
+
+def test_prescription_brings_its_own_glass_along() -> None:
+    text = GOOD.replace('"N-BK7-Schott"', '"Q1-mine"') + GLASS
+    lens = parse_prescription(text)
+    assert lens.surfaces[0].medium.coefficients == (1.6, 0.005)
+    assert parse_prescription(format_prescription(lens)) == lens
+    with pytest.raises(ContractError, match="Q1-mine"):
+        parse_prescription(text.split("[[glass]]")[0])
+
+
+def test_glass_catalogues_lie_beside_the_prescription(tmp_path: Path) -> None:
+    (tmp_path / "my.agf").write_text(AGF)
+    text = 'glass_catalogues = ["my.agf"]\n' + GOOD.replace('"N-BK7-Schott"', '"FOO"')
+    (tmp_path / "lens.toml").write_text(text)
+    lens = read_prescription(tmp_path / "lens.toml")
+    assert lens.surfaces[0].glass == "FOO-my"
+    # once written, the file needs no catalogue beside it
+    assert parse_prescription(format_prescription(lens)) == lens
+    with pytest.raises(ContractError, match="relative to a file"):
+        parse_prescription(text)
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        ('glass_catalogues = "my.agf"', "list of .agf files"),
+        ("glass = 3", r"write \[\[glass\]\] tables"),
+        ("glass = [{name = 'x'}]", "needs the keys"),
+    ],
+)
+def test_wrong_glass_keys_are_refused(extra: str, message: str) -> None:
+    with pytest.raises(ContractError, match=message):
+        parse_prescription(f"{extra}\n{GOOD}")
+
+
+def test_trade_name_becomes_the_strict_one() -> None:
+    assert Surface(curvature_per_mm=0, thickness_mm=1, glass="N-BK7").glass == "N-BK7-Schott"
+    assert parse_prescription(GOOD.replace("N-BK7-Schott", "N-BK7")) == parse_prescription(GOOD)
+
+
+def test_material_of_another_name_is_refused() -> None:
+    glass = Surface(curvature_per_mm=0, thickness_mm=1, glass="N-BK7").medium
+    with pytest.raises(ContractError, match="one name"):
+        Surface(curvature_per_mm=0, thickness_mm=1, glass="F2-Schott", material=glass)
+
+
+@given(degrees=st.floats(0, 89.9))
+def test_angles_are_written_so_that_they_come_back_to_the_last_bit(degrees: float) -> None:
+    assert math.radians(float(degrees_text(math.radians(degrees)))) == math.radians(degrees)
 
 
 def test_single_surface_table_is_refused() -> None:

@@ -1,13 +1,11 @@
 """The recipe of a lens search: what is free, within which ranges, from which seed (TOML)."""
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.glass import find_glass
+from camkit.models_def.optics.glass.catalogue import find_glass
+from camkit.models_def.toml_table import read_table, section
 
 Range = tuple[float, float]
 
@@ -23,6 +21,8 @@ class SurfaceRecipe:
 
     def __post_init__(self) -> None:
         find_glass(self.glass)
+        for bounds in (self.curvature_range_per_mm, self.thickness_range_mm, self.conic_range):
+            _check_range(bounds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +74,7 @@ class LensRecipe:
     def __post_init__(self) -> None:
         if len(self.surfaces) < 3 or self.surfaces[0].curvature_range_per_mm != (0.0, 0.0):
             raise ContractError("surface 0 of a lens recipe must be the stop, a plane")
+        _check_range(self.focus_range_mm)
         if not 1 <= self.kept <= self.starts:
             raise ContractError(f"kept must be 1..starts; got {self.kept} of {self.starts}")
 
@@ -82,55 +83,17 @@ def read_recipe(path: Path) -> LensRecipe:
     """Read a lens recipe.
 
     Raises:
-        ContractError: If it is not TOML or a key is unknown or missing.
+        ContractError: If it is not TOML or a key is unknown, missing or of a wrong type.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise ContractError(f"a lens recipe must be TOML; {error}") from error
-    surfaces = tuple(_surface(t) for t in table.pop("surface", []))
-    _check(table, {f.name for f in fields(LensRecipe)} - {"surfaces"}, "the recipe")
-    values: dict[str, Any] = {key: _value(key, value) for key, value in table.items()}
-    return LensRecipe(surfaces=surfaces, **values)
+    table = read_table(path, "lens recipe")
+    surfaces = table.pop("surface", [])
+    if not isinstance(surfaces, list):
+        raise ContractError("surfaces of a lens recipe must be written as [[surface]] tables")
+    made = [section(f"surface[{i}]", SurfaceRecipe, t) for i, t in enumerate(surfaces)]
+    # the tables are surfaces already: they pass the type check of their field as they are
+    return section("lens recipe", LensRecipe, {**table, "surfaces": made})
 
 
-def _value(key: str, value: Any) -> Any:
-    """Give a value in the type of its field; lists of numbers become tuples."""
-    wanted = LensRecipe.__annotations__[key]
-    if wanted in (str, int):
-        if not isinstance(value, wanted) or isinstance(value, bool):
-            raise ContractError(f"{key} must be {wanted.__name__}; got {value!r}")
-        return value
-    numbers = value if isinstance(value, list) else [value]
-    if any(isinstance(v, bool) or not isinstance(v, int | float) for v in numbers):
-        raise ContractError(f"{key} must be numbers; got {value!r}")
-    if wanted is float:
-        if isinstance(value, list):
-            raise ContractError(f"{key} must be one number; got {value!r}")
-        return float(value)
-    return tuple(float(v) for v in numbers)
-
-
-def _surface(table: Mapping[str, Any]) -> SurfaceRecipe:
-    table = {"conic_range": [0.0, 0.0], **table}
-    _check(table, {f.name for f in fields(SurfaceRecipe)}, "a surface of the recipe")
-    return SurfaceRecipe(
-        glass=str(table["glass"]),
-        curvature_range_per_mm=_range(table["curvature_range_per_mm"]),
-        thickness_range_mm=_range(table["thickness_range_mm"]),
-        conic_range=_range(table["conic_range"]),
-    )
-
-
-def _range(value: Any) -> Range:
-    if not isinstance(value, list) or len(value) != 2 or value[0] > value[1]:
-        raise ContractError(f"a range is [low, high]; got {value!r}")
-    return float(value[0]), float(value[1])
-
-
-def _check(table: Mapping[str, Any], known: set[str], where: str) -> None:
-    if set(table) != known:
-        raise ContractError(
-            f"{where}: unknown keys {sorted(set(table) - known)}, "
-            f"missing keys {sorted(known - set(table))}"
-        )
+def _check_range(bounds: Range) -> None:
+    if len(bounds) != 2 or bounds[0] > bounds[1]:
+        raise ContractError(f"a range is [low, high]; got {list(bounds)}")

@@ -1,0 +1,19 @@
+"""The commands of `camkit lens` joined."""
+
+import typer
+
+from camkit.cli.lens.convert import convert
+from camkit.cli.lens.optimize import optimize
+from camkit.cli.lens.show import show
+
+lens_app = typer.Typer(
+    name="lens", help="One lens: look at it, improve it, convert it.", no_args_is_help=True
+)
+lens_app.command()(show)
+lens_app.command()(optimize)
+lens_app.command()(convert)
+
+
+@lens_app.callback()
+def lens() -> None:
+    """One lens: look at it, improve it, convert it."""

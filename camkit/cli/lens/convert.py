@@ -1,0 +1,37 @@
+"""`camkit lens convert`: a lens file in the other format."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="IN")],
+    out: Annotated[Path, typer.Argument(help="The same lens (.toml or .zmx).", metavar="OUT")],
+    glass: GlassFiles = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Write a lens in the other format; what is left out is said on stderr (needs torch)."""
+    from camkit.cli.design_time import refuse_existing, require_torch
+
+    require_torch("camkit lens convert")
+    refuse_existing([out], overwrite=overwrite)
+    from camkit.models_def.optics.glass.agf import read_agf
+    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens, write_lens
+
+    catalogues = [read_agf(path) for path in glass or ()]
+    lens, notes = read_noted_lens(source, catalogues)
+    write_lens(lens, out)
+    for note in notes:
+        typer.echo(f"{source.name}: {note}", err=True)
+    if json_:
+        found = {"lens": lens.name, "surfaces": len(lens.surfaces), "out": str(out)}
+        typer.echo(json.dumps({**found, "notes": list(notes)}))
+    else:
+        typer.echo(f"{out}: {lens.name}, {len(lens.surfaces)} surfaces")

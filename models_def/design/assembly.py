@@ -1,0 +1,131 @@
+"""A recipe turned into the parts of a loop."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+from camkit.errors import ContractError
+from camkit.models_def.design.loop import DesignParts
+from camkit.models_def.design.optics import LensModule
+from camkit.models_def.design.recipe import DesignRecipe, OpticsRecipe
+from camkit.models_def.design.sensor import Recorder
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.pupil import half_disc
+from camkit.models_def.optics.search.problem import Problem
+from camkit.models_def.optics.search.recovery import RecoveryMerit
+from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.training.pictures import open_source
+from camkit.units import to_radians
+
+PRESCRIPTIONS: Final = Path(__file__).resolve().parents[1] / "prescriptions"
+
+
+def find_lens(name: str, folder: Path | None = None) -> Lens:
+    """Give a built-in prescription by name, or read a lens file.
+
+    Args:
+        name: Name, or path relative to `folder`.
+        folder: Of the recipe.
+
+    Raises:
+        ContractError: If there is neither.
+    """
+    built_in = PRESCRIPTIONS / f"{name}.toml"
+    if built_in.is_file():
+        return read_lens(built_in)
+    path = (folder or Path()) / name
+    if not path.is_file():
+        known = ", ".join(sorted(p.stem for p in PRESCRIPTIONS.glob("*.toml")))
+        raise ContractError(f"no lens {name!r}: give a path, or one of {known}")
+    return read_lens(path)
+
+
+def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
+    """Give the fields, wavelengths and depths of a recipe, and what is free of a lens."""
+    optics = recipe.optics
+    if optics.object_distances_mm:
+        lens = replace(lens, object_distance_mm=optics.object_distances_mm[0])
+    if optics.f_number:
+        lens = replace(lens, aperture_kind="f_number", aperture_value=optics.f_number)
+    last = optics.solved_surface % len(lens.surfaces)
+    free = FreeLens(
+        lens=lens,
+        variables=recipe.variables,
+        solved=last if optics.efl_mm else None,
+        efl_mm=optics.efl_mm or None,
+        rides=optics.rides,
+    )
+    return Problem(
+        free=free,
+        slopes=field_slopes(optics),
+        wavelengths_um=torch.tensor(recipe.pixels.wavelengths_um, dtype=torch.float64),
+        object_distances_mm=optics.object_distances_mm,
+        samples=half_disc(optics.pupil_rays),
+        core_mm=recipe.pixels.pitch_um / 1000,
+        limits=recipe.limits,
+    )
+
+
+def field_slopes(optics: OpticsRecipe) -> Tensor:
+    """Give the fields (field,) as slopes, at equal steps of ideal image height."""
+    far = math.tan(to_radians(optics.half_field_deg))
+    return torch.linspace(0, far, optics.fields, dtype=torch.float64)
+
+
+def merit_of(recipe: DesignRecipe) -> RecoveryMerit:
+    """Give the pixels and colours of a recipe."""
+    weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
+    return RecoveryMerit(
+        pitch_um=recipe.pixels.pitch_um,
+        kernel_px=recipe.pixels.kernel_px,
+        color_weights=weights / weights.sum(1, keepdim=True),
+    )
+
+
+def network_of(recipe: DesignRecipe) -> nn.Module | None:
+    """Build the network of a recipe for the planes of its front; None without one."""
+    choice = recipe.network
+    if not choice.name:
+        return None
+    torch.manual_seed(recipe.schedule.seed)
+    network = build_network(choice.name, **choice.config)
+    wanted = recipe.front.channels
+    if network.in_channels != wanted:
+        raise ContractError(
+            f"network {choice.name} takes {network.in_channels} planes, the front "
+            f"{recipe.front.kind!r} gives {wanted}; set network.config.in_channels"
+        )
+    return network
+
+
+def parts_of(
+    recipe: DesignRecipe, *, folder: Path | None = None, pictures: Path | None = None
+) -> DesignParts:
+    """Give what a loop joins.
+
+    Args:
+        recipe: The design.
+        folder: Of the recipe, for relative paths.
+        pictures: Folder of sharp pictures; None for procedural scenes alone.
+    """
+    problem = problem_of(recipe, find_lens(recipe.prescription, folder))
+    lens = LensModule(problem, merit_of(recipe), problem.free.scaled(), whiten=recipe.optics.whiten)
+    return DesignParts(
+        lens=lens,
+        network=network_of(recipe),
+        front=recipe.front,
+        recorder=Recorder(noise=recipe.pixels.noise),
+        loss=recipe.loss,
+        source=open_source(
+            pictures,
+            picture_share=recipe.data.picture_share,
+            scenes=recipe.data.procedural_scenes,
+            scene_px=recipe.data.scene_px,
+        ),
+    )

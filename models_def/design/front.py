@@ -1,0 +1,65 @@
+"""What stands between sensor and network: nothing, or the Wiener filter of the present kernels."""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.design.sensor import encode
+from camkit.models_def.sensors.wiener import to_otf
+
+FrontKind = Literal["none", "wiener"]
+_MARGIN_PX: Final = 32
+_CORNER: Final = 1 / 512
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Front:
+    """The planes that a network sees, in sRGB tone.
+
+    Attributes:
+        kind: none: the capture (3 planes); wiener: the capture and its Wiener result (6).
+        signal_to_noise: Power of the signal at one cycle per pixel over that of the noise.
+        exponent: Of the fall of the signal's power.
+    """
+
+    kind: FrontKind = "none"
+    signal_to_noise: float = 0.3
+    exponent: float = 2.5
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("none", "wiener"):
+            raise ContractError(f"a front is none or wiener; got {self.kind!r}")
+        if not self.signal_to_noise > 0:
+            raise ContractError(f"signal_to_noise must be > 0; got {self.signal_to_noise}")
+
+    @property
+    def channels(self) -> int:
+        """Give how many planes there are."""
+        return 3 if self.kind == "none" else 6
+
+    @property
+    def margin_px(self) -> int:
+        """Give what is recorded around a patch and cut off again."""
+        return 0 if self.kind == "none" else _MARGIN_PX
+
+    def planes(self, recorded: Tensor, kernels: Tensor) -> Tensor:
+        """Give (b, channels, p, p) from (b, 3, p + 2 margin, ...) and kernels (b, 3, k, k)."""
+        if self.kind == "none":
+            return encode(recorded)
+        inner = slice(_MARGIN_PX, -_MARGIN_PX)
+        both = torch.cat([recorded, self._restore(recorded, kernels)], dim=1)
+        return encode(both[..., inner, inner])
+
+    def _restore(self, recorded: Tensor, kernels: Tensor) -> Tensor:
+        size = recorded.shape[-2], recorded.shape[-1]
+        fy = torch.fft.fftfreq(size[0])[:, None]
+        fx = torch.fft.rfftfreq(size[1])[None]
+        noise = (fy**2 + fx**2 + _CORNER**2) ** (self.exponent / 2) / self.signal_to_noise
+        otf = to_otf(kernels.to(recorded.dtype), size)
+        gain = otf.conj() / (otf.real.square() + otf.imag.square() + noise)
+        level = recorded.mean((-2, -1), keepdim=True)
+        restored: Tensor = torch.fft.irfft2(torch.fft.rfft2(recorded - level) * gain, s=size)
+        return restored + level

@@ -1,0 +1,302 @@
+"""The loop of a joint design: lens and network under one loss.
+
+A step draws sharp patches and fields, photographs them through the present lens at every depth,
+recovers them, and moves the free numbers of the lens and the weights of the network, each with a
+rate of its own. All draws follow from the seed and the number of the step, so that a resumed run
+ends in the same bits. The lens that was best on fixed patches is kept, with its network.
+
+Several machines share a step when the process group of torch.distributed is up (torchrun): each
+draws its own patches, gradients are averaged.
+"""
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from camkit.errors import ContractError
+from camkit.models_def.design.front import Front
+from camkit.models_def.design.loss import DesignLoss, design_loss
+from camkit.models_def.design.optics import LensModule
+from camkit.models_def.design.sensor import Recorder, capture, encode
+from camkit.models_def.training.pictures import SceneSource
+
+VALID_SEED: Final = 900_000
+_CLIP: Final = 1.0
+
+State = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignSchedule:
+    """How a design runs.
+
+    Attributes:
+        steps: In all.
+        batch: Patches a step.
+        patch_px: Side of a patch after blur and margins.
+        lens_rate: Learning rate of the lens; 0 trains the network alone.
+        network_rate: Of the network.
+        epoch_steps: Steps after which both rates are multiplied by `decay`.
+        decay: See there.
+        hold_steps: The lens stays for so many steps at first, until the network follows.
+        freeze_share: The lens stays for this last share of the steps.
+        penalty_weight: Of the limits of the lens.
+        valid_steps: Steps between validations.
+        valid_patches: Of a validation.
+        seed: Of weights and draws.
+    """
+
+    steps: int = 2000
+    batch: int = 8
+    patch_px: int = 128
+    lens_rate: float = 0.02
+    network_rate: float = 8e-4
+    epoch_steps: int = 200
+    decay: float = 0.8
+    hold_steps: int = 100
+    freeze_share: float = 0.25
+    penalty_weight: float = 10.0
+    valid_steps: int = 100
+    valid_patches: int = 24
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        counts = (self.steps, self.batch, self.patch_px, self.epoch_steps, self.valid_steps)
+        if min(*counts, self.valid_patches) < 1:
+            raise ContractError(f"counts of a design schedule must be >= 1; got {self}")
+        if not (0 <= self.freeze_share <= 1 and 0 < self.decay <= 1):
+            raise ContractError(f"freeze_share and decay must lie in 0..1; got {self}")
+        if min(self.lens_rate, self.network_rate) < 0:
+            raise ContractError(f"learning rates must be >= 0; got {self}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignParts:
+    """What a loop joins.
+
+    Attributes:
+        lens: With its free numbers.
+        network: Takes what `front` gives; None judges what the front gives last (Wiener alone,
+            or the capture).
+        front: Between sensor and network.
+        recorder: The pixels.
+        loss: What is minimised.
+        source: Of sharp patches.
+    """
+
+    lens: LensModule
+    network: nn.Module | None
+    front: Front
+    recorder: Recorder
+    loss: DesignLoss
+    source: SceneSource
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """Patches of a step: sharp (b, 3, s, s) linear, fields (b,), normal (depth, b, 3, c, c)."""
+
+    sharp: Tensor
+    fields: Tensor
+    normal: Tensor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """One validated moment.
+
+    Attributes:
+        step: Steps done.
+        seconds: Since the loop was made or resumed.
+        loss: Of the last step.
+        valid_db: Mean PSNR of sRGB values over fixed patches.
+        best_db: The best so far.
+    """
+
+    step: int
+    seconds: float
+    loss: float
+    valid_db: float
+    best_db: float
+
+
+class DesignLoop:
+    """Runs a joint design."""
+
+    def __init__(self, parts: DesignParts, schedule: DesignSchedule) -> None:
+        self.parts, self.schedule = parts, schedule
+        self.step = 0
+        self.best_db = -math.inf
+        self.best: State = {}
+        groups = [{"params": [parts.lens.moves], "lr": schedule.lens_rate}]
+        if parts.network is not None:
+            groups.append({"params": [*parts.network.parameters()], "lr": schedule.network_rate})
+        self._rates = [float(group["lr"]) for group in groups]  # type: ignore[arg-type]
+        self._optimizer = torch.optim.Adam(groups)
+        self._valid = [self._draw(VALID_SEED + i, 1) for i in range(schedule.valid_patches)]
+
+    def run(self, until: int | None = None) -> Iterator[Progress]:
+        """Go on to a step (the last by default), giving every validated moment."""
+        plan, begin = self.schedule, time.monotonic()
+        end = plan.steps if until is None else min(until, plan.steps)
+        while self.step < end:
+            loss = self._one_step()
+            if self.step % plan.valid_steps == 0 or self.step == end:
+                yield self.judge(loss, time.monotonic() - begin)
+
+    def _one_step(self) -> float:
+        plan, parts = self.schedule, self.parts
+        moving = self._lens_moves()
+        decay = plan.decay ** (self.step // plan.epoch_steps)
+        for group, rate in zip(self._optimizer.param_groups, self._rates, strict=True):
+            group["lr"] = rate * decay
+        self._optimizer.param_groups[0]["lr"] *= moving
+        batch = self._draw(_step_seed(plan.seed, self.step), plan.batch)
+        with torch.set_grad_enabled(True):
+            parts.lens.moves.requires_grad_(moving)
+            kernels, penalty = self._kernels(moving=moving)
+            pictures, sharp = self._pictures(batch, kernels)
+            loss = design_loss(parts.loss, pictures, sharp)
+            total = loss + plan.penalty_weight * penalty
+        self._optimizer.zero_grad(set_to_none=True)
+        if total.requires_grad:
+            total.backward()  # type: ignore[no-untyped-call]
+        self._share_gradients()
+        if parts.network is not None:
+            nn.utils.clip_grad_norm_(parts.network.parameters(), _CLIP)
+        self._optimizer.step()
+        self.step += 1
+        return float(loss.detach())
+
+    def _lens_moves(self) -> bool:
+        plan = self.schedule
+        last = plan.steps - round(plan.freeze_share * plan.steps)
+        return plan.lens_rate > 0 and plan.hold_steps <= self.step < last
+
+    def _kernels(self, *, moving: bool) -> tuple[Tensor, Tensor]:
+        with torch.set_grad_enabled(moving):
+            kernels, penalty = self.parts.lens()
+        return kernels.float(), penalty
+
+    def _pictures(self, batch: Batch, kernels: Tensor) -> tuple[Tensor, Tensor]:
+        """Give recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone."""
+        parts, plan = self.parts, self.schedule
+        made = []
+        for depth, of_depth in enumerate(kernels):
+            chosen = of_depth[batch.fields]
+            recorded = capture(batch.sharp, chosen, parts.recorder, batch.normal[depth])
+            planes = parts.front.planes(recorded, chosen)
+            made.append(planes[:, -3:] if parts.network is None else parts.network(planes))
+        edge = (batch.sharp.shape[-1] - plan.patch_px) // 2
+        sharp = batch.sharp[..., edge : edge + plan.patch_px, edge : edge + plan.patch_px]
+        return torch.stack(made), encode(sharp)
+
+    def _draw(self, seed: int, count: int) -> Batch:
+        parts, plan = self.parts, self.schedule
+        rng = np.random.default_rng(seed)
+        kernel_px, fields = parts.lens.merit.kernel_px, len(parts.lens.problem.slopes)
+        inner = plan.patch_px + 2 * parts.front.margin_px
+        side = inner + kernel_px - 1
+        crops = np.stack([parts.source.draw_crop(rng, side) for _ in range(count)])
+        depths = len(parts.lens.problem.object_distances_mm) or 1
+        normal = rng.standard_normal((depths, count, 3, inner, inner), dtype=np.float32)
+        return Batch(
+            sharp=torch.from_numpy(crops.clip(0, 1)),
+            fields=torch.from_numpy(
+                rng.permutation(np.arange(count) + rng.integers(fields)) % fields
+            ),
+            normal=torch.from_numpy(normal),
+        )
+
+    def judge(self, loss: float = math.nan, seconds: float = 0.0) -> Progress:
+        """Recover fixed patches with the present lens and network; the best are kept."""
+        with torch.no_grad():
+            kernels, _ = self._kernels(moving=False)
+            found = [self._psnr_db(batch, kernels) for batch in self._valid]
+        valid_db = float(np.mean(found))
+        if valid_db > self.best_db:
+            self.best_db, self.best = valid_db, self._weights()
+        return Progress(
+            step=self.step, seconds=seconds, loss=loss, valid_db=valid_db, best_db=self.best_db
+        )
+
+    def _psnr_db(self, batch: Batch, kernels: Tensor) -> float:
+        pictures, sharp = self._pictures(batch, kernels)
+        error = (pictures.clamp(0, 1) - sharp).square().mean((2, 3, 4)).clamp_min(1e-10)
+        return float((-10 * torch.log10(error)).mean())
+
+    def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
+        """Give kernels and, for some fixed patches, (count, 3, h, w) captures, recovered, sharp."""
+        with torch.no_grad():
+            kernels, _ = self._kernels(moving=False)
+            rows = []
+            for batch in self._valid[:count]:
+                pictures, sharp = self._pictures(batch, kernels)
+                chosen = kernels[0][batch.fields]
+                seen = capture(batch.sharp, chosen, self.parts.recorder, batch.normal[0])
+                edge = self.parts.front.margin_px
+                inner = slice(edge, seen.shape[-1] - edge)
+                rows.append((encode(seen[..., inner, inner])[0], pictures[0, 0], sharp[0]))
+        captures, recovered, sharp_ones = (
+            torch.stack(column) for column in zip(*rows, strict=True)
+        )
+        return kernels, (captures, recovered, sharp_ones)
+
+    def _share_gradients(self) -> None:
+        if not (torch.distributed.is_available() and torch.distributed.is_initialized()):
+            return
+        workers = torch.distributed.get_world_size()
+        for group in self._optimizer.param_groups:
+            for parameter in group["params"]:
+                if parameter.grad is not None:
+                    torch.distributed.all_reduce(parameter.grad)
+                    parameter.grad /= workers
+
+    def _weights(self) -> State:
+        network = self.parts.network
+        return {
+            "moves": self.parts.lens.moves.detach().clone(),
+            "network": {}
+            if network is None
+            else {name: value.detach().clone() for name, value in network.state_dict().items()},
+        }
+
+    def state(self) -> State:
+        """Give all that a resumed run needs: tensors and plain numbers."""
+        return {
+            "step": self.step,
+            "best_db": self.best_db,
+            "best": self.best,
+            "weights": self._weights(),
+            "optimizer": self._optimizer.state_dict(),
+        }
+
+    def load(self, state: State) -> None:
+        """Go back to a saved state."""
+        self.step, self.best_db, self.best = state["step"], state["best_db"], state["best"]
+        self._set(state["weights"])
+        self._optimizer.load_state_dict(state["optimizer"])
+
+    def take_best(self) -> None:
+        """Put the best lens and its network in place."""
+        if self.best:
+            self._set(self.best)
+
+    def _set(self, weights: State) -> None:
+        with torch.no_grad():
+            self.parts.lens.moves.copy_(weights["moves"])
+        if self.parts.network is not None:
+            self.parts.network.load_state_dict(weights["network"])
+
+
+def _step_seed(seed: int, step: int) -> int:
+    rank = 0
+    if torch.distributed.is_available() and torch.distributed.is_initialized():
+        rank = torch.distributed.get_rank()
+    return (seed * 1_000_003 + step) * 64 + rank

@@ -1,0 +1,196 @@
+"""A joint design as TOML: which lens, what of it is free, what it looks at, what recovers it."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.errors import ContractError
+from camkit.models_def.design.front import Front
+from camkit.models_def.design.loop import DesignSchedule
+from camkit.models_def.design.loss import DesignLoss
+from camkit.models_def.networks.catalog import NETWORK_NAMES
+from camkit.models_def.optics.search.limits import Limits
+from camkit.models_def.optics.search.variables import Variable
+from camkit.models_def.toml_table import check_keys, read_table, section, typed
+
+_KEYS: Final = {
+    *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
+    *("schedule", "data"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpticsRecipe:
+    """What the lens is looked at with.
+
+    Attributes:
+        half_field_deg: Field angle of the far end of the strip.
+        fields: How many fields from the axis, at equal steps of image height.
+        object_distances_mm: Depths, the first one focused on; empty for that of the lens.
+        efl_mm: Kept by the curvature of `solved_surface`; 0 keeps nothing.
+        solved_surface: See there.
+        rides: Whether the sensor rides on the paraxial image.
+        pupil_rays: In half the pupil.
+        whiten: Whether one unit of every move changes the spots alike.
+        f_number: Of the lens; 0 for that of the prescription.
+    """
+
+    half_field_deg: float
+    fields: int = 9
+    object_distances_mm: tuple[float, ...] = ()
+    efl_mm: float = 0.0
+    solved_surface: int = -1
+    rides: bool = True
+    pupil_rays: int = 512
+    whiten: bool = True
+    f_number: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.half_field_deg < 80 or self.fields < 2 or self.pupil_rays < 1:
+            raise ContractError(
+                "optics needs half_field_deg in 0..80, fields >= 2 and pupil_rays >= 1"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PixelRecipe:
+    """The sensor of a design.
+
+    Attributes:
+        pitch_um: Of the pixels.
+        kernel_px: Odd window of a PSF.
+        wavelengths_um: Increasing, an odd number.
+        color_weights: One row of weights for R, G and B, as many as wavelengths.
+        noise: Standard deviation, 1.0 = white level.
+    """
+
+    pitch_um: float
+    kernel_px: int = 65
+    wavelengths_um: tuple[float, ...] = (0.46, 0.54, 0.61)
+    color_weights: tuple[tuple[float, ...], ...] = (
+        (0.02, 0.13, 0.85),
+        (0.08, 0.84, 0.08),
+        (0.85, 0.14, 0.01),
+    )
+    noise: float = 0.01
+
+    def __post_init__(self) -> None:
+        rows = {len(row) for row in self.color_weights}
+        if len(self.color_weights) != 3 or rows != {len(self.wavelengths_um)}:
+            raise ContractError(
+                "color_weights must be three rows (R, G, B) of one weight per wavelength"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkChoice:
+    """Which network; the empty name stands for none.
+
+    Attributes:
+        name: In the catalogue.
+        config: What of its config differs from the defaults.
+    """
+
+    name: str = ""
+    config: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        if self.name and self.name not in NETWORK_NAMES:
+            raise ContractError(
+                f"network must be one of {', '.join(NETWORK_NAMES)}; got {self.name!r}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignData:
+    """Where sharp patches come from.
+
+    Attributes:
+        picture_share: Share of patches from pictures, where a folder is given.
+        procedural_scenes: How many different scenes.
+        scene_px: Their side.
+    """
+
+    picture_share: float = 0.8
+    procedural_scenes: int = 24
+    scene_px: int = 512
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignRecipe:
+    """A joint design.
+
+    Attributes:
+        name: Of the camera.
+        prescription: Name of a built-in prescription or path of a lens file.
+        variables: What of the lens is free.
+    """
+
+    name: str
+    prescription: str
+    variables: tuple[Variable, ...]
+    optics: OpticsRecipe
+    limits: Limits
+    pixels: PixelRecipe
+    front: Front
+    network: NetworkChoice
+    loss: DesignLoss
+    schedule: DesignSchedule
+    data: DesignData
+
+
+def read_design(path: Path) -> DesignRecipe:
+    """Read and check a design recipe.
+
+    Raises:
+        ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
+    """
+    return to_design(read_table(path, "design recipe"))
+
+
+def to_design(table: Mapping[str, Any]) -> DesignRecipe:
+    """Turn a parsed TOML table into a recipe; raises ContractError as `read_design` does."""
+    check_keys("design recipe", table, _KEYS)
+    for key in ("name", "prescription", "vary", "optics", "pixels"):
+        if key not in table:
+            raise ContractError(f"design recipe lacks {key}")
+    free = table["vary"]
+    if not isinstance(free, list):
+        raise ContractError("what varies must be written as [[vary]] tables")
+    network = {"config": {}, **dict(table.get("network", {}))}
+    return DesignRecipe(
+        name=typed("name", table["name"], str),
+        prescription=typed("prescription", table["prescription"], str),
+        variables=tuple(section(f"vary[{i}]", Variable, v) for i, v in enumerate(free)),
+        optics=section("optics", OpticsRecipe, table["optics"]),
+        limits=section("limits", Limits, table.get("limits", {})),
+        pixels=section("pixels", PixelRecipe, table["pixels"]),
+        front=section("front", Front, table.get("front", {})),
+        network=section("network", NetworkChoice, network),
+        loss=section("loss", DesignLoss, table.get("loss", {})),
+        schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
+        data=section("data", DesignData, table.get("data", {})),
+    )
+
+
+def with_choices(
+    recipe: DesignRecipe,
+    *,
+    steps: int | None = None,
+    lens_rate: float | None = None,
+    prescription: str | None = None,
+    seed: int | None = None,
+) -> DesignRecipe:
+    """Give the recipe with what a caller chose instead; None keeps what it says."""
+    changes = {"steps": steps, "lens_rate": lens_rate, "seed": seed}
+    chosen = {key: value for key, value in changes.items() if value is not None}
+    schedule = replace(recipe.schedule, **chosen)  # type: ignore[arg-type]
+    return replace(recipe, schedule=schedule, prescription=prescription or recipe.prescription)
+
+
+def recipe_digest(recipe: DesignRecipe) -> str:
+    """Give a hash of all that decides a run."""
+    return hashlib.sha256(json.dumps(asdict(recipe), sort_keys=True).encode()).hexdigest()

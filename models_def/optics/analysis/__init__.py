@@ -1,0 +1,14 @@
+"""What a lens does, in the numbers and curves of lens design.
+
+In the order in which data flows (every result states its pupil, see `camkit...optics.pupil`):
+
+- `sampling`: samplings of the pupil by name; which pupil an analysis uses
+- `first_order`: paraxial marginal and chief ray, invariant, ideal image height, Airy radius
+- `spots`: spot diagrams, their RMS and maximum, and how these converge with the sampling
+- `curves`: distortion, relative illumination, field curvature, axial and lateral colour
+- `seidel`: third-order and chromatic sums by surface
+- `wavefront`: optical path differences at the exit pupil
+- `wave_psf`: the diffraction PSF summed from them
+- `mtf`: contrast from rays or from a PSF, and its diffraction limit
+- `psf_model`: whether a lens needs waves, and the cheaper PSF that is right
+"""

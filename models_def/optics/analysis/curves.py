@@ -1,0 +1,154 @@
+"""Curves over the field and over the wavelength.
+
+Foci are measured from the sensor, positive away from the lens.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.analysis.first_order import ideal_heights
+from camkit.models_def.optics.analysis.spots import analysis_tensors, chief_landings, launch_beams
+from camkit.models_def.optics.paraxial import focal_lengths
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.pupil import (
+    PupilDefinition,
+    PupilSamples,
+    half_disc,
+)
+from camkit.models_def.optics.spot import ANGLE_STEP_RAD, field_light
+from camkit.models_def.optics.trace import Rays, trace
+
+_CLOSE: Final = 1e-4
+_NEAR_AXIS_RAD: Final = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldCurvature:
+    """Foci of close rays about the chief ray, from the sensor along the axis.
+
+    Attributes:
+        tangential_mm: (field, wavelength), of rays in the meridional plane (Y-focus); NaN if the
+            chief ray is lost, inf if they stay parallel.
+        sagittal_mm: (field, wavelength), of rays across it (X-focus).
+    """
+
+    tangential_mm: Tensor
+    sagittal_mm: Tensor
+
+
+def field_curvature(
+    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition = "stop"
+) -> FieldCurvature:
+    """Trace rays close to the chief ray and find where they cross it.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+        wavelengths_um: (wavelength,).
+        definition: Of the pupil; it says which ray is the chief ray.
+    """
+    near: PupilDefinition = "paraxial" if definition == "paraxial" else "chief"
+    zero = torch.zeros(1, dtype=torch.float64)
+    step = torch.full_like(zero, _CLOSE)
+    samples = PupilSamples(
+        x=torch.cat([zero, step, zero, zero]), y=torch.cat([zero, zero, step, -step])
+    )
+    beams = launch_beams(lens, slopes, wavelengths_um, samples, near, open_apertures=True)
+    landed = trace(beams.tensors, beams.rays)
+    alive = landed.valid.all(-1)
+    x, y = landed.x, landed.y
+    lean_x, lean_y = landed.l / landed.n, landed.m / landed.n
+    tangential = -(y[..., 2] - y[..., 3]) / (lean_y[..., 2] - lean_y[..., 3])
+    sagittal = -(x[..., 1] - x[..., 0]) / (lean_x[..., 1] - lean_x[..., 0])
+    return FieldCurvature(
+        tangential_mm=torch.where(alive, tangential, math.nan),
+        sagittal_mm=torch.where(alive, sagittal, math.nan),
+    )
+
+
+def distortion(
+    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
+) -> Tensor:
+    """Give chief height / ideal height - 1 (field, wavelength); 0 on the axis, NaN if lost.
+
+    The ideal height is the paraxial one of the reference wavelength where the sensor stands (see
+    `ideal_heights`), so lateral colour shows as a difference between wavelengths.
+    """
+    heights = chief_landings(lens, slopes, wavelengths_um, definition)
+    ideal = ideal_heights(lens, slopes)[:, None]
+    away = torch.abs(slopes[:, None]) > 0
+    share = heights / torch.where(away, ideal, 1.0) - 1
+    return torch.where(away | ~torch.isfinite(heights), share, 0.0)
+
+
+def lateral_colour_mm(
+    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
+) -> Tensor:
+    """Give how far (field, wavelength) chief rays land beyond that of the reference wavelength."""
+    reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    heights = chief_landings(lens, slopes, torch.cat([wavelengths_um, reference]), definition)
+    return heights[:, :-1] - heights[:, -1:]
+
+
+def axial_colour_mm(lens: Lens, wavelengths_um: Tensor) -> Tensor:
+    """Give the paraxial focus (wavelength,) beyond that of the reference wavelength."""
+    reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    foci = _paraxial_foci(lens, torch.cat([wavelengths_um, reference]))
+    return foci[:-1] - foci[-1]
+
+
+def _paraxial_foci(lens: Lens, wavelengths_um: Tensor) -> Tensor:
+    axis = torch.zeros(1, dtype=torch.float64)
+    if math.isinf(lens.object_distance_mm):
+        return focal_lengths(analysis_tensors(lens, wavelengths_um))[1]
+    found = field_curvature(lens, axis, wavelengths_um, "paraxial")
+    return found.sagittal_mm[0] + lens.surfaces[-1].thickness_mm
+
+
+def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor:
+    """Give where (wavelength, pupil) axial rays cross the axis, from the sensor; NaN if lost.
+
+    Args:
+        lens: The prescription.
+        pupil: (pupil,), heights in the paraxial entrance pupil, > 0..1.
+        wavelengths_um: (wavelength,).
+    """
+    axis = torch.zeros(1, dtype=torch.float64)
+    samples = PupilSamples(x=torch.zeros_like(pupil), y=pupil)
+    beams = launch_beams(lens, axis, wavelengths_um, samples, "paraxial")
+    landed = trace(beams.tensors, beams.rays)
+    return torch.where(landed.valid, _crossing(landed), math.nan)[0]
+
+
+def _crossing(rays: Rays) -> Tensor:
+    return -rays.y * rays.n / rays.m
+
+
+def relative_illumination_of(
+    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, rays: int = 1024
+) -> Tensor:
+    """Give the light (field, wavelength) of a uniform scene, 1 on the axis; NaN without chief ray.
+
+    The rule of `spot.field_light`, with every ray aimed at the stop whatever the pupil of the
+    spots: it is the stop that lets light through. Losses of coating and bulk are not counted.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+        wavelengths_um: (wavelength,).
+        rays: In half the stop.
+    """
+    angles = torch.cat([torch.zeros(1, dtype=torch.float64), torch.atan(slopes)])
+    angles = angles.clamp_min(_NEAR_AXIS_RAD)
+    beams = launch_beams(lens, torch.tan(angles), wavelengths_um, half_disc(rays), "stop")
+    area = torch.where(trace(beams.tensors, beams.rays).valid, beams.area_mm2, 0.0).sum(-1)
+    heights, ahead, behind = (
+        chief_landings(lens, torch.tan(angles + step), wavelengths_um, "stop")
+        for step in (0.0, ANGLE_STEP_RAD, -ANGLE_STEP_RAD)
+    )
+    light = field_light(area, angles[:, None], heights, ahead - behind)
+    return light[1:] / light[:1]

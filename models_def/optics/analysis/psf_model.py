@@ -1,0 +1,89 @@
+"""Which PSF a lens needs: rays where blur is wide against the Airy disc, waves where it is not."""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.analysis.first_order import airy_radius_mm
+from camkit.models_def.optics.analysis.sampling import Pupil
+from camkit.models_def.optics.analysis.spots import rms_about_centroid, spot_diagram
+from camkit.models_def.optics.analysis.wave_psf import trace_wave_psf
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.psf import TracedPsf, trace_psf
+from camkit.models_def.optics.spot import chief_heights
+from camkit.units import UM_PER_MM
+
+PsfKind = Literal["geometric", "wave"]
+
+WAVE_BELOW: Final = 5.0
+"""RMS blur over Airy radius below which diffraction shows in a PSF; see docs/lens.md."""
+_BLUR_SAMPLING: Final = "gauss:6x16"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PsfModel:
+    """Which model a lens needs, and why.
+
+    Attributes:
+        kind: The cheaper one that is right for every field and wavelength.
+        blur_mm: (field, wavelength), RMS radius of the geometric spot; NaN without rays.
+        airy_mm: (wavelength,), radius of the Airy disc on the axis.
+        reason: One sentence with the numbers that decide.
+    """
+
+    kind: PsfKind
+    blur_mm: Tensor
+    airy_mm: Tensor
+    reason: str
+
+
+def psf_model(lens: Lens, slopes: Tensor, wavelengths_um: Tensor) -> PsfModel:
+    """Say which PSF model a lens needs.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+        wavelengths_um: (wavelength,).
+    """
+    pupil = Pupil(definition="paraxial", sampling=_BLUR_SAMPLING)
+    blur = rms_about_centroid(spot_diagram(lens, slopes, wavelengths_um, pupil))
+    airy = torch.tensor([airy_radius_mm(lens, w) for w in wavelengths_um.tolist()])
+    ratio = torch.nan_to_num(blur / airy, nan=torch.inf)
+    least = int(ratio.argmin())
+    field, wave = divmod(least, len(wavelengths_um))
+    kind: PsfKind = "wave" if float(ratio.min()) < WAVE_BELOW else "geometric"
+    side = "less" if kind == "wave" else "no less"
+    reason = (
+        f"{kind}: the sharpest spot (field {field + 1}, {float(wavelengths_um[wave]):g} um) has an "
+        f"RMS radius of {float(blur[field, wave]) * UM_PER_MM:.2f} um, "
+        f"{float(ratio[field, wave]):.2g} times the Airy radius of "
+        f"{float(airy[wave]) * UM_PER_MM:.2f} um, {side} than {WAVE_BELOW:g} times"
+    )
+    if not bool(torch.isfinite(ratio).any()):
+        reason = "geometric: no ray arrives at any field, so there is nothing to compare"
+    return PsfModel(kind=kind, blur_mm=blur, airy_mm=airy, reason=reason)
+
+
+def lens_psf(
+    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, size_px: int, pitch_um: float
+) -> TracedPsf:
+    """Give the PSF of fields by the cheaper model that is right, every ray aimed at the stop.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+        wavelengths_um: (wavelength,).
+        size_px: Odd kernel side.
+        pitch_um: Sensor pitch.
+
+    Returns:
+        Kernels (field, wavelength, size, size) as `psf.trace_psf` gives them.
+
+    Raises:
+        ContractError: If a chief ray is lost, or no light falls into a kernel.
+    """
+    if psf_model(lens, slopes, wavelengths_um).kind == "wave":
+        return trace_wave_psf(lens, slopes, wavelengths_um, size_px, pitch_um)
+    return trace_psf(lens, chief_heights(lens, slopes), wavelengths_um, size_px, pitch_um)

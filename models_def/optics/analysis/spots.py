@@ -1,0 +1,177 @@
+"""Spot diagrams: where the rays of a field land, about its centroid and about its chief ray.
+
+Every ray counts by its share of the pupil's disc, not by the area of its beam, as the spot
+diagrams of other programs do.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.analysis.sampling import Pupil, sample_weights
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.pupil import (
+    PupilDefinition,
+    PupilSamples,
+    beam_radius_mm,
+    pupil_rays,
+    real_stop_radius_mm,
+    with_open_apertures,
+)
+from camkit.models_def.optics.spot import Spots, rms_radius
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, surface_tensors, trace
+
+_EDGE_SLACK: Final = 1e-7
+CONVERGENCE_SAMPLINGS: Final = (
+    *("hexapolar:3", "hexapolar:6", "hexapolar:12", "hexapolar:24"),
+    *("gauss:4x8", "gauss:8x16", "gauss:16x32"),
+)
+
+
+def field_slopes(lens: Lens) -> Tensor:
+    """Give tan of the field angles (field,) of the file."""
+    return torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
+
+
+def analysis_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
+    """Give the tensors of a lens, rims wide enough for rays that rounding put beyond them."""
+    tensors = surface_tensors(lens, wavelengths_um)
+    return replace(tensors, semi_diameter_mm=tensors.semi_diameter_mm * (1 + _EDGE_SLACK))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beams:
+    """Rays of fields and wavelengths at the first vertex plane.
+
+    Attributes:
+        tensors: The lens at the wavelengths, (..., wavelength, 1).
+        rays: (field, wavelength, rays).
+        area_mm2: (field, wavelength, rays), of their beams there; 0 if not aimed.
+    """
+
+    tensors: SurfaceTensors
+    rays: Rays
+    area_mm2: Tensor
+
+
+def launch_beams(
+    lens: Lens,
+    slopes: Tensor,
+    wavelengths_um: Tensor,
+    samples: PupilSamples,
+    definition: PupilDefinition,
+    *,
+    open_apertures: bool = False,
+) -> Beams:
+    """Start the rays of every field and wavelength.
+
+    Args:
+        lens: The prescription.
+        slopes: (field,), tan of the field angles.
+        wavelengths_um: (wavelength,).
+        samples: Of the unit disc, (rays,).
+        definition: Of the pupil; `stop` with the radius of the real marginal ray.
+        open_apertures: Let rays pass beyond the rims.
+    """
+    tensors = analysis_tensors(lens, wavelengths_um[:, None])
+    if open_apertures:
+        tensors = with_open_apertures(tensors)
+    stop_mm = real_stop_radius_mm(lens) if definition == "stop" else None
+    slope = slopes[:, None, None].expand(-1, len(wavelengths_um), 1)
+    rays, weight = pupil_rays(
+        lens, tensors, samples, slope, definition=definition, stop_radius_mm=stop_mm
+    )
+    radius = beam_radius_mm(lens) if stop_mm is None else stop_mm
+    share_mm2 = math.pi * radius**2 / len(samples.x)
+    return Beams(tensors=tensors, rays=rays, area_mm2=weight * share_mm2)
+
+
+def chief_landings(
+    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, definition: PupilDefinition
+) -> Tensor:
+    """Give the heights (field, wavelength) in mm of chief rays on the sensor; NaN if lost.
+
+    The chief ray passes the middle of the stop, or of the paraxial entrance pupil by that
+    definition. Rims do not stop it: it is a reference even where the beam is vignetted.
+    """
+    middle = PupilSamples(x=torch.zeros_like(slopes[:1]), y=torch.zeros_like(slopes[:1]))
+    # any radius does for the middle, so that of the stop need not be traced
+    aimed: PupilDefinition = "paraxial" if definition == "paraxial" else "chief"
+    beams = launch_beams(lens, slopes, wavelengths_um, middle, aimed, open_apertures=True)
+    landed = trace(beams.tensors, beams.rays)
+    return torch.where(landed.valid, landed.y, math.nan)[..., 0]
+
+
+def spot_diagram(lens: Lens, slopes: Tensor, wavelengths_um: Tensor, pupil: Pupil) -> Spots:
+    """Trace spots (field, wavelength, rays); lost rays have weight 0.
+
+    `chief_y_mm` is the chief ray of the reference wavelength by the pupil's definition.
+
+    Raises:
+        ContractError: If the stop has no real radius (definition `stop`).
+    """
+    beams = launch_beams(lens, slopes, wavelengths_um, pupil.samples, pupil.definition)
+    landed = trace(beams.tensors, beams.rays)
+    reference = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    return Spots(
+        x_mm=landed.x,
+        y_mm=landed.y,
+        weight=torch.where(landed.valid, sample_weights(pupil.samples), 0.0),
+        chief_y_mm=chief_landings(lens, slopes, reference, pupil.definition)[:, 0],
+        fate=landed.fate,
+    )
+
+
+def rms_about_centroid(spots: Spots) -> Tensor:
+    """Give the RMS radius (field, wavelength) in mm about the centroid; NaN without rays."""
+    return torch.where(spots.weight.sum(-1) > 0, rms_radius(spots), math.nan)
+
+
+def rms_about_chief(spots: Spots) -> Tensor:
+    """Give the RMS distance (field, wavelength) in mm from the chief ray; NaN without rays."""
+    square = (spots.weight * _from_chief(spots) ** 2).sum(-1) / spots.weight.sum(-1)
+    return torch.sqrt(square)
+
+
+def max_from_chief(spots: Spots) -> Tensor:
+    """Give the largest distance (field, wavelength) in mm from the chief ray; NaN without rays.
+
+    The chief ray is that of the reference wavelength.
+    """
+    alive = spots.weight > 0
+    largest = torch.where(alive, _from_chief(spots), -1.0).amax(-1)
+    return torch.where(alive.any(-1), largest, math.nan)
+
+
+def _from_chief(spots: Spots) -> Tensor:
+    return torch.hypot(spots.x_mm, spots.y_mm - spots.chief_y_mm[:, None, None])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Convergence:
+    """RMS radii of the reference wavelength about the centroid by sampling.
+
+    Attributes:
+        samplings: Names.
+        rays: How many each has.
+        rms_mm: (sampling, field); the last sampling is the finest.
+    """
+
+    samplings: tuple[str, ...]
+    rays: tuple[int, ...]
+    rms_mm: Tensor
+
+
+def spot_convergence(lens: Lens, slopes: Tensor, definition: PupilDefinition) -> Convergence:
+    """Trace the spots of the fields with coarse and fine samplings of the pupil."""
+    wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    pupils = [Pupil(definition=definition, sampling=name) for name in CONVERGENCE_SAMPLINGS]
+    rms = [rms_about_centroid(spot_diagram(lens, slopes, wave, pupil))[:, 0] for pupil in pupils]
+    return Convergence(
+        samplings=CONVERGENCE_SAMPLINGS,
+        rays=tuple(len(pupil.samples.x) for pupil in pupils),
+        rms_mm=torch.stack(rms),
+    )

@@ -1,0 +1,143 @@
+"""Where the sensor should lie: at the paraxial image, the smallest spots, the flattest wavefront.
+
+The last two are least squares with one solution, since rays are straight behind the lens: a point
+on a sensor moved by s is x + s l / n, and a path to a point on it grows linearly with s.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final, Literal, get_args
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.paraxial import paraxial_image
+from camkit.models_def.optics.prescription import Lens, with_focus_shift
+from camkit.models_def.optics.pupil import (
+    PupilDefinition,
+    PupilSamples,
+    half_disc,
+    pupil_rays,
+)
+from camkit.models_def.optics.trace import Rays, surface_tensors, trace
+
+FocusMerit = Literal["paraxial", "spot", "wavefront"]
+FOCUS_MERITS: Final[tuple[FocusMerit, ...]] = get_args(FocusMerit)
+_RAYS: Final = 256
+
+
+def focus_shift_mm(
+    lens: Lens,
+    merit: FocusMerit,
+    *,
+    field_weights: Sequence[float] | None = None,
+    wavelength_weights: Sequence[float] | None = None,
+    samples: PupilSamples | None = None,
+    definition: PupilDefinition = "stop",
+) -> float:
+    """Give how far the sensor should move away from the lens.
+
+    Args:
+        lens: The prescription; its fields, wavelengths and object distance count.
+        merit: `paraxial`: the paraxial image at the reference wavelength. `spot`: the least mean
+            square radius about the centroid of all wavelengths of a field. `wavefront`: the
+            least variance of the wavefront, tilt of each field and piston of each wavelength
+            removed.
+        field_weights: One per field; equal by default.
+        wavelength_weights: One per wavelength; equal by default.
+        samples: Of the pupil; 256 stratified points of its half by default.
+        definition: See `pupil`.
+
+    Raises:
+        ContractError: If the merit or the number of weights is wrong, or no ray arrives.
+    """
+    if merit not in FOCUS_MERITS:
+        raise ContractError(f"the merit must be one of {', '.join(FOCUS_MERITS)}; got {merit}")
+    if merit == "paraxial":
+        return paraxial_image(lens).distance_mm - lens.surfaces[-1].thickness_mm
+    chosen = half_disc(_RAYS) if samples is None else samples
+    slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
+    waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
+    with torch.no_grad():
+        tensors = surface_tensors(lens, waves[:, None])
+        slope = slopes[:, None, None].expand(-1, len(waves), 1)
+        rays, weight = pupil_rays(lens, tensors, chosen, slope, definition=definition)
+        rays = replace(rays, path_mm=launch_path_mm(rays, lens.object_distance_mm))
+        landed = trace(tensors, rays, path=True)
+        weight = torch.where(landed.valid, weight, 0.0)
+        weight = weight * _weights(field_weights, len(slopes), "field")[:, None, None]
+        weight = weight * _weights(wavelength_weights, len(waves), "wavelength")[:, None]
+        if not bool(weight.sum() > 0):
+            raise ContractError(f"no ray of {lens.name} reaches the sensor; it cannot be focused")
+        return _spot_shift(landed, weight) if merit == "spot" else _wave_shift(landed, weight)
+
+
+def with_focus(lens: Lens, merit: FocusMerit) -> Lens:
+    """Give the lens with its sensor at the best place; see `focus_shift_mm`."""
+    return with_focus_shift(lens, focus_shift_mm(lens, merit))
+
+
+def launch_path_mm(rays: Rays, object_distance_mm: float) -> Tensor:
+    """Give the path in air from the object point to launched rays, any constant left out.
+
+    Args:
+        rays: From `pupil.launch`.
+        object_distance_mm: Of the object plane; inf for a plane wave, whose path counts from the
+            wavefront through the first vertex.
+    """
+    if math.isinf(object_distance_mm):
+        return rays.x * rays.l + rays.y * rays.m + rays.z * rays.n
+    return (rays.z + object_distance_mm) / rays.n
+
+
+def _weights(given: Sequence[float] | None, count: int, what: str) -> Tensor:
+    if given is None:
+        return torch.ones(count, dtype=torch.float64)
+    if len(given) != count or not all(w >= 0 for w in given):
+        raise ContractError(f"expected {count} {what} weights >= 0; got {list(given)}")
+    return torch.tensor(given, dtype=torch.float64)
+
+
+def _spot_shift(landed: Rays, weight: Tensor) -> float:
+    """Minimise sum w |p - mean p + s (t - mean t)|^2, p the landing points, t their slopes.
+
+    The pupil's half x < 0 mirrors the other, so means of x are 0 in it: x needs no mean.
+    """
+    total = weight.sum((1, 2), keepdim=True).clamp_min(1e-300)
+
+    def centred(value: Tensor) -> Tensor:
+        return value - (weight * value).sum((1, 2), keepdim=True) / total
+
+    ty = centred(landed.m / landed.n)
+    tx, y = landed.l / landed.n, centred(landed.y)
+    both = (weight * (landed.x * tx + y * ty)).sum()
+    return float(-both / (weight * (tx**2 + ty**2)).sum())
+
+
+def _wave_shift(landed: Rays, weight: Tensor) -> float:
+    """Minimise sum w (W + s dW/ds + tilt)^2 with the piston of each beam removed.
+
+    W is the path to the foot of the perpendicular from the reference point of the field, exact to
+    second order in the distance by which a ray misses it.
+    """
+    path = landed.path_mm
+    if path is None:
+        raise ContractError("rays must carry their optical path; trace them with path=True")
+    share = weight / weight.sum((1, 2), keepdim=True).clamp_min(1e-300)
+    middle = (share * landed.y).sum((1, 2), keepdim=True)
+    lean = (share * landed.m / landed.n).sum((1, 2), keepdim=True)
+    waves = path - landed.x * landed.l - (landed.y - middle) * landed.m
+    by_shift = lean * landed.m + landed.n
+    fields = weight.shape[0]
+    tilts = [landed.m * (torch.arange(fields)[:, None, None] == i) for i in range(fields)]
+    beam = weight.sum(2, keepdim=True).clamp_min(1e-300)
+    root = torch.sqrt(weight)
+
+    def column(value: Tensor) -> Tensor:
+        return (root * (value - (weight * value).sum(2, keepdim=True) / beam)).flatten()
+
+    table = torch.stack([column(by_shift), *map(column, tilts)], dim=1)
+    found = torch.linalg.lstsq(table, -column(waves)[:, None]).solution
+    return float(found[0, 0])

@@ -1,0 +1,155 @@
+"""Named sets of glasses, and finding one by name: exactly, or an error that names near matches.
+
+A strict name is "material-catalogue" ("N-BK7-Schott") or "material-source" for the literature
+("PMMA-Sultanova2009"). A bare trade name ("N-BK7") stands for the strict one as long as exactly
+one catalogue has it; "F2", which Schott and Hikari make from different melts, is an error.
+"""
+
+import difflib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from typing import Any, Final
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.glass.material import Glass
+from camkit.models_def.optics.glass.model_glass import parse_model_name
+
+AIR: Final = Glass(name="air", formula="constant", coefficients=(1.0,), source="reference medium")
+_NEAR: Final = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GlassCatalogue:
+    """A named set of glasses.
+
+    Attributes:
+        name: Of the maker, or of the file of a user's catalogue.
+        glasses: Their strict names end in "-" and the name of the catalogue, except those of the
+            literature, which end in their source.
+        literature: Materials of many sources; other programs do not know their names.
+    """
+
+    name: str
+    glasses: tuple[Glass, ...]
+    literature: bool = False
+    _by_name: Mapping[str, Glass] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        names = {glass.name: glass for glass in self.glasses}
+        if len(names) != len(self.glasses):
+            raise ContractError(f"catalogue {self.name} has two glasses of one name")
+        object.__setattr__(self, "_by_name", names)
+
+    def get(self, name: str) -> Glass | None:
+        """Give the glass of exactly this strict name, or None."""
+        return self._by_name.get(name)
+
+    def with_trade_name(self, trade_name: str) -> tuple[Glass, ...]:
+        """Give the glasses of this trade name: at most one but in the literature."""
+        if not self.literature:
+            found = self.get(f"{trade_name}-{self.name}")
+            return (found,) if found else ()
+        return tuple(g for g in self.glasses if trade_name_of(g) == trade_name)
+
+
+def trade_name_of(glass: Glass) -> str:
+    """Give the name without catalogue or source."""
+    return glass.name.rpartition("-")[0] or glass.name
+
+
+@cache
+def builtin_catalogues() -> tuple[GlassCatalogue, ...]:
+    """Give the catalogues that come with camkit, Schott's first."""
+    folder = resources.files("camkit.models_def.optics.glass") / "data"
+    files = ("schott", "ohara", "hoya", "hikari", "cdgm", "misc", "literature")
+    return tuple(
+        _catalogue(json.loads((folder / f"{name}.json").read_text(encoding="utf-8")))
+        for name in files
+    )
+
+
+def _catalogue(table: Mapping[str, Any]) -> GlassCatalogue:
+    suffix = "" if table["literature"] else f"-{table['catalogue']}"
+    return GlassCatalogue(
+        name=table["catalogue"],
+        literature=table["literature"],
+        glasses=tuple(_glass(row, suffix, table["source"]) for row in table["glasses"]),
+    )
+
+
+def _glass(row: Sequence[Any], suffix: str, source: str) -> Glass:
+    name, formula, range_um, index_d, abbe_number, coefficients, *own_source = row
+    return Glass(
+        name=f"{name}{suffix}",
+        formula=formula,
+        coefficients=tuple(coefficients),
+        source=own_source[0] if own_source else source,
+        range_um=(range_um[0], range_um[1]),
+        stated_index_d=index_d,
+        stated_abbe_number=abbe_number,
+    )
+
+
+def glass_names(catalogues: Iterable[GlassCatalogue] = ()) -> tuple[str, ...]:
+    """Give every strict name that a prescription may use."""
+    return (AIR.name, *(glass.name for glass in _all(catalogues)))
+
+
+def _all(catalogues: Iterable[GlassCatalogue]) -> Iterator[Glass]:
+    for catalogue in (*catalogues, *builtin_catalogues()):
+        yield from catalogue.glasses
+
+
+def find_glass(name: str, catalogues: Sequence[GlassCatalogue] = ()) -> Glass:
+    """Give the glass of this name.
+
+    Args:
+        name: A strict name, "air", a model glass (see `model_glass`), or a trade name that exactly
+            one catalogue has.
+        catalogues: The user's; they are asked before those of camkit.
+
+    Raises:
+        ContractError: If there is none, or a trade name stands for several; the message names near
+            matches. Nothing is guessed.
+    """
+    if name == AIR.name:
+        return AIR
+    for catalogue in (*catalogues, *builtin_catalogues()):
+        found = catalogue.get(name)
+        if found is not None:
+            return found
+    model = parse_model_name(name)
+    if model is not None:
+        return model
+    several: list[tuple[Glass, bool]] = []
+    for group in (catalogues, builtin_catalogues()):
+        several = [(g, c.literature) for c in group for g in c.with_trade_name(name)]
+        # a material of the literature is no trade name: its source decides its index
+        if len(several) == 1 and not several[0][1]:
+            return several[0][0]
+        if several:
+            break
+    near = [glass.name for glass, _ in several] or _near_names(name, catalogues)
+    raise ContractError(
+        f"glass must be a known name with its source; got {name!r}; write {' or '.join(near)}"
+    )
+
+
+def own_glass(glass: Glass, catalogues: Iterable[GlassCatalogue]) -> Glass | None:
+    """Give the glass back if it comes from one of the user's catalogues, else None."""
+    return glass if any(c.get(glass.name) is glass for c in catalogues) else None
+
+
+def _near_names(name: str, catalogues: Sequence[GlassCatalogue]) -> list[str]:
+    wanted = name.casefold()
+
+    def likeness(glass: Glass) -> float:
+        trade_name = trade_name_of(glass).casefold()
+        match = difflib.SequenceMatcher(None, trade_name, wanted)
+        return max(match.ratio(), 0.99 * (glass.name.casefold() == wanted))
+
+    ranked = sorted(_all(catalogues), key=likeness, reverse=True)
+    return [glass.name for glass in ranked[:_NEAR]]

@@ -1,0 +1,61 @@
+"""Read or write a lens by the suffix of its file: .toml or .zmx."""
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from camkit.errors import UnsupportedError
+from camkit.models_def.optics.glass.catalogue import GlassCatalogue
+from camkit.models_def.optics.lens_file.zmx_reader import read_zmx
+from camkit.models_def.optics.lens_file.zmx_writer import write_zmx
+from camkit.models_def.optics.prescription import Lens, read_prescription, write_prescription
+
+SUFFIXES: Final = (".toml", ".zmx")
+
+_log = logging.getLogger(__name__)
+
+
+def read_lens(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> Lens:
+    """Read a lens; what of a .zmx file is left out is logged as a warning.
+
+    Args:
+        path: .toml or .zmx, in small or capital letters.
+        catalogues: Of the user (`read_agf`), beside those that come with camkit.
+
+    Raises:
+        UnsupportedError: If the suffix is another, or a .zmx file holds what camkit lacks.
+        ContractError: If the lens is wrong or a glass unknown.
+        DecodeError: If a file is damaged.
+    """
+    lens, notes = read_noted_lens(path, catalogues)
+    for note in notes:
+        _log.warning("%s: %s", path.name, note)
+    return lens
+
+
+def read_noted_lens(
+    path: Path, catalogues: Sequence[GlassCatalogue] = ()
+) -> tuple[Lens, tuple[str, ...]]:
+    """Read a lens and what of its file it does not carry, one line each; see `read_lens`."""
+    if _suffix(path) == ".toml":
+        return read_prescription(path, catalogues), ()
+    found = read_zmx(path, catalogues)
+    return found.lens, found.notes
+
+
+def write_lens(lens: Lens, path: Path) -> None:
+    """Write a lens in the format of the suffix; see `write_prescription` and `write_zmx`."""
+    if _suffix(path) == ".toml":
+        write_prescription(lens, path)
+    else:
+        write_zmx(lens, path)
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise UnsupportedError(
+            f"a lens file ends in {' or '.join(SUFFIXES)}; got {path.name}: rename or convert it"
+        )
+    return suffix

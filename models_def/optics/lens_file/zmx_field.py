@@ -1,0 +1,108 @@
+"""Fields of a .zmx file (angles, object heights, image heights) as camkit's field angles.
+
+camkit's field angle is seen from the first vertex, and a lens is round: only the distance of a
+field from the axis counts, not its sign or azimuth.
+"""
+
+import math
+from dataclasses import replace
+from enum import IntEnum
+
+import torch
+
+from camkit.errors import UnsupportedError
+from camkit.models_def.optics.lens_file.zmx_records import Records, last
+from camkit.models_def.optics.paraxial import paraxial_data, trace_paraxial
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.spot import slopes_for_heights
+from camkit.models_def.optics.trace import surface_tensors
+from camkit.units import to_radians
+
+
+class FieldKind(IntEnum):
+    """The first number of the FTYP line."""
+
+    ANGLE = 0
+    OBJECT_HEIGHT = 1
+    PARAXIAL_IMAGE_HEIGHT = 2
+    REAL_IMAGE_HEIGHT = 3
+
+
+def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
+    """Give the lens with the fields of its file, increasing, each once.
+
+    Args:
+        lens: Everything else about it.
+        system: The records outside the surfaces.
+        mm_per_unit: Length unit of the file.
+
+    Raises:
+        UnsupportedError: If the fields are of a kind that camkit does not convert.
+    """
+    record = last(system, "FTYP")
+    kind = int(record.number(0, 0.0)) if record else FieldKind.ANGLE
+    if kind not in list(FieldKind):
+        line = f"line {record.line}: " if record else ""
+        raise UnsupportedError(
+            f"{line}fields are of kind {kind}; camkit reads angles (0), object heights (1), "
+            "paraxial (2) and real image heights (3)"
+        )
+    points = _points(system)
+    if kind == FieldKind.ANGLE and math.isinf(lens.object_distance_mm):
+        angles = {math.fabs(to_radians(y)) if x == 0 else _skew_angle(x, y) for x, y in points}
+    elif kind == FieldKind.ANGLE:
+        angles = {_angle_from_vertex(lens, _skew_angle(x, y)) for x, y in points}
+    else:
+        heights = sorted({math.hypot(x, y) * mm_per_unit for x, y in points})
+        angles = set(_angles_of_heights(lens, FieldKind(kind), heights))
+    return replace(lens, field_angles_rad=tuple(sorted(angles)))
+
+
+def _points(system: Records) -> list[tuple[float, float]]:
+    """Give the fields (x, y) that are in use: FTYP says how many of the numbers."""
+    record = last(system, "FTYP")
+    x_record = last(system, "XFLN") or last(system, "XFLD")
+    y_record = last(system, "YFLN") or last(system, "YFLD")
+    xs = x_record.numbers() if x_record else ()
+    ys = y_record.numbers() if y_record else ()
+    length = max(len(xs), len(ys), 1)
+    pairs = [(xs[i] if i < len(xs) else 0.0, ys[i] if i < len(ys) else 0.0) for i in range(length)]
+    count = int(record.number(2, 0.0)) if record else 0
+    return pairs[:count] if count > 0 else pairs
+
+
+def _skew_angle(x_deg: float, y_deg: float) -> float:
+    return math.atan(math.hypot(math.tan(to_radians(x_deg)), math.tan(to_radians(y_deg))))
+
+
+def _angle_from_vertex(lens: Lens, angle_rad: float) -> float:
+    """Convert an angle at the entrance pupil, as other programs have it for a near object."""
+    distance_mm = lens.object_distance_mm
+    pupil_mm = paraxial_data(lens).entrance_pupil_mm
+    return math.atan(math.tan(angle_rad) * (distance_mm + pupil_mm) / distance_mm)
+
+
+def _angles_of_heights(lens: Lens, kind: FieldKind, heights_mm: list[float]) -> list[float]:
+    near = math.isfinite(lens.object_distance_mm)
+    if kind == FieldKind.REAL_IMAGE_HEIGHT:
+        slopes = slopes_for_heights(lens, torch.tensor(heights_mm, dtype=torch.float64))
+        return [math.atan(abs(slope)) for slope in slopes.tolist()]
+    if kind == FieldKind.OBJECT_HEIGHT:
+        if not near:
+            raise UnsupportedError("object heights need an object at a finite distance")
+        return [math.atan(height / lens.object_distance_mm) for height in heights_mm]
+    if not near:
+        focal_mm = abs(paraxial_data(lens).efl_mm)
+        return [math.atan(height / focal_mm) for height in heights_mm]
+    scale = _magnification(lens) * lens.object_distance_mm
+    return [math.atan(height / scale) for height in heights_mm]
+
+
+def _magnification(lens: Lens) -> float:
+    """Give |image height / object height|: the ratio of the marginal slopes."""
+    wave = torch.tensor(lens.reference_wavelength_um, dtype=torch.float64)
+    tensors = surface_tensors(lens, wave)
+    one = torch.ones((), dtype=torch.float64)
+    surfaces = range(len(lens.surfaces))
+    _, slope = trace_paraxial(tensors, lens.object_distance_mm * one, one, surfaces)
+    return abs(1 / float(slope * tensors.index[-1]))

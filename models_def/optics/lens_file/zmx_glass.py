@@ -1,0 +1,142 @@
+"""Glasses named as .zmx files name them: trade names in capitals, in the order of the GCAT line.
+
+A glass that no catalogue file can name (a plastic of the literature, a model glass) is written as
+a model glass with its strict name as the comment of the surface, from which it is read back.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.glass.catalogue import (
+    GlassCatalogue,
+    builtin_catalogues,
+    find_glass,
+    trade_name_of,
+)
+from camkit.models_def.optics.glass.dispersion import (
+    D_LINE_UM,
+    RANGE_TOLERANCE,
+    abbe_number,
+    refractive_index,
+)
+from camkit.models_def.optics.glass.material import Glass
+from camkit.models_def.optics.glass.model_glass import MODEL_PREFIX, model_glass
+
+MODEL_NAME: Final = "___BLANK"
+COMMENT: Final = "glass "
+_SAME: Final = 1e-9
+"""Other programs write 13 digits or more."""
+_ALIASES: Final = {"nikon": "hikari", "nikon_hikari": "hikari", "nikon-hikari": "hikari"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GlassOrder:
+    """Where a .zmx file's glasses are looked for.
+
+    Attributes:
+        own: The user's catalogues; asked first.
+        listed: Those of camkit that the GCAT line names, in its order; the first that has a name
+            decides. A name that none of them has must stand in exactly one of the others.
+    """
+
+    own: tuple[GlassCatalogue, ...] = ()
+    listed: tuple[GlassCatalogue, ...] = ()
+
+
+def glass_order(names: Sequence[str], own: Sequence[GlassCatalogue]) -> GlassOrder:
+    """Give the order for a GCAT line; catalogues that camkit does not have are passed over."""
+    known = {c.name.casefold(): c for c in builtin_catalogues() if not c.literature}
+    wanted = [_ALIASES.get(name.casefold(), name.casefold()) for name in names]
+    return GlassOrder(own=tuple(own), listed=tuple(known[n] for n in wanted if n in known))
+
+
+def find_zmx_glass(name: str, order: GlassOrder) -> Glass:
+    """Give the glass of a GLAS line.
+
+    Raises:
+        ContractError: If no catalogue has it, or several do that GCAT does not name.
+    """
+    for catalogue in (*order.own, *order.listed):
+        found = _in_capitals(catalogue, name)
+        if found is not None:
+            return found
+    rest = [c for c in builtin_catalogues() if not c.literature and c not in order.listed]
+    several = [glass for c in rest if (glass := _in_capitals(c, name))]
+    if len(several) == 1:
+        return several[0]
+    if several:
+        names = " or ".join(glass.name for glass in several)
+        raise ContractError(
+            f"glass {name} may be {names}; name its catalogue in the GCAT line of the file"
+        )
+    try:
+        return find_glass(name)
+    except ContractError as error:
+        raise ContractError(f"{error}; or give its catalogue with --glass FILE.agf") from error
+
+
+def _in_capitals(catalogue: GlassCatalogue, name: str) -> Glass | None:
+    found = catalogue.with_trade_name(name)
+    if found:
+        return found[0]
+    wanted = f"{name}-{catalogue.name}".upper()
+    several = [glass for glass in catalogue.glasses if glass.name.upper() == wanted]
+    return several[0] if len(several) == 1 else None
+
+
+def read_model_glass(numbers: Sequence[float], comment: str, order: GlassOrder) -> Glass:
+    """Give the glass of a `GLAS ___BLANK` line: (n_d, V_d, dP_gF), and the surface's comment."""
+    model = model_glass(*numbers)
+    if comment.startswith(COMMENT):
+        try:
+            glass = find_glass(comment.removeprefix(COMMENT), order.own)
+        except ContractError:
+            return model
+        # someone may have changed the numbers in another program: then they hold
+        pairs = zip(index_and_abbe(glass), numbers, strict=False)
+        if all(math.isclose(own, written, rel_tol=_SAME) for own, written in pairs):
+            return glass
+    return model
+
+
+def index_and_abbe(glass: Glass) -> tuple[float, float]:
+    """Give n_d and V_d as a GLAS line holds them; 0 where the glass has none."""
+    low, high = glass.range_um
+    if not (low * (1 - RANGE_TOLERANCE) <= 0.4861 and high * (1 + RANGE_TOLERANCE) >= 0.6563):
+        return 0.0, 0.0
+    line = torch.tensor(D_LINE_UM, dtype=torch.float64)
+    number = abbe_number(glass)
+    return float(refractive_index(glass, line)), number if number != float("inf") else 0.0
+
+
+def glass_words(glass: Glass, order: GlassOrder, *, own: bool) -> tuple[str, str]:
+    """Give the text of a GLAS line and the comment that goes with it.
+
+    Args:
+        glass: Not air.
+        order: Of the catalogues that the GCAT line of the file will name.
+        own: It comes from a user's catalogue, which a reader must be given too.
+    """
+    if glass.name.startswith(MODEL_PREFIX):
+        words = [*glass.name.removeprefix(MODEL_PREFIX).split(","), "0.0"][:3]
+        return f"{MODEL_NAME} 1 0 {' '.join(words)} 0 0 0 0 0", ""
+    index_d, number = index_and_abbe(glass)
+    numbers = f"{index_d!r} {number!r} 0 0 0 0 0 0"
+    trade_name = trade_name_of(glass)
+    if (own and " " not in trade_name) or _reads_back(trade_name, glass, order):
+        return f"{trade_name if own else trade_name.upper()} 0 0 {numbers}", ""
+    if index_d:
+        return f"{MODEL_NAME} 1 0 {numbers}", f"{COMMENT}{glass.name}"
+    return f"{glass.name} 0 0 {numbers}", ""
+
+
+def _reads_back(trade_name: str, glass: Glass, order: GlassOrder) -> bool:
+    try:
+        return find_zmx_glass(trade_name.upper(), order).name == glass.name
+    except ContractError:
+        return False

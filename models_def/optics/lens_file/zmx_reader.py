@@ -1,0 +1,220 @@
+"""A .zmx file (its sequential, centred, refracting part) as a `Lens`."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from camkit.errors import DecodeError, UnsupportedError
+from camkit.models_def.optics.glass.catalogue import GlassCatalogue
+from camkit.models_def.optics.glass.encoding import read_text
+from camkit.models_def.optics.lens_file.zmx_field import with_fields
+from camkit.models_def.optics.lens_file.zmx_glass import glass_order
+from camkit.models_def.optics.lens_file.zmx_records import (
+    Record,
+    Records,
+    ZmxRecords,
+    last,
+    parse_records,
+)
+from camkit.models_def.optics.lens_file.zmx_surface import (
+    SurfaceContext,
+    read_surface,
+    refuse_unsupported,
+)
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import ApertureKind, Lens, Surface
+
+_MM_PER_UNIT: Final = {"MM": 1.0, "CM": 10.0, "IN": 25.4, "METER": 1000.0, "M": 1000.0}
+_DEFAULT_WAVE: Final = (0.55, 1.0)
+_APERTURES: Final = ("ENPD", "FNUM", "FLOA", "OBNA")
+_VIGNETTING: Final = ("VDXN", "VDYN", "VCXN", "VCYN")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZmxLens:
+    """A lens and what of its file it does not carry.
+
+    Attributes:
+        lens: The lens.
+        notes: For people, one line each.
+    """
+
+    lens: Lens
+    notes: tuple[str, ...]
+
+
+def read_zmx(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> ZmxLens:
+    """Read a lens from a .zmx file.
+
+    Args:
+        path: UTF-16, UTF-8 or latin-1.
+        catalogues: Of the user; asked for glasses before those of the GCAT line.
+
+    Raises:
+        DecodeError: If the file is damaged; the message gives the line.
+        UnsupportedError: If it holds what camkit does not trace; the message names it.
+        ContractError: If a glass is unknown or the lens makes no sense.
+    """
+    return parse_zmx(read_text(path), catalogues, name=path.stem)
+
+
+def parse_zmx(
+    text: str, catalogues: Sequence[GlassCatalogue] = (), *, name: str = "lens"
+) -> ZmxLens:
+    """Read a lens from the text of a .zmx file; see `read_zmx`."""
+    records = parse_records(text)
+    system = records.system
+    mode = last(system, "MODE")
+    if mode is not None and mode.words[:1] not in {(), ("SEQ",)}:
+        raise UnsupportedError(f"line {mode.line}: MODE {mode.text}; camkit reads MODE SEQ")
+    scale = _mm_per_unit(last(system, "UNIT"))
+    object_mm = _object_distance_mm(records, scale)
+    _check_image(records)
+    gcat = last(system, "GCAT")
+    order = glass_order(gcat.words if gcat else (), catalogues)
+    surfaces = tuple(
+        read_surface(block, SurfaceContext(number=i, mm_per_unit=scale, order=order))
+        for i, block in enumerate(records.surfaces[1:-1], start=1)
+    )
+    stop = _stop(records)
+    waves, reference = _wavelengths(system)
+    title = last(system, "NAME")
+    kind, value = _aperture(records, stop, scale)
+    lens = Lens(
+        name=(title.text.strip() if title else "") or name,
+        note="\n".join(record.text[2:] for record in system.get("NOTE", []) if record.text[2:]),
+        surfaces=surfaces,
+        stop=stop,
+        aperture_kind=kind,
+        aperture_value=value,
+        object_distance_mm=object_mm,
+        wavelengths_um=waves,
+        reference_wavelength_um=reference,
+    )
+    lens = _with_object_aperture(lens, system)
+    return ZmxLens(lens=with_fields(lens, system, scale), notes=_notes(records, surfaces))
+
+
+def _mm_per_unit(record: Record | None) -> float:
+    name = record.words[0].upper() if record and record.words else "MM"
+    if name not in _MM_PER_UNIT:
+        raise DecodeError(f"UNIT must be one of {', '.join(_MM_PER_UNIT)}; got {name[:40]}")
+    return _MM_PER_UNIT[name]
+
+
+def _object_distance_mm(records: ZmxRecords, scale: float) -> float:
+    block = records.surfaces[0]
+    refuse_unsupported(block, 0)
+    if last(block, "GLAS") is not None:
+        raise UnsupportedError("the object lies in glass; camkit has it in air")
+    curvature, distance = last(block, "CURV"), last(block, "DISZ")
+    if curvature is not None and curvature.number(0) != 0:
+        raise UnsupportedError(f"line {curvature.line}: the object is curved; camkit has it flat")
+    if distance is None or distance.words[:1] == ("INFINITY",):
+        return math.inf
+    value = distance.number(0)
+    if abs(value) >= 1e10:  # what programs without infinity write
+        return math.inf
+    if value <= 0:
+        raise UnsupportedError(
+            f"line {distance.line}: the object lies {value:g} in front of the lens; "
+            "camkit needs it at a positive distance"
+        )
+    return value * scale
+
+
+def _check_image(records: ZmxRecords) -> None:
+    block = records.surfaces[-1]
+    refuse_unsupported(block, len(records.surfaces) - 1)
+    curvature = last(block, "CURV")
+    if curvature is not None and curvature.number(0) != 0:
+        raise UnsupportedError(f"line {curvature.line}: the image is curved; a sensor is flat")
+
+
+def _stop(records: ZmxRecords) -> int:
+    found = [i for i, block in enumerate(records.surfaces) if "STOP" in block]
+    if len(found) != 1 or not 1 <= found[0] < len(records.surfaces) - 1:
+        raise DecodeError(f"one surface of the lens must hold STOP; got {found or 'none'}")
+    return found[0] - 1
+
+
+def _aperture(records: ZmxRecords, stop: int, scale: float) -> tuple[ApertureKind, float]:
+    """Give the aperture; that of OBNA is put in later, when the entrance pupil is known."""
+    found = [r for key in _APERTURES if (r := last(records.system, key)) is not None]
+    if len(found) != 1:
+        given = ", ".join(record.key for record in found) or "none"
+        raise DecodeError(f"the aperture must be one of {', '.join(_APERTURES)}; got {given}")
+    record = found[0]
+    if record.key == "FLOA":
+        size = last(records.surfaces[stop + 1], "DIAM")
+        if size is None or not size.number(0) > 0:
+            raise DecodeError(f"line {record.line}: FLOA needs the stop's DIAM; got none")
+        return "stop_semi_diameter_mm", size.number(0) * scale
+    if not record.number(0) > 0:
+        raise DecodeError(f"line {record.line}: {record.key} must be > 0; got {record.text}")
+    if record.key == "ENPD":
+        return "entrance_pupil_diameter_mm", record.number(0) * scale
+    if record.key == "OBNA":
+        return "entrance_pupil_diameter_mm", 1.0
+    near = last(records.surfaces[0], "DISZ")
+    if record.number(1, 0.0) != 0 and near is not None and near.words[:1] != ("INFINITY",):
+        raise UnsupportedError(
+            f"line {record.line}: a working f-number of a near object; give the entrance pupil"
+        )
+    return "f_number", record.number(0)
+
+
+def _with_object_aperture(lens: Lens, system: Records) -> Lens:
+    record = last(system, "OBNA")
+    if record is None:
+        return lens
+    sine = record.number(0)
+    if not (sine < 1 and math.isfinite(lens.object_distance_mm)):
+        raise DecodeError(f"line {record.line}: OBNA needs a near object and NA < 1; got {sine}")
+    if record.number(1, 0.0) != 0:
+        raise UnsupportedError(f"line {record.line}: OBNA given as an angle; give it as NA")
+    distance_mm = lens.object_distance_mm + paraxial_data(lens).entrance_pupil_mm
+    return replace(lens, aperture_value=2 * distance_mm * math.tan(math.asin(sine)))
+
+
+def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
+    """Give the wavelengths in um, increasing, each once, and the primary one."""
+    found = [*system.get("WAVM", []), *system.get("WAVE", [])]
+    listed = [(r.number(1), r.number(2, 1.0)) for r in sorted(found, key=lambda r: r.number(0))]
+    old = last(system, "WAVL")
+    if not listed and old is not None:
+        listed = [(value, 1.0) for value in old.numbers()]
+    kind, primary = last(system, "FTYP"), last(system, "PWAV")
+    position = int(primary.number(0)) if primary else 1
+    count = int(kind.number(3, 0.0)) if kind else 0
+    if 0 < count <= len(listed):
+        listed = listed[:count]
+    else:
+        # without a count: programs fill the rest of their table with 0.55 um
+        while len(listed) > max(position, 1) and listed[-1] == _DEFAULT_WAVE:
+            listed.pop()
+    if not 1 <= position <= len(listed):
+        raise DecodeError(f"PWAV must be one of {len(listed)} wavelengths; got {position}")
+    # a wavelength of weight 0 is not looked at, but may define the focus
+    seen = {wave for wave, weight in listed if weight} or {wave for wave, _ in listed}
+    return tuple(sorted(seen)), listed[position - 1][0]
+
+
+def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...]:
+    notes = []
+    for key in _VIGNETTING:
+        record = last(records.system, key)
+        if record is not None and any(record.numbers()):
+            notes.append(
+                f"line {record.line}: vignetting factors {key} left out: only fixed "
+                "semi-diameters and apertures vignette"
+            )
+    zoom = last(records.system, "MNUM")
+    if zoom is not None and zoom.number(0, 1.0) > 1:
+        notes.append(f"line {zoom.line}: {zoom.words[0]} configurations: the one shown is read")
+    gaps = [i for i, s in enumerate(surfaces, start=1) if s.thickness_mm < 0]
+    if gaps:
+        notes.append(f"surfaces {gaps} have negative thickness: kept")
+    return tuple(notes)

@@ -1,0 +1,162 @@
+"""One surface of a .zmx file as a `Surface` in millimetres."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from camkit.errors import ContractError, DecodeError, UnsupportedError
+from camkit.models_def.optics.glass.catalogue import AIR, own_glass
+from camkit.models_def.optics.glass.material import Glass
+from camkit.models_def.optics.lens_file.zmx_glass import (
+    MODEL_NAME,
+    GlassOrder,
+    find_zmx_glass,
+    read_model_glass,
+)
+from camkit.models_def.optics.lens_file.zmx_records import Record, Records, last
+from camkit.models_def.optics.prescription import Surface
+
+EVEN_TERMS: Final = 8
+_TYPES: Final = ("STANDARD", "EVENASPH")
+_FIXED: Final = 1
+_OBSTACLES: Final = ("SQAP", "SQOB", "ELAP", "ELOB", "USAP", "USOB", "OBSC", "SPID")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceContext:
+    """What a surface needs to know of its file.
+
+    Attributes:
+        number: Of the surface, from the object (0).
+        mm_per_unit: Length unit of the file.
+        order: Where glasses are looked for.
+    """
+
+    number: int
+    mm_per_unit: float
+    order: GlassOrder
+
+
+def read_surface(records: Records, context: SurfaceContext) -> Surface:
+    """Read a surface between object and image.
+
+    An automatic semi-diameter (DIAM flag 0) is what the rays of the file happened to need: it
+    limits nothing. A fixed one (flag 1) vignettes, and so does a circular aperture (CLAP), which
+    takes its place. MEMA, FLAP (a floating aperture: DIAM says it all) and drawing data are
+    passed over.
+
+    Raises:
+        UnsupportedError: If its type, aperture or tilt is none that camkit traces.
+        DecodeError: If a number is damaged.
+    """
+    refuse_unsupported(records, context.number)
+    scale = context.mm_per_unit
+    thickness = last(records, "DISZ")
+    if thickness is not None and thickness.words[:1] == ("INFINITY",):
+        raise UnsupportedError(
+            f"line {thickness.line}: surface {context.number} is infinitely thick; "
+            "only the object may be"
+        )
+    glass = _glass(records, context)
+    return Surface(
+        curvature_per_mm=_value(records, "CURV") / scale,
+        thickness_mm=thickness.number(0) * scale if thickness else 0.0,
+        glass=glass.name,
+        material=own_glass(glass, context.order.own),
+        semi_diameter_mm=_semi_diameter(records, context.number) * scale,
+        conic=_value(records, "CONI"),
+        even_asphere=_even_asphere(records, context),
+    )
+
+
+def refuse_unsupported(records: Records, number: int) -> None:
+    """Refuse a surface that camkit does not trace, by name.
+
+    Raises:
+        UnsupportedError: If it is of another type, a mirror, tilted, or not round.
+    """
+    kind = last(records, "TYPE")
+    if kind is not None and (kind.words[:1] or ("nothing",))[0].upper() not in _TYPES:
+        raise UnsupportedError(
+            f"line {kind.line}: surface {number} is of type {' '.join(kind.words)[:40]}; "
+            f"camkit reads {' and '.join(_TYPES)}"
+        )
+    glass = last(records, "GLAS")
+    if glass is not None and glass.words[:1] == ("MIRROR",):
+        raise UnsupportedError(
+            f"line {glass.line}: surface {number} is a mirror; camkit traces lenses only"
+        )
+    for key in _OBSTACLES:
+        found = last(records, key)
+        if found is not None:
+            raise UnsupportedError(
+                f"line {found.line}: surface {number} has an aperture {key}; camkit has round "
+                "ones about the axis (CLAP from 0)"
+            )
+    for key, first in (("OBDC", 0), ("SCBD", 3)):
+        found = last(records, key)
+        if found is not None and any(found.number(i) for i in range(first, len(found.words))):
+            raise UnsupportedError(
+                f"line {found.line}: surface {number} is tilted or decentred ({key}); "
+                "camkit traces centred lenses"
+            )
+
+
+def _value(records: Records, key: str) -> float:
+    found = last(records, key)
+    return found.number(0) if found else 0.0
+
+
+def _glass(records: Records, context: SurfaceContext) -> Glass:
+    found = last(records, "GLAS")
+    if found is None or not found.words or found.words[0].upper() == "AIR":
+        return AIR
+    name = found.words[0]
+    try:
+        if name == MODEL_NAME:
+            comment = last(records, "COMM")
+            numbers = [found.number(3), found.number(4), found.number(5, 0.0)]
+            return read_model_glass(numbers, comment.text.strip() if comment else "", context.order)
+        return find_zmx_glass(name, context.order)
+    except ContractError as error:
+        where = f"line {found.line}: surface {context.number}"
+        raise ContractError(f"{where}: {error}") from error
+
+
+def _semi_diameter(records: Records, number: int) -> float:
+    aperture, diameter = last(records, "CLAP"), last(records, "DIAM")
+    if aperture is not None:
+        if aperture.number(0) != 0:
+            raise UnsupportedError(
+                f"line {aperture.line}: surface {number} has a central obscuration"
+            )
+        return _positive(aperture, aperture.number(1))
+    if diameter is None or diameter.number(1, 0.0) != _FIXED or diameter.number(0) == 0:
+        return math.inf
+    return _positive(diameter, diameter.number(0))
+
+
+def _positive(record: Record, value: float) -> float:
+    if not value > 0:
+        raise DecodeError(f"line {record.line}: {record.key} must be > 0; got {value}")
+    return value
+
+
+def _even_asphere(records: Records, context: SurfaceContext) -> tuple[float, ...]:
+    kind = last(records, "TYPE")
+    if kind is None or kind.words[0].upper() != "EVENASPH":
+        return ()
+    terms = [0.0] * EVEN_TERMS
+    for record in records.get("PARM", []):
+        order, value = record.number(0), record.number(1)
+        if order not in range(EVEN_TERMS + 1) or (order == 0 and value):
+            raise DecodeError(
+                f"line {record.line}: PARM of an even asphere is 1..{EVEN_TERMS}; "
+                f"got {record.words[0]}"
+            )
+        if order:
+            # the coefficient of r^(2 order) has the unit length^(1 - 2 order)
+            terms[int(order) - 1] = value / context.mm_per_unit ** (2 * int(order) - 1)
+    while terms and terms[-1] == 0:
+        terms.pop()
+    return tuple(terms)

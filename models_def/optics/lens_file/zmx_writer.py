@@ -1,0 +1,159 @@
+"""A `Lens` as a .zmx file: read back to the last bit by camkit, and read by other programs."""
+
+import itertools
+import math
+from pathlib import Path
+from typing import Final
+
+from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.optics.glass.catalogue import AIR, builtin_catalogues
+from camkit.models_def.optics.lens_file.zmx_glass import (
+    MODEL_NAME,
+    GlassOrder,
+    glass_order,
+    glass_words,
+)
+from camkit.models_def.optics.lens_file.zmx_surface import EVEN_TERMS
+from camkit.models_def.optics.prescription import Lens, Surface, degrees_text
+
+_BLOCK: Final = ("  HIDE 0 0 0 0 0 0 0 0 0 0", "  MIRR 2 0")
+_TABLE_SIZE: Final = 12
+_MAX_ORDERED: Final = 4
+
+
+def write_zmx(lens: Lens, path: Path) -> None:
+    """Write a lens as UTF-16 with byte order mark and Windows line ends, as its program does.
+
+    Raises:
+        UnsupportedError: If a surface has more aspheric terms than the format.
+        ContractError: If the lens is a fabricated copy (index offsets are not written).
+    """
+    path.write_bytes(format_zmx(lens).replace("\n", "\r\n").encode("utf-16"))
+
+
+def format_zmx(lens: Lens) -> str:
+    """Give the .zmx text of a lens; see `write_zmx`."""
+    if any(surface.index_offset for surface in lens.surfaces):
+        raise ContractError("a lens file holds no index offsets; write the nominal lens")
+    names = _catalogue_names(lens)
+    order = glass_order(names, ())
+    lines = [*_system_lines(lens, names), *_object_lines(lens)]
+    for i, surface in enumerate(lens.surfaces):
+        lines += _surface_lines(lens, surface, i, order)
+    last = len(lens.surfaces) + 1
+    lines += [f"SURF {last}", "  TYPE STANDARD", '  CURV 0.0 0 0 0 0 ""', *_BLOCK, "  DISZ 0"]
+    lines += ['  DIAM 0 0 0 0 1 ""', "TOL TOFF   0   0   0   0   0 0 0", "MNUM 1 1"]
+    return "\n".join(lines) + "\n"
+
+
+def _catalogue_names(lens: Lens) -> list[str]:
+    """Give the makers whose glasses the lens uses, for GCAT.
+
+    Two makers may have glasses of one name: the order is the one in which most glasses of the
+    lens can go out by their names, since other programs know no camkit model glass.
+    """
+    names: dict[str, None] = {}
+    makers = [c for c in builtin_catalogues() if not c.literature]
+    for surface in lens.surfaces:
+        if surface.material is not None and "-" in surface.glass:
+            names[surface.glass.rpartition("-")[2]] = None
+        names |= {c.name.upper(): None for c in makers if c.get(surface.glass) is not None}
+    glasses = {surface.glass: surface.medium for surface in lens.surfaces}.values()
+
+    def named(order: list[str]) -> int:
+        read = glass_order(order, ())
+        return sum(MODEL_NAME not in glass_words(glass, read, own=False)[0] for glass in glasses)
+
+    if len(names) > _MAX_ORDERED:
+        return list(names)
+    return max(map(list, itertools.permutations(names)), key=named)
+
+
+def _system_lines(lens: Lens, catalogues: list[str]) -> list[str]:
+    words = {
+        "f_number": f"FNUM {lens.aperture_value!r} 0",
+        "entrance_pupil_diameter_mm": f"ENPD {lens.aperture_value!r}",
+        "stop_semi_diameter_mm": "FLOA",
+    }
+    near = math.isfinite(lens.object_distance_mm)
+    fields = [_height_text(lens, a) if near else degrees_text(a) for a in lens.field_angles_rad]
+    count = max(_TABLE_SIZE, len(fields))
+    zeros = " ".join(["0"] * count)
+    waves = list(lens.wavelengths_um)
+    # a reference that is none of the wavelengths of interest is written with weight 0
+    extra = [lens.reference_wavelength_um] if lens.reference_wavelength_um not in waves else []
+    name = " ".join(lens.name.split())
+    return [
+        "VERS 140730 0 0",
+        "MODE SEQ",
+        f"NAME {name}",
+        *(f"NOTE 0 {line}" for line in lens.note.splitlines()),
+        "UNIT MM X W X CM MR CPMM",
+        words[lens.aperture_kind],
+        "ENVD 20 1 0",
+        "GFAC 0 0",
+        *([f"GCAT {' '.join(catalogues)}"] if catalogues else []),
+        "RAIM 0 0 1 1 0 0 0 0 0",
+        f"FTYP {1 if near else 0} 0 {len(fields)} {len(waves + extra)} 0 0 0",
+        f"XFLN {zeros}",
+        f"YFLN {' '.join([*fields, *['0'] * (count - len(fields))])}",
+        f"FWGN {' '.join(['1'] * count)}",
+        *(f"{key} {zeros}" for key in ("VDXN", "VDYN", "VCXN", "VCYN", "VANN")),
+        *(f"WAVM {i} {wave!r} 1" for i, wave in enumerate(waves, start=1)),
+        *(f"WAVM {len(waves) + 1} {wave!r} 0" for wave in extra),
+        f"PWAV {(waves + extra).index(lens.reference_wavelength_um) + 1}",
+    ]
+
+
+def _height_text(lens: Lens, angle_rad: float) -> str:
+    """Give the object height that becomes this angle again."""
+    height_mm = math.tan(angle_rad) * lens.object_distance_mm
+    low = high = height_mm
+    for _ in range(8):
+        for value in (low, high):
+            if math.atan(value / lens.object_distance_mm) == angle_rad:
+                return repr(value)
+        low, high = math.nextafter(low, 0), math.nextafter(high, math.inf)
+    return repr(height_mm)
+
+
+def _object_lines(lens: Lens) -> list[str]:
+    near = math.isfinite(lens.object_distance_mm)
+    distance = repr(lens.object_distance_mm) if near else "INFINITY"
+    head = ["SURF 0", "  TYPE STANDARD", '  CURV 0.0 0 0 0 0 ""', *_BLOCK]
+    return [*head, f"  DISZ {distance}", '  DIAM 0 0 0 0 1 ""']
+
+
+def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrder) -> list[str]:
+    if len(surface.even_asphere) > EVEN_TERMS:
+        raise UnsupportedError(
+            f"surface {position} has {len(surface.even_asphere)} aspheric terms; "
+            f"a .zmx file holds {EVEN_TERMS} (to r^{2 * EVEN_TERMS})"
+        )
+    glass, comment = ("", "")
+    if surface.glass != AIR.name:
+        glass, comment = glass_words(surface.medium, order, own=surface.material is not None)
+    kind = "EVENASPH" if surface.even_asphere else "STANDARD"
+    lines = [
+        f"SURF {position + 1}",
+        *([f"  COMM {comment}"] if comment else []),
+        *(["  STOP"] if position == lens.stop else []),
+        f"  TYPE {kind}",
+        f'  CURV {surface.curvature_per_mm!r} 0 0 0 0 ""',
+        *_BLOCK,
+        *(f"  PARM {i} {a!r}" for i, a in enumerate(surface.even_asphere, start=1)),
+        f"  DISZ {surface.thickness_mm!r}",
+        *([f"  GLAS {glass}"] if glass else []),
+        *([f"  CONI {surface.conic!r}"] if surface.conic else []),
+    ]
+    return lines + _aperture_lines(lens, surface, position)
+
+
+def _aperture_lines(lens: Lens, surface: Surface, position: int) -> list[str]:
+    """Give DIAM, fixed where the surface vignettes; a stop that floats holds the aperture there."""
+    size_mm, limit = surface.semi_diameter_mm, math.isfinite(surface.semi_diameter_mm)
+    floating = position == lens.stop and lens.aperture_kind == "stop_semi_diameter_mm"
+    if floating and size_mm != lens.aperture_value:
+        clap = [f"  CLAP 0 {size_mm!r} 0"] if limit else []
+        return [f'  DIAM {lens.aperture_value!r} 0 0 0 1 ""', *clap]
+    return [f'  DIAM {size_mm!r} 1 0 0 1 ""' if limit else '  DIAM 0 0 0 0 1 ""']

@@ -1,0 +1,120 @@
+"""A penalty that keeps a design where rays pass, smooth on both sides of the border.
+
+Each ray has margins at each surface: that it meets the conic, that the surface exists there, that
+it lies within the rim, that it is not totally reflected. All are 1 in the middle of a weak lens
+and 0 at the border. A ray pays ((barrier - margin) / barrier)^2 for margins below the barrier, at
+every surface up to the first where it fails and not beyond, where nothing it says has a meaning.
+What a ray pays is continuous where it begins to fail; it falls by a step where a ray that failed
+further back begins to fail here.
+The limits of thickness take their heights from living rays alone, for the same reason.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, sag, sag_slope
+
+BARRIER: Final = 0.05
+_TINY: Final = 1e-6
+
+
+def ray_penalty(
+    tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays], barrier: float = BARRIER
+) -> Tensor:
+    """Give what each ray pays (shape of the rays); differentiable, also for lost rays.
+
+    Args:
+        tensors: The lens.
+        launched: At the vertex plane of the first surface.
+        seen: From `trace`, all surfaces.
+        barrier: The margin below which a ray pays.
+
+    Raises:
+        ContractError: If `seen` does not belong to all surfaces, or the barrier is not in 0..1.
+    """
+    if len(seen) != len(tensors.aspheric):
+        raise ContractError(f"expected {len(tensors.aspheric)} surfaces in seen; got {len(seen)}")
+    if not 0 < barrier < 1:
+        raise ContractError(f"barrier must lie in 0..1; got {barrier}")
+    total = torch.zeros_like(seen[-1].x)
+    before, depth = launched, launched.z
+    for i, on in enumerate(seen):
+        margins = _margins(tensors, before, depth, on, i)
+        cost = torch.stack([torch.relu(1 - m / barrier) ** 2 for m in margins]).sum(0)
+        # a lost ray whose margins do not say why, as one that did not converge
+        cost = torch.where(on.valid | (cost > 0), cost, 1.0)
+        total = total + torch.where(before.valid, cost, 0.0)
+        before, depth = on, on.z - tensors.thickness_mm[i]
+    return total
+
+
+def _margins(
+    tensors: SurfaceTensors, before: Rays, depth: Tensor, on: Rays, i: int
+) -> list[Tensor]:
+    c, k = tensors.curvature_per_mm[i], tensors.conic[i]
+    way = -depth / before.n
+    x, y = before.x + way * before.l, before.y + way * before.m
+    # the conic, as in `tracing.kernel`; a ray that misses it is judged where it passes nearest
+    a = c * (1 + k * before.n**2)
+    b = before.n - c * (x * before.l + y * before.m)
+    g = c * (x**2 + y**2)
+    square = b**2 - a * g
+    away = b + torch.sqrt(square.clamp_min(_TINY))
+    near = g / torch.where(away > _TINY, away, 1.0)
+    hit_x = torch.where(on.valid, on.x, x + near * before.l)
+    hit_y = torch.where(on.valid, on.y, y + near * before.m)
+    rho = hit_x**2 + hit_y**2
+    exists = 1 - (1 + k) * c**2 * rho
+    terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
+    lean = 2 * sag_slope(c, k, terms, rho)
+    facing = before.n - lean * (hit_x * before.l + hit_y * before.m)
+    ratio = tensors.index[i] / tensors.index[i + 1]
+    transmits = 1 - ratio**2 * (1 - facing**2 / (1 + lean**2 * rho))
+    inside = 1 - rho / tensors.semi_diameter_mm[i] ** 2
+    margins = [exists, transmits, inside, facing]
+    return margins if tensors.aspheric[i] else [square, *margins]
+
+
+def thickness_penalty(
+    tensors: SurfaceTensors, seen: Sequence[Rays], least_mm: Sequence[float]
+) -> Tensor:
+    """Give what too thin elements and gaps cost: squares in mm^2, differentiable.
+
+    Args:
+        tensors: The lens.
+        seen: From `trace`, all surfaces.
+        least_mm: Per gap between two surfaces, at the centre and at the edge. The edge lies at
+            the larger of the heights that living rays reach on the two surfaces.
+
+    Returns:
+        (gap, ...), the rest as in the tensors' thickness.
+
+    Raises:
+        ContractError: If a gap has no limit.
+    """
+    if len(least_mm) != len(seen) - 1:
+        raise ContractError(f"expected {len(seen) - 1} limits in mm; got {len(least_mm)}")
+    rows = []
+    for i, least in enumerate(least_mm):
+        gap = tensors.thickness_mm[i]
+        rho = torch.maximum(_reach(seen[i], gap), _reach(seen[i + 1], gap))
+        edge = gap + _height(tensors, i + 1, rho) - _height(tensors, i, rho)
+        rows.append(torch.relu(least - gap) ** 2 + torch.relu(least - edge) ** 2)
+    return torch.stack(rows)
+
+
+def _height(tensors: SurfaceTensors, i: int, rho: Tensor) -> Tensor:
+    terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
+    return sag(tensors.curvature_per_mm[i], tensors.conic[i], terms, rho)
+
+
+def _reach(rays: Rays, like: Tensor) -> Tensor:
+    """Give the largest rho of living rays, in the shape of a number of the lens."""
+    rho = torch.where(rays.valid, rays.x**2 + rays.y**2, 0.0)
+    extra = rho.ndim - like.ndim
+    dims = [d for d in range(rho.ndim) if d < extra or like.shape[d - extra] == 1]
+    return rho.amax(dims, keepdim=True).reshape(like.shape) if dims else rho

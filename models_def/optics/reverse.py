@@ -1,0 +1,93 @@
+"""Rays from the sensor to the scene, through the same surfaces in the opposite order.
+
+In this direction z counts from the sensor towards the scene; x and y stay as they are. So the
+scene point of a field at the slope s (see `pupil.launch`) is met at y = -s times its distance.
+"""
+
+import math
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
+
+
+def reverse(tensors: SurfaceTensors) -> SurfaceTensors:
+    """Give the lens as light from the sensor meets it.
+
+    The gap to the sensor stays last, where it means nothing: replace it by what follows.
+    """
+    gaps = tensors.thickness_mm.flip(0)
+    return replace(
+        tensors,
+        curvature_per_mm=-tensors.curvature_per_mm.flip(0),
+        conic=tensors.conic.flip(0),
+        even_asphere=-tensors.even_asphere.flip(0),
+        thickness_mm=torch.cat([gaps[1:], gaps[:1]]),
+        semi_diameter_mm=tensors.semi_diameter_mm.flip(0),
+        index=tensors.index.flip(0),
+        aspheric=tensors.aspheric[::-1],
+    )
+
+
+def launch_from_sensor(x_mm: Tensor, y_mm: Tensor, target: tuple[Tensor, Tensor, float]) -> Rays:
+    """Start rays on the sensor towards points of a plane, the exit pupil as a rule.
+
+    Args:
+        x_mm: Sensor points; broadcasts with the rest.
+        y_mm: The same.
+        target: x, y and distance in mm of the points from the sensor, the distance positive
+            towards the scene. A negative one is a pupil behind the sensor: rays leave its
+            points behind.
+
+    Raises:
+        ContractError: If the plane is the sensor's.
+    """
+    target_x, target_y, distance_mm = target
+    if not (math.isfinite(distance_mm) and distance_mm != 0):
+        raise ContractError(f"the target distance must be finite and not 0; got {distance_mm} mm")
+    dx, dy = (target_x - x_mm) / distance_mm, (target_y - y_mm) / distance_mm
+    blank = torch.zeros_like(dx + dy)
+    n = 1 / torch.sqrt(1 + dx**2 + dy**2) + blank
+    return Rays(
+        x=x_mm + blank,
+        y=y_mm + blank,
+        z=blank,
+        l=dx * n,
+        m=dy * n,
+        n=n,
+        fate=torch.zeros_like(n, dtype=torch.int8),
+    )
+
+
+def trace_to_scene(
+    tensors: SurfaceTensors,
+    rays: Rays,
+    object_distance_mm: float,
+    *,
+    path: bool = False,
+    compiled: bool = False,
+) -> Rays:
+    """Trace rays from the sensor to the scene.
+
+    Args:
+        tensors: The lens (in the order of the light of a photograph).
+        rays: On the sensor (z = 0 there), n > 0 towards the scene.
+        object_distance_mm: From the first vertex to the plane of the scene; inf for none.
+        path: See `trace`.
+        compiled: See `trace`.
+
+    Returns:
+        Rays on the plane of the scene; for a distant one on the vertex plane of the first
+        surface, where only their directions count.
+    """
+    if not object_distance_mm >= 0:
+        raise ContractError(f"object_distance_mm must be >= 0; got {object_distance_mm}")
+    lens = reverse(tensors)
+    beyond_mm = 0.0 if math.isinf(object_distance_mm) else object_distance_mm
+    last = torch.full_like(lens.thickness_mm[-1:], beyond_mm)
+    lens = replace(lens, thickness_mm=torch.cat([lens.thickness_mm[:-1], last]))
+    away = replace(rays, z=rays.z - tensors.thickness_mm[-1])
+    return trace(lens, away, path=path, compiled=compiled)

@@ -1,0 +1,69 @@
+"""A lens made larger or smaller, faster or slower."""
+
+import math
+from dataclasses import replace
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
+from camkit.models_def.optics.prescription import Lens, Surface
+
+
+def scale_lens(lens: Lens, factor: float) -> Lens:
+    """Give the lens with every length times a factor; angles, conics and F-number stay.
+
+    Args:
+        lens: The prescription.
+        factor: > 0.
+    """
+    if not (math.isfinite(factor) and factor > 0):
+        raise ContractError(f"the scale must be a number > 0; got {factor}")
+    length = 1.0 if lens.aperture_kind == "f_number" else factor
+    return replace(
+        lens,
+        surfaces=tuple(_scaled(surface, factor) for surface in lens.surfaces),
+        aperture_value=lens.aperture_value * length,
+        object_distance_mm=lens.object_distance_mm * factor,
+    )
+
+
+def _scaled(surface: Surface, factor: float) -> Surface:
+    # a_j multiplies r^(2 j) and gives mm
+    terms = enumerate(surface.even_asphere, start=1)
+    return replace(
+        surface,
+        curvature_per_mm=surface.curvature_per_mm / factor,
+        thickness_mm=surface.thickness_mm * factor,
+        semi_diameter_mm=surface.semi_diameter_mm * factor,
+        even_asphere=tuple(a * factor ** (1 - 2 * j) for j, a in terms),
+    )
+
+
+def scale_to_efl(lens: Lens, efl_mm: float) -> Lens:
+    """Give the lens scaled to a focal length at its reference wavelength.
+
+    Raises:
+        ContractError: If the focal length is not finite or has the other sign.
+    """
+    return scale_lens(lens, efl_mm / paraxial_data(lens).efl_mm)
+
+
+def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens:
+    """Give the lens stopped to an F-number, stated as its entrance pupil diameter.
+
+    Rims stay as they are, so a lens that is opened may be vignetted by its own glass.
+
+    Args:
+        lens: The prescription.
+        f_number: EFL / entrance pupil diameter at the reference wavelength; or, if
+            `working`, that of the paraxial image of its object (`paraxial.Image`).
+        working: Which. They are the same for an object at infinity.
+    """
+    if not (math.isfinite(f_number) and f_number > 0):
+        raise ContractError(f"the F-number must be > 0; got {f_number}")
+    data = paraxial_data(lens)
+    now = paraxial_image(lens).working_f_number if working else abs(data.f_number)
+    return replace(
+        lens,
+        aperture_kind="entrance_pupil_diameter_mm",
+        aperture_value=data.entrance_pupil_diameter_mm * now / f_number,
+    )

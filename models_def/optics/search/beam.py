@@ -1,0 +1,60 @@
+"""Rays of a batch of lenses: the paraxial entrance pupil filled from every field.
+
+The search needs a pupil whose rays depend smoothly on the lens and cost no aiming; what a real
+stop passes is measured afterwards (`pupil`, definition `stop`).
+"""
+
+import math
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.paraxial import focal_lengths
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.pupil import PupilSamples, launch
+from camkit.models_def.optics.search.variables import entrance_pupil
+from camkit.models_def.optics.trace import Rays, SurfaceTensors
+
+
+def pupil_radius_mm(lens: Lens, reference: SurfaceTensors, magnification: Tensor) -> Tensor:
+    """Give the radius of the entrance pupil in the batch shape.
+
+    Args:
+        lens: States the aperture.
+        reference: The batch at the reference wavelength.
+        magnification: Of the stop, see `entrance_pupil`.
+    """
+    if lens.aperture_kind == "stop_semi_diameter_mm":
+        return lens.aperture_value * torch.abs(magnification)
+    if lens.aperture_kind == "f_number":
+        return torch.abs(focal_lengths(reference)[0]) / lens.aperture_value / 2
+    return torch.full_like(magnification, lens.aperture_value / 2)
+
+
+def launch_beam(
+    lens: Lens,
+    reference: SurfaceTensors,
+    slopes: Tensor,
+    samples: PupilSamples,
+    object_distance_mm: float,
+) -> Rays:
+    """Start rays at the first vertex plane: (start, field, 1, 1 + ray), ray 0 is the chief ray.
+
+    Args:
+        lens: States stop and aperture.
+        reference: (surface, start, 1, 1, 1) at the reference wavelength.
+        slopes: (field,), tan of the field angles seen from the entrance pupil's axis point for a
+            distant object, from the first vertex for a near one (as `launch`).
+        samples: Of the unit disc, (ray,).
+        object_distance_mm: From the first vertex; inf allowed.
+    """
+    place, magnification = entrance_pupil(reference, lens.stop)
+    radius = pupil_radius_mm(lens, reference, magnification)
+    zero = torch.zeros(1, dtype=samples.x.dtype)
+    px, py = radius * torch.cat([zero, samples.x]), radius * torch.cat([zero, samples.y])
+    slope = slopes[:, None, None]
+    if math.isinf(object_distance_mm):
+        return launch(px, py - place * slope, slope, object_distance_mm)
+    share = object_distance_mm / (object_distance_mm + place)
+    top = -slope * object_distance_mm
+    return launch(px * share, top + (py - top) * share, slope, object_distance_mm)

@@ -1,0 +1,54 @@
+"""A found lens made into a prescription: apertures that pass its light, numbers of a drawing."""
+
+from dataclasses import replace
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.search.problem import Problem, trace_batch
+
+_CLEARANCE_MM: Final = 0.5
+_RIM_RAYS: Final = 41
+
+
+def finished(problem: Problem, scaled: Tensor) -> Lens:
+    """Give a found lens (variable,) with semi-diameters that pass every ray of the fields.
+
+    The stop keeps its own size: it limits the beam.
+    """
+    lens = problem.free.made(scaled)
+    rim = torch.linspace(-1, 1, _RIM_RAYS, dtype=torch.float64)
+    samples = replace(problem.samples, x=torch.zeros_like(rim), y=rim, weight=None)
+    distances = problem.object_distances_mm or (lens.object_distance_mm,)
+    with torch.no_grad():
+        seen = [
+            trace_batch(replace(problem, samples=samples), scaled[None], d).seen for d in distances
+        ]
+    surfaces = []
+    for i, surface in enumerate(lens.surfaces):
+        reach = max(float(torch.hypot(s[i].x, s[i].y).max()) for s in seen)
+        semi_mm = round(reach + _CLEARANCE_MM, 1)
+        if i == lens.stop:
+            semi_mm = (
+                reach if lens.aperture_kind != "stop_semi_diameter_mm" else lens.aperture_value
+            )
+        surfaces.append(replace(surface, semi_diameter_mm=semi_mm))
+    return replace(lens, surfaces=tuple(surfaces))
+
+
+def with_rounded_numbers(lens: Lens) -> Lens:
+    """Give the lens as a drawing would state it: 0.1 um, conics to four digits."""
+    return replace(
+        lens,
+        surfaces=tuple(
+            replace(
+                s,
+                curvature_per_mm=1 / round(s.radius_mm, 4) if s.curvature_per_mm else 0.0,
+                thickness_mm=round(s.thickness_mm, 4),
+                conic=round(s.conic, 4),
+            )
+            for s in lens.surfaces
+        ),
+    )

@@ -1,0 +1,168 @@
+"""A given lens made better: its free numbers moved by damped least squares."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import VARY, Lens, Surface, Vary
+from camkit.models_def.optics.search.least_squares import Residuals, descend
+from camkit.models_def.optics.search.problem import Problem, residuals
+from camkit.models_def.optics.search.variables import FreeLens, Kind, Variable
+
+CONIC_REACH: Final = 5.0
+FOCUS_REACH_MM: Final = 2.0
+_LEAST_GLASS_MM: Final = 1.0
+_LEAST_AIR_MM: Final = 0.1
+_ASPHERE_TERMS: Final = 4
+_ASPHERE_SAG_MM: Final = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Improvement:
+    """What a search from a given lens found.
+
+    Attributes:
+        scaled: (variable,), the best.
+        merit_before: Sum of squares of the given lens.
+        merit: Of the best.
+        merits: Of every start that went to the end, best first.
+        evaluations: Lenses traced.
+    """
+
+    scaled: Tensor
+    merit_before: float
+    merit: float
+    merits: tuple[float, ...]
+    evaluations: int
+
+
+def free_lens(lens: Lens, vary: Sequence[Sequence[Vary]]) -> FreeLens:
+    """Free numbers of a lens within bounds around their present values.
+
+    The focal length is kept by the curvature of the last refracting surface when curvatures are
+    free; the sensor rides on the paraxial image, with a defocus of its own.
+
+    Args:
+        lens: As it is.
+        vary: For each surface what is free; none for a surface that stays.
+
+    Raises:
+        ContractError: If nothing is free, or a name is unknown.
+    """
+    if len(vary) != len(lens.surfaces) or not any(vary):
+        raise ContractError(
+            "nothing of the lens is free: name numbers by `vary` of a surface, or --vary "
+            f"{','.join(VARY)}"
+        )
+    solved = _solved_surface(lens, vary)
+    variables: list[Variable] = []
+    for i, (surface, names) in enumerate(zip(lens.surfaces, vary, strict=True)):
+        for name in names:
+            variables += _variables(lens, surface, i, name, solved=solved)
+    variables.append(Variable(kind="defocus", low=-FOCUS_REACH_MM, high=FOCUS_REACH_MM))
+    efl_mm = None if solved is None else paraxial_data(lens).efl_mm
+    return FreeLens(lens=lens, variables=tuple(variables), solved=solved, efl_mm=efl_mm)
+
+
+def refracting_surfaces(lens: Lens) -> tuple[int, ...]:
+    """Give the surfaces between different media; a stop in air is none."""
+    media = ["air", *(surface.glass for surface in lens.surfaces)]
+    return tuple(i for i, surface in enumerate(lens.surfaces) if media[i] != surface.glass)
+
+
+def _solved_surface(lens: Lens, vary: Sequence[Sequence[Vary]]) -> int | None:
+    free = [i for i in refracting_surfaces(lens) if "curvature" in vary[i]]
+    return free[-1] if free else None
+
+
+def _variables(
+    lens: Lens, surface: Surface, i: int, name: Vary, *, solved: int | None
+) -> list[Variable]:
+    if name == "curvature":
+        if i == solved:
+            return []
+        c = surface.curvature_per_mm
+        reach = max(abs(c), 1 / abs(paraxial_data(lens).efl_mm))
+        return [_around("curvature", i, c, reach)]
+    if name == "conic":
+        return [_around("conic", i, surface.conic, CONIC_REACH)]
+    if name == "thickness":
+        if i == len(lens.surfaces) - 1:
+            return []
+        least = _LEAST_AIR_MM if surface.glass == "air" else _LEAST_GLASS_MM
+        most = max(2 * surface.thickness_mm, surface.thickness_mm + 5)
+        return [
+            Variable(kind="thickness", surface=i, low=min(least, surface.thickness_mm), high=most)
+        ]
+    return _asphere_variables(lens, surface, i)
+
+
+def _asphere_variables(lens: Lens, surface: Surface, i: int) -> list[Variable]:
+    """Free r^4 and higher; the r^2 term is a curvature and stays."""
+    radius_mm = min(surface.semi_diameter_mm, paraxial_data(lens).entrance_pupil_diameter_mm)
+    made = []
+    for term in range(1, max(_ASPHERE_TERMS, len(surface.even_asphere))):
+        own = surface.even_asphere[term] if term < len(surface.even_asphere) else 0.0
+        reach = max(2 * abs(own), _ASPHERE_SAG_MM / radius_mm ** (2 * term + 2))
+        made.append(
+            Variable(kind="even_asphere", surface=i, term=term, low=own - reach, high=own + reach)
+        )
+    return made
+
+
+def _around(kind: Kind, i: int, value: float, reach: float) -> Variable:
+    return Variable(kind=kind, surface=i, low=value - reach, high=value + reach)
+
+
+def improve(
+    merit: Residuals | Problem,
+    begin: Tensor,
+    *,
+    starts: int = 8,
+    spread: float = 0.05,
+    scout_steps: int = 5,
+    steps: int = 60,
+    seed: int = 1,
+) -> Improvement:
+    """Improve one lens; the best of several starts near it goes to the end.
+
+    Args:
+        merit: A problem, or residuals of scaled variables.
+        begin: (variable,), the lens; it is one of the starts, so the result is never worse.
+        starts: How many.
+        spread: Half-width of the draws about `begin`, as a share of the bounds.
+        scout_steps: Steps of each start.
+        steps: Steps of the best quarter.
+        seed: Of the draws.
+    """
+    function = _function(merit)
+    rng = np.random.default_rng(seed)
+    drawn = torch.from_numpy(rng.uniform(-spread, spread, (max(starts, 1), len(begin))))
+    drawn[0] = 0
+    held = torch.zeros(len(begin), dtype=torch.bool)
+    scouted = descend(function, (begin + drawn).clamp(0, 1), scout_steps, held)
+    kept = torch.cat([begin[None], scouted.scaled[: max(1, starts // 4)]])
+    found = descend(function, kept, steps, held)
+    with torch.no_grad():
+        before = float((function(begin[None]) ** 2).sum())
+    merits = tuple(found.merits.tolist())
+    return Improvement(
+        scaled=found.scaled[0],
+        merit_before=before,
+        merit=merits[0],
+        merits=merits,
+        evaluations=scouted.evaluations + found.evaluations,
+    )
+
+
+def _function(merit: Residuals | Problem) -> Residuals:
+    if isinstance(merit, Problem):
+        problem = merit
+        return lambda scaled: residuals(problem, scaled)
+    return merit

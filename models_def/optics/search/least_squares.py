@@ -1,0 +1,78 @@
+"""Damped least squares (Levenberg-Marquardt) on a batch of starts with bounds.
+
+Starts and difference columns are traced together, in one leading dimension.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+from torch import Tensor
+
+Residuals = Callable[[Tensor], Tensor]
+"""(start, variable) in 0..1 to (start, residual)."""
+
+_DIFFERENCE: Final = 1e-6
+_DAMPING_RANGE: Final = (1e-6, 1e6)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Descent:
+    """Where starts have come to.
+
+    Attributes:
+        scaled: (start, variable), best first.
+        merits: (start,), sums of squares.
+        evaluations: Lenses traced in all, difference columns included.
+    """
+
+    scaled: Tensor
+    merits: Tensor
+    evaluations: int
+
+
+def jacobian(residuals: Residuals, scaled: Tensor) -> tuple[Tensor, Tensor]:
+    """Give residuals (start, residual) and forward differences (start, residual, variable)."""
+    starts, count = scaled.shape
+    # inwards, so that a lens at its upper bound is not asked for beyond it
+    sign = torch.where(scaled > 0.5, -1.0, 1.0) * _DIFFERENCE
+    both = torch.cat([scaled[:, None], scaled[:, None] + torch.diag_embed(sign)], dim=1)
+    values = residuals(both.flatten(0, 1)).reshape(starts, count + 1, -1)
+    slopes = (values[:, 1:] - values[:, :1]) / sign[..., None]
+    return values[:, 0], slopes.transpose(1, 2)
+
+
+def descend(residuals: Residuals, scaled: Tensor, steps: int, held: Tensor) -> Descent:
+    """Lower the sum of squares of every start; no start ends worse than it began.
+
+    Args:
+        residuals: What is squared and summed.
+        scaled: (start, variable) in 0..1.
+        steps: Tried steps of each start.
+        held: (variable,), numbers that stay.
+    """
+    damping = torch.full((len(scaled), 1), 1e-2, dtype=torch.float64)
+    with torch.no_grad():
+        for _ in range(steps):
+            value, slope = jacobian(residuals, scaled)
+            moved = _step(value, slope, scaled, damping, held)
+            better = (residuals(moved) ** 2).sum(1) < (value**2).sum(1)
+            scaled = torch.where(better[:, None], moved, scaled)
+            factor = torch.where(better, 0.3, 4.0)[:, None]
+            damping = (damping * factor).clamp(*_DAMPING_RANGE)
+        merits = (residuals(scaled) ** 2).sum(1)
+    order = torch.argsort(merits)
+    count = scaled.shape[0] * (steps * (scaled.shape[1] + 2) + 1)
+    return Descent(scaled=scaled[order], merits=merits[order], evaluations=count)
+
+
+def _step(value: Tensor, slope: Tensor, scaled: Tensor, damping: Tensor, held: Tensor) -> Tensor:
+    normal = slope.transpose(1, 2) @ slope
+    gradient = (slope.transpose(1, 2) @ value[..., None])[..., 0]
+    # variables at a bound that would leave it, and held ones, stay
+    stuck = ((scaled <= 0) & (gradient > 0)) | ((scaled >= 1) & (gradient < 0)) | held
+    diagonal = normal.diagonal(dim1=1, dim2=2)
+    weight = torch.where(stuck, 1e12, damping * diagonal + 1e-9)
+    change = torch.linalg.solve(normal + torch.diag_embed(weight), -gradient)
+    return torch.where(stuck, scaled, (scaled + change).clamp(0, 1))

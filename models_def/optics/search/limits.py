@@ -1,0 +1,96 @@
+"""What a lens must not be, as residuals that vanish inside the limits."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, sag
+
+_PENALTY_PER_MM: Final = 3.0
+_STEEPEST: Final = 0.8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of a search.
+
+    Attributes:
+        distortion: Share of the ideal height that costs nothing; inf for no limit.
+        min_edge_mm: Least edge thickness of an element.
+        min_air_mm: Least edge distance of two elements.
+        min_bfl_mm: Least distance of the sensor from the last vertex.
+        max_curvature_per_mm: Of the solved surface, which has no bounds of its own.
+    """
+
+    distortion: float = math.inf
+    min_edge_mm: float = 1.0
+    min_air_mm: float = 0.1
+    min_bfl_mm: float = 0.0
+    max_curvature_per_mm: float = 0.08
+
+    def __post_init__(self) -> None:
+        if not (self.distortion > 0 and self.max_curvature_per_mm > 0):
+            raise ContractError(f"distortion and curvature limits must be > 0; got {self}")
+
+
+def limit_residuals(
+    limits: Limits,
+    tensors: SurfaceTensors,
+    seen: list[Rays],
+    *,
+    solved: int | None,
+    glass: tuple[bool, ...],
+) -> Tensor:
+    """Give residuals (start, residual).
+
+    Args:
+        limits: The limits.
+        tensors: (surface, start, 1, 1, 1).
+        seen: Rays on every surface, (start, field, wave, ray). Lost rays rest on the axis, so
+            heights are those of living rays.
+        solved: The surface whose curvature is solved for.
+        glass: Whether the medium after each surface is glass.
+    """
+    # the root behind the maximum: its slope is finite though some rays lie on the axis
+    reach = torch.stack(
+        [(r.x**2 + r.y**2).flatten(1).amax(1).clamp_min(1e-12) for r in seen]
+    ).sqrt()
+    wide = torch.maximum(reach[:-1], reach[1:])
+    front = torch.stack([_height(tensors, i, wide[i]) for i in range(len(wide))])
+    back = torch.stack([_height(tensors, i + 1, wide[i]) for i in range(len(wide))])
+    gaps = tensors.thickness_mm[..., 0, 0, 0]
+    least = [limits.min_edge_mm if inside else limits.min_air_mm for inside in glass[:-1]]
+    # a stop is a plane in air: it may stand where a surface bulges through it
+    real = [before or after for before, after in zip((False, *glass), glass, strict=False)]
+    least = [edge if real[i] and real[i + 1] else -math.inf for i, edge in enumerate(least)]
+    thin = torch.relu(torch.tensor(least, dtype=gaps.dtype)[:, None] - (gaps[:-1] + back - front))
+    curvature = tensors.curvature_per_mm[..., 0, 0, 0]
+    steep = torch.relu(torch.abs(curvature * reach) - _STEEPEST)
+    short = torch.relu(limits.min_bfl_mm - gaps[-1])[None]
+    rows = [thin, steep, short]
+    if solved is not None:
+        rows.append(
+            torch.relu(torch.abs(curvature[solved]) - limits.max_curvature_per_mm)[None] * 10
+        )
+    return torch.cat([row.T for row in rows], dim=1) * _PENALTY_PER_MM
+
+
+def _height(tensors: SurfaceTensors, i: int, radius_mm: Tensor) -> Tensor:
+    curvature, conic = (t[i, :, 0, 0, 0] for t in (tensors.curvature_per_mm, tensors.conic))
+    return sag(curvature, conic, tensors.even_asphere[i, ..., 0, 0, 0], radius_mm**2)
+
+
+def distortion_residuals(limits: Limits, chief_y: Tensor, ideal_y: Tensor) -> Tensor:
+    """Give residuals (start, field) of chief rays that land too far from their ideal heights.
+
+    Args:
+        limits: The limits.
+        chief_y: (start, field) in mm.
+        ideal_y: (field,) or (start, field) in mm, not 0.
+    """
+    bent = torch.relu(torch.abs(chief_y / ideal_y - 1) - limits.distortion)
+    return 10 * _PENALTY_PER_MM * bent

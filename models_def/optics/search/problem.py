@@ -1,0 +1,121 @@
+"""A lens problem: what is free, what is looked at, what is good; one residual function."""
+
+import math
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.paraxial import trace_paraxial
+from camkit.models_def.optics.pupil import PupilSamples, half_disc
+from camkit.models_def.optics.search.beam import launch_beam
+from camkit.models_def.optics.search.limits import Limits, distortion_residuals, limit_residuals
+from camkit.models_def.optics.search.merit import MERITS, Merit, spot_residuals
+from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """What a search minimises.
+
+    Attributes:
+        free: The lens and its free numbers.
+        slopes: (field,), tan of the field angles, the first one 0.
+        wavelengths_um: (wave,), an odd number; the middle one judges distortion.
+        object_distances_mm: Depths that count alike; empty for that of the lens. The sensor stays
+            where the lens's own object distance puts it.
+        samples: Of half the unit disc.
+        merit: Which merit of spots.
+        core_mm: Its s.
+        limits: What a lens must not be.
+    """
+
+    free: FreeLens
+    slopes: Tensor
+    wavelengths_um: Tensor
+    object_distances_mm: tuple[float, ...] = ()
+    samples: PupilSamples = field(default_factory=lambda: half_disc(20))
+    merit: Merit = "sum_abs"
+    core_mm: float = 6e-3
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        if self.merit not in MERITS:
+            raise ContractError(f"a merit is one of {', '.join(MERITS)}; got {self.merit!r}")
+        if len(self.wavelengths_um) % 2 == 0:
+            raise ContractError("a problem needs an odd number of wavelengths")
+        if not (self.core_mm > 0 and len(self.slopes) > 0 and float(self.slopes[0]) == 0):
+            raise ContractError("a problem needs a core > 0 and fields that start at the axis")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Traced:
+    """A batch of lenses looked at from one object distance.
+
+    Attributes:
+        reference: The lenses at the reference wavelength.
+        tensors: The lenses at all wavelengths.
+        landed: (start, field, wave, 1 + ray) on the sensor, ray 0 is the chief ray.
+        seen: The same on every surface.
+    """
+
+    reference: SurfaceTensors
+    tensors: SurfaceTensors
+    landed: Rays
+    seen: list[Rays]
+
+
+def trace_batch(problem: Problem, scaled: Tensor, object_distance_mm: float) -> Traced:
+    """Trace a batch (start, variable) from every field; gradients flow."""
+    free = problem.free
+    reference_um = torch.tensor([free.lens.reference_wavelength_um], dtype=torch.float64)
+    reference = free.tensors(scaled, reference_um)
+    tensors = free.tensors(scaled, problem.wavelengths_um)
+    rays = launch_beam(free.lens, reference, problem.slopes, problem.samples, object_distance_mm)
+    seen: list[Rays] = []
+    landed = trace(tensors, rays, seen=seen)
+    return Traced(reference=reference, tensors=tensors, landed=landed, seen=seen)
+
+
+def residuals(problem: Problem, scaled: Tensor) -> Tensor:
+    """Give residuals (start, residual) of a batch (start, variable)."""
+    own = problem.free.lens.object_distance_mm
+    parts: list[Tensor] = []
+    distances = problem.object_distances_mm or (own,)
+    for number, distance_mm in enumerate(distances):
+        traced = trace_batch(problem, scaled, distance_mm)
+        spots = spot_residuals(traced.landed, problem.core_mm, problem.merit)
+        parts.append(spots / math.sqrt(len(distances)))
+        if number == 0:
+            parts.append(limits_of(problem, traced, distance_mm))
+    return torch.cat(parts, dim=1)
+
+
+def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
+    """Give residuals (start, residual) of what the lenses must not be."""
+    free, limits = problem.free, problem.limits
+    parts = [
+        limit_residuals(
+            limits,
+            traced.tensors,
+            traced.seen,
+            solved=free.solved,
+            glass=tuple(s.glass != "air" for s in free.lens.surfaces),
+        )
+    ]
+    if math.isfinite(limits.distortion) and len(problem.slopes) > 1:
+        middle = len(problem.wavelengths_um) // 2
+        chief = traced.landed.y[:, 1:, middle, 0]
+        ideal = problem.slopes[1:] * _image_scale_mm(traced.reference, distance_mm)
+        parts.append(distortion_residuals(limits, chief, ideal))
+    return torch.cat(parts, dim=1)
+
+
+def _image_scale_mm(reference: SurfaceTensors, object_distance_mm: float) -> Tensor:
+    """Give the paraxial image height per field slope (start, 1): the EFL for a distant object."""
+    one = torch.ones_like(reference.index[0] * reference.curvature_per_mm[0])
+    surfaces = range(len(reference.aspheric))
+    _, slope = trace_paraxial(reference, one, one / object_distance_mm, surfaces)
+    return (-1 / slope).reshape(-1, 1)

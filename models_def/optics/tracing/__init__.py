@@ -1,0 +1,10 @@
+"""The arithmetic of `trace`: rays through surfaces, and back.
+
+In the order in which data flows:
+
+- `profile`: height and slope of a surface
+- `kernel`: rays through the surfaces of a lens, each with its fate
+- `adjoint`: the gradients, from where rays met the surfaces
+- `gradient`: both as one node of the autograd graph, in blocks, with bounded memory
+- `compilation`: a whole lens fused into one loop
+"""

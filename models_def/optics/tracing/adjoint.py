@@ -1,0 +1,283 @@
+"""The gradients of a trace by its adjoint, surface by surface from the last to the first.
+
+At the intersection the implicit function theorem holds: for a hit P = P0 + s d on the surface
+z = h(rho; p) with normal N = (-q x, -q y, 1), N.dP = h_p dp, hence
+ds = (h_p dp - N.(dP0 + s dd)) / N.d. So the gradient needs only where a ray met the surface, not
+how it was found: no graph of Newton steps, six numbers per ray and surface. P0 is the previous
+hit, which makes s the length of the whole way and the optical path a sum of n s.
+
+Refraction is d' = ratio d + bend N, bend = (T - ratio D) / N.N, with D = N.d and T = N.d'
+(ratio = n / n', T^2 = (1 - ratio^2) N.N + ratio^2 D^2).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.tracing.kernel import Kept, Numbers, Plan, State, rest
+from camkit.models_def.optics.tracing.profile import TINY, polynomial
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """Which gradients are asked for; semi-diameters have none."""
+
+    rays: bool
+    curvature: bool
+    conic: bool
+    even_asphere: bool
+    thickness: bool
+    index: bool
+
+
+class Slopes(NamedTuple):
+    """What flows back: derivatives of the loss by a result; None is zero."""
+
+    end: State
+    path: Tensor | None
+    seen: list[State | None]
+
+
+class Gradients(NamedTuple):
+    """Of the launched rays and the lens; a list has an entry per surface (indices: one more)."""
+
+    rays: State | None
+    curvature: list[Tensor]
+    conic: list[Tensor]
+    even_asphere: list[list[Tensor]]
+    thickness: list[Tensor]
+    indices: list[Tensor]
+
+
+Gather = Callable[[Tensor, Tensor], Tensor]
+
+
+class _Shape(NamedTuple):
+    """A surface where rays meet it: rho, root S, 1 / S, q = 2 dh/d rho, N.N."""
+
+    rho: Tensor
+    root: Tensor
+    inverse: Tensor
+    lean: Tensor
+    length2: Tensor
+
+
+class _Bent(NamedTuple):
+    """The adjoint of refraction: of the hit (x, y, z), q, d (through N.d), and the ratio."""
+
+    x: Tensor
+    y: Tensor
+    z: Tensor
+    lean: Tensor
+    facing: Tensor
+    slope_facing: Tensor
+    ratio: Tensor | None
+
+
+def pull_back(
+    plan: Plan,
+    wanted: Wanted,
+    lens: Sequence[Numbers],
+    launched: State,
+    kept: Kept,
+    slopes: Slopes,
+    gather: Gather,
+) -> Gradients:
+    """Give the gradients of a trace.
+
+    Args:
+        plan: As the trace had it.
+        wanted: What to compute.
+        lens: As the trace had it.
+        launched: As the trace had them (lost ones at rest).
+        kept: Of the trace.
+        slopes: Of the loss by what the trace gave.
+        gather: Sums a per-ray derivative to the shape of the number it belongs to.
+    """
+    total = Gradients(launched, [], [], [], [], [torch.zeros_like(lens[-1].after)])
+    g = rest(slopes.end, kept.fate, adaptive=plan.adaptive, n=0.0)
+    path = None if slopes.path is None else torch.where(kept.fate == 0, slopes.path, 0.0)
+    g = _leave_plane(wanted, lens[-1], kept.seen[-1], g, path, total, gather)
+    for i in reversed(range(len(lens))):
+        p, hit, extra = lens[i], kept.seen[i], slopes.seen[i]
+        if extra is not None:
+            extra = rest(extra, kept.fates[i], adaptive=plan.adaptive, n=0.0)
+            g = State(*(a + b for a, b in zip(g, extra, strict=True)))
+        before = launched
+        if i:
+            last = kept.seen[i - 1]
+            before = last._replace(z=last.z - lens[i - 1].gap)
+        shape = _shape(p, hit, aspheric=plan.aspheric[i])
+        bent = _refraction(p, shape, before, hit, g, with_ratio=wanted.index)
+        way = (hit.z - before.z) / before.n
+        push = torch.addcmul(bent.x * before.l, bent.y, before.m)
+        push = torch.addcmul(push, bent.z, before.n)
+        push = push if path is None else push + path * p.before
+        push = push / bent.facing
+        aspheric = plan.aspheric[i]
+        _collect(p, wanted, shape, bent, push, total, gather, aspheric=aspheric)
+        if wanted.index:
+            _collect_index(p, bent, None if path is None else path * way, total, gather)
+        if i or wanted.rays:
+            g = _before(p, g, shape, bent, push, way, hit)
+        if i and wanted.thickness:
+            total.thickness.append(gather(-g.z, lens[i - 1].gap))
+    return Gradients(
+        g if wanted.rays else None,
+        total.curvature[::-1],
+        total.conic[::-1],
+        total.even_asphere[::-1],
+        total.thickness[::-1],
+        total.indices[::-1],
+    )
+
+
+def _leave_plane(
+    wanted: Wanted,
+    p: Numbers,
+    hit: State,
+    g: State,
+    path: Tensor | None,
+    total: Gradients,
+    gather: Gather,
+) -> State:
+    back = (hit.z - p.gap) / hit.n
+    slope = torch.addcmul(g.x * hit.l, g.y, hit.m)
+    if path is not None:
+        slope = slope + path * p.after
+        if wanted.index:
+            total.indices[0] = total.indices[0] - gather(path * back, p.after)
+    slope = slope / hit.n
+    if wanted.thickness:
+        total.thickness.append(gather(slope, p.gap))
+    return State(
+        x=g.x,
+        y=g.y,
+        z=-slope,
+        l=torch.addcmul(g.l, back, g.x, value=-1),
+        m=torch.addcmul(g.m, back, g.y, value=-1),
+        n=torch.addcmul(g.n, back, slope),
+    )
+
+
+def _shape(p: Numbers, hit: State, *, aspheric: bool) -> _Shape:
+    rho = torch.addcmul(hit.x * hit.x, hit.y, hit.y)
+    root = (1 - rho * p.opening).clamp_min(TINY).sqrt() if aspheric else 1 - hit.z * p.kc
+    inverse = torch.reciprocal(root)
+    lean = inverse * p.c
+    if aspheric and p.slopes:
+        lean = lean + polynomial(p.slopes, rho)
+    return _Shape(rho, root, inverse, lean, 1 + lean * lean * rho)
+
+
+def _refraction(
+    p: Numbers, shape: _Shape, before: State, hit: State, g: State, *, with_ratio: bool
+) -> _Bent:
+    lean, length2 = shape.lean, shape.length2
+    facing = before.n - torch.addcmul(hit.x * before.l, hit.y, before.m) * lean
+    leaving = hit.n - torch.addcmul(hit.x * hit.l, hit.y, hit.m) * lean
+    bend = (leaving - facing * p.ratio) / length2
+    pull = (g.n - torch.addcmul(g.l * hit.x, g.m, hit.y) * lean) / length2
+    slope_facing = -bend * pull * length2 * p.ratio / leaving
+    slope_length2 = pull * (p.rest2 / leaving - 2 * bend)
+    shear = slope_length2 * lean
+    # slopes by the first two parts of the normal (-q x, -q y, 1)
+    normal_x = torch.addcmul(bend * g.l, slope_facing, before.l)
+    normal_x = torch.addcmul(normal_x, shear, hit.x, value=-1)
+    normal_y = torch.addcmul(bend * g.m, slope_facing, before.m)
+    normal_y = torch.addcmul(normal_y, shear, hit.y, value=-1)
+    slope_lean = -torch.addcmul(normal_x * hit.x, normal_y, hit.y)
+    twist = slope_lean * _lean_slope(p, shape) * 2
+    ratio = None
+    if with_ratio:
+        along = torch.addcmul(g.l * before.l, g.m, before.m)
+        along = torch.addcmul(along, g.n, before.n)
+        ratio = along - pull * (facing + (length2 - facing * facing) * p.ratio / leaving)
+    return _Bent(
+        x=g.x + twist * hit.x - lean * normal_x,
+        y=g.y + twist * hit.y - lean * normal_y,
+        z=g.z,
+        lean=slope_lean,
+        facing=facing,
+        slope_facing=slope_facing,
+        ratio=ratio,
+    )
+
+
+def _lean_slope(p: Numbers, shape: _Shape) -> Tensor:
+    """Give dq / d rho."""
+    cube = shape.inverse * shape.inverse * shape.inverse
+    slope = cube * (p.opening * p.c / 2)
+    bends = [a * j for j, a in enumerate(p.slopes)][1:]
+    return slope + polynomial(bends, shape.rho) if bends else slope
+
+
+def _before(
+    p: Numbers,
+    g: State,
+    shape: _Shape,
+    bent: _Bent,
+    push: Tensor,
+    way: Tensor,
+    hit: State,
+) -> State:
+    tilt = push * shape.lean
+    x, y, z = bent.x + tilt * hit.x, bent.y + tilt * hit.y, bent.z - push
+    swing = bent.slope_facing * shape.lean
+    l = torch.addcmul(g.l * p.ratio, way, x)  # noqa: E741
+    m = torch.addcmul(g.m * p.ratio, way, y)
+    n = torch.addcmul(g.n * p.ratio, way, z)
+    return State(
+        x=x,
+        y=y,
+        z=z,
+        l=torch.addcmul(l, swing, hit.x, value=-1),
+        m=torch.addcmul(m, swing, hit.y, value=-1),
+        n=n + bent.slope_facing,
+    )
+
+
+def _collect(
+    p: Numbers,
+    wanted: Wanted,
+    shape: _Shape,
+    bent: _Bent,
+    push: Tensor,
+    total: Gradients,
+    gather: Gather,
+    *,
+    aspheric: bool,
+) -> None:
+    """Add the slopes by curvature, conic and polynomial: push h_p + slope_lean q_p."""
+    inverse, rho = shape.inverse, shape.rho
+    if wanted.curvature or wanted.conic:
+        cube = bent.lean * inverse * inverse * inverse
+        share = push * inverse / (1 + shape.root)
+        if wanted.curvature:
+            total.curvature.append(gather(torch.addcmul(cube, share, rho), p.c))
+        if wanted.conic:
+            slope = (cube + share * rho / (1 + shape.root)) * rho * (p.c * p.c * p.c / 2)
+            total.conic.append(gather(slope, p.k))
+    if wanted.even_asphere:
+        row: list[Tensor] = []
+        power = torch.ones_like(rho)
+        for j, term in enumerate(p.terms, start=1):
+            if aspheric:
+                slope = power * torch.add(push * rho, bent.lean, alpha=2 * j)
+                power = power * rho
+            row.append(gather(slope, term) if aspheric else torch.zeros_like(term))
+        total.even_asphere.append(row)
+
+
+def _collect_index(
+    p: Numbers, bent: _Bent, longer: Tensor | None, total: Gradients, gather: Gather
+) -> None:
+    """Add the slopes by the indices on both sides: through their ratio and the path."""
+    if bent.ratio is None:
+        return
+    slope = gather(bent.ratio, p.ratio) / p.after
+    total.indices[-1] = total.indices[-1] - slope * p.ratio
+    total.indices.append(slope if longer is None else slope + gather(longer, p.before))

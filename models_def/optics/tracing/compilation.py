@@ -1,0 +1,184 @@
+"""A whole lens fused into one loop by `torch.compile`, forward and backward.
+
+The loop keeps a ray in registers through all surfaces, and the backward loop traces it again
+instead of reading it from memory. Both are compiled on first use for a layout of surfaces (which
+are aspheric, how many terms, which gradients); numbers of the lens and of rays may change.
+"""
+
+import contextlib
+import functools
+import itertools
+import logging
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.tracing.adjoint import Gradients, Slopes, Wanted, pull_back
+from camkit.models_def.optics.tracing.gradient import FIXED, Eager, Engine, Task
+from camkit.models_def.optics.tracing.kernel import (
+    NOT_CONVERGED,
+    Kept,
+    LensTensors,
+    Plan,
+    Result,
+    State,
+    numbers,
+    rest,
+    run,
+)
+
+_LOG = logging.getLogger(__name__)
+_COMPILERS: Final = ("g++", "clang++", "c++", "cl")
+_RECOMPILATIONS: Final = 64
+
+Loop = Callable[..., tuple[Tensor, ...]]
+
+
+@functools.cache
+def compiler_fault() -> str | None:
+    """Tell why nothing can be compiled here, after one trial; None if it can."""
+    if not any(map(shutil.which, _COMPILERS)):
+        return f"no C++ compiler found (looked for {', '.join(_COMPILERS)})"
+    try:
+        torch.compile(lambda x: x * 2 + 1, fullgraph=True)(torch.ones(8))
+    except (RuntimeError, OSError, ImportError) as error:
+        return f"torch.compile failed: {error}"
+    return None
+
+
+def compiled_engine() -> Engine:
+    """Give the engine that compiles, or, with a warning, the plain one where that is impossible."""
+    fault = compiler_fault()
+    if fault is None:
+        return Fused()
+    _LOG.warning("the tracer is not compiled: %s", fault)
+    return Eager()
+
+
+class Fused:
+    """One loop over the rays for the whole lens; a loop per wavelength or lens of a batch."""
+
+    def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
+        """Trace a block; the plain way if three Newton steps are not enough for some ray."""
+        loop = _forward(replace(plan, adaptive=False))
+        end = [torch.empty_like(rays.x, memory_format=torch.contiguous_format) for _ in range(7)]
+        end.insert(6, torch.empty_like(fate, memory_format=torch.contiguous_format))
+        for row in _rows(lens, fate.shape):
+            values = [v[row.rays].flatten() for v in (*rays, fate)]
+            with _patience():
+                found = loop(row.lens, State(*values[:6]), values[6])
+            for whole, part in zip(end, found, strict=False):
+                whole[row.rays] = part.reshape(whole[row.rays].shape)
+        if any(plan.aspheric) and bool((end[6] == NOT_CONVERGED).any()):
+            return Eager().run(plan, lens, rays, fate)
+        return Result(State(*end[:6]), end[7] if plan.path else None, Kept(end[6], [], []))
+
+    def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
+        """Give the gradients of a block, traced again in the same loop."""
+        if task.kept is not None:
+            return Eager().pull(task, lens, rays, fate)
+        wanted, path = task.wanted, task.slopes.path
+        loop = _backward(replace(task.plan, adaptive=False), wanted)
+        given = (*rays, fate, *task.slopes.end, *([] if path is None else [path]))
+        of_rays = [torch.empty_like(rays.x, memory_format=torch.contiguous_format) for _ in rays]
+        of_lens = LensTensors(*(torch.zeros_like(v) for v in lens))
+        for row in _rows(lens, fate.shape):
+            v = [value[row.rays].flatten() for value in given]
+            with _patience():
+                found = list(loop(row.lens, State(*v[:6]), v[6], State(*v[7:13]), *v[13:]))
+            for whole in of_rays if wanted.rays else []:
+                whole[row.rays] = found.pop(0).reshape(whole[row.rays].shape)
+            _add(wanted, of_lens, row, [float(g.sum()) for g in found])
+        return Gradients(
+            State(*of_rays) if wanted.rays else None,
+            list(of_lens.curvature),
+            list(of_lens.conic),
+            [list(terms) for terms in of_lens.even_asphere],
+            list(of_lens.thickness),
+            list(of_lens.indices),
+        )
+
+
+class _Row(NamedTuple):
+    """Rays that share the numbers of a lens: the lens, and where it and the rays lie."""
+
+    lens: LensTensors
+    rays: tuple[int | slice, ...]
+    places: tuple[tuple[int | slice, ...], ...]
+
+
+def _rows(lens: LensTensors, shape: torch.Size) -> Iterator[_Row]:
+    dims = range(-len(shape), 0)
+    pairs = list(zip(lens, FIXED, strict=True))
+    varied = [any(v.ndim - f >= -d and v.shape[d] > 1 for v, f in pairs) for d in dims]
+    whole = slice(None)
+    ranges: list[Sequence[int | slice]] = [
+        range(shape[d]) if vary else (whole,) for d, vary in zip(dims, varied, strict=True)
+    ]
+    for at in itertools.product(*ranges):
+        places: list[tuple[int | slice, ...]] = []
+        for v, fixed in pairs:
+            own = [0 if v.shape[d] == 1 else at[d] for d in range(fixed - v.ndim, 0)]
+            places.append((*[whole] * fixed, *own))
+        cut = LensTensors(*(v[place] for v, place in zip(lens, places, strict=True)))
+        yield _Row(cut, at, tuple(places))
+
+
+def _add(wanted: Wanted, total: LensTensors, row: _Row, sums: list[float]) -> None:
+    """Add the sums over a row, in the order of `_columns`."""
+    *first, last = _flags(wanted)
+    flags = (*first, False, last)
+    start = 0
+    for value, place, flag in zip(total, row.places, flags, strict=True):
+        if flag:
+            part = value[place]
+            count = part.numel()
+            part += part.new_tensor(sums[start : start + count]).reshape(part.shape)
+            start += count
+
+
+def _flags(wanted: Wanted) -> tuple[bool, ...]:
+    return (wanted.curvature, wanted.conic, wanted.even_asphere, wanted.thickness, wanted.index)
+
+
+@functools.cache
+def _forward(plan: Plan) -> Loop:
+    def fused(lens: LensTensors, rays: State, fate: Tensor) -> tuple[Tensor, ...]:
+        result = run(plan, numbers(lens), rays, fate)
+        path = () if result.path is None else (result.path,)
+        return (*result.end, result.kept.fate, *path)
+
+    return torch.compile(fused, fullgraph=True, dynamic=True)
+
+
+@functools.cache
+def _backward(plan: Plan, wanted: Wanted) -> Loop:
+    def fused(
+        lens: LensTensors, rays: State, fate: Tensor, end: State, path: Tensor | None = None
+    ) -> tuple[Tensor, ...]:
+        surfaces = numbers(lens)
+        kept = run(plan, surfaces, rays, fate).kept
+        slopes = Slopes(end, path, [None] * len(surfaces))
+        still = rest(rays, fate, adaptive=False)
+        # sums are left to the caller: a reduction would end the loop
+        found = pull_back(plan, wanted, surfaces, still, kept, slopes, lambda value, _: value)
+        even = [term for row in found.even_asphere for term in row]
+        lists = [found.curvature, found.conic, even, found.thickness, found.indices]
+        chosen = [v for v, flag in zip(lists, _flags(wanted), strict=True) if flag]
+        return (*(found.rays or ()), *(v for column in chosen for v in column))
+
+    return torch.compile(fused, fullgraph=True, dynamic=True)
+
+
+@contextlib.contextmanager
+def _patience() -> Iterator[None]:
+    """Allow as many layouts of lenses as a session may use."""
+    # imported here: it takes a second that a plain trace need not wait for
+    from torch._dynamo import config
+
+    with config.patch(recompile_limit=_RECOMPILATIONS), torch.no_grad():
+        yield

@@ -1,0 +1,251 @@
+"""A trace as one node of the autograd graph, in blocks of rays that fit the cache.
+
+Saved for backward are the rays on each surface (24 bytes in float32, 48 in float64, per ray and
+surface) while that is less than `KEEP_BYTES`; beyond, only the launched rays are, and each block
+is traced again when its gradient is due. So memory is bounded whatever the number of surfaces.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple, Protocol
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from camkit.models_def.optics.tracing.adjoint import Gradients, Slopes, Wanted, pull_back
+from camkit.models_def.optics.tracing.kernel import (
+    Kept,
+    LensTensors,
+    Plan,
+    Result,
+    State,
+    numbers,
+    rest,
+    run,
+)
+
+BLOCK_RAYS: Final = 16_384
+KEEP_BYTES: Final = 2**28
+
+
+class Task(NamedTuple):
+    """The backward half of a block; `kept` is None if it must be traced again."""
+
+    plan: Plan
+    wanted: Wanted
+    kept: Kept | None
+    slopes: Slopes
+
+
+class Engine(Protocol):
+    """What computes a block: eager here, compiled in `compilation`."""
+
+    def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
+        """Trace a block; an empty `kept.seen` means that it need not be kept."""
+        ...
+
+    def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
+        """Give the gradients of a block."""
+        ...
+
+
+class Eager:
+    """One torch operation after the other."""
+
+    def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
+        """Trace a block."""
+        return run(plan, numbers(lens), rays, fate)
+
+    def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
+        """Give the gradients of a block."""
+        surfaces = numbers(lens)
+        kept = task.kept
+        if kept is None:
+            kept = run(task.plan, surfaces, rays, fate).kept
+        rays = rest(rays, fate, adaptive=task.plan.adaptive)
+        return pull_back(task.plan, task.wanted, surfaces, rays, kept, task.slopes, _sum_to)
+
+
+def _sum_to(value: Tensor, like: Tensor) -> Tensor:
+    return value.sum_to_size(like.shape) if value.shape != like.shape else value
+
+
+class _Block(NamedTuple):
+    """Part of the rays: `size` of them from `start` along a dimension counted from the last."""
+
+    dim: int
+    start: int
+    size: int
+
+    def of(self, value: Tensor, fixed: int = 0) -> Tensor:
+        """Give the part of a tensor that broadcasts against the rays.
+
+        Args:
+            value: Its first `fixed` dimensions do not belong to the rays.
+            fixed: How many.
+        """
+        if value.ndim - fixed < -self.dim or value.shape[self.dim] == 1:
+            return value
+        return value.narrow(self.dim, self.start, self.size)
+
+
+def _blocks(shape: torch.Size, device: torch.device) -> list[_Block]:
+    """Cut the longest dimension so that a block has about `BLOCK_RAYS` rays."""
+    count = shape.numel()
+    limit = BLOCK_RAYS if device.type == "cpu" else BLOCK_RAYS * 64
+    if count <= limit:
+        return []
+    dim = max(range(len(shape)), key=lambda d: shape[d])
+    size = max(1, limit * shape[dim] // count)
+    starts = range(0, shape[dim], size)
+    return [_Block(dim - len(shape), s, min(size, shape[dim] - s)) for s in starts]
+
+
+class _Spec(NamedTuple):
+    """What is not a tensor: the plan, the engine, whether rays on each surface are given out."""
+
+    plan: Plan
+    engine: Engine
+    with_seen: bool
+
+
+def trace_tensors(
+    plan: Plan,
+    engine: Engine,
+    lens: LensTensors,
+    rays: State,
+    fate: Tensor,
+    *,
+    with_seen: bool = False,
+) -> Result:
+    """Trace rays, differentiable by rays and lens (not twice, not in forward mode).
+
+    Args:
+        plan: What is static.
+        engine: What computes.
+        lens: Tensors of one type and device, broadcasting against the rays.
+        rays: Of the same type and device.
+        fate: int8.
+        with_seen: Whether `kept.seen` and `kept.fates` of the result are filled.
+    """
+    spec = _Spec(plan, engine, with_seen)
+    flat: tuple[Tensor, ...] = _Trace.apply(spec, fate, *rays, *lens)  # type: ignore[no-untyped-call]
+    head = 7 + plan.path
+    return Result(
+        State(*flat[:6]),
+        flat[7] if plan.path else None,
+        Kept(flat[6], *_unflatten(flat[head:])),
+    )
+
+
+def _flatten(kept: Kept) -> list[Tensor]:
+    return [v for state, fate in zip(kept.seen, kept.fates, strict=True) for v in (*state, fate)]
+
+
+def _unflatten(flat: Sequence[Tensor]) -> tuple[list[State], list[Tensor]]:
+    seen = [State(*flat[i : i + 6]) for i in range(0, len(flat), 7)]
+    return seen, list(flat[6::7])
+
+
+def _part(
+    block: _Block | None, lens: LensTensors, rays: State, fate: Tensor
+) -> tuple[LensTensors, State, Tensor]:
+    if block is None:
+        return lens, rays, fate
+    cut = LensTensors(*(block.of(v, FIXED[i]) for i, v in enumerate(lens)))
+    return cut, State(*(block.of(v) for v in rays)), block.of(fate)
+
+
+# leading dimensions of lens tensors that are not the rays': surface, and term of the polynomial
+FIXED: Final = (1, 1, 2, 1, 1, 1)
+
+
+class _Trace(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, spec: _Spec, fate: Tensor, *tensors: Tensor) -> tuple[Tensor, ...]:
+        rays, lens = State(*tensors[:6]), LensTensors(*tensors[6:])
+        batches = (v.shape[fixed:] for v, fixed in zip(lens, FIXED, strict=True))
+        shapes = [fate.shape, *(v.shape for v in rays), *batches]
+        shape: torch.Size = torch.broadcast_shapes(*shapes)  # type: ignore[no-untyped-call]
+        rays, fate = State(*(v.expand(shape) for v in rays)), fate.expand(shape)
+        size = shape.numel() * len(spec.plan.aspheric) * 6 * rays.x.element_size()
+        keep = any(ctx.needs_input_grad) and size <= KEEP_BYTES
+        blocks = _blocks(shape, fate.device)
+        parts: list[list[Tensor]] = []
+        saved: list[Tensor] = []
+        counts: list[int] = []
+        whole: list[_Block | None] = [None]
+        for block in blocks or whole:
+            result = spec.engine.run(spec.plan, *_part(block, lens, rays, fate))
+            flat = _flatten(result.kept)
+            counts.append(len(flat) + 1 if keep and flat else 0)
+            saved += [result.kept.fate, *flat][: counts[-1]]
+            path = [] if result.path is None else [result.path]
+            parts.append([*result.end, result.kept.fate, *path, *(flat if spec.with_seen else [])])
+        out = tuple(_join(v, blocks) for v in zip(*parts, strict=True))
+        ctx.save_for_backward(fate, *tensors, *saved)
+        ctx.spec, ctx.shape, ctx.blocks, ctx.counts = spec, shape, blocks, counts
+        ctx.set_materialize_grads(False)
+        ctx.mark_non_differentiable(*(v for v in out if v.dtype == torch.int8))
+        return out
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *slopes: Tensor | None) -> tuple[Tensor | None, ...]:
+        fate, *tensors = ctx.saved_tensors[:13]
+        saved = ctx.saved_tensors[13:]
+        rays, lens = State(*(v.expand(ctx.shape) for v in tensors[:6])), LensTensors(*tensors[6:])
+        needs = ctx.needs_input_grad[2:]
+        wanted = Wanted(
+            rays=any(needs[:6]),
+            curvature=needs[6],
+            conic=needs[7],
+            even_asphere=needs[8],
+            thickness=needs[9],
+            index=needs[11],
+        )
+        sums = [
+            torch.zeros_like(v) if need else None for v, need in zip(lens, needs[6:], strict=True)
+        ]
+        blocks = ctx.blocks or [None]
+        parts: list[State] = []
+        for block, count in zip(blocks, ctx.counts, strict=True):
+            here, saved = saved[:count], saved[count:]
+            kept = Kept(here[0], *_unflatten(here[1:])) if here else None
+            cut = [v if v is None or block is None else block.of(v) for v in slopes]
+            part = _part(block, lens, rays, fate)
+            task = Task(ctx.spec.plan, wanted, kept, _slopes(ctx.spec.plan, cut, part[1].x))
+            found = ctx.spec.engine.pull(task, *part)
+            parts.append(found.rays)
+            _add(sums, found, block)
+        of_rays: list[Tensor | None] = [None] * 6
+        if wanted.rays:
+            joined = (_join(v, ctx.blocks) for v in zip(*parts, strict=True))
+            of_rays = [v.sum_to_size(t.shape) for v, t in zip(joined, tensors[:6], strict=True)]
+        return (None, None, *of_rays, *sums)
+
+
+def _join(parts: tuple[Tensor, ...], blocks: list[_Block]) -> Tensor:
+    return torch.cat(parts, blocks[0].dim) if blocks else parts[0]
+
+
+def _slopes(plan: Plan, flat: Sequence[Tensor | None], like: Tensor) -> Slopes:
+    zero = torch.zeros((), dtype=like.dtype, device=like.device).expand_as(like)
+
+    def state(values: Sequence[Tensor | None]) -> State:
+        return State(*(zero if v is None else v for v in values))
+
+    head = 7 + plan.path
+    rows = [flat[i : i + 6] for i in range(head, len(flat), 7)]
+    seen = [None if all(v is None for v in row) else state(row) for row in rows]
+    seen = seen or [None] * len(plan.aspheric)
+    return Slopes(state(flat[:6]), flat[7] if plan.path else None, seen)
+
+
+def _add(sums: Sequence[Tensor | None], found: Gradients, block: _Block | None) -> None:
+    rows = [torch.stack(row) for row in found.even_asphere if row]
+    columns = [found.curvature, found.conic, rows, found.thickness, [], found.indices]
+    for total, values, fixed in zip(sums, columns, FIXED, strict=True):
+        if total is not None and values:
+            part = total if block is None else block.of(total, fixed)
+            part += torch.stack(values)

@@ -1,0 +1,79 @@
+"""TOML tables turned into dataclasses; unknown, missing and wrong keys are errors naming them."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+from camkit.errors import ContractError
+
+T = TypeVar("T")
+
+
+def read_table(path: Path, what: str) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Args:
+        path: The file.
+        what: What it holds, for errors.
+
+    Raises:
+        ContractError: If it is missing or no TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ContractError(f"cannot read {what} {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ContractError(f"{what} {path} is not valid TOML: {error}") from error
+
+
+def section(where: str, kind: type[T], table: Any) -> T:
+    """Make a dataclass of a table, key by key.
+
+    Raises:
+        ContractError: If a key is unknown, missing or of a wrong type, or a value is refused.
+    """
+    if not isinstance(table, Mapping):
+        raise ContractError(f"{where} must be a table; got {table!r}")
+    hints = get_type_hints(kind)
+    check_keys(where, table, set(hints))
+    required = {f.name for f in fields(kind) if _is_required(f)}  # type: ignore[arg-type]
+    missing = required - set(table)
+    if missing:
+        raise ContractError(f"{where} lacks {', '.join(sorted(missing))}")
+    return kind(**{k: typed(f"{where}.{k}", v, hints[k]) for k, v in table.items()})
+
+
+def check_keys(where: str, table: Mapping[str, Any], known: set[str]) -> None:
+    """Refuse keys that are not known."""
+    unknown = sorted(set(table) - known)
+    if unknown:
+        raise ContractError(
+            f"{where}: unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}"
+        )
+
+
+def typed(where: str, value: Any, kind: Any) -> Any:
+    """Give a value as the type of its field; whole numbers pass as float, lists as tuples."""
+    if get_origin(kind) is tuple:
+        if not isinstance(value, list):
+            raise ContractError(f"{where} must be a list; got {value!r}")
+        inner = get_args(kind)[0]
+        return tuple(typed(f"{where}[{i}]", v, inner) for i, v in enumerate(value))
+    if get_origin(kind) is Literal:
+        if value not in get_args(kind):
+            known = ", ".join(map(str, get_args(kind)))
+            raise ContractError(f"{where} must be one of {known}; got {value!r}")
+        return value
+    kind = get_origin(kind) or kind
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+        raise ContractError(f"{where} must be of type {kind.__name__}; got {value!r}")
+    return value
+
+
+def _is_required(entry: Any) -> bool:
+    return entry.default is MISSING and entry.default_factory is MISSING

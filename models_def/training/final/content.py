@@ -1,0 +1,87 @@
+"""What the final stage compares: output and truth as a display shows them, and eq. (6.12).
+
+The network works on stabilised planes. Features and discriminators were made for, or judge,
+pictures that people look at; so planes become linear light, Rec.709 and sRGB first. The pixel term
+stays in the square-root domain of `losses`, unclipped, so that highlights count too.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+from torch import Tensor
+
+Features = Callable[[Tensor], Tensor]
+
+SRGB_KNEE: Final = 0.0031308
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Views:
+    """Output and truth of a batch; where nothing can be known, the truth is the output itself.
+
+    Attributes:
+        output: (b, 3, h, w) square-root domain.
+        target: Likewise.
+        judged: (b, 3, h, w) bool.
+        seen: (b, 3, h, w) sRGB of the output, in 0..1.
+        real: Likewise of the target.
+    """
+
+    output: Tensor
+    target: Tensor
+    judged: Tensor
+    seen: Tensor
+    real: Tensor
+
+
+def make_views(output: Tensor, target: Tensor, weight: Tensor, to_rec709: Tensor) -> Views:
+    """Prepare a batch for the losses.
+
+    Args:
+        output: (b, 3, h, w) stabilised.
+        target: (b, 3, h, w) stabilised; negative where nothing can be known.
+        weight: (b, 3) scale * sqrt(shot) per colour, to the square-root domain.
+        to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
+    """
+    judged = target >= 0
+    root = output * weight[:, :, None, None]
+    true = torch.where(judged, target * weight[:, :, None, None], root.detach())
+    return Views(
+        output=root,
+        target=true,
+        judged=judged,
+        seen=to_display(root, to_rec709),
+        real=to_display(true, to_rec709).detach(),
+    )
+
+
+def to_display(root: Tensor, to_rec709: Tensor) -> Tensor:
+    """Give (b, 3, h, w) sRGB in 0..1 from the square-root domain.
+
+    The small constant read_variance / shot under the root is left in: it is the same on both sides.
+
+    References: IEC 61966-2-1 (the curve).
+    """
+    light = root.clamp(min=0).square()
+    linear = torch.einsum("ij,bjhw->bihw", to_rec709, light).clamp(0, 1)
+    # The power has an infinite slope at 0, which would turn the other branch's gradient into NaN.
+    curve = 1.055 * linear.clamp(min=SRGB_KNEE) ** (1 / 2.4) - 0.055
+    return torch.where(linear <= SRGB_KNEE, 12.92 * linear, curve)
+
+
+def pixel_loss(views: Views) -> Tensor:
+    """Give the mean |difference| over what can be judged, in the square-root domain."""
+    gap = (views.output - views.target).abs()
+    return gap.sum() / views.judged.sum().clamp(min=1)
+
+
+def perceptual_loss(views: Views, features: Features | None) -> Tensor:
+    """Give the mean squared difference of features; of the sRGB values themselves without any.
+
+    The thesis writes a norm; the mean square is what the cited source computes, and makes a weight
+    mean the same for every size of patch.
+    """
+    phi = features or torch.Tensor.contiguous
+    return (phi(views.seen) - phi(views.real)).square().mean()

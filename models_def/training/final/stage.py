@@ -1,0 +1,104 @@
+"""The final stage as the ordinary trainer runs it: files read, credits written, fitter made."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+
+from camkit.colorimetry import rec709_from_camera
+from camkit.contracts import RadialDistortion
+from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.training.checkpoint import read_checkpoint
+from camkit.models_def.training.final.fitter import FinalFitter, FinalParts
+from camkit.models_def.training.final.pairs import PairSamples, read_pairs
+from camkit.models_def.training.final.vgg import file_digest, read_vgg
+from camkit.models_def.training.fitter import Fits
+from camkit.models_def.training.lens_bank import PRESCRIPTIONS
+from camkit.models_def.training.psf_bank import PsfBank
+from camkit.models_def.training.recipe import NetworkRecipe, Recipe
+from camkit.models_def.training.samples import corner_height_mm
+from camkit.models_def.training.trainer import Stage
+
+STAGE_NAME: Final = "final"
+WITHOUT_VGG: Final = (
+    "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
+)
+
+Distort = Callable[[Recipe], RadialDistortion | None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FinalOptions:
+    """What the final stage is given.
+
+    Attributes:
+        start: Checkpoint to start from.
+        vgg: Weights of VGG-19; None compares sRGB values instead of features.
+        pairs: Folder of real pairs.
+        device: cpu or cuda.
+    """
+
+    start: Path
+    vgg: Path | None = None
+    pairs: Path | None = None
+    device: str = "cpu"
+
+
+def trace_recipe_distortion(recipe: Recipe) -> RadialDistortion:
+    """Give the distortion of a recipe's lens."""
+    lens = read_prescription(PRESCRIPTIONS / f"{recipe.lens.prescription}.toml")
+    return trace_distortion(lens, corner_height_mm(recipe))
+
+
+def make_stage(
+    recipe: Recipe, options: FinalOptions, *, distort: Distort = trace_recipe_distortion
+) -> Stage:
+    """Prepare the final stage of a recipe.
+
+    Args:
+        recipe: Its table `final`.
+        options: Files.
+        distort: Gives the distortion that real pairs are aligned through; None for none.
+
+    Raises:
+        ContractError: If a file is not what it should be.
+    """
+    start = read_checkpoint(options.start)
+    features = None if options.vgg is None else read_vgg(options.vgg)
+    matrix = rec709_from_camera(np.array(recipe.camera.color_matrix))
+
+    def make_fitter(entry: NetworkRecipe, bank: PsfBank) -> Fits:
+        pairs: PairSamples | None = None
+        if options.pairs is not None:
+            pairs = read_pairs(
+                options.pairs, recipe, bank, distort(recipe), seed=entry.schedule.seed
+            )
+        parts = FinalParts(
+            start=start,
+            to_rec709=torch.from_numpy(matrix),
+            features=features,
+            pairs=pairs,
+            device=options.device,
+        )
+        return FinalFitter(entry, recipe.final, parts)
+
+    return Stage(
+        name=STAGE_NAME,
+        schedule=recipe.final.schedule,
+        make_fitter=make_fitter,
+        credit=_credit(options),
+    )
+
+
+def _credit(options: FinalOptions) -> str:
+    """Say what else the weights learned from, for the card."""
+    features = "without VGG-19"
+    if options.vgg is not None:
+        digest = file_digest(options.vgg)[:16]
+        features = f"with VGG-19 features of {options.vgg.name} (sha256 {digest}...)"
+    pairs = "" if options.pairs is None else f" and real pairs of {options.pairs.name}"
+    return f"; final stage against two discriminators, {features}{pairs}"

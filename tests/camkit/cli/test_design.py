@@ -1,0 +1,54 @@
+import json
+from pathlib import Path
+
+RECIPE = """
+name = "tiny"
+prescription = "duet"
+[[vary]]
+kind = "conic"
+surface = 4
+low = -4.0
+high = 4.0
+[optics]
+half_field_deg = 12.0
+fields = 3
+pupil_rays = 24
+[pixels]
+pitch_um = 6.0
+kernel_px = 33
+[front]
+kind = "wiener"
+[schedule]
+batch = 1
+patch_px = 24
+hold_steps = 0
+valid_steps = 2
+valid_patches = 2
+[data]
+procedural_scenes = 1
+scene_px = 128
+"""
+
+
+def test_a_design_leaves_lens_log_and_pictures_and_goes_on(camkit_command, tmp_path: Path) -> None:
+    recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
+    recipe.write_text(RECIPE)
+    command = ("design", recipe, "--out-dir", out, "--steps", "2", "--pictures", "2")
+    outcome = camkit_command(*command, "--json")
+    assert outcome.code == 0, outcome.err
+    report = json.loads(outcome.out)
+    assert report["steps"] == 2
+    assert "validation" in outcome.err
+    assert (out / "tiny_000002.png").read_bytes()[:4] == b"\x89PNG"
+    again = camkit_command(*command)
+    assert again.code == 2
+    assert "--resume" in again.err
+    assert camkit_command("lens", "convert", report["lens"], tmp_path / "tiny.zmx").code == 0
+
+
+def test_resume_and_overwrite_exclude_each_other(camkit_command, tmp_path: Path) -> None:
+    recipe = tmp_path / "tiny.toml"
+    recipe.write_text(RECIPE)
+    outcome = camkit_command("design", recipe, "--resume", "--overwrite")
+    assert outcome.code == 2
+    assert "one of them" in outcome.err

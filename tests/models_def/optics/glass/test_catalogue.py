@@ -1,0 +1,128 @@
+import pytest
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.glass.catalogue import (
+    GlassCatalogue,
+    builtin_catalogues,
+    find_glass,
+    glass_names,
+    own_glass,
+)
+from camkit.models_def.optics.glass.dispersion import (
+    D_LINE_UM,
+    RANGE_TOLERANCE,
+    abbe_number,
+    refractive_index,
+)
+from camkit.models_def.optics.glass.material import Glass
+
+STATED_INDEX = 1e-5
+STATED_ABBE = 0.0101
+"""Makers print V_d with two decimals."""
+GLASSES = [glass for catalogue in builtin_catalogues() for glass in catalogue.glasses]
+MINE = GlassCatalogue(
+    name="mine",
+    glasses=(
+        Glass(name="F2-mine", formula="constant", coefficients=(1.7,), source="test"),
+        Glass(name="X1-mine", formula="constant", coefficients=(1.6,), source="test"),
+    ),
+)
+
+
+def test_every_stated_index_and_abbe_number_follow_from_the_coefficients() -> None:
+    line = torch.tensor(D_LINE_UM, dtype=torch.float64)
+    stated = [glass for glass in GLASSES if glass.stated_index_d is not None]
+    assert len(stated) > 1400
+    for glass in stated:
+        index = float(refractive_index(glass, line))
+        assert index == pytest.approx(glass.stated_index_d, abs=STATED_INDEX), glass.name
+        assert abbe_number(glass) == pytest.approx(glass.stated_abbe_number, abs=STATED_ABBE)
+
+
+def test_every_glass_has_a_real_index_over_its_whole_range() -> None:
+    for glass in GLASSES:
+        low, high = glass.range_um
+        waves = torch.linspace(low, high, 20, dtype=torch.float64)
+        index = refractive_index(glass, waves)
+        assert bool((index > 1).all()), glass.name
+
+
+def test_every_glass_names_its_source() -> None:
+    assert all(glass.source for glass in GLASSES)
+
+
+def test_strict_names_are_unique_over_all_catalogues() -> None:
+    names = glass_names()
+    assert len(set(names)) == len(names)
+    assert {"air", "SF1-Schott", "LASFN9-Schott", "Zeonex-E48R-Sultanova2009"} <= set(names)
+
+
+def test_common_plastics_and_crystals_are_there() -> None:
+    wanted = ("PMMA", "PC", "PS", "SAN", "NAS-21", "Zeonex-E48R")
+    assert all(find_glass(f"{name}-Sultanova2009") for name in wanted)
+    for name in ("COC-Misc", "fused-silica-Malitson1965", "CaF2-Malitson1963"):
+        assert find_glass(name).range_um[0] < 0.4
+
+
+def test_trade_name_of_one_catalogue_stands_for_the_strict_one() -> None:
+    assert find_glass("N-BK7") == find_glass("N-BK7-Schott")
+    assert find_glass("S-LAH64").name == "S-LAH64-Ohara"
+
+
+@pytest.mark.parametrize(
+    ("name", "offered"),
+    [
+        ("BK7", "N-BK7-Schott"),
+        ("F2", "F2-Schott or F2-Hikari"),
+        ("SF10", "SF10-Schott or SF10-Hikari"),
+        ("PMMA", "PMMA-Misc or PMMA-Sultanova2009"),
+        ("PC", "PC-Sultanova2009"),
+        ("pmma", "PMMA-Sultanova2009"),
+        ("PMMA-sultanova2009", "PMMA-Sultanova2009"),
+        ("N-BK7-schott", "N-BK7-Schott"),
+        ("", "write"),
+        ("N-BK8", "N-BK7-Schott"),
+    ],
+)
+def test_a_glass_is_never_guessed_but_near_names_are_offered(name: str, offered: str) -> None:
+    with pytest.raises(ContractError, match="glass must be a known name") as error:
+        find_glass(name)
+    assert offered in str(error.value)
+
+
+def test_n_sf10_is_not_sf10() -> None:
+    line = torch.tensor(D_LINE_UM, dtype=torch.float64)
+    new, old = find_glass("N-SF10"), find_glass("SF10-Schott")
+    assert new.coefficients != old.coefficients
+    assert float(refractive_index(new, line)) == pytest.approx(1.72828, abs=STATED_INDEX)
+    assert abbe_number(new) - abbe_number(old) == pytest.approx(28.53 - 28.41, abs=0.011)
+
+
+def test_users_catalogue_is_asked_first() -> None:
+    assert find_glass("F2", [MINE]).name == "F2-mine"
+    assert find_glass("X1-mine", [MINE]).coefficients == (1.6,)
+    assert find_glass("N-BK7", [MINE]).name == "N-BK7-Schott"
+    assert own_glass(find_glass("X1", [MINE]), [MINE]) is MINE.glasses[1]
+    assert own_glass(find_glass("N-BK7"), [MINE]) is None
+
+
+def test_users_catalogue_changes_nothing_for_others() -> None:
+    find_glass("X1", [MINE])
+    with pytest.raises(ContractError, match="X1"):
+        find_glass("X1")
+
+
+def test_catalogue_with_two_glasses_of_one_name_is_refused() -> None:
+    with pytest.raises(ContractError, match="two glasses"):
+        GlassCatalogue(name="x", glasses=(MINE.glasses[0], MINE.glasses[0]))
+
+
+def test_wavelength_outside_the_range_is_refused_with_the_range() -> None:
+    glass = find_glass("PMMA-Sultanova2009")
+    low, high = glass.range_um
+    near = [low * (1.001 - RANGE_TOLERANCE), high * (0.999 + RANGE_TOLERANCE)]
+    assert bool((refractive_index(glass, torch.tensor(near, dtype=torch.float64)) > 1.4).all())
+    for beyond in (low * 0.94, high * 1.06):
+        with pytest.raises(ContractError, match=r"0\.4368\.\.1\.052 um"):
+            refractive_index(glass, torch.tensor([0.5, beyond], dtype=torch.float64))

@@ -1,0 +1,334 @@
+import math
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
+from camkit.models_def.optics.glass.agf import parse_agf
+from camkit.models_def.optics.lens_file.zmx_reader import parse_zmx, read_zmx
+from camkit.models_def.optics.paraxial import focal_lengths, paraxial_data
+from camkit.models_def.optics.spot import chief_heights
+from camkit.models_def.optics.trace import Rays, surface_tensors, trace
+from tests.zmx_factory import BACK, FRONT, HEAD, LA1131, OBJECT
+
+MINE = parse_agf("NM FOO 2 0 1.6 50\nCD 1.4 0.01\nLD 0.3 2\n", "mine")
+
+
+def _changed(*changes: tuple[str, str]) -> str:
+    text = LA1131
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    return text
+
+
+def test_vendor_file_is_read_whole() -> None:
+    found = parse_zmx(LA1131)
+    lens = found.lens
+    assert found.notes == ()
+    assert lens.name == "LA1131 Plano-Convex - N-BK7 Ø25.4"
+    assert lens.note == "FOR INFORMATION ONLY"
+    assert (lens.aperture_kind, lens.aperture_value) == ("entrance_pupil_diameter_mm", 22.86)
+    assert (lens.stop, lens.object_distance_mm) == (0, math.inf)
+    assert lens.wavelengths_um == (0.4861, 0.5876, 0.6563)
+    assert lens.reference_wavelength_um == 0.5876
+    assert lens.field_angles_rad == (0.0,)
+    front, back = lens.surfaces
+    assert front.radius_mm == pytest.approx(25.75, rel=1e-15)
+    assert (front.glass, front.thickness_mm) == ("N-BK7-Schott", 5.34)
+    assert (back.glass, back.thickness_mm) == ("air", 44.20486329487)
+
+
+def test_rays_through_the_vendor_file_land_where_its_program_says() -> None:
+    lens = parse_zmx(LA1131).lens
+    tensors = surface_tensors(lens, torch.tensor(0.4861, dtype=torch.float64))
+    edge = torch.tensor(11.43, dtype=torch.float64)
+    zero, one = torch.zeros_like(edge), torch.ones_like(edge)
+    rays = Rays(x=zero, y=edge, z=zero, l=zero, m=zero, n=one, fate=zero.to(torch.int8))
+    # the file's automatic semi-diameter of the image, to its thirteen digits
+    assert abs(float(trace(tensors, rays).y)) == pytest.approx(0.3584516158236, abs=2e-12)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-8", "latin-1"])
+def test_every_usual_encoding_gives_the_same_lens(tmp_path, encoding: str) -> None:
+    path = tmp_path / "lens.ZMX"
+    path.write_bytes(LA1131.replace("\n", "\r\n").encode(encoding))
+    assert read_zmx(path).lens == parse_zmx(LA1131).lens
+
+
+def test_missing_gcat_type_unit_mode_and_name_are_tolerated() -> None:
+    lines = [
+        line
+        for line in LA1131.splitlines()
+        if line.split()[0] not in {"GCAT", "TYPE", "UNIT", "MODE", "NAME", "NOTE"}
+    ]
+    lens = parse_zmx("\n".join(lines), name="file").lens
+    assert lens.surfaces == parse_zmx(LA1131).lens.surfaces
+    assert lens.name == "file"
+
+
+def test_indentation_is_not_needed() -> None:
+    text = "\n".join(line.strip() for line in LA1131.splitlines())
+    assert parse_zmx(text).lens == parse_zmx(LA1131).lens
+
+
+def test_automatic_semi_diameter_limits_nothing_and_a_fixed_one_vignettes() -> None:
+    front, back = parse_zmx(LA1131).lens.surfaces
+    assert front.semi_diameter_mm == 12.7
+    assert back.semi_diameter_mm == math.inf
+
+
+def test_circular_aperture_takes_the_place_of_the_semi_diameter() -> None:
+    text = _changed(("  FLAP 0 1.27E+1 0", "  CLAP 0 9.5 0"), ("  FLAP 0 1.08", "  CLAP 0 1.08"))
+    front, back = parse_zmx(text).lens.surfaces
+    assert (front.semi_diameter_mm, back.semi_diameter_mm) == (9.5, 10.83488179091)
+
+
+def test_r2_term_of_an_even_asphere_is_honoured() -> None:
+    """The asphere of optics-notes 3.5: f = 1 / ((n - 1) (c + 2 a2)) = 25.7153."""
+    text = HEAD.replace("WAVM 2 5.876E-1 1", "WAVM 2 0.587 1") + OBJECT + FRONT + BACK
+    text = text.replace("  TYPE STANDARD\n  CURV 3.88", "  TYPE EVENASPH\n  CURV 0.05\n  KEEP 3.88")
+    terms = "".join(
+        f"  PARM {i} {a}\n"
+        for i, a in enumerate((-2.248851e-4, -4.690412e-6, -6.404376e-8, 0, 0, 0, 0, 0), start=1)
+    )
+    text = text.replace("GLAS N-BK7", "GLAS N-SF11").replace("  DISZ 5.34\n", f"  DISZ 7\n{terms}")
+    lens = parse_zmx(text).lens
+    assert lens.surfaces[0].even_asphere == (-2.248851e-4, -4.690412e-6, -6.404376e-8)
+    assert paraxial_data(lens).efl_mm == pytest.approx(25.7153, abs=5e-5)
+
+
+def test_conic_is_read() -> None:
+    text = _changed(("  DISZ 5.34", "  CONI -1.01\n  DISZ 5.34"))
+    assert parse_zmx(text).lens.surfaces[0].conic == -1.01
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("CM", 10.0), ("IN", 25.4), ("METER", 1000.0)])
+def test_lengths_are_converted_to_millimetres(unit: str, mm: float) -> None:
+    changes = [
+        ("UNIT MM", f"UNIT {unit}"),
+        ("TYPE STANDARD\n  CURV 3.8", "TYPE EVENASPH\n  CURV 3.8"),
+    ]
+    text = _changed(*changes, ("  DISZ 5.34", "  PARM 2 0.5\n  DISZ 5.34"))
+    lens, plain = parse_zmx(text).lens, parse_zmx(LA1131).lens
+    front = lens.surfaces[0]
+    assert front.radius_mm == pytest.approx(25.75 * mm)
+    assert front.thickness_mm == pytest.approx(5.34 * mm)
+    assert front.semi_diameter_mm == pytest.approx(12.7 * mm)
+    assert front.even_asphere == pytest.approx((0, 0.5 / mm**3))
+    assert lens.aperture_value == pytest.approx(22.86 * mm)
+    assert lens.wavelengths_um == plain.wavelengths_um
+
+
+@pytest.mark.parametrize(
+    ("line", "kind", "value"),
+    [
+        ("FNUM 4.5 0", "f_number", 4.5),
+        ("FNUM 4.5 1", "f_number", 4.5),
+        ("FLOA", "stop_semi_diameter_mm", 12.7),
+        ("FLOA 0", "stop_semi_diameter_mm", 12.7),
+    ],
+)
+def test_aperture_kinds_are_kept(line: str, kind: str, value: float) -> None:
+    lens = parse_zmx(_changed(("ENPD 2.286E+1", line))).lens
+    assert (lens.aperture_kind, lens.aperture_value) == (kind, value)
+
+
+def test_object_space_aperture_becomes_an_entrance_pupil() -> None:
+    text = _changed(("ENPD 2.286E+1", "OBNA 0.1 0"), ("DISZ INFINITY", "DISZ 200"))
+    lens = parse_zmx(text).lens
+    assert lens.object_distance_mm == 200
+    half = lens.aperture_value / 2
+    # the stop is the first surface: the pupil lies there
+    assert half / math.hypot(half, 200) == pytest.approx(0.1, rel=1e-12)
+
+
+def test_fields_are_taken_as_distances_from_the_axis_each_once() -> None:
+    text = _changed(("FTYP 0 0 1", "FTYP 0 0 4"), ("YFLN 0 0 0 0", "YFLN 0 -14 14 7"))
+    text = text.replace("XFLN 0 0 0 0", "XFLN 0 0 0 7")
+    angles = [math.degrees(a) for a in parse_zmx(text).lens.field_angles_rad]
+    skew = math.degrees(math.atan(math.sqrt(2) * math.tan(math.radians(7))))
+    assert angles == pytest.approx([0, skew, 14])
+
+
+def test_angle_of_a_near_object_is_seen_from_the_entrance_pupil() -> None:
+    text = _changed(
+        ("FTYP 0 0 1", "FTYP 0 0 1"), ("YFLN 0", "YFLN 10"), ("DISZ INFINITY", "DISZ 90")
+    )
+    dummy = "SURF 1\n  CURV 0 0\n  DISZ 10\n  DIAM 0 0\n"
+    front = FRONT.replace("SURF 1", "SURF 2")
+    back = BACK.replace("SURF 3", "SURF 4").replace("SURF 2", "SURF 3")
+    text = text.replace(FRONT, dummy + front).replace(BACK, back)
+    lens = parse_zmx(text).lens
+    assert lens.stop == 1
+    # object height tan(10) * (90 + 10), seen from the first vertex at 90
+    expected = math.tan(math.radians(10)) * 100 / 90
+    assert math.tan(lens.field_angles_rad[0]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_object_heights_become_angles_at_the_first_vertex() -> None:
+    changes = [
+        ("FTYP 0 0 1", "FTYP 1 0 2"),
+        ("YFLN 0 0", "YFLN 0 20"),
+        ("DISZ INFINITY", "DISZ 100"),
+    ]
+    angles = parse_zmx(_changed(*changes)).lens.field_angles_rad
+    assert angles == (0.0, math.atan(0.2))
+
+
+def test_paraxial_image_height_is_efl_times_tangent() -> None:
+    lens = parse_zmx(_changed(("FTYP 0 0 1", "FTYP 2 0 2"), ("YFLN 0 0", "YFLN 0 5"))).lens
+    tensors = surface_tensors(lens, torch.tensor(0.5876, dtype=torch.float64))
+    efl = float(focal_lengths(tensors)[0])
+    assert math.tan(lens.field_angles_rad[1]) == pytest.approx(5 / efl, rel=1e-12)
+
+
+def test_paraxial_image_height_of_a_near_object_follows_the_magnification() -> None:
+    changes = [
+        ("FTYP 0 0 1", "FTYP 2 0 2"),
+        ("YFLN 0 0", "YFLN 0 5"),
+        ("DISZ INFINITY", "DISZ 100"),
+    ]
+    lens = parse_zmx(_changed(*changes)).lens
+    data = paraxial_data(lens)
+    # Newton: |m| = f / (distance from the front focal point)
+    magnification = data.efl_mm / (100 + data.ffl_mm)
+    assert math.tan(lens.field_angles_rad[1]) == pytest.approx(5 / magnification / 100, rel=1e-9)
+
+
+def test_real_image_height_is_met_by_the_chief_ray() -> None:
+    lens = parse_zmx(_changed(("FTYP 0 0 1", "FTYP 3 0 2"), ("YFLN 0 0", "YFLN 0 5"))).lens
+    slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
+    assert chief_heights(lens, slopes).tolist() == pytest.approx([0, 5], abs=1e-9)
+
+
+def test_wavelengths_without_a_count_lose_the_filling_of_the_table() -> None:
+    text = _changed(("FTYP 0 0 1 3 0 0 0", "FTYP 0 0"))
+    assert parse_zmx(text).lens.wavelengths_um == (0.4861, 0.5876, 0.6563)
+    old = text.replace("WAVM", "XAVM").replace("PWAV 2", "WAVL 0.486 0.588 0.656\nPWAV 3")
+    assert parse_zmx(old).lens.wavelengths_um == (0.486, 0.588, 0.656)
+    assert parse_zmx(old).lens.reference_wavelength_um == 0.656
+
+
+@pytest.mark.parametrize(
+    ("glas", "gcat", "name"),
+    [
+        ("F2 0 0 1.5 40", "SCHOTT", "F2-Schott"),
+        ("F2 0 0 1.5 40", "HIKARI SCHOTT", "F2-Hikari"),
+        ("SK16 0 0 1.5 40", "SCHOTT", "SK16-Hikari"),
+        ("N-SF6HTULTRA 0 0", "", "N-SF6HTultra-Schott"),
+        ("PMMA 0 0 1.5 40", "MISC", "PMMA-Misc"),
+        ("PMMA 0 0 1.5 40", "", "PMMA-Misc"),
+        ("SILICA 0 0", "UNKNOWN CORNING", "SILICA-Misc"),
+        ("FOO 0 0 1.5 40", "SCHOTT", "FOO-mine"),
+        ("___BLANK 1 0 1.5168 64.17 0 0 0 0 0 0", "", "model:1.5168,64.17"),
+        ("___BLANK 1 0 1.5168 64.17 0.01 0 0 0 0 0", "", "model:1.5168,64.17,0.01"),
+        ("AIR", "", "air"),
+    ],
+)
+def test_glass_is_found_in_the_order_of_gcat(glas: str, gcat: str, name: str) -> None:
+    text = _changed(("GLAS N-BK7 0 0 0 0 0 0 0 0 0 0", f"GLAS {glas}"))
+    text = text.replace("GCAT SCHOTT INFRARED MISC", f"GCAT {gcat}")
+    front = parse_zmx(text, [MINE]).lens.surfaces[0]
+    assert front.glass == name
+    assert (front.material is not None) == name.endswith("mine")
+
+
+@pytest.mark.parametrize(
+    ("glas", "message"),
+    [
+        ("BK7", r"line 32: surface 1: glass must be .*'BK7'.*N-BK7-Schott.*--glass FILE.agf"),
+        ("F2", "may be F2-Schott or F2-Hikari"),
+        ("___BLANK 1 0 0.5 60", "a model glass needs"),
+    ],
+)
+def test_unknown_glass_is_refused_with_its_line(glas: str, message: str) -> None:
+    text = _changed(("GLAS N-BK7 0 0 0 0 0 0 0 0 0 0", f"GLAS {glas}"), ("GCAT SCHOTT", "GCAT"))
+    with pytest.raises(ContractError, match=message):
+        parse_zmx(text)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("  TYPE STANDARD\n  CURV 3.8", "  TYPE COORDBRK\n  CURV 3.8"), "surface 1 .* COORDBRK"),
+        (("  TYPE STANDARD\n  CURV 3.8", "  TYPE BINARY_2\n  CURV 3.8"), "surface 1 .* BINARY_2"),
+        (("GLAS N-BK7", "GLAS MIRROR"), "surface 1 is a mirror"),
+        (("  FLAP 0 1.27E+1 0", "  SQAP 5 5 0"), "surface 1 has an aperture SQAP"),
+        (("  FLAP 0 1.27E+1 0", "  CLAP 1 12 0"), "central obscuration"),
+        (("  FLAP 0 1.27E+1 0", "  OBDC 0 1.5"), "decentred"),
+        (("  FLAP 0 1.27E+1 0", "  SCBD 1 0 0 0 0 90 0 0"), "tilted"),
+        (("MODE SEQ", "MODE NSC"), "MODE SEQ"),
+        (("  DISZ 5.34", "  DISZ INFINITY"), "surface 1 is infinitely thick"),
+        (("DISZ INFINITY", "DISZ -20"), "positive distance"),
+        (("DISZ INFINITY", "GLAS N-BK7\n  DISZ INFINITY"), "object lies in glass"),
+        (("CURV 0.0 0", "CURV 0.1 0"), "object is curved"),
+        (("SURF 3\n  TYPE STANDARD\n  CURV 0.0", "SURF 3\n  CURV 0.01"), "image is curved"),
+        (("FTYP 0 0 1", "FTYP 4 0 1"), "fields are of kind 4"),
+        (("FTYP 0 0 1", "FTYP 1 0 1"), "finite distance"),
+        (("ENPD 2.286E+1", "OBNA 5 1"), "NA < 1"),
+    ],
+)
+def test_what_camkit_does_not_trace_is_refused_by_name(
+    change: tuple[str, str], message: str
+) -> None:
+    with pytest.raises((UnsupportedError, DecodeError), match=message):
+        parse_zmx(_changed(change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("DISZ 5.34", "DISZ nan"), "line 31: DISZ needs a finite number"),
+        (("DISZ 5.34", "DISZ"), "line 31: DISZ needs 1 values"),
+        (("CURV 3.88", "CURV 1e300 3.88"), "line 29: CURV needs a finite"),
+        (("ENPD 2.286E+1", ""), "aperture must be one of .* got none"),
+        (("ENPD 2.286E+1", "ENPD 3\nFNUM 4 0"), "got ENPD, FNUM"),
+        (("ENPD 2.286E+1", "ENPD 0"), "ENPD must be > 0"),
+        (("  STOP\n", ""), "must hold STOP; got none"),
+        (("SURF 2", "SURF 7"), "expected SURF 2; got SURF 7"),
+        (("UNIT MM", "UNIT FURLONG"), "UNIT must be one of"),
+        (("PWAV 2", "PWAV 9"), "PWAV must be one of 3"),
+        (("DIAM 1.27E+1 1", "DIAM -5 1"), "DIAM must be > 0"),
+    ],
+)
+def test_damaged_file_is_refused_with_its_line(change: tuple[str, str], message: str) -> None:
+    with pytest.raises(DecodeError, match=message):
+        parse_zmx(_changed(change))
+
+
+def test_left_out_vignetting_factors_and_configurations_are_noted() -> None:
+    text = _changed(("VCYN 0 0", "VCYN 0 0.2"), ("MNUM 1 1", "MNUM 3 1"))
+    vignetting, zoom = parse_zmx(text).notes
+    assert "VCYN" in vignetting
+    assert "3 configurations" in zoom
+
+
+@settings(max_examples=150, deadline=None)
+@given(cut=st.integers(0, len(LA1131)), noise=st.text(max_size=15), start=st.integers(0, 300))
+def test_cut_or_spoilt_file_gives_a_lens_or_an_expected_error(
+    cut: int, noise: str, start: int
+) -> None:
+    try:
+        parse_zmx(LA1131[:start] + noise + LA1131[start:cut] + noise)
+    except CamkitError:
+        return
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data())
+def test_replaced_words_give_a_lens_or_an_expected_error(data: st.DataObject) -> None:
+    lines = LA1131.splitlines()
+    number = data.draw(st.integers(0, len(lines) - 1))
+    words = lines[number].split()
+    position = data.draw(st.integers(0, len(words) - 1))
+    words[position] = data.draw(
+        st.sampled_from(["nan", "inf", "-1", "1e12", "0", "x", "INFINITY", "1e-300", ""])
+    )
+    lines[number] = "  " * lines[number].startswith(" ") + " ".join(words)
+    try:
+        parse_zmx("\n".join(lines))
+    except CamkitError:
+        return

@@ -1,0 +1,128 @@
+"""Rewrite the glass data of camkit from a copy of the refractiveindex.info database (CC0).
+
+    python -m tools.build_glass path/to/database/data-nk
+
+The folder is `data-nk` of the database (github.com/polyanskiy/refractiveindex.info-database, also
+inside the wheel of `optiland`). Writes one JSON file per catalogue into
+`models_def/optics/glass/data/`; `misc.json` is edited by hand and
+stays. Sumita is left out: its printed n_d and V_d disagree with its coefficients.
+"""
+
+import argparse
+import json
+import re
+from pathlib import Path
+
+DATA = Path(__file__).resolve().parents[1] / "models_def" / "optics" / "glass" / "data"
+MAKERS = {
+    "Schott": "SCHOTT catalogue of 2017-01-20",
+    "Ohara": "OHARA catalogue of 2017-11-30",
+    "Hoya": "HOYA catalogue of 2017-04-01",
+    "Hikari": "NIKON HIKARI catalogue of 2017-11",
+    "CDGM": "CDGM catalogue of 2022-06",
+}
+ORGANIC = "organic/"
+PLASTIC = "other/commercial plastics/"
+POLYMERS = "Sultanova, Kasarova, Nikolov 2009, Acta Phys. Pol. A 116, 585"
+LITERATURE = {
+    "PMMA-Sultanova2009": (f"{ORGANIC}(C5H8O2)n - poly(methyl methacrylate)/Sultanova", POLYMERS),
+    "PC-Sultanova2009": (f"{ORGANIC}(C16H14O3)n - polycarbonate/Sultanova", POLYMERS),
+    "PS-Sultanova2009": (f"{ORGANIC}(C8H8)n - polystyren/Sultanova", POLYMERS),
+    "SAN-Sultanova2009": ("other/mixed organic/(C8H8)n-(C3H3N)m/Sultanova", POLYMERS),
+    "cellulose-Sultanova2009": (f"{ORGANIC}(C6H10O5)n - cellulose/Sultanova", POLYMERS),
+    "NAS-21-Sultanova2009": (f"{PLASTIC}NAS-21/Sultanova", POLYMERS),
+    "Zeonex-E48R-Sultanova2009": (f"{PLASTIC}ZeonexE48R/Sultanova", POLYMERS),
+    "Optorez-1330-Sultanova2009": (f"{PLASTIC}Optorez1330/Sultanova", POLYMERS),
+    "PMMA-Beadie2015": (
+        f"{ORGANIC}(C5H8O2)n - poly(methyl methacrylate)/Beadie",
+        "Beadie, Brindza, Flynn, Rosenberg, Shirk 2015, Appl. Opt. 54, F139",
+    ),
+    "fused-silica-Malitson1965": ("main/SiO2/Malitson", "Malitson 1965, J. Opt. Soc. Am. 55, 1205"),
+    "CaF2-Malitson1963": ("main/CaF2/Malitson", "Malitson 1963, Appl. Opt. 2, 1103"),
+    "CaF2-Daimon2002": ("main/CaF2/Daimon-20", "Daimon, Masumura 2002, Appl. Opt. 41, 5275"),
+    "BaF2-Malitson1964": ("main/BaF2/Malitson", "Malitson 1964, J. Opt. Soc. Am. 54, 628"),
+    "MgF2-o-Dodge1984": ("main/MgF2/Dodge-o", "Dodge 1984, Appl. Opt. 23, 1980"),
+    "LiF-Li1976": ("main/LiF/Li", "Li 1976, J. Phys. Chem. Ref. Data 5, 329"),
+    "sapphire-o-Malitson1972": (
+        "main/Al2O3/Malitson-o",
+        "Malitson, Dodge 1972, J. Opt. Soc. Am. 62, 1405A",
+    ),
+    "ZnSe-Connolly1979": (
+        "main/ZnSe/Connolly",
+        "Connolly, diBenedetto, Donadio 1979, Proc. SPIE 181, 141",
+    ),
+    "ZnS-Debenham1984": ("main/ZnS/Debenham", "Debenham 1984, Appl. Opt. 23, 2238"),
+    "Ge-Burnett2016": ("main/Ge/Burnett", "Burnett, Kaplan, Stover, Phenis 2016, Proc. SPIE 9974"),
+}
+SCHOTT_POWERS = [0.0, 2.0, -2.0, -4.0, -6.0, -8.0]
+
+
+def field(text: str, key: str) -> list[float]:
+    found = re.search(rf"^\s*-?\s*{key}: *([-+0-9.eE ]+)$", text, re.MULTILINE)
+    return [float(word) for word in found[1].split()] if found else []
+
+
+def dispersion(text: str) -> tuple[str, list[float]] | None:
+    """Give formula and coefficients in camkit's terms; None for tables and rare formulas."""
+    kind = re.search(r"type: formula (\d)", text)
+    numbers = field(text, "coefficients")
+    if kind is None or not numbers:
+        return None
+    if kind[1] in "12":
+        power = 2 if kind[1] == "1" else 1
+        pairs = zip(numbers[1::2], numbers[2::2], strict=True)
+        terms = [v for b, c in pairs if b for v in (b, c**power)]
+        return (
+            ("sellmeier", terms) if numbers[0] == 0 else ("sellmeier_offset", numbers[:1] + terms)
+        )
+    if kind[1] not in "35":
+        return None
+    amounts, powers = [numbers[0], *numbers[1::2]], [0.0, *numbers[2::2]]
+    if kind[1] == "5":
+        wanted = [-2.0 * i for i in range(len(powers))]
+        return ("cauchy", amounts) if powers == wanted else None
+    if powers == SCHOTT_POWERS[: len(powers)]:
+        return "schott", amounts + [0.0] * (6 - len(amounts))
+    return "powers", [v for pair in zip(amounts, powers, strict=True) for v in pair if pair[0]]
+
+
+def entry(path: Path, name: str, source: str = "") -> str | None:
+    text = path.read_text(encoding="utf-8")
+    found = dispersion(text)
+    if found is None or "n_is_absolute: true" in text:
+        return None
+    row = [name, found[0], field(text, "wavelength_range"), *stated(text), found[1]]
+    return json.dumps([*row, source] if source else row, separators=(",", ":"))
+
+
+def stated(text: str) -> list[float | None]:
+    return [(field(text, key) or [None])[0] for key in ("nd", "Vd")]
+
+
+def write(name: str, rows: list[str], source: str, *, literature: bool = False) -> None:
+    head = {"catalogue": name, "literature": literature, "source": source}
+    lines = ",\n".join(rows)
+    text = f'{json.dumps(head)[:-1]},\n"glasses": [\n{lines}\n]}}\n'
+    path = DATA / f"{name.lower()}.json"
+    path.write_text(text, encoding="utf-8")
+    print(f"{path.name}: {len(rows)} glasses, {len(text) / 1000:.0f} kB")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("database", type=Path)
+    database: Path = parser.parse_args().database
+    for maker, source in MAKERS.items():
+        paths = sorted((database / "glass" / maker.lower()).rglob("*.yml"), key=lambda p: p.stem)
+        rows = [row for path in paths if (row := entry(path, path.stem))]
+        write(maker, rows, source)
+    rows = [
+        row
+        for name, (path, source) in LITERATURE.items()
+        if (row := entry(database / f"{path}.yml", name, source))
+    ]
+    write("literature", rows, "refractiveindex.info database", literature=True)
+
+
+if __name__ == "__main__":
+    main()
