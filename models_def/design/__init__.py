@@ -11,6 +11,7 @@
 - `similarity`: SSIM with gradients
 - `loss`: eq. (6.15) and (6.16) of the thesis, and the loss of a recovered picture
 - `loop`: the training loop: parameter groups, decay, hold and freeze, the best lens kept, resume
+- `score`: a lens and its network judged on fresh pictures
 - `assembly`: a recipe turned into the parts of a loop
 - `run`: a loop with its files: checkpoint, log, the lens
 """

@@ -12,7 +12,7 @@ draws its own patches, gradients are averaged.
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -27,6 +27,7 @@ from camkit.models_def.design.sensor import Recorder, capture, encode
 from camkit.models_def.training.pictures import SceneSource
 
 VALID_SEED: Final = 900_000
+SCORE_SEED: Final = 950_000
 _CLIP: Final = 1.0
 
 State = dict[str, Any]
@@ -230,6 +231,21 @@ class DesignLoop:
         pictures, sharp = self._pictures(batch, kernels)
         error = (pictures.clamp(0, 1) - sharp).square().mean((2, 3, 4)).clamp_min(1e-10)
         return float((-10 * torch.log10(error)).mean())
+
+    def field_psnr_db(self, patches: int) -> list[list[float]]:
+        """Give the PSNR of so many fixed patches at every field, drawn apart from all others."""
+        fields = len(self.parts.lens.problem.slopes)
+        with torch.no_grad():
+            kernels, _ = self._kernels(moving=False)
+            found: list[list[float]] = []
+            for field in range(fields):
+                at = torch.tensor([field])
+                drawn = [
+                    replace(self._draw(SCORE_SEED + field * patches + i, 1), fields=at)
+                    for i in range(patches)
+                ]
+                found.append([self._psnr_db(batch, kernels) for batch in drawn])
+        return found
 
     def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
         """Give kernels and, for some fixed patches, (count, 3, h, w) captures, recovered, sharp."""

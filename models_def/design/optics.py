@@ -13,6 +13,7 @@ from camkit.models_def.optics.search.problem import Problem, limits_of, residual
 from camkit.models_def.optics.search.recovery import RecoveryMerit, splat_batch
 
 _RIDGE: Final = 1e-3
+_AT_BOUND: Final = 1e-6
 
 
 class LensModule(nn.Module):
@@ -71,12 +72,16 @@ def whitening(problem: Problem, scaled: Tensor) -> Tensor:
     """Give the basis (variable, variable) in which all moves change the spots alike.
 
     It is the inverse square root of J^T J of the RMS residuals, so that a unit move along any axis
-    changes the RMS spot by the size of the pixel core.
+    changes the RMS spot by the size of the pixel core. A number at one of its bounds has an axis
+    of its own: mixed with others, it would be cut off where they move on without it.
     """
     rms = replace(problem, merit="rms")
     with torch.no_grad():
         _, slope = jacobian(lambda given: residuals(rms, given), scaled[None])
     normal = slope[0].T @ slope[0] / problem.core_mm**2
+    inside = ((scaled > _AT_BOUND) & (scaled < 1 - _AT_BOUND)).to(normal.dtype)
+    apart = 1 - torch.outer(inside, inside)
+    normal = torch.where((apart > 0) & ~torch.eye(len(scaled), dtype=torch.bool), 0.0, normal)
     values, vectors = torch.linalg.eigh(normal)
     floor = _RIDGE * float(values.max().clamp_min(1e-12))
     basis: Tensor = vectors @ torch.diag((values + floor) ** -0.5) @ vectors.T

@@ -60,6 +60,7 @@ def plot_logs(logs: dict[str, Path], chart: Path) -> None:
 
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
+    floors: set[float] = set()
     for name, path in logs.items():
         entries = read_log(path)
         losses = [(e["cpu_s"] / 60, e["loss"]) for e in entries if "loss" in e]
@@ -68,9 +69,10 @@ def plot_logs(logs: dict[str, Path], chart: Path) -> None:
             left.plot(*zip(*losses, strict=True), label=name, linewidth=0.8)
         if scores:
             right.plot(*zip(*scores, strict=True), label=name, marker=".")
-        floor = next((e["wiener_db"] for e in entries if "wiener_db" in e), None)
-        if floor is not None:
-            right.axhline(floor, color="grey", linestyle=":", label="Wiener alone")
+        floors |= {round(e["wiener_db"], 2) for e in entries if "wiener_db" in e}
+    for number, floor in enumerate(sorted(floors)):
+        label = "_" if number else "Wiener alone"
+        right.axhline(floor, color="grey", linestyle=":", label=label)
     left.set(xlabel="CPU minutes", ylabel="training loss")
     right.set(xlabel="CPU minutes", ylabel="validation PSNR, sRGB (dB)")
     for axis in (left, right):

@@ -5,6 +5,7 @@ stop passes is measured afterwards (`pupil`, definition `stop`).
 """
 
 import math
+from typing import Final
 
 import torch
 from torch import Tensor
@@ -14,6 +15,10 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilSamples, launch
 from camkit.models_def.optics.search.variables import entrance_pupil
 from camkit.models_def.optics.trace import Rays, SurfaceTensors
+
+LEAD_X: Final = (0.0, 0.0, 0.0, 1.0)
+LEAD_Y: Final = (0.0, 1.0, -1.0, 0.0)
+LEAD: Final = len(LEAD_X)
 
 
 def pupil_radius_mm(lens: Lens, reference: SurfaceTensors, magnification: Tensor) -> Tensor:
@@ -38,7 +43,10 @@ def launch_beam(
     samples: PupilSamples,
     object_distance_mm: float,
 ) -> Rays:
-    """Start rays at the first vertex plane: (start, field, 1, 1 + ray), ray 0 is the chief ray.
+    """Start rays at the first vertex plane: (start, field, 1, LEAD + ray).
+
+    The first rays lead: the chief ray, then the rim (above, below, beside). They bound the beam,
+    for limits; merits leave them out.
 
     Args:
         lens: States stop and aperture.
@@ -50,8 +58,9 @@ def launch_beam(
     """
     place, magnification = entrance_pupil(reference, lens.stop)
     radius = pupil_radius_mm(lens, reference, magnification)
-    zero = torch.zeros(1, dtype=samples.x.dtype)
-    px, py = radius * torch.cat([zero, samples.x]), radius * torch.cat([zero, samples.y])
+    lead_x = torch.tensor(LEAD_X, dtype=samples.x.dtype)
+    lead_y = torch.tensor(LEAD_Y, dtype=samples.x.dtype)
+    px, py = radius * torch.cat([lead_x, samples.x]), radius * torch.cat([lead_y, samples.y])
     slope = slopes[:, None, None]
     if math.isinf(object_distance_mm):
         return launch(px, py - place * slope, slope, object_distance_mm)

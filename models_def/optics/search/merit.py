@@ -13,6 +13,7 @@ from typing import Final, Literal, get_args
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.search.beam import LEAD
 from camkit.models_def.optics.trace import Rays
 
 Merit = Literal["rms", "sum_abs", "energy"]
@@ -25,13 +26,13 @@ def spot_residuals(landed: Rays, core_mm: float, merit: Merit = "sum_abs") -> Te
     """Give residuals (start, residual) in mm (sqrt(mm) for `sum_abs`).
 
     Args:
-        landed: (start, field, wave, 1 + ray) on the sensor, ray 0 is the chief ray; half the
-            pupil, x >= 0, so that the centroid lies on x = 0.
+        landed: (start, field, wave, LEAD + ray) on the sensor, see `beam`; half the pupil,
+            x >= 0, so that the centroid lies on x = 0.
         core_mm: s.
         merit: Which.
     """
-    alive = landed.valid[..., 1:].to(landed.x.dtype)
-    x, y = landed.x[..., 1:], landed.y[..., 1:]
+    alive = landed.valid[..., LEAD:].to(landed.x.dtype)
+    x, y = landed.x[..., LEAD:], landed.y[..., LEAD:]
     count = alive.sum((-2, -1), keepdim=True).clamp_min(1)
     dy = y - (y * alive).sum((-2, -1), keepdim=True) / count
     scale = _scale(x**2 + dy**2, core_mm, merit) * alive

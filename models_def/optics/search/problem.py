@@ -57,7 +57,7 @@ class Traced:
     Attributes:
         reference: The lenses at the reference wavelength.
         tensors: The lenses at all wavelengths.
-        landed: (start, field, wave, 1 + ray) on the sensor, ray 0 is the chief ray.
+        landed: (start, field, wave, LEAD + ray) on the sensor, see `beam`.
         seen: The same on every surface.
     """
 

@@ -19,6 +19,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.search.beam import LEAD
 from camkit.models_def.optics.trace import Rays
 from camkit.units import UM_PER_MM
 
@@ -54,8 +55,8 @@ def recovery_residuals(landed: Rays, merit: RecoveryMerit) -> Tensor:
     """Give residuals (start, field * colour).
 
     Args:
-        landed: (start, field, wave, 1 + ray) on the sensor, ray 0 is the chief ray; half the
-            pupil, x >= 0.
+        landed: (start, field, wave, LEAD + ray) on the sensor, see `beam`; half the pupil,
+            x >= 0.
         merit: What stands behind the lens.
     """
     kernels = splat_batch(landed, merit)
@@ -84,8 +85,8 @@ def splat_batch(landed: Rays, merit: RecoveryMerit) -> Tensor:
     They sum to the share of the light that falls into the window.
     """
     size, scale = merit.kernel_px, UM_PER_MM / merit.pitch_um
-    alive = landed.valid[..., 1:].to(landed.x.dtype)
-    x, y = landed.x[..., 1:] * scale, landed.y[..., 1:] * scale
+    alive = landed.valid[..., LEAD:].to(landed.x.dtype)
+    x, y = landed.x[..., LEAD:] * scale, landed.y[..., LEAD:] * scale
     total = alive.sum((-2, -1), keepdim=True).clamp_min(1)
     # where the window lies is not a matter of the lens: no gradient through it
     middle = ((y * alive).sum((-2, -1), keepdim=True) / total).detach()

@@ -1,14 +1,15 @@
 import pytest
 import torch
 
+from camkit.models_def.optics.search.beam import LEAD
 from camkit.models_def.optics.search.merit import MERITS, Merit, spot_residuals
 from camkit.models_def.optics.trace import Rays
 
 
 def rays_at(x_mm: torch.Tensor, y_mm: torch.Tensor, lost: int = 0) -> Rays:
-    """Give (1, 1, 1, 1 + ray) rays on the sensor; the chief ray lies on the axis."""
-    zero = torch.zeros(1, dtype=torch.float64)
-    x, y = torch.cat([zero, x_mm]), torch.cat([zero, y_mm])
+    """Give (1, 1, 1, LEAD + ray) rays on the sensor; those that lead lie on the axis."""
+    lead = torch.zeros(LEAD, dtype=torch.float64)
+    x, y = torch.cat([lead, x_mm]), torch.cat([lead, y_mm])
     fate = torch.zeros(len(x), dtype=torch.int8)
     fate[len(x) - lost :] = 1
     blank = torch.zeros_like(x)
@@ -25,14 +26,14 @@ def spot() -> Rays:
 
 
 def test_rms_is_the_mean_square_distance_from_the_centroid(spot: Rays) -> None:
-    x, y = spot.x[0, 0, 0, 1:], spot.y[0, 0, 0, 1:]
+    x, y = spot.x[0, 0, 0, LEAD:], spot.y[0, 0, 0, LEAD:]
     wanted = (x**2 + (y - y.mean()) ** 2).mean()
     found = spot_residuals(spot, 0.006, "rms").square().sum()
     assert float(found) == pytest.approx(float(wanted), rel=1e-12)
 
 
 def test_sum_abs_tends_to_the_mean_distance(spot: Rays) -> None:
-    x, y = spot.x[0, 0, 0, 1:], spot.y[0, 0, 0, 1:]
+    x, y = spot.x[0, 0, 0, LEAD:], spot.y[0, 0, 0, LEAD:]
     wanted = torch.hypot(x, y - y.mean()).mean()
     found = spot_residuals(spot, 1e-9, "sum_abs").square().sum()
     assert float(found) == pytest.approx(float(wanted), rel=1e-6)
@@ -59,7 +60,7 @@ def test_a_perfect_spot_costs_nothing_and_has_a_finite_slope(merit: Merit) -> No
 
 @pytest.mark.parametrize("merit", MERITS)
 def test_lost_rays_cost_more_than_any_spot(merit: Merit, spot: Rays) -> None:
-    x, y = spot.x[0, 0, 0, 1:], spot.y[0, 0, 0, 1:]
+    x, y = spot.x[0, 0, 0, LEAD:], spot.y[0, 0, 0, LEAD:]
     whole = spot_residuals(spot, 0.006, merit).square().sum()
     spoiled = spot_residuals(rays_at(x, y, lost=20), 0.006, merit).square().sum()
     assert float(spoiled) > float(whole) + 0.05

@@ -1,0 +1,67 @@
+from dataclasses import replace
+
+import torch
+
+from camkit.models_def.design.assembly import parts_of
+from camkit.models_def.design.optics import LensModule, whitening
+from camkit.models_def.design.recipe import DesignRecipe
+from camkit.models_def.design.score import at_lens, score_design
+from camkit.models_def.optics.search.problem import Problem, residuals
+
+
+def rms_change(problem: Problem, begin: torch.Tensor, move: torch.Tensor) -> float:
+    """Give how far the spots move, in pixel cores."""
+    rms = replace(problem, merit="rms")
+    with torch.no_grad():
+        gap = residuals(rms, (begin + move)[None]) - residuals(rms, begin[None])
+    return float(gap.norm()) / problem.core_mm
+
+
+def test_equal_moves_change_the_spots_alike(recipe: DesignRecipe) -> None:
+    problem = parts_of(recipe).lens.problem
+    begin = torch.full((3,), 0.5, dtype=torch.float64)
+    basis = whitening(problem, begin)
+    found = [rms_change(problem, begin, 0.02 * column) / 0.02 for column in basis.T]
+    assert max(found) < 1.5
+    plain = torch.eye(3, dtype=torch.float64)
+    spread = [rms_change(problem, begin, 0.02 * column) for column in plain]
+    assert max(spread) / min(spread) > 2 * max(found) / min(found)
+
+
+def test_a_number_at_its_bound_has_an_axis_of_its_own(recipe: DesignRecipe) -> None:
+    problem = parts_of(recipe).lens.problem
+    basis = whitening(problem, torch.tensor([0.5, 0.0, 0.5], dtype=torch.float64))
+    assert float(basis[1, [0, 2]].abs().max()) < 1e-12
+    assert float(basis[[0, 2], 1].abs().max()) < 1e-12
+    assert abs(float(basis[0, 2])) > 1e-6
+
+
+def test_numbers_stay_within_their_bounds(recipe: DesignRecipe) -> None:
+    lens = parts_of(recipe).lens
+    with torch.no_grad():
+        lens.moves.fill_(1e6)
+    assert float(lens.scaled().detach().max()) <= 1
+    assert float(lens.scaled().detach().min()) >= 0
+
+
+def test_a_score_is_the_same_every_time_and_falls_with_defocus(recipe: DesignRecipe) -> None:
+    parts = parts_of(recipe)
+    sharp = parts.lens.begin.clone()
+    soft = sharp.clone()
+    soft[-1] = (soft[-1] + 0.4).clamp(0, 1)
+    one, again, away = (
+        score_design(parts, recipe.schedule, s, source=parts.source, patches_per_field=2)
+        for s in (sharp, sharp, soft)
+    )
+    assert one == again
+    assert len(one.by_field_db) == 3
+    assert away.psnr_db < one.psnr_db - 0.3
+
+
+def test_parts_at_a_lens_have_that_lens(recipe: DesignRecipe) -> None:
+    parts = parts_of(recipe)
+    scaled = torch.tensor([0.4, 0.6, 0.5], dtype=torch.float64)
+    lens = at_lens(parts, scaled, rays=64).lens
+    assert isinstance(lens, LensModule)
+    torch.testing.assert_close(lens.scaled().detach(), scaled)
+    assert len(lens.problem.samples.x) == 64
