@@ -13,5 +13,6 @@
 - `loop`: the training loop: parameter groups, decay, hold and freeze, the best lens kept, resume
 - `score`: a lens and its network judged on fresh pictures
 - `assembly`: a recipe turned into the parts of a loop
+- `tolerance`: what fabrication costs after recovery
 - `run`: a loop with its files: checkpoint, log, the lens
 """

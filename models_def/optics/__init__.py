@@ -20,5 +20,7 @@ In the order in which data flows:
 - `sampling`: what coarse samples and blocks cost, in dB
 - `freeze`: the least samples within a stated loss; the file and its report
 - `analysis/`: spots, MTF, curves, third order and wavefronts for people
+- `tolerance/`: errors of fabrication, decentres and tilts among them
 - `search/`: how a lens is found and improved: free numbers, merits, damped least squares
+- `render/`: pictures of a textured plane, by rays or by a map of PSFs
 """

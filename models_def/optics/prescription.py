@@ -45,6 +45,7 @@ _LENS_KEYS: Final = {
     "glass_catalogues",
     "glass",
     "surface",
+    "tolerance",
     *APERTURE_KINDS,
 }
 

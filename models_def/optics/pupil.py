@@ -13,6 +13,7 @@ Three definitions of the pupil; spots and PSFs differ by them, so each states it
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, Literal, get_args
 
@@ -146,32 +147,44 @@ def aim(
     wanted_x, wanted_y, slope = target.x + blank, target.y + blank, slope + blank
     if stop == 0 and not bool(tensors.curvature_per_mm[0].any()) and not tensors.aspheric[0]:
         return Aim(x=wanted_x, y=wanted_y, weight=torch.ones_like(wanted_x))
-    with torch.no_grad():
-        return _newton_aim(
-            with_open_apertures(tensors), stop, (wanted_x, wanted_y), slope, distance_mm
-        )
+    tensors = with_open_apertures(tensors)
 
-
-def _newton_aim(
-    tensors: SurfaceTensors,
-    stop: int,
-    wanted: tuple[Tensor, Tensor],
-    slope: Tensor,
-    distance_mm: float,
-) -> Aim:
     def at_stop(x: Tensor, y: Tensor) -> Rays:
         rays = launch(x, y, slope, distance_mm)
         rays = trace(tensors, rays, surfaces=range(stop))
         return refract(tensors, rays, stop)
 
-    x = torch.zeros_like(wanted[0] + tensors.index[0])
-    y = torch.zeros_like(x)
+    axis = torch.zeros_like(wanted_x + tensors.index[0])
+    with torch.no_grad():
+        return newton_aim(at_stop, (wanted_x, wanted_y), (axis, axis))
+
+
+def newton_aim(
+    at_stop: Callable[[Tensor, Tensor], Rays],
+    wanted: tuple[Tensor, Tensor],
+    begin: tuple[Tensor, Tensor],
+    *,
+    steps: int = AIM_STEPS,
+    fresh: int = AIM_STEPS,
+) -> Aim:
+    """Find launch points by Newton's method with differences for slopes.
+
+    Args:
+        at_stop: Takes launch points x and y in mm to the rays on the stop, rims open.
+        wanted: x and y in mm on the stop; broadcast with `begin`.
+        begin: Launch points to begin from.
+        steps: The last one only judges.
+        fresh: So many first steps measure the slopes, at three traces each; the others keep them.
+    """
+    x, y = begin
     step, found = _DIFFERENCE_MM, torch.zeros_like(x, dtype=torch.bool)
     determinant = torch.ones_like(x)
-    for _ in range(AIM_STEPS):
-        here, right, down = at_stop(x, y), at_stop(x + step, y), at_stop(x, y + step)
-        xx, yx = (right.x - here.x) / step, (right.y - here.y) / step
-        xy, yy = (down.x - here.x) / step, (down.y - here.y) / step
+    for number in range(steps):
+        here = at_stop(x, y)
+        if number < fresh:
+            right, down = at_stop(x + step, y), at_stop(x, y + step)
+            xx, yx = (right.x - here.x) / step, (right.y - here.y) / step
+            xy, yy = (down.x - here.x) / step, (down.y - here.y) / step
         alive = here.valid & right.valid & down.valid
         product = xx * yy - xy * yx
         good = alive & (torch.abs(product) > 1e-9)

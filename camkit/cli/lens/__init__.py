@@ -3,5 +3,6 @@
 - `app`: the commands joined
 - `show`: a lens on one page
 - `optimize`: a lens made better on spots
+- `tolerance`: fabricated copies, their yield, what to tighten first
 - `convert`: between .toml and .zmx
 """

@@ -5,12 +5,14 @@ import typer
 from camkit.cli.lens.convert import convert
 from camkit.cli.lens.optimize import optimize
 from camkit.cli.lens.show import show
+from camkit.cli.lens.tolerance import tolerance
 
 lens_app = typer.Typer(
     name="lens", help="One lens: look at it, improve it, convert it.", no_args_is_help=True
 )
 lens_app.command()(show)
 lens_app.command()(optimize)
+lens_app.command()(tolerance)
 lens_app.command()(convert)
 
 

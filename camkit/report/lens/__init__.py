@@ -9,6 +9,7 @@ colour_chart   longitudinal aberration, axial and lateral colour
 seidel_chart   third-order sums by surface
 figure         a chart as SVG and PNG
 design_picture a moment of a joint design
+yield_chart    fabricated copies: yield, classes of errors, table and JSON
 page           the HTML page, complete in itself
 output         all files written
 """
