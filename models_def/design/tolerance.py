@@ -1,0 +1,367 @@
+"""What fabrication costs after recovery: PSNR of copies, their yield, what to tighten first.
+
+Captures are made with the kernels of fabricated copies and recovered by the Wiener filter of the
+nominal lens, which is all that a bundle knows. Patches and noise are the same for every copy.
+Patches repeat beyond their borders, as the Fourier transform of the filter takes them to: no
+border rings into what is judged, however wide the kernels.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.design.front import Front
+from camkit.models_def.design.sensor import Recorder, capture, encode
+from camkit.models_def.optics.kernel_bank import gaussian_response
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.pupil import PupilSamples, half_disc
+from camkit.models_def.optics.tolerance.deviation import (
+    Deviations,
+    Single,
+    draw_deviations,
+    no_deviations,
+    single_deviations,
+)
+from camkit.models_def.optics.tolerance.errors import ErrorKind, Tolerances
+from camkit.models_def.optics.tolerance.fabricated import View, land
+from camkit.models_def.optics.tolerance.landing import copy_kernels, spot_rms_mm, window_px
+from camkit.models_def.training.pictures import open_source
+from camkit.units import to_radians
+
+# share of the largest field, azimuth: the axis, a ring of diagonals, the edge in four directions
+FIELDS: Final = (
+    (0.0, 0.0),
+    *((0.7, float(azimuth)) for azimuth in (45, 135, 225, 315)),
+    *((1.0, float(azimuth)) for azimuth in (0, 90, 180, 270)),
+)
+_LARGEST_KERNEL_PX: Final = 127
+_LOST: Final = 0.005
+_PROBES: Final = 4
+_BATCH: Final = 4
+_SPOT_RAYS: Final = 128
+_SCENES: Final = 4
+_SCENE_PX: Final = 512
+_VISIBLE_UM: Final = (0.36, 0.83)
+
+Array = NDArray[np.float64]
+Watch = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToleranceRun:
+    """How copies are drawn and judged.
+
+    Attributes:
+        samples: Fabricated copies.
+        limit_copies: Copies per class with that class alone at its half-width.
+        seed: Of errors, patches and noise.
+        pitch_um: Of the pixels.
+        noise: Standard deviation, 1.0 = white level.
+        patch_px: Side of a patch.
+        patches: Per field.
+        rays: Of the pupil.
+        pictures: Folder of sharp pictures; None for procedural scenes.
+    """
+
+    samples: int = 50
+    limit_copies: int = 4
+    seed: int = 1
+    pitch_um: float = 6.0
+    noise: float = 0.01
+    patch_px: int = 96
+    patches: int = 2
+    rays: int = 512
+    pictures: Path | None = None
+
+    def __post_init__(self) -> None:
+        counts = (self.samples, self.limit_copies, self.patch_px, self.patches, self.rays // 2)
+        if min(counts) < 1 or self.seed < 0:
+            raise ContractError(
+                f"counts of a tolerance run must be >= 1, the seed >= 0; got {self}"
+            )
+        if not self.pitch_um > 0:
+            raise ContractError(f"pitch_um must be > 0; got {self.pitch_um}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """What was found of copies.
+
+    Attributes:
+        psnr_db: (copy, field), of sRGB values after recovery, the mean over patches.
+        spot_rms_mm: (copy, field), all wavelengths alike, about the centroid.
+        refocus_mm: (copy,), what the compensator did.
+        energy_kept: Least share of light inside the kernel window.
+    """
+
+    psnr_db: Array
+    spot_rms_mm: Array
+    refocus_mm: Array
+    energy_kept: float
+
+    @property
+    def mean_db(self) -> Array:
+        """(copy,), over fields."""
+        return np.asarray(self.psnr_db.mean(1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassLoss:
+    """What one class of errors costs, alone and at its half-width.
+
+    Attributes:
+        kind: The class.
+        half_width: In its unit.
+        loss_db: (copy,), mean over fields.
+        spot_growth_mm: Of the RMS radius over all fields, the mean over copies.
+    """
+
+    kind: ErrorKind
+    half_width: float
+    loss_db: Array
+    spot_growth_mm: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Offender:
+    """One error at one limit: how much the RMS radius over all fields grows."""
+
+    single: Single
+    spot_growth_mm: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToleranceResult:
+    """All that a run found.
+
+    Attributes:
+        lens: Nominal.
+        tolerances: What was drawn.
+        run: How.
+        fields: (share of the largest slope, azimuth in degrees).
+        kernel_px: Window of the kernels.
+        nominal: The lens as designed.
+        samples: Fabricated copies.
+        classes: The largest loss first.
+        offenders: Single errors, the largest growth first.
+    """
+
+    lens: Lens
+    tolerances: Tolerances
+    run: ToleranceRun
+    fields: tuple[tuple[float, float], ...]
+    kernel_px: int
+    nominal: Measured
+    samples: Measured
+    classes: tuple[ClassLoss, ...]
+    offenders: tuple[Offender, ...]
+
+    def percentile_db(self, percent: float) -> float:
+        """Give the PSNR that `percent` of the copies fall short of."""
+        return float(np.percentile(self.samples.mean_db, percent))
+
+    def share_at_least(self, psnr_db: float) -> float:
+        """Give the yield: the share of copies with at least this PSNR."""
+        return float((self.samples.mean_db >= psnr_db).mean())
+
+
+def run_tolerance(
+    lens: Lens, tolerances: Tolerances, run: ToleranceRun, watch: Watch | None = None
+) -> ToleranceResult:
+    """Draw copies of a lens and judge them.
+
+    Args:
+        lens: Nominal, focused as it is meant to be.
+        tolerances: Widths of the errors.
+        run: How.
+        watch: Is told how many copies are done, and of how many.
+
+    Raises:
+        ContractError: If a field of the lens or of a copy loses its light.
+    """
+    judge = _judge(lens, tolerances, run)
+    kinds = tolerances.active()
+    parts = _batches(run.samples)
+    limits = _batches(run.limit_copies)
+    total = run.samples + run.limit_copies * len(kinds)
+    done = 0
+
+    def measure(given: Tolerances, numbers: list[range], *, at_limits: bool) -> Measured:
+        nonlocal done
+        found = []
+        for some in numbers:
+            drawn = draw_deviations(lens, given, some, run.seed, at_limits=at_limits)
+            found.append(judge.measure(drawn))
+            done += len(some)
+            if watch is not None:
+                watch(done, total)
+        return _joined(found)
+
+    nominal = judge.measure(no_deviations(lens))
+    samples = measure(tolerances, parts, at_limits=False)
+    classes = [
+        _class_loss(
+            tolerances, kind, nominal, measure(tolerances.only(kind), limits, at_limits=True)
+        )
+        for kind in kinds
+    ]
+    return ToleranceResult(
+        lens=lens,
+        tolerances=tolerances,
+        run=run,
+        fields=judge.fields,
+        kernel_px=judge.kernels.shape[-1],
+        nominal=nominal,
+        samples=samples,
+        classes=tuple(sorted(classes, key=lambda found: -float(found.loss_db.mean()))),
+        offenders=_offenders(judge),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Judge:
+    """Fixed fields, patches and noise, and the nominal kernels (field, 3, k, k)."""
+
+    lens: Lens
+    tolerances: Tolerances
+    run: ToleranceRun
+    fields: tuple[tuple[float, float], ...]
+    view: View
+    color_weights: Tensor
+    kernels: Tensor
+    sharp: Tensor
+    normal: Tensor
+
+    def measure(self, deviations: Deviations) -> Measured:
+        landing = land(self.lens, deviations, self.view, self.tolerances.compensator)
+        size = self.kernels.shape[-1]
+        kernels, kept = copy_kernels(landing, self.color_weights, size, self.run.pitch_um)
+        psnr = [self._psnr_db(of_copy.float()) for of_copy in kernels]
+        return Measured(
+            psnr_db=np.stack(psnr),
+            spot_rms_mm=spot_rms_mm(landing).numpy(),
+            refocus_mm=landing.refocus_mm.numpy(),
+            energy_kept=float(kept.min()),
+        )
+
+    def _psnr_db(self, kernels: Tensor) -> Array:
+        """Photograph with kernels (field, 3, k, k), recover with the nominal ones: (field,)."""
+        front, count = Front(kind="wiener"), self.run.patches
+        with torch.no_grad():
+            own, known = (k.repeat_interleave(count, 0) for k in (kernels, self.kernels))
+            recorded = capture(self.sharp, own, Recorder(noise=self.run.noise), self.normal)
+            recovered = front.planes(recorded, known)[:, -3:]
+            edge = (self.sharp.shape[-1] - self.run.patch_px) // 2
+            inner = slice(edge, edge + self.run.patch_px)
+            error = recovered.clamp(0, 1) - encode(self.sharp[..., inner, inner])
+            square = error.double().square().mean((1, 2, 3)).clamp_min(1e-10)
+            psnr: Array = (-10 * torch.log10(square)).reshape(-1, count).mean(1).numpy()
+        return psnr
+
+
+def _judge(lens: Lens, tolerances: Tolerances, run: ToleranceRun) -> _Judge:
+    """Fix fields and patches; the window of the kernels holds the nominal and the first copies."""
+    far = np.tan(max(lens.field_angles_rad, default=0.0))
+    fields = FIELDS if far > 0 else FIELDS[:1]
+    view = _view(lens, fields, far, run.rays)
+    waves = view.wavelengths_um.numpy()
+    seen = waves.min() > _VISIBLE_UM[0] and waves.max() < _VISIBLE_UM[1]
+    colors = gaussian_response(waves).response if seen else np.full((3, waves.size), 1 / waves.size)
+    weights = torch.from_numpy(colors)
+
+    def kernels(deviations: Deviations, size_px: int) -> Tensor:
+        landing = land(lens, deviations, view, tolerances.compensator)
+        return copy_kernels(landing, weights, size_px, run.pitch_um)[0]
+
+    probes = draw_deviations(lens, tolerances, range(_PROBES), run.seed)
+    none = no_deviations(lens)
+    wide = [kernels(given, _LARGEST_KERNEL_PX) for given in (none, probes)]
+    size = max(9, window_px(torch.cat(wide), _LOST))
+    front, rng = Front(kind="wiener"), np.random.default_rng(run.seed)
+    inner = run.patch_px + 2 * front.margin_px
+    source = open_source(
+        run.pictures,
+        picture_share=0.0 if run.pictures is None else 1.0,
+        scenes=_SCENES,
+        scene_px=_SCENE_PX,
+    )
+    count = len(fields) * run.patches
+    crops = np.stack([source.draw_crop(rng, inner) for _ in range(count)])
+    around = (size - 1) // 2
+    sharp = np.pad(crops, ((0, 0), (0, 0), (around, around), (around, around)), mode="wrap")
+    normal = rng.standard_normal((count, 3, inner, inner), dtype=np.float32)
+    return _Judge(
+        lens=lens,
+        tolerances=tolerances,
+        run=run,
+        fields=fields,
+        view=view,
+        color_weights=weights,
+        kernels=kernels(none, size)[0].float(),
+        sharp=torch.from_numpy(sharp.clip(0, 1)),
+        normal=torch.from_numpy(normal),
+    )
+
+
+def _view(lens: Lens, fields: tuple[tuple[float, float], ...], far: float, rays: int) -> View:
+    half = half_disc(rays // 2)
+    return View(
+        slopes=torch.tensor([far * share for share, _ in fields], dtype=torch.float64),
+        azimuths_rad=torch.tensor([to_radians(a) for _, a in fields], dtype=torch.float64),
+        wavelengths_um=torch.tensor(lens.wavelengths_um, dtype=torch.float64),
+        # mirrored: the nominal kernels are as symmetric as the lens
+        samples=PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y])),
+    )
+
+
+def _batches(count: int) -> list[range]:
+    return [range(i, min(i + _BATCH, count)) for i in range(0, count, _BATCH)]
+
+
+def _joined(parts: list[Measured]) -> Measured:
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("psnr_db", "spot_rms_mm", "refocus_mm")
+    }
+    return Measured(**arrays, energy_kept=min(part.energy_kept for part in parts))
+
+
+def _class_loss(
+    tolerances: Tolerances, kind: ErrorKind, nominal: Measured, found: Measured
+) -> ClassLoss:
+    return ClassLoss(
+        kind=kind,
+        half_width=tolerances.of(kind).half_width,
+        loss_db=nominal.mean_db[0] - found.mean_db,
+        spot_growth_mm=float((_overall(found.spot_rms_mm) - _overall(nominal.spot_rms_mm)).mean()),
+    )
+
+
+def _overall(spot_rms_mm: Array) -> Array:
+    """Give the RMS radius (copy,) over all fields."""
+    return np.asarray(np.sqrt((spot_rms_mm**2).mean(-1)))
+
+
+def _offenders(judge: _Judge) -> tuple[Offender, ...]:
+    """Rate every single error at both its limits, by spots of few rays."""
+    half = half_disc(_SPOT_RAYS // 2)
+    few = PupilSamples(x=torch.cat([half.x, -half.x]), y=torch.cat([half.y, half.y]))
+    view = replace(judge.view, samples=few)
+
+    def overall(deviations: Deviations) -> Array:
+        landing = land(judge.lens, deviations, view, judge.tolerances.compensator)
+        return _overall(spot_rms_mm(landing).numpy())
+
+    singles, deviations = single_deviations(judge.lens, judge.tolerances)
+    if not singles:
+        return ()
+    grown = overall(deviations) - overall(no_deviations(judge.lens))
+    pairs = sorted(zip(grown.tolist(), singles, strict=True), key=lambda pair: -pair[0])
+    return tuple(Offender(single=single, spot_growth_mm=mm) for mm, single in pairs)

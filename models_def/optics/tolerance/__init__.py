@@ -1,0 +1,15 @@
+"""What fabrication does to a lens: errors of surfaces and elements, and how light goes then.
+
+In the order in which data flows:
+
+- `errors`: classes of errors, how wide each is, what assembly corrects
+- `error_table`: the same from a TOML table
+- `elements`: which surfaces are one piece of glass
+- `deviation`: drawn errors of fabricated copies
+- `pose`: where decentred and tilted surfaces stand
+- `misaligned_trace`: rays through such surfaces
+- `fabricated`: copies as tensors, their beams aimed, traced and refocused
+- `landing`: spots and kernels of copies
+
+`design.tolerance` puts the recovery behind them and draws the yield.
+"""

@@ -1,0 +1,187 @@
+"""Drawn errors of fabricated copies."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.tolerance.elements import glass_elements
+from camkit.models_def.optics.tolerance.errors import Array, ErrorKind, ErrorWidth, Tolerances
+
+FIELDS: Final[dict[ErrorKind, str]] = {
+    "radius": "radius",
+    "thickness": "thickness_mm",
+    "index": "index",
+    "abbe": "abbe",
+    "conic": "conic",
+    "surface_decentre": "surface_decentre_mm",
+    "surface_tilt": "surface_tilt_rad",
+    "element_decentre": "element_decentre_mm",
+    "element_tilt": "element_tilt_rad",
+    "focus": "focus_mm",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviations:
+    """Errors of copies, 0 where a class does not apply.
+
+    Attributes:
+        radius: (copy, surface), relative.
+        thickness_mm: (copy, surface).
+        index: (copy, surface), of the medium after it.
+        abbe: (copy, surface), relative.
+        conic: (copy, surface).
+        surface_decentre_mm: (copy, surface, 2), x and y.
+        surface_tilt_rad: (copy, surface, 2), a rotation vector: its x turns y towards z.
+        element_decentre_mm: (copy, element, 2).
+        element_tilt_rad: (copy, element, 2).
+        focus_mm: (copy,).
+    """
+
+    radius: Array
+    thickness_mm: Array
+    index: Array
+    abbe: Array
+    conic: Array
+    surface_decentre_mm: Array
+    surface_tilt_rad: Array
+    element_decentre_mm: Array
+    element_tilt_rad: Array
+    focus_mm: Array
+
+    @property
+    def copies(self) -> int:
+        """How many there are."""
+        return len(self.focus_mm)
+
+
+def draw_deviations(
+    lens: Lens,
+    tolerances: Tolerances,
+    copies: range,
+    seed: int,
+    *,
+    at_limits: bool = False,
+) -> Deviations:
+    """Draw the errors of copies.
+
+    Copy i follows from (seed, i) alone, and each class has draws of its own: another width, or
+    another number of copies, leaves all other errors as they are.
+
+    Args:
+        lens: Nominal.
+        tolerances: How wide.
+        copies: Their numbers.
+        seed: Of all draws.
+        at_limits: Every error at its full half-width, with the drawn sign or direction.
+
+    Raises:
+        ContractError: If the seed is negative.
+    """
+    if seed < 0:
+        raise ContractError(f"a seed must be >= 0; got {seed}")
+    elements, surfaces = glass_elements(lens), len(lens.surfaces)
+    rows = [_uniform(seed, i, surfaces, len(elements)) for i in copies]
+    flat, on_surface, on_element, focus = (np.stack(part) for part in zip(*rows, strict=True))
+    glass = np.array([surface.glass != "air" for surface in lens.surfaces], dtype=np.float64)
+    curved = np.array([surface.curvature_per_mm != 0 for surface in lens.surfaces])
+    refracting = np.zeros(surfaces)
+    for element in elements:
+        refracting[element.start : element.stop] = 1
+    gaps = np.ones(surfaces)
+    gaps[-1] = 0
+
+    def signed(width: ErrorWidth, draws: Array) -> Array:
+        if at_limits:
+            return width.half_width * np.where(draws < 0.5, -1.0, 1.0)
+        return width.signed(draws)
+
+    def vector(width: ErrorWidth, draws: Array) -> Array:
+        length = np.full(draws.shape[:-1], width.half_width)
+        length = length if at_limits else width.length(draws[..., 0])
+        angle = 2 * np.pi * draws[..., 1]
+        return np.stack([length * np.cos(angle), length * np.sin(angle)], axis=-1)
+
+    return Deviations(
+        radius=signed(tolerances.radius, flat[:, 0]) * curved,
+        thickness_mm=signed(tolerances.thickness, flat[:, 1]) * gaps,
+        index=signed(tolerances.index, flat[:, 2]) * glass,
+        abbe=signed(tolerances.abbe, flat[:, 3]) * glass,
+        conic=signed(tolerances.conic, flat[:, 4]) * refracting,
+        surface_decentre_mm=vector(tolerances.surface_decentre, on_surface[:, 0])
+        * refracting[:, None],
+        surface_tilt_rad=vector(tolerances.surface_tilt, on_surface[:, 1]) * refracting[:, None],
+        element_decentre_mm=vector(tolerances.element_decentre, on_element[:, 0]),
+        element_tilt_rad=vector(tolerances.element_tilt, on_element[:, 1]),
+        focus_mm=signed(tolerances.focus, focus),
+    )
+
+
+def no_deviations(lens: Lens) -> Deviations:
+    """Give one copy without errors."""
+    drawn = draw_deviations(lens, Tolerances(), range(1), 0)
+    return Deviations(**{name: np.zeros_like(value) for name, value in _arrays(drawn)})
+
+
+def _arrays(deviations: Deviations) -> Iterator[tuple[str, Array]]:
+    return ((f.name, getattr(deviations, f.name)) for f in fields(deviations))
+
+
+def _uniform(
+    seed: int, number: int, surfaces: int, elements: int
+) -> tuple[Array, Array, Array, np.float64]:
+    """Give draws of 0..1: (5, surface), (2, surface, 2), (2, element, 2) and one number."""
+    rng = np.random.default_rng((seed, number))
+    return (
+        rng.random((5, surfaces)),
+        rng.random((2, surfaces, 2)),
+        rng.random((2, elements, 2)),
+        np.float64(rng.random()),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Single:
+    """One error of one part.
+
+    Attributes:
+        kind: Its class.
+        part: Number of the surface or of the piece of glass, from 0; None for the focus.
+        value: The error.
+    """
+
+    kind: ErrorKind
+    part: int | None
+    value: float
+
+
+def single_deviations(lens: Lens, tolerances: Tolerances) -> tuple[tuple[Single, ...], Deviations]:
+    """Give copies with one error each: every number at plus and minus its half-width.
+
+    Decentres are along y, tilts turn y towards z.
+    """
+    # at its limits every number that an error can reach is not 0
+    reach = draw_deviations(lens, tolerances, range(1), 0, at_limits=True)
+    singles: list[Single] = []
+    for kind in tolerances.active():
+        touched = getattr(reach, FIELDS[kind])[0]
+        parts = (
+            [None] if kind == "focus" else np.flatnonzero(touched.reshape(len(touched), -1)[:, 0])
+        )
+        for part in parts:
+            number = None if part is None else int(part)
+            width = tolerances.of(kind).half_width
+            singles += [Single(kind=kind, part=number, value=v) for v in (width, -width)]
+    arrays = {name: np.zeros((len(singles), *value.shape[1:])) for name, value in _arrays(reach)}
+    for copy, single in enumerate(singles):
+        place: tuple[int, ...] = (copy,) if single.part is None else (copy, single.part)
+        if "decentre" in single.kind:
+            place = (*place, 1)
+        elif "tilt" in single.kind:
+            place = (*place, 0)
+        arrays[FIELDS[single.kind]][place] = single.value
+    return tuple(singles), Deviations(**arrays)

@@ -1,0 +1,19 @@
+"""Which surfaces are one piece of glass: cemented ones move as one."""
+
+from camkit.models_def.optics.prescription import Lens
+
+
+def glass_elements(lens: Lens) -> tuple[range, ...]:
+    """Give the surfaces of each piece; a stop or a dummy in air belongs to none."""
+    found: list[range] = []
+    start: int | None = None
+    for i, surface in enumerate(lens.surfaces):
+        if start is None and surface.glass != "air":
+            start = i
+        elif start is not None and surface.glass == "air":
+            found.append(range(start, i + 1))
+            start = None
+    if start is not None:
+        # the sensor lies in the glass
+        found.append(range(start, len(lens.surfaces)))
+    return tuple(found)

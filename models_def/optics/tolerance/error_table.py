@@ -1,0 +1,97 @@
+"""Tolerances from TOML: the table [tolerance] of a lens file, or of a file of its own."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.tolerance.errors import ERROR_KINDS, ErrorKind, ErrorWidth, Tolerances
+from camkit.units import to_radians
+
+TABLE: Final = "tolerance"
+_ARCMIN: Final = to_radians(1 / 60)
+# key of a file: class, and the class's unit in that of the key
+KEYS: Final[dict[str, tuple[ErrorKind, float]]] = {
+    "radius_percent": ("radius", 0.01),
+    "thickness_mm": ("thickness", 1.0),
+    "index": ("index", 1.0),
+    "abbe_percent": ("abbe", 0.01),
+    "conic": ("conic", 1.0),
+    "surface_decentre_mm": ("surface_decentre", 1.0),
+    "surface_tilt_arcmin": ("surface_tilt", _ARCMIN),
+    "surface_tilt_deg": ("surface_tilt", to_radians(1.0)),
+    "element_decentre_mm": ("element_decentre", 1.0),
+    "element_tilt_arcmin": ("element_tilt", _ARCMIN),
+    "element_tilt_deg": ("element_tilt", to_radians(1.0)),
+    "focus_mm": ("focus", 1.0),
+}
+_SETTINGS: Final = {"distribution", "compensator"}
+_ENTRY_KEYS: Final = {"half_width", "distribution"}
+
+
+def read_tolerances(path: Path) -> Tolerances | None:
+    """Read the [tolerance] table of a TOML file; None if it has none.
+
+    Raises:
+        ContractError: If the file is not TOML, or the table is wrong.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise ContractError(f"{path.name} must be TOML; {error}") from error
+    return parse_tolerances(table[TABLE]) if TABLE in table else None
+
+
+def parse_tolerances(table: object) -> Tolerances:
+    """Give the tolerances of a [tolerance] table; classes that it does not name are 0.
+
+    A class is a half-width, or `{ half_width = 0.1, distribution = "normal" }`.
+
+    Raises:
+        ContractError: If a key is unknown, names a class twice, or has a wrong value.
+    """
+    if not isinstance(table, Mapping):
+        raise ContractError(f"[{TABLE}] must be a table; got {table!r:.80}")
+    unknown = sorted(set(table) - set(KEYS) - _SETTINGS)
+    if unknown:
+        known = ", ".join((*KEYS, *sorted(_SETTINGS)))
+        raise ContractError(f"[{TABLE}]: unknown keys {unknown}; known are {known}")
+    common = table.get("distribution", "uniform")
+    widths: dict[str, Any] = dict.fromkeys(ERROR_KINDS, ErrorWidth(half_width=0.0))
+    named: set[str] = set()
+    for key in (key for key in table if key in KEYS):
+        kind, unit = KEYS[key]
+        if kind in named:
+            raise ContractError(f"[{TABLE}]: {key} names {kind} again; keep one of the two")
+        named.add(kind)
+        widths[kind] = _width(key, table[key], unit, common)
+    return Tolerances(**widths, compensator=table.get("compensator", "paraxial"))
+
+
+def _width(key: str, value: object, unit: float, common: Any) -> ErrorWidth:
+    entry: Mapping[str, Any] = value if isinstance(value, Mapping) else {"half_width": value}
+    number = entry.get("half_width")
+    wrong = sorted(set(entry) - _ENTRY_KEYS)
+    if wrong or isinstance(number, bool) or not isinstance(number, int | float):
+        raise ContractError(
+            f"[{TABLE}]: {key} must be a number or {{ half_width = NUMBER, distribution = NAME }}; "
+            f"got {value!r:.80}"
+        )
+    return ErrorWidth(half_width=number * unit, distribution=entry.get("distribution", common))
+
+
+def in_file_units(kind: ErrorKind, value: float) -> str:
+    """Give an error as people write it, such as `0.2 %`."""
+    texts = {
+        "radius": (0.01, " %"),
+        "abbe": (0.01, " %"),
+        "thickness": (1.0, " mm"),
+        "focus": (1.0, " mm"),
+        "surface_decentre": (1.0, " mm"),
+        "element_decentre": (1.0, " mm"),
+        "surface_tilt": (_ARCMIN, "'"),
+        "element_tilt": (_ARCMIN, "'"),
+    }
+    unit, name = texts.get(kind, (1.0, ""))
+    return f"{value / unit:.4g}{name}"

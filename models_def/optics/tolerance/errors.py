@@ -1,0 +1,140 @@
+"""Classes of fabrication errors, how wide each is, and what assembly corrects."""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal, Self, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.prescription import FabricationErrors
+from camkit.units import to_radians
+
+Distribution = Literal["uniform", "normal"]
+Compensator = Literal["paraxial", "spot", "none"]
+ErrorKind = Literal[
+    "radius",
+    "thickness",
+    "index",
+    "abbe",
+    "conic",
+    "surface_decentre",
+    "surface_tilt",
+    "element_decentre",
+    "element_tilt",
+    "focus",
+]
+DISTRIBUTIONS: Final[tuple[Distribution, ...]] = get_args(Distribution)
+COMPENSATORS: Final[tuple[Compensator, ...]] = get_args(Compensator)
+ERROR_KINDS: Final[tuple[ErrorKind, ...]] = get_args(ErrorKind)
+
+NORMAL_SIGMAS: Final = 2.0  # a normal error is cut off at its half-width, at so many sigma
+MAX_TILT_RAD: Final = 0.5
+_MAX_SHARE: Final = 0.5
+_BASE: Final = FabricationErrors()
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorWidth:
+    """How an error is spread.
+
+    Attributes:
+        half_width: Largest error, in the unit of its class; of a decentre or tilt its length.
+        distribution: uniform (a decentre: over the disc), or normal with a standard deviation of
+            half the half-width, cut off at the half-width.
+    """
+
+    half_width: float
+    distribution: Distribution = "uniform"
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.half_width) and self.half_width >= 0):
+            raise ContractError(f"a half-width must be finite and >= 0; got {self.half_width}")
+        if self.distribution not in DISTRIBUTIONS:
+            raise ContractError(
+                f"a distribution is {' or '.join(DISTRIBUTIONS)}; got {self.distribution!r}"
+            )
+
+    def signed(self, uniform: Array) -> Array:
+        """Turn uniform draws of 0..1 into errors of both signs."""
+        if self.distribution == "uniform":
+            return self.half_width * (2 * uniform - 1)
+        low = ndtr(-NORMAL_SIGMAS)
+        sigma = self.half_width / NORMAL_SIGMAS
+        return np.asarray(sigma * ndtri(low + uniform * (1 - 2 * low)))
+
+    def length(self, uniform: Array) -> Array:
+        """Turn uniform draws of 0..1 into lengths of vectors of any direction."""
+        if self.distribution == "uniform":
+            return self.half_width * np.sqrt(uniform)
+        cut = 1 - math.exp(-(NORMAL_SIGMAS**2) / 2)
+        sigma = self.half_width / NORMAL_SIGMAS
+        return np.asarray(sigma * np.sqrt(-2 * np.log1p(-uniform * cut)))
+
+
+_NOTHING: Final = ErrorWidth(half_width=0.0)
+_DECENTRE: Final = ErrorWidth(half_width=0.02)
+_TILT: Final = ErrorWidth(half_width=to_radians(1 / 60))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """Half-widths of every class of errors, and the compensator.
+
+    Decentres and tilts are those of the pieces of glass (`element_`, about the front vertex) and
+    of each of their surfaces (`surface_`, about its own vertex).
+
+    Attributes:
+        radius: Relative, of every curved surface.
+        thickness: mm, of every gap and element, the last one excepted.
+        index: Of every glass.
+        abbe: Relative, of the Abbe number of every glass, the index at the d line kept.
+        conic: Of every surface of a glass.
+        surface_decentre: mm.
+        surface_tilt: Radians.
+        element_decentre: mm.
+        element_tilt: Radians.
+        focus: mm, of the distance to the sensor, after the compensator.
+        compensator: What moves the sensor at assembly: to where it stood to the paraxial image
+            in the design (decision 0004), to the smallest RMS spot in the same way, or nothing.
+    """
+
+    radius: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.radius_relative))
+    thickness: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.thickness_mm))
+    index: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.index))
+    abbe: ErrorWidth = _NOTHING
+    conic: ErrorWidth = _NOTHING
+    surface_decentre: ErrorWidth = _DECENTRE
+    surface_tilt: ErrorWidth = _TILT
+    element_decentre: ErrorWidth = _DECENTRE
+    element_tilt: ErrorWidth = _TILT
+    focus: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.focus_mm))
+    compensator: Compensator = "paraxial"
+
+    def __post_init__(self) -> None:
+        if self.compensator not in COMPENSATORS:
+            raise ContractError(
+                f"a compensator is one of {', '.join(COMPENSATORS)}; got {self.compensator!r}"
+            )
+        if max(self.radius.half_width, self.abbe.half_width) > _MAX_SHARE:
+            raise ContractError(f"radius and abbe errors must be at most 50 %; got {self}")
+        if max(self.surface_tilt.half_width, self.element_tilt.half_width) > MAX_TILT_RAD:
+            raise ContractError(f"tilts must be at most {MAX_TILT_RAD} rad; got {self}")
+
+    def of(self, kind: ErrorKind) -> ErrorWidth:
+        """Give the width of a class."""
+        width: ErrorWidth = getattr(self, kind)
+        return width
+
+    def active(self) -> tuple[ErrorKind, ...]:
+        """Give the classes that are not 0."""
+        return tuple(kind for kind in ERROR_KINDS if self.of(kind).half_width > 0)
+
+    def only(self, kind: ErrorKind) -> Self:
+        """Give the same with every other class 0."""
+        others: dict[str, Any] = dict.fromkeys(ERROR_KINDS, _NOTHING)
+        return replace(self, **{**others, kind: self.of(kind)})

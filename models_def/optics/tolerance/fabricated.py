@@ -1,0 +1,244 @@
+"""Copies of a lens as tensors: their beams aimed at the stop, traced and refocused."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.glass.dispersion import D_LINE_UM
+from camkit.models_def.optics.paraxial import trace_paraxial
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.pupil import (
+    PupilSamples,
+    launch,
+    newton_aim,
+    pupil_rays,
+    with_fixed_stop,
+    with_open_apertures,
+)
+from camkit.models_def.optics.tolerance.deviation import Deviations, no_deviations
+from camkit.models_def.optics.tolerance.elements import glass_elements
+from camkit.models_def.optics.tolerance.errors import Array, Compensator
+from camkit.models_def.optics.tolerance.misaligned_trace import meet, trace_misaligned
+from camkit.models_def.optics.tolerance.pose import Pose, poses
+from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, surface_tensors
+
+# beams of copies start from those of the nominal lens, which are close: slopes are measured once
+_AIM_STEPS: Final = 4
+_AIM_FRESH: Final = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """What is looked at.
+
+    Attributes:
+        slopes: (field,), tan of the field angles.
+        azimuths_rad: (field,), of the image point, from +y towards +x.
+        wavelengths_um: (wave,).
+        samples: Of the whole unit disc, (ray,).
+    """
+
+    slopes: Tensor
+    azimuths_rad: Tensor
+    wavelengths_um: Tensor
+    samples: PupilSamples
+
+    def __post_init__(self) -> None:
+        if self.slopes.shape != self.azimuths_rad.shape or not len(self.slopes):
+            raise ContractError("a view needs fields, each with a slope and an azimuth")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Landing:
+    """Where the light of copies falls; each field turned to +y.
+
+    Attributes:
+        rays: (copy, field, wave, ray) on the sensor.
+        weight: (copy, field, wave, ray), area of the beams; 0 for lost rays.
+        chief_x_mm: (copy, field), chief ray of the reference wavelength.
+        chief_y_mm: (copy, field).
+        refocus_mm: (copy,), what the compensator moved the sensor away from the lens.
+    """
+
+    rays: Rays
+    weight: Tensor
+    chief_x_mm: Tensor
+    chief_y_mm: Tensor
+    refocus_mm: Tensor
+
+
+def fabricated_tensors(
+    lens: Lens, deviations: Deviations, wavelengths_um: Tensor
+) -> SurfaceTensors:
+    """Give the tensors (surface, copy, 1, wave, 1) of copies, float64; decentres lie in poses.
+
+    Args:
+        lens: Nominal.
+        deviations: The errors; the focus error is added to the last thickness.
+        wavelengths_um: (wave,).
+    """
+    nominal = surface_tensors(lens, wavelengths_um)
+
+    def column(values: Array) -> Tensor:
+        """Give (surface, copy, 1, 1, 1) from (copy, surface)."""
+        return torch.from_numpy(values).T[:, :, None, None, None]
+
+    def wide(values: Tensor) -> Tensor:
+        """Give (surface, 1, 1, 1, 1) from (surface,)."""
+        return values[:, None, None, None, None]
+
+    glass = nominal.index[1:, None]
+    if deviations.abbe.any():
+        # n - n_d is divided by the relative change of V_d; infrared glasses have no d line
+        line = torch.tensor([D_LINE_UM], dtype=torch.float64)
+        at_d = surface_tensors(lens, line).index[1:, None]
+        glass = at_d + (glass - at_d) / (1 + column(deviations.abbe)[:, :, 0, 0])
+    index = (glass + column(deviations.index)[:, :, 0, 0])[:, :, None, :, None]
+    thickness = wide(nominal.thickness_mm) + column(deviations.thickness_mm)
+    focus = torch.zeros_like(thickness)
+    focus[-1] = torch.from_numpy(deviations.focus_mm)[:, None, None, None]
+    return SurfaceTensors(
+        curvature_per_mm=wide(nominal.curvature_per_mm) / (1 + column(deviations.radius)),
+        conic=wide(nominal.conic) + column(deviations.conic),
+        even_asphere=nominal.even_asphere[:, :, None, None, None, None],
+        thickness_mm=thickness + focus,
+        semi_diameter_mm=wide(nominal.semi_diameter_mm),
+        index=torch.cat([torch.ones_like(index[:1]), index]),
+        aspheric=nominal.aspheric,
+    )
+
+
+def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensator) -> Landing:
+    """Trace the beams of every copy, field and wavelength to the sensor.
+
+    Every ray is aimed at its point of the stop, whose size is that of the nominal lens. Errors
+    act on the whole pupil: nothing is mirrored.
+
+    Args:
+        lens: Nominal.
+        deviations: Of the copies.
+        view: Fields, wavelengths, rays.
+        compensator: See `errors.Tolerances`.
+
+    Raises:
+        ContractError: If the chief ray of a copy is lost, or no ray arrives.
+    """
+    fixed = with_fixed_stop(lens)
+    with torch.no_grad():
+        rays, weight = _trace(fixed, deviations, view)
+        shift = _refocus(fixed, deviations, view, compensator, (rays, weight))
+        centre = PupilSamples(
+            x=torch.zeros(1, dtype=torch.float64), y=torch.zeros(1, dtype=torch.float64)
+        )
+        wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+        chief, alive = _trace(fixed, deviations, replace(view, wavelengths_um=wave, samples=centre))
+        if not bool((alive > 0).all()) or not bool((weight > 0).any(-1).all()):
+            raise ContractError("the light of a copy is lost; use smaller errors or fields")
+        rays, chief = _moved(rays, shift), _moved(chief, shift)
+    return Landing(
+        rays=rays,
+        weight=weight,
+        chief_x_mm=chief.x[:, :, 0, 0],
+        chief_y_mm=chief.y[:, :, 0, 0],
+        refocus_mm=shift,
+    )
+
+
+def _trace(lens: Lens, deviations: Deviations, view: View) -> tuple[Rays, Tensor]:
+    """Give rays (copy, field, wave, ray) on the sensor before refocus, and their weights."""
+    tensors = fabricated_tensors(lens, deviations, view.wavelengths_um)
+    thickness = tensors.thickness_mm[:, :, 0, 0, 0]
+    stands = poses(deviations, glass_elements(lens), thickness, view.azimuths_rad)
+    nominal = surface_tensors(lens, view.wavelengths_um[:, None])
+    slope = view.slopes[:, None, None].expand(-1, len(view.wavelengths_um), 1)
+    rays, weight = pupil_rays(lens, nominal, view.samples, slope)
+    if lens.stop > 0 or stands[0] is not None or lens.surfaces[0].curvature_per_mm:
+        rays, weight = _aimed(lens, (tensors, stands), view, (rays, slope))
+    shape = (deviations.copies, *rays.x.shape[-3:])
+    rays = Rays(
+        **{k: getattr(rays, k).expand(shape).clone() for k in ("x", "y", "z", "l", "m", "n")},
+        fate=rays.fate.expand(shape).clone(),
+    )
+    landed = trace_misaligned(tensors, stands, rays)
+    return landed, torch.where(landed.valid, weight, 0.0)
+
+
+def _aimed(
+    lens: Lens,
+    copies: tuple[SurfaceTensors, list[Pose | None]],
+    view: View,
+    start: tuple[Rays, Tensor],
+) -> tuple[Rays, Tensor]:
+    """Aim the nominal rays anew, at the stop of every copy."""
+    tensors, stands = copies
+    opened = with_open_apertures(tensors)
+    rays, slope = start
+
+    def at_stop(x: Tensor, y: Tensor) -> Rays:
+        launched = launch(x, y, slope, lens.object_distance_mm)
+        before = trace_misaligned(opened, stands, launched, end=lens.stop)
+        return meet(opened, stands[lens.stop], before, lens.stop)
+
+    blank = torch.zeros_like(tensors.thickness_mm[0] + rays.x)
+    radius = lens.aperture_value
+    wanted = (view.samples.x * radius, view.samples.y * radius)
+    begin = (rays.x + blank, rays.y + blank)
+    found = newton_aim(at_stop, wanted, begin, steps=_AIM_STEPS, fresh=_AIM_FRESH)
+    share = 1.0 if view.samples.weight is None else view.samples.weight * len(view.samples.x)
+    again = launch(found.x, found.y, slope, lens.object_distance_mm)
+    lost = torch.where(found.weight > 0, int(Fate.VALID), int(Fate.MISSED)).to(torch.int8)
+    return replace(again, fate=lost), found.weight * share
+
+
+def _refocus(
+    lens: Lens,
+    deviations: Deviations,
+    view: View,
+    compensator: Compensator,
+    traced: tuple[Rays, Tensor],
+) -> Tensor:
+    """Give how far the compensator moves the sensors (copy,)."""
+    if compensator == "none":
+        return torch.zeros(deviations.copies, dtype=torch.float64)
+    nothing = no_deviations(lens)
+    if compensator == "paraxial":
+        return _image_mm(lens, deviations) - _image_mm(lens, nothing)
+    # the focus error comes after the compensator, which must not see it
+    error = torch.from_numpy(deviations.focus_mm)
+    return _spot_shift(*traced) + error - _spot_shift(*_trace(lens, nothing, view))
+
+
+def _image_mm(lens: Lens, deviations: Deviations) -> Tensor:
+    """Give the paraxial image distances (copy,) from the last vertex, reference wavelength."""
+    wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    tensors = fabricated_tensors(lens, deviations, wave)
+    one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])
+    far = math.isinf(lens.object_distance_mm)
+    height, slope = (one, 0 * one) if far else (lens.object_distance_mm * one, one)
+    height, slope = trace_paraxial(tensors, height, slope, range(len(lens.surfaces)))
+    return (-height / slope).reshape(-1)
+
+
+def _spot_shift(rays: Rays, weight: Tensor) -> Tensor:
+    """Minimise the mean square radius about the centroid of all wavelengths of a field.
+
+    sum w |p - mean p + s (t - mean t)|^2 over all rays, p the landing points, t their slopes.
+    """
+    total = weight.sum((2, 3), keepdim=True).clamp_min(1e-300)
+    share = weight / total
+
+    def centred(value: Tensor) -> Tensor:
+        return value - (share * value).sum((2, 3), keepdim=True)
+
+    tx, ty = centred(rays.l / rays.n), centred(rays.m / rays.n)
+    both = (share * (centred(rays.x) * tx + centred(rays.y) * ty)).sum((1, 2, 3))
+    return -both / (share * (tx**2 + ty**2)).sum((1, 2, 3))
+
+
+def _moved(rays: Rays, shift_mm: Tensor) -> Rays:
+    way = shift_mm[:, None, None, None] / rays.n
+    return replace(rays, x=rays.x + way * rays.l, y=rays.y + way * rays.m)

@@ -1,0 +1,100 @@
+"""Where decentred and tilted surfaces stand.
+
+A surface is first turned about its vertex and shifted, then its piece of glass is turned about
+the piece's front vertex and shifted: p = R q + o, with q in the frame of the surface and p in the
+frame of its nominal vertex.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.optics.tolerance.deviation import Deviations
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose:
+    """Of one surface.
+
+    Attributes:
+        turn: R, (..., 3, 3); the dimensions before broadcast against the rays.
+        offset_mm: o, (..., 3).
+    """
+
+    turn: Tensor
+    offset_mm: Tensor
+
+
+def rotation(vector_rad: Tensor) -> Tensor:
+    """Give the rotation (..., 3, 3) about (x, y, 0) by its length, right-handed (Rodrigues).
+
+    Args:
+        vector_rad: (..., 2).
+    """
+    x, y = vector_rad.unbind(-1)
+    angle = torch.hypot(x, y)
+    # sin(a) / a and (1 - cos(a)) / a^2, also at 0
+    first = torch.sinc(angle / torch.pi)
+    second = torch.sinc(angle / (2 * torch.pi)) ** 2 / 2
+    rows = [
+        [1 - second * y * y, second * x * y, first * y],
+        [second * x * y, 1 - second * x * x, -first * x],
+        [-first * y, first * x, 1 - second * (x * x + y * y)],
+    ]
+    return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
+
+
+def poses(
+    deviations: Deviations,
+    elements: tuple[range, ...],
+    thickness_mm: Tensor,
+    azimuths_rad: Tensor,
+) -> list[Pose | None]:
+    """Give the pose of every surface (copy, field, 1, 1), seen with each field turned to +y.
+
+    The nominal lens is round, so a field at an azimuth is one at +y with all errors turned back.
+
+    Args:
+        deviations: The errors.
+        elements: See `elements.glass_elements`.
+        thickness_mm: (surface, copy), of the copies.
+        azimuths_rad: (field,), from +y towards +x.
+
+    Returns:
+        One for each surface; None for surfaces that no piece of glass carries.
+    """
+
+    def turned(vectors: Tensor) -> Tensor:
+        """Give (copy, field, part, 2) with the fields' directions turned to +y."""
+        cos, sin = torch.cos(azimuths_rad)[:, None], torch.sin(azimuths_rad)[:, None]
+        x, y = vectors[:, None, :, 0], vectors[:, None, :, 1]
+        return torch.stack([cos * x - sin * y, sin * x + cos * y], dim=-1)
+
+    shift, tilt, piece_shift, piece_tilt = (
+        turned(torch.from_numpy(vectors))
+        for vectors in (
+            deviations.surface_decentre_mm,
+            deviations.surface_tilt_rad,
+            deviations.element_decentre_mm,
+            deviations.element_tilt_rad,
+        )
+    )
+    found: list[Pose | None] = [None] * len(thickness_mm)
+    for number, element in enumerate(elements):
+        whole = rotation(piece_tilt[:, :, number])
+        depth = torch.zeros_like(thickness_mm[0])
+        for i in element:
+            down = torch.zeros(*shift.shape[:2], 3, dtype=shift.dtype)
+            down[..., 2] = depth[:, None]
+            # the vertex seen from the front vertex, then from its own nominal place
+            vertex = down + _flat(shift[:, :, i])
+            offset = (whole @ vertex[..., None])[..., 0] - down + _flat(piece_shift[:, :, number])
+            turn = whole @ rotation(tilt[:, :, i])
+            found[i] = Pose(turn=turn[:, :, None, None], offset_mm=offset[:, :, None, None])
+            depth = depth + thickness_mm[i]
+    return found
+
+
+def _flat(vector: Tensor) -> Tensor:
+    return torch.nn.functional.pad(vector, (0, 1))

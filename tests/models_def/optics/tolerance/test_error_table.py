@@ -1,0 +1,71 @@
+import math
+from pathlib import Path
+
+import pytest
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.tolerance.error_table import (
+    in_file_units,
+    parse_tolerances,
+    read_tolerances,
+)
+
+
+def test_table_is_read_in_the_units_of_its_keys(tmp_path: Path) -> None:
+    path = tmp_path / "errors.toml"
+    path.write_text(
+        """
+[tolerance]
+distribution = "normal"
+compensator = "spot"
+radius_percent = 0.1
+element_tilt_arcmin = 3
+surface_tilt_deg = { half_width = 0.5, distribution = "uniform" }
+"""
+    )
+    found = read_tolerances(path)
+    assert found is not None
+    assert found.active() == ("radius", "surface_tilt", "element_tilt")
+    assert found.radius.half_width == pytest.approx(0.001)
+    assert found.radius.distribution == "normal"
+    assert found.element_tilt.half_width == pytest.approx(math.radians(0.05))
+    assert found.surface_tilt.half_width == pytest.approx(math.radians(0.5))
+    assert found.surface_tilt.distribution == "uniform"
+    assert found.compensator == "spot"
+
+
+def test_file_without_the_table_has_none(tmp_path: Path) -> None:
+    (tmp_path / "x.toml").write_text("name = 'x'")
+    assert read_tolerances(tmp_path / "x.toml") is None
+
+
+@pytest.mark.parametrize(
+    ("table", "word"),
+    [
+        (3, "table"),
+        ({"radius": 0.1}, "radius_percent"),
+        ({"index": "much"}, "index"),
+        ({"index": True}, "index"),
+        ({"index": {"half": 1}}, "index"),
+        ({"index": {"distribution": "normal"}}, "index"),
+        ({"index": -0.1}, "half-width"),
+        ({"index": 1.0, "distribution": "flat"}, "distribution"),
+        ({"surface_tilt_deg": 1.0, "surface_tilt_arcmin": 1.0}, "again"),
+        ({"compensator": 7}, "compensator"),
+    ],
+)
+def test_wrong_table_is_refused_with_the_key(table: object, word: str) -> None:
+    with pytest.raises(ContractError, match=word):
+        parse_tolerances(table)
+
+
+def test_damaged_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "x.toml").write_text("[tolerance")
+    with pytest.raises(ContractError, match="TOML"):
+        read_tolerances(tmp_path / "x.toml")
+
+
+def test_people_see_the_units_of_the_file() -> None:
+    assert in_file_units("radius", 0.002) == "0.2 %"
+    assert in_file_units("element_tilt", math.radians(-1 / 60)) == "-1'"
+    assert in_file_units("index", 0.0005) == "0.0005"
