@@ -18,7 +18,7 @@ from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.problem import Problem
-from camkit.models_def.optics.search.recovery import RecoveryMerit
+from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.training.pictures import open_source
 from camkit.units import to_radians
@@ -78,10 +78,10 @@ def field_slopes(optics: OpticsRecipe) -> Tensor:
     return torch.linspace(0, far, optics.fields, dtype=torch.float64)
 
 
-def merit_of(recipe: DesignRecipe) -> RecoveryMerit:
+def pixels_of(recipe: DesignRecipe) -> Pixels:
     """Give the pixels and colours of a recipe."""
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
-    return RecoveryMerit(
+    return Pixels(
         pitch_um=recipe.pixels.pitch_um,
         kernel_px=recipe.pixels.kernel_px,
         color_weights=weights / weights.sum(1, keepdim=True),
@@ -115,7 +115,9 @@ def parts_of(
         pictures: Folder of sharp pictures; None for procedural scenes alone.
     """
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
-    lens = LensModule(problem, merit_of(recipe), problem.free.scaled(), whiten=recipe.optics.whiten)
+    lens = LensModule(
+        problem, pixels_of(recipe), problem.free.scaled(), whiten=recipe.optics.whiten
+    )
     return DesignParts(
         lens=lens,
         network=network_of(recipe),

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.design.sensor import encode
+from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.sensors.wiener import to_otf
 
 FrontKind = Literal["none", "wiener"]
@@ -48,10 +48,10 @@ class Front:
     def planes(self, recorded: Tensor, kernels: Tensor) -> Tensor:
         """Give (b, channels, p, p) from (b, 3, p + 2 margin, ...) and kernels (b, 3, k, k)."""
         if self.kind == "none":
-            return encode(recorded)
+            return encode_srgb(recorded)
         inner = slice(_MARGIN_PX, -_MARGIN_PX)
         both = torch.cat([recorded, self._restore(recorded, kernels)], dim=1)
-        return encode(both[..., inner, inner])
+        return encode_srgb(both[..., inner, inner])
 
     def _restore(self, recorded: Tensor, kernels: Tensor) -> Tensor:
         size = recorded.shape[-2], recorded.shape[-1]

@@ -23,7 +23,8 @@ from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.loss import DesignLoss, design_loss
 from camkit.models_def.design.optics import LensModule
-from camkit.models_def.design.sensor import Recorder, capture, encode
+from camkit.models_def.design.sensor import Recorder, capture
+from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.training.pictures import SceneSource
 
 VALID_SEED: Final = 900_000
@@ -196,12 +197,12 @@ class DesignLoop:
             made.append(planes[:, -3:] if parts.network is None else parts.network(planes))
         edge = (batch.sharp.shape[-1] - plan.patch_px) // 2
         sharp = batch.sharp[..., edge : edge + plan.patch_px, edge : edge + plan.patch_px]
-        return torch.stack(made), encode(sharp)
+        return torch.stack(made), encode_srgb(sharp)
 
     def _draw(self, seed: int, count: int) -> Batch:
         parts, plan = self.parts, self.schedule
         rng = np.random.default_rng(seed)
-        kernel_px, fields = parts.lens.merit.kernel_px, len(parts.lens.problem.slopes)
+        kernel_px, fields = parts.lens.pixels.kernel_px, len(parts.lens.problem.slopes)
         inner = plan.patch_px + 2 * parts.front.margin_px
         side = inner + kernel_px - 1
         crops = np.stack([parts.source.draw_crop(rng, side) for _ in range(count)])
@@ -258,7 +259,7 @@ class DesignLoop:
                 seen = capture(batch.sharp, chosen, self.parts.recorder, batch.normal[0])
                 edge = self.parts.front.margin_px
                 inner = slice(edge, seen.shape[-1] - edge)
-                rows.append((encode(seen[..., inner, inner])[0], pictures[0, 0], sharp[0]))
+                rows.append((encode_srgb(seen[..., inner, inner])[0], pictures[0, 0], sharp[0]))
         captures, recovered, sharp_ones = (
             torch.stack(column) for column in zip(*rows, strict=True)
         )

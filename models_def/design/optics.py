@@ -10,7 +10,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.least_squares import jacobian
 from camkit.models_def.optics.search.problem import Problem, limits_of, residuals, trace_batch
-from camkit.models_def.optics.search.recovery import RecoveryMerit, splat_batch
+from camkit.models_def.optics.search.splat import Pixels, splat_batch
 
 _RIDGE: Final = 1e-3
 _AT_BOUND: Final = 1e-6
@@ -24,14 +24,14 @@ class LensModule(nn.Module):
 
     Attributes:
         problem: What is free, and which fields, wavelengths and depths are looked at.
-        merit: Pixels and colours.
+        pixels: The sensor.
     """
 
     begin: Tensor
     basis: Tensor
 
     def __init__(
-        self, problem: Problem, merit: RecoveryMerit, begin: Tensor, *, whiten: bool = True
+        self, problem: Problem, pixels: Pixels, begin: Tensor, *, whiten: bool = True
     ) -> None:
         """Begin at `begin` (variable,), scaled.
 
@@ -41,7 +41,7 @@ class LensModule(nn.Module):
         super().__init__()
         if not problem.free.variables:
             raise ContractError("a joint design needs at least one free number of the lens")
-        self.problem, self.merit = problem, merit
+        self.problem, self.pixels = problem, pixels
         self.register_buffer("begin", begin.clone())
         basis = whitening(problem, begin) if whiten else torch.eye(len(begin), dtype=begin.dtype)
         self.register_buffer("basis", basis)
@@ -59,7 +59,7 @@ class LensModule(nn.Module):
         kernels, penalty = [], torch.zeros((), dtype=scaled.dtype)
         for distance_mm in distances:
             traced = trace_batch(self.problem, scaled, distance_mm)
-            kernels.append(splat_batch(traced.landed, self.merit)[0])
+            kernels.append(splat_batch(traced.landed, self.pixels)[0])
             penalty = penalty + limits_of(self.problem, traced, distance_mm).square().sum()
         return torch.stack(kernels), penalty
 

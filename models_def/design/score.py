@@ -31,7 +31,7 @@ def at_lens(parts: DesignParts, scaled: Tensor, *, rays: int | None = None) -> D
     problem = parts.lens.problem
     if rays is not None:
         problem = replace(problem, samples=half_disc(rays))
-    lens = LensModule(problem, parts.lens.merit, scaled.detach(), whiten=False)
+    lens = LensModule(problem, parts.lens.pixels, scaled.detach(), whiten=False)
     return replace(parts, lens=lens)
 
 

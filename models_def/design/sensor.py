@@ -1,15 +1,11 @@
 """Sharp patches blurred by kernels and recorded, with gradients to the kernels."""
 
 from dataclasses import dataclass
-from typing import Final
 
-import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.sensors.forward import blur
-
-_LINEAR_BELOW: Final = 0.0031308
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,10 +39,3 @@ def capture(sharp: Tensor, kernels: Tensor, recorder: Recorder, normal: Tensor) 
     """
     light = blur(sharp, kernels.to(sharp.dtype)) + recorder.noise * normal
     return light + (light.clamp(0, 1) - light).detach()
-
-
-def encode(linear: Tensor) -> Tensor:
-    """Give the sRGB tone of linear values; negative ones become black, as on a display."""
-    light = linear.clamp_min(0)
-    high = 1.055 * light.clamp_min(_LINEAR_BELOW) ** (1 / 2.4) - 0.055
-    return torch.where(light <= _LINEAR_BELOW, 12.92 * light, high)

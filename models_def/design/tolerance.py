@@ -18,7 +18,7 @@ from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
-from camkit.models_def.design.sensor import Recorder, capture, encode
+from camkit.models_def.design.sensor import Recorder, capture
 from camkit.models_def.optics.kernel_bank import gaussian_response
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilSamples, half_disc
@@ -32,6 +32,7 @@ from camkit.models_def.optics.tolerance.deviation import (
 from camkit.models_def.optics.tolerance.errors import ErrorKind, Tolerances
 from camkit.models_def.optics.tolerance.fabricated import View, land
 from camkit.models_def.optics.tolerance.landing import copy_kernels, spot_rms_mm, window_px
+from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.training.pictures import open_source
 from camkit.units import to_radians
 
@@ -260,7 +261,7 @@ class _Judge:
             recovered = front.planes(recorded, known)[:, -3:]
             edge = (self.sharp.shape[-1] - self.run.patch_px) // 2
             inner = slice(edge, edge + self.run.patch_px)
-            error = recovered.clamp(0, 1) - encode(self.sharp[..., inner, inner])
+            error = recovered.clamp(0, 1) - encode_srgb(self.sharp[..., inner, inner])
             square = error.double().square().mean((1, 2, 3)).clamp_min(1e-10)
             psnr: Array = (-10 * torch.log10(square)).reshape(-1, count).mean(1).numpy()
         return psnr

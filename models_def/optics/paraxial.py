@@ -73,19 +73,32 @@ def focal_lengths(tensors: SurfaceTensors) -> tuple[Tensor, Tensor]:
     return -1 / slope, -height / slope
 
 
-def _image_of_stop(tensors: SurfaceTensors, stop: int) -> tuple[float, float]:
-    """Give position (after the last vertex) and magnification of the stop seen from behind."""
+def image_distance(tensors: SurfaceTensors, object_distance_mm: float) -> Tensor:
+    """Give the paraxial image distance in mm from the last vertex, in the batch shape."""
+    one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])
     count = len(tensors.aspheric)
-    if stop == count - 1:
-        return 0.0, 1.0
-    zero, one = torch.zeros((), dtype=torch.float64), torch.ones((), dtype=torch.float64)
-    rest = range(stop + 1, count)
-    gap = tensors.thickness_mm[stop]
-    height, slope = trace_paraxial(tensors, gap * one, one, rest)
-    position = -height / slope
+    height, slope = trace_paraxial(tensors, one, one / object_distance_mm, range(count))
+    return -height / slope
+
+
+def image_of_stop(tensors: SurfaceTensors, stop: int) -> tuple[Tensor, Tensor]:
+    """Give place (mm behind the last vertex) and magnification of the stop seen from behind."""
+    zero = torch.zeros_like(tensors.index[0] * tensors.curvature_per_mm[0])
+    rest = range(stop + 1, len(tensors.aspheric))
+    if not rest:
+        return zero, zero + 1
+    height, slope = trace_paraxial(tensors, tensors.thickness_mm[stop] + zero, zero + 1, rest)
+    place = -height / slope
     # a ray that leaves the edge of the stop parallel to the axis meets the pupil edge
-    edge, lean = trace_paraxial(tensors, one, zero, rest)
-    return float(position), float(edge + position * lean)
+    edge, lean = trace_paraxial(tensors, zero + 1, zero, rest)
+    return place, edge + place * lean
+
+
+def entrance_pupil(tensors: SurfaceTensors, stop: int) -> tuple[Tensor, Tensor]:
+    """Give place (mm behind the first vertex) and magnification of the entrance pupil."""
+    # a stop at a surface: rays in front of it see it through the surfaces before it only
+    place, scale = image_of_stop(reverse(tensors), len(tensors.aspheric) - 1 - stop)
+    return -place, scale
 
 
 def paraxial_data(lens: Lens, wavelength_um: float | None = None) -> Paraxial:
@@ -97,20 +110,18 @@ def paraxial_data(lens: Lens, wavelength_um: float | None = None) -> Paraxial:
     """
     wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
     tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
-    back = reverse(tensors)
     efl, bfl = (float(v) for v in focal_lengths(tensors))
-    ffl = -float(focal_lengths(back)[1])
-    # a stop at a surface: rays in front of it see it through the surfaces before it only
-    front_position, front_scale = _image_of_stop(back, len(tensors.aspheric) - 1 - lens.stop)
-    exit_position, exit_scale = _image_of_stop(tensors, lens.stop)
+    ffl = -float(focal_lengths(reverse(tensors))[1])
+    entrance_mm, front_scale = (float(v) for v in entrance_pupil(tensors, lens.stop))
+    exit_mm, exit_scale = (float(v) for v in image_of_stop(tensors, lens.stop))
     stop_mm = _stop_semi_diameter(lens, efl, front_scale)
     return Paraxial(
         efl_mm=efl,
         bfl_mm=bfl,
         ffl_mm=ffl,
-        entrance_pupil_mm=-front_position,
+        entrance_pupil_mm=entrance_mm,
         entrance_pupil_diameter_mm=2 * stop_mm * abs(front_scale),
-        exit_pupil_mm=exit_position,
+        exit_pupil_mm=exit_mm,
         exit_pupil_diameter_mm=2 * stop_mm * abs(exit_scale),
         stop_semi_diameter_mm=stop_mm,
     )

@@ -55,7 +55,7 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
     flat = torch.zeros(*row.shape[:2], size_px * size_px, dtype=row.dtype)
     for corner in range(4):
         down, right = divmod(corner, 2)
-        place, weight = _tent(row, column, (down, right), size_px)
+        place, weight = tent(row, column, (down, right), size_px)
         flat = flat.scatter_add(-1, place, weight * spots.weight)
     kernels = flat.reshape(*row.shape[:2], size_px, size_px)
     kernels = kernels + kernels.flip(-1)
@@ -66,7 +66,7 @@ def splat(spots: Spots, size_px: int, pitch_um: float) -> TracedPsf:
     return TracedPsf(kernels=kernels / inside[..., None, None], energy_kept=kept)
 
 
-def _tent(
+def tent(
     row: Tensor, column: Tensor, offset: tuple[int, int], size_px: int
 ) -> tuple[Tensor, Tensor]:
     """Give flat places and weights of one of the four pixels around each ray."""

@@ -5,6 +5,7 @@
     psf         the kernel of an image point
     wiener      the Wiener filter of a patch
     stabilise   the transform around the network
+    tone        the sRGB curve, for losses on what a display shows
 
 All take batches and hand gradients on.
 """

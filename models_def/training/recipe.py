@@ -6,22 +6,21 @@ names the key.
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_type_hints
+from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from camkit.bundle.camera import Camera
 from camkit.bundle.stages import Wiener
 from camkit.errors import ContractError
+from camkit.models_def.toml_table import check_keys, read_table, section, typed
 
 LOSSES = ("log_mse", "mse")
 PRECISIONS = ("float32", "bfloat16")
 
-T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -257,31 +256,25 @@ def read_recipe(path: Path) -> Recipe:
     Raises:
         ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ContractError(f"cannot read recipe {path}: {error.strerror}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ContractError(f"recipe {path} is not valid TOML: {error}") from error
-    return to_recipe(table)
+    return to_recipe(read_table(path, "recipe"))
 
 
 def to_recipe(table: Mapping[str, Any]) -> Recipe:
     """Turn a parsed TOML table into a recipe; raises ContractError as `read_recipe` does."""
     known = {"name", "object_distance_mm", "scale", "camera", "wiener", "lens"}
-    _check_keys("recipe", table, known | {"data", "schedule", "networks", "final"})
-    schedule = _section("schedule", ScheduleRecipe, table.get("schedule", {}))
+    check_keys("recipe", table, known | {"data", "schedule", "networks", "final"})
+    schedule = section("schedule", ScheduleRecipe, table.get("schedule", {}))
     networks = table.get("networks")
     if not isinstance(networks, Mapping) or not networks:
         raise ContractError("a recipe needs at least one table [networks.SIZE]")
     return Recipe(
-        name=_typed("name", table.get("name"), str),
-        object_distance_mm=_typed("object_distance_mm", table.get("object_distance_mm"), float),
-        scale=_typed("scale", table.get("scale", 64.0), float),
+        name=typed("name", table.get("name"), str),
+        object_distance_mm=typed("object_distance_mm", table.get("object_distance_mm"), float),
+        scale=typed("scale", table.get("scale", 64.0), float),
         camera=_model("camera", Camera, table),
         wiener=_model("wiener", Wiener, table),
-        lens=_section("lens", LensRecipe, table.get("lens", {})),
-        data=_section("data", DataRecipe, table.get("data", {})),
+        lens=section("lens", LensRecipe, table.get("lens", {})),
+        data=section("data", DataRecipe, table.get("data", {})),
         networks={size: _network(size, entry, schedule) for size, entry in networks.items()},
         final=_final(table.get("final", {})),
     )
@@ -289,12 +282,12 @@ def to_recipe(table: Mapping[str, Any]) -> Recipe:
 
 def _network(size: str, entry: Mapping[str, Any], schedule: ScheduleRecipe) -> NetworkRecipe:
     where = f"networks.{size}"
-    _check_keys(where, entry, {"network", "config", "schedule"})
+    check_keys(where, entry, {"network", "config", "schedule"})
     changed = asdict(schedule) | dict(entry.get("schedule", {}))
     return NetworkRecipe(
-        network=_typed(f"{where}.network", entry.get("network"), str),
+        network=typed(f"{where}.network", entry.get("network"), str),
         config=dict(entry.get("config", {})),
-        schedule=_section(f"{where}.schedule", ScheduleRecipe, changed),
+        schedule=section(f"{where}.schedule", ScheduleRecipe, changed),
     )
 
 
@@ -302,8 +295,8 @@ def _final(table: Any) -> FinalRecipe:
     if not isinstance(table, Mapping):
         raise ContractError(f"final must be a table; got {table!r}")
     changed = asdict(FINAL_SCHEDULE) | dict(table.get("schedule", {}))
-    schedule = _section("final.schedule", ScheduleRecipe, changed)
-    return _section("final", FinalRecipe, {**table, "schedule": schedule})
+    schedule = section("final.schedule", ScheduleRecipe, changed)
+    return section("final", FinalRecipe, {**table, "schedule": schedule})
 
 
 def differing_camera(one: Recipe, other: Recipe) -> str | None:
@@ -337,35 +330,3 @@ def _model(where: str, kind: type[M], table: Mapping[str, Any]) -> M:
         first = error.errors()[0]
         place = ".".join([where, *(str(part) for part in first["loc"])])
         raise ContractError(f"{place}: {first['msg']}") from error
-
-
-def _section(where: str, kind: type[T], table: Any) -> T:
-    if not isinstance(table, Mapping):
-        raise ContractError(f"{where} must be a table; got {table!r}")
-    hints = get_type_hints(kind)
-    _check_keys(where, table, set(hints))
-    required = {f.name for f in fields(kind) if _is_required(f)}  # type: ignore[arg-type]
-    missing = required - set(table)
-    if missing:
-        raise ContractError(f"{where} lacks {', '.join(sorted(missing))}")
-    return kind(**{k: _typed(f"{where}.{k}", v, hints[k]) for k, v in table.items()})
-
-
-def _is_required(entry: Any) -> bool:
-    return entry.default is MISSING and entry.default_factory is MISSING
-
-
-def _check_keys(where: str, table: Mapping[str, Any], known: set[str]) -> None:
-    unknown = sorted(set(table) - known)
-    if unknown:
-        raise ContractError(
-            f"{where}: unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}"
-        )
-
-
-def _typed(where: str, value: Any, kind: type[T]) -> T:
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return kind(value)  # type: ignore[call-arg]
-    if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
-        raise ContractError(f"{where} must be of type {kind.__name__}; got {value!r}")
-    return value

@@ -7,7 +7,7 @@
 - `problem`: merit and limits of a batch of lenses, as one residual function
 - `least_squares`: damped least squares on a batch of starts
 - `finish`: a found lens made into a prescription
-- `recovery`: the merit of a lens behind which a Wiener filter stands
+- `splat`: PSFs of a batch in the colours of a sensor
 - `recipe`: a search within ranges, as TOML
 - `design`: the best of many random starts within the ranges of a recipe
 - `improvement`: a given lens made better

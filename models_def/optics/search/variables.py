@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.paraxial import trace_paraxial, vertex_curvature
+from camkit.models_def.optics.paraxial import image_distance, trace_paraxial
 from camkit.models_def.optics.prescription import Lens, Surface
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
 
@@ -215,14 +215,6 @@ class FreeLens:
         return replace(tensors, thickness_mm=torch.cat([gaps[:-1], last[None]]))
 
 
-def image_distance(tensors: SurfaceTensors, object_distance_mm: float) -> Tensor:
-    """Give the paraxial image distance in mm from the last vertex, in the batch shape."""
-    one = torch.ones_like(tensors.index[0] * tensors.curvature_per_mm[0])
-    count = len(tensors.aspheric)
-    height, slope = trace_paraxial(tensors, one, one / object_distance_mm, range(count))
-    return -height / slope
-
-
 def solve_curvature(tensors: SurfaceTensors, surface: int, efl_mm: float) -> Tensor:
     """Give the curvature of one surface that makes the focal length `efl_mm`.
 
@@ -237,27 +229,3 @@ def solve_curvature(tensors: SurfaceTensors, surface: int, efl_mm: float) -> Ten
         given = replace(tensors, curvature_per_mm=curvature)
         slopes.append(trace_paraxial(given, one, torch.zeros_like(one), range(count))[1])
     return (-1 / efl_mm - slopes[0]) / (slopes[1] - slopes[0])
-
-
-def entrance_pupil(tensors: SurfaceTensors, stop: int) -> tuple[Tensor, Tensor]:
-    """Give the place of the entrance pupil (mm behind the first vertex) and its magnification.
-
-    Rays are followed backwards from the stop: n u = n' u' + y c (n' - n), y' = y - t u.
-    """
-    curvature = vertex_curvature(tensors)
-    zero = torch.zeros_like(tensors.index[0] * tensors.curvature_per_mm[0])
-    middle, lean = _backwards(tensors, curvature, stop, zero, zero + 1)
-    edge, slope = _backwards(tensors, curvature, stop, zero + 1, zero)
-    place = -middle / lean
-    return place, edge + place * slope
-
-
-def _backwards(
-    tensors: SurfaceTensors, curvature: Tensor, stop: int, height: Tensor, slope: Tensor
-) -> tuple[Tensor, Tensor]:
-    """Carry a ray from just in front of the stop to just in front of the first surface."""
-    for i in reversed(range(stop)):
-        height = height - tensors.thickness_mm[i] * slope
-        before, after = tensors.index[i], tensors.index[i + 1]
-        slope = (after * slope + height * curvature[i] * (after - before)) / before
-    return height, slope

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.search.recovery import tent
+from camkit.models_def.optics.psf import tent
 from camkit.models_def.optics.tolerance.fabricated import Landing
 from camkit.units import UM_PER_MM
 

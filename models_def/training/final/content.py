@@ -7,14 +7,13 @@ stays in the square-root domain of `losses`, unclipped, so that highlights count
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
 import torch
 from torch import Tensor
 
-Features = Callable[[Tensor], Tensor]
+from camkit.models_def.sensors.tone import encode_srgb
 
-SRGB_KNEE: Final = 0.0031308
+Features = Callable[[Tensor], Tensor]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,14 +60,10 @@ def to_display(root: Tensor, to_rec709: Tensor) -> Tensor:
     """Give (b, 3, h, w) sRGB in 0..1 from the square-root domain.
 
     The small constant read_variance / shot under the root is left in: it is the same on both sides.
-
-    References: IEC 61966-2-1 (the curve).
     """
     light = root.clamp(min=0).square()
     linear = torch.einsum("ij,bjhw->bihw", to_rec709, light).clamp(0, 1)
-    # The power has an infinite slope at 0, which would turn the other branch's gradient into NaN.
-    curve = 1.055 * linear.clamp(min=SRGB_KNEE) ** (1 / 2.4) - 0.055
-    return torch.where(linear <= SRGB_KNEE, 12.92 * linear, curve)
+    return encode_srgb(linear)
 
 
 def pixel_loss(views: Views) -> Tensor:

@@ -1,9 +1,10 @@
 import numpy as np
 import torch
 
-from camkit.colorimetry import encode_srgb
+from camkit.colorimetry import encode_srgb as encode_array
 from camkit.models_def.design.front import Front
-from camkit.models_def.design.sensor import Recorder, capture, encode
+from camkit.models_def.design.sensor import Recorder, capture
+from camkit.models_def.sensors.tone import encode_srgb
 
 
 def dot(side: int) -> torch.Tensor:
@@ -33,8 +34,8 @@ def test_clipping_lets_gradients_through() -> None:
 
 def test_the_tone_is_srgb_with_a_finite_slope_everywhere() -> None:
     values = torch.tensor([-0.1, 0.0, 1e-4, 0.0031308, 0.2, 1.0], requires_grad=True)
-    found = encode(values)
-    wanted = encode_srgb(values.detach().numpy()[1:])
+    found = encode_srgb(values)
+    wanted = encode_array(values.detach().numpy()[1:])
     np.testing.assert_allclose(found.detach().numpy()[1:], wanted, atol=1e-6)
     found.sum().backward()  # type: ignore[no-untyped-call]
     assert values.grad is not None
@@ -53,7 +54,7 @@ def test_without_noise_the_wiener_front_undoes_the_blur() -> None:
     front = Front(kind="wiener", signal_to_noise=1e4)
     planes = front.planes(seen, blur)
     edge = front.margin_px + kernel // 2
-    target = encode(sharp[..., edge:-edge, edge:-edge])
+    target = encode_srgb(sharp[..., edge:-edge, edge:-edge])
     errors = [float((part - target).square().mean()) for part in planes.split(3, dim=1)]
     assert planes.shape == (1, 6, inner - 64, inner - 64)
     assert errors[1] < 0.02 * errors[0]

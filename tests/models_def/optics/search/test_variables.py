@@ -2,15 +2,15 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
-from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.search.problem import Problem
-from camkit.models_def.optics.search.variables import (
-    FreeLens,
-    Variable,
+from camkit.models_def.optics.paraxial import (
     entrance_pupil,
     image_distance,
+    paraxial_data,
+    paraxial_image,
 )
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.search.problem import Problem
+from camkit.models_def.optics.search.variables import FreeLens, Variable
 from camkit.models_def.optics.trace import surface_tensors
 
 WAVES_UM = torch.tensor([0.48, 0.55, 0.65], dtype=torch.float64)

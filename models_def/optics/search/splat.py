@@ -1,0 +1,56 @@
+"""PSFs of a batch of lenses, differentiable, in the colours of a sensor."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.psf import tent
+from camkit.models_def.optics.search.beam import LEAD
+from camkit.models_def.optics.trace import Rays
+from camkit.units import UM_PER_MM
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pixels:
+    """The sensor that a batch is seen by.
+
+    Attributes:
+        pitch_um: Of the pixels.
+        color_weights: (3, wave), each row sums to 1: how much of each wavelength a colour sees.
+        kernel_px: Window of a PSF, odd; light outside counts as lost.
+    """
+
+    pitch_um: float
+    color_weights: Tensor
+    kernel_px: int = 65
+
+    def __post_init__(self) -> None:
+        if self.kernel_px < 9 or self.kernel_px % 2 == 0:
+            raise ContractError(f"kernel_px must be odd, at least 9; got {self.kernel_px}")
+        if not self.pitch_um > 0:
+            raise ContractError(f"pitch_um must be > 0; got {self.pitch_um}")
+
+
+def splat_batch(landed: Rays, pixels: Pixels) -> Tensor:
+    """Give kernels (start, field, colour, k, k) about the centroid of all colours.
+
+    They sum to the share of the light that falls into the window.
+    """
+    size, scale = pixels.kernel_px, UM_PER_MM / pixels.pitch_um
+    alive = landed.valid[..., LEAD:].to(landed.x.dtype)
+    x, y = landed.x[..., LEAD:] * scale, landed.y[..., LEAD:] * scale
+    total = alive.sum((-2, -1), keepdim=True).clamp_min(1)
+    # where the window lies is not a matter of the lens: no gradient through it
+    middle = ((y * alive).sum((-2, -1), keepdim=True) / total).detach()
+    row, column = y - middle + (size - 1) / 2, x + (size - 1) / 2
+    flat = torch.zeros(*row.shape[:3], size * size, dtype=row.dtype)
+    share = alive / alive.shape[-1] / 2
+    for corner in range(4):
+        down, right = divmod(corner, 2)
+        place, weight = tent(row, column, (down, right), size)
+        flat = flat.scatter_add(-1, place, weight * share)
+    half = flat.reshape(*row.shape[:3], size, size)
+    both = half + half.flip(-1)
+    return torch.einsum("cw,sfwyx->sfcyx", pixels.color_weights.to(both.dtype), both)
