@@ -96,7 +96,9 @@ def to_rec709(stage: ColorStage) -> Matrix:
     return np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ to_xyz)
 
 
-def recover_highlights(band: FloatArray, clip_levels: tuple[float, float, float]) -> FloatArray:
+def recover_highlights(
+    band: FloatArray, clip_levels: tuple[float, float, float], *, in_place: bool = False
+) -> FloatArray:
     """Raise clipped channels so that burnt-out light is neutral, never magenta.
 
     After white balance the channels clip at different levels, so an overexposed white has too
@@ -107,6 +109,7 @@ def recover_highlights(band: FloatArray, clip_levels: tuple[float, float, float]
     Args:
         band: (3, rows, w) float32, white-balanced camera RGB.
         clip_levels: Value at which each channel clips: its white balance gain.
+        in_place: Whether the band itself is changed.
 
     Returns:
         (3, rows, w) float32; the band itself where nothing is clipped.
@@ -126,7 +129,7 @@ def recover_highlights(band: FloatArray, clip_levels: tuple[float, float, float]
         others = 0.5 * (assumed[(channel + 1) % 3] + assumed[(channel + 2) % 3])
         lift = clipped[channel] * (others - x[channel])
         raised[channel] = x[channel] + np.maximum(lift, 0.0)
-    out = band.copy()
+    out = band if in_place else band.copy()
     out[:, near] = raised
     return out
 

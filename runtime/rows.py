@@ -6,7 +6,7 @@ Every stage reads rows from a `RowSource` and yields bands of finished rows from
     capture -> [bands] -> RollingRows -> reader -> next stage -> [bands] -> ...
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final, Protocol
 
 import numpy as np
@@ -35,6 +35,14 @@ class RowSource(Protocol):
         ...
 
 
+class PiecedRows(RowSource, Protocol):
+    """A row source that can give its rows as they lie, without joining them."""
+
+    def pieces(self, top: int, bottom: int) -> Sequence[FloatArray]:
+        """Give rows top..bottom in consecutive pieces (channel, rows, w); otherwise as `read`."""
+        ...
+
+
 class ArrayRows:
     """A whole picture in memory as a row source."""
 
@@ -53,51 +61,32 @@ class ArrayRows:
         """Give rows top..bottom as a view."""
         return self._planes[:, top:bottom]
 
+    def pieces(self, top: int, bottom: int) -> Sequence[FloatArray]:
+        """Give the same view as the only piece."""
+        return [self.read(top, bottom)]
 
-class MappedRows:
-    """A row source whose rows are computed from another source by a pointwise function.
 
-    The function gets a few rows at a time, from several threads at once.
+def changed_bands(
+    bands: Iterator[FloatArray], change: Callable[[FloatArray, int], None], *, threads: int = 1
+) -> Iterator[FloatArray]:
+    """Change bands in place by a pointwise function: readers of rows overlap, bands do not.
+
+    Args:
+        bands: (channel, rows, w) from top to bottom, each an array that nobody else reads.
+        change: Changes rows; gets a few of them at a time and the number of the first, from
+            several threads at once.
+        threads: Threads that share the rows of a band; no influence on the bits.
     """
+    top = 0
+    for band in bands:
 
-    def __init__(
-        self,
-        source: RowSource,
-        function: Callable[[FloatArray, int], FloatArray],
-        channels: int,
-        *,
-        threads: int = 1,
-    ) -> None:
-        """Name source and function.
+        def work(first: int, last: int, whole: FloatArray = band, above: int = top) -> None:
+            change(whole[:, first:last], above + first)
 
-        Args:
-            source: Where rows are read.
-            function: (rows, first row) -> (channels, as many rows, w) float32.
-            channels: Of the result.
-            threads: Threads that share the rows of one read; no influence on the bits.
-        """
-        self._source = source
-        self._function = function
-        self._channels = channels
-        self._threads = threads
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Give (channel, h, w) of the whole picture."""
-        _, h, w = self._source.shape
-        return self._channels, h, w
-
-    def read(self, top: int, bottom: int) -> FloatArray:
-        """Give function(rows, top) of the rows top..bottom."""
-        rows = self._source.read(top, bottom)
-        width = rows.shape[2]
-        mapped = np.empty((self._channels, bottom - top, width), dtype=np.float32)
-
-        def fill(first: int, last: int) -> None:
-            mapped[:, first:last] = self._function(rows[:, first:last], top + first)
-
-        run_chunks(fill, bottom - top, width, threads=self._threads)
-        return mapped
+        run_chunks(work, band.shape[1], band.shape[2], threads=threads)
+        top += band.shape[1]
+        yield band
+        del band, work  # nothing may hold a band while the next one is made
 
 
 class RollingRows:
@@ -119,7 +108,7 @@ class RollingRows:
         self._tops.append(0)
         return RowReader(self, len(self._tops) - 1)
 
-    def read_for(self, reader: int, top: int, bottom: int) -> FloatArray:
+    def pieces_for(self, reader: int, top: int, bottom: int) -> list[FloatArray]:
         """Give rows to one of the readers; `RowReader.read` says what is refused."""
         if not 0 <= top < bottom <= self.shape[1]:
             raise ContractError(f"rows {top}..{bottom} lie outside 0..{self.shape[1]}")
@@ -138,8 +127,7 @@ class RollingRows:
                 self._kept.append((self._end, band))
             self._end += band.shape[1]
         pieces = [b[:, max(top - y, 0) : bottom - y] for y, b in self._kept if y < bottom]
-        pieces = [p for p in pieces if p.shape[1]]
-        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
+        return [p for p in pieces if p.shape[1]]
 
 
 def _without_stale(top: int, band: FloatArray, needed: int) -> tuple[int, FloatArray]:
@@ -168,4 +156,9 @@ class RowReader:
         Raises:
             ContractError: If the rows lie outside the picture or above an earlier read.
         """
-        return self._rows.read_for(self._number, top, bottom)
+        pieces = self.pieces(top, bottom)
+        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
+
+    def pieces(self, top: int, bottom: int) -> list[FloatArray]:
+        """Give the same rows as they lie, in consecutive pieces."""
+        return self._rows.pieces_for(self._number, top, bottom)

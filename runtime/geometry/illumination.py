@@ -81,8 +81,11 @@ class IlluminationGain:
         self._columns = np.rint(x_mm**2 * scale).astype(np.intp)
         self._rows = np.rint(y_mm**2 * scale).astype(np.intp)
 
-    def divide(self, band: FloatArray, top: int) -> FloatArray:
-        """Undo vignetting on a (3, rows, w) band that starts at row `top`; a new array."""
+    def divide(self, band: FloatArray, top: int, out: FloatArray | None = None) -> FloatArray:
+        """Undo vignetting on a (3, rows, w) band that starts at row `top`.
+
+        Fills `out`, which may be the band, or a new array.
+        """
         rows = self._rows[top : top + band.shape[1], None]
         gain = self._table.take(rows + self._columns, mode="clip")
-        return np.asarray(band * gain)
+        return np.asarray(np.multiply(band, gain, out=out))

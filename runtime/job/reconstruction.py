@@ -6,7 +6,7 @@
 Nothing is computed before the first band is asked for; a `Reconstruction` serves one thread, once.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Demosaic, Illumination, Network, Undistort, Wiener
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import BlockBank, LocalPsf, PlainBlock
@@ -35,9 +35,9 @@ from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Labels
 from camkit.runtime.plan.estimate import Estimate
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.rows import MappedRows, RollingRows, RowSource
+from camkit.runtime.rows import RollingRows, RowSource, changed_bands
 from camkit.runtime.signal.front_rows import FrontRows
-from camkit.runtime.signal.stabilise import NetworkRows, unstabilise_bands
+from camkit.runtime.signal.stabilise import NetworkRows, unstabilise
 
 BAND_ROWS: Final = 128
 STAGE_ORDER: Final = (
@@ -148,22 +148,23 @@ class Reconstruction:
     def bands(self) -> Iterator[FloatArray]:
         """Yield finished bands (3, rows, w) of the output colour, from top to bottom."""
         bundle = self._setup.bundle
-        rows = self._front_rows()
-        if bundle is not None:
-            rows = self._restored_rows(bundle, rows)
-        return self._finished_bands(rows)
+        front = self._front_rows()
+        if bundle is None:
+            return self._finished_bands(_read_bands(front))
+        return self._finished_bands(self._restored_bands(bundle, front))
 
     def fill_plain(self) -> FloatArray:
         """Give (3, h, w) developed without bank and network, all corrections applied."""
-        return np.concatenate(list(self._finished_bands(self._front_rows())), axis=1)
+        bands = self._finished_bands(_read_bands(self._front_rows()))
+        return np.concatenate(list(bands), axis=1)
 
-    def _finished_bands(self, rows: RowSource) -> Iterator[FloatArray]:
-        """Yield the bands behind the restoration: highlights, corrections, colour."""
-        bundle = self._setup.bundle
-        if self.capture.cfa is not None:
-            rows = self._mapped(rows, lambda band, _: recover_highlights(band, self.white_balance))
-        if bundle is not None:
-            rows = self._corrected_rows(bundle, rows)
+    def _finished_bands(self, bands: Iterator[FloatArray]) -> Iterator[FloatArray]:
+        """Yield the bands behind the restoration: highlights, corrections, colour.
+
+        Args:
+            bands: Each an array that nobody else reads.
+        """
+        rows = self._undistorted(RollingRows(self.shape, self._evened(bands)).reader())
         _, height, _ = self.shape
         for top in range(0, height, BAND_ROWS):
             band = rows.read(top, min(top + BAND_ROWS, height))
@@ -212,57 +213,49 @@ class Reconstruction:
             ContractError: If there is no bundle, or it has no Wiener stage.
         """
         bundle = self._setup.bundle
-        if bundle is None or bundle.manifest.stage(Wiener) is None:
+        bank = None if bundle is None else self._bank(bundle)
+        if bank is None or self.prepared.noise is None:
             raise ContractError("a network stands behind the Wiener bank of a bundle")
-        _, source = self._bank_rows(bundle, self._front_rows(), scale)
-        return source.read(0, self.capture.height)
+        rows = self._network_rows(bank, self._front_rows(), self.prepared.noise, scale)
+        return rows.read(0, self.capture.height)
 
-    def _restored_rows(self, bundle: Bundle, front: RowSource) -> RowSource:
-        run, noise = self.prepared.network, self.prepared.noise
+    def _restored_bands(self, bundle: Bundle, front: RowSource) -> Iterator[FloatArray]:
+        """Yield what bank and network make of the rows, each band an array of its own."""
+        bank, run, noise = self._bank(bundle), self.prepared.network, self.prepared.noise
         stage = bundle.manifest.stage(Network)
-        with_network = run is not None and stage is not None
-        restored, source = self._bank_rows(
-            bundle, front, stage.scale if with_network and stage is not None else None
-        )
-        if run is None or stage is None or noise is None:
-            return restored
+        if bank is None or noise is None:
+            return _read_bands(front)
+        if run is None or stage is None:
+            return self._bank_bands(bank, front)
         bands = run.bands(
-            TimedRows(source, self._clock, "stabilise"),
+            self._network_rows(bank, front, noise, stage.scale),
             progress=self._progress,
             cancel=self._cancel,
             guard=self._guard,
         )
-        linear = unstabilise_bands(
-            self._clock.bands("network", bands),
-            noise,
-            scale=stage.scale,
-            threads=self._setup.threads,
+
+        def undo(rows: FloatArray, _: int) -> None:
+            unstabilise(rows, noise, scale=stage.scale, out=rows)
+
+        linear = changed_bands(
+            self._clock.bands("network", bands), undo, threads=self._setup.threads
         )
-        return self._rolled("stabilise", linear)
+        return self._clock.bands("stabilise", linear)
 
-    def _bank_rows(
-        self, bundle: Bundle, front: RowSource, scale: float | None
-    ) -> tuple[RowSource, RowSource]:
-        """Give the rows of the bank, and with a scale the stabilised rows (6) for a network.
-
-        Only one of the two may be read.
-        """
-        noise, method = self.prepared.noise, self._setup.options.method
-        bank = self._bank(bundle)
-        if bank is None or noise is None:
-            return front, front
+    def _network_rows(
+        self, bank: BlockBank, front: RowSource, noise: NoiseModel, scale: float
+    ) -> RowSource:
+        """Give the stabilised rows (6) of the capture and of the bank."""
         planes = RollingRows(front.shape, _read_bands(front))
-        bank_reader = planes.reader()
-        restored = self._rolled(
-            "wiener" if method == "net" else method,
-            bank.restore_bands(bank_reader, self._unknown_rows, self._plain_blocks()),
-        )
-        if scale is None:
-            return restored, restored
-        source = NetworkRows(
-            planes.reader(), restored, noise, scale=scale, threads=self._setup.threads
-        )
-        return restored, source
+        restored = RollingRows(front.shape, self._bank_bands(bank, planes.reader()))
+        both = planes.reader(), restored.reader()
+        rows = NetworkRows(*both, noise, scale=scale, threads=self._setup.threads)
+        return TimedRows(rows, self._clock, "stabilise")
+
+    def _bank_bands(self, bank: BlockBank, rows: RowSource) -> Iterator[FloatArray]:
+        method = self._setup.options.method
+        bands = bank.restore_bands(rows, self._unknown_rows, self._plain_blocks())
+        return self._clock.bands("wiener" if method == "net" else method, bands)
 
     def _unknown_rows(self, top: int, bottom: int) -> NDArray[np.bool_]:
         source = self.capture.saturated_rows if self._front is None else self._front.unknown_rows
@@ -295,33 +288,40 @@ class Reconstruction:
             threads=self._setup.threads,
         )
 
-    def _corrected_rows(self, bundle: Bundle, rows: RowSource) -> RowSource:
-        if self.prepared.placement is None:
+    def _evened(self, bands: Iterator[FloatArray]) -> Iterator[FloatArray]:
+        """Raise clipped lights and divide by the illumination, in place."""
+        raises, gain = self.capture.cfa is not None, self._illumination_gain()
+        if not raises and gain is None:
+            return bands
+
+        def even(rows: FloatArray, top: int) -> None:
+            if raises:
+                recover_highlights(rows, self.white_balance, in_place=True)
+            if gain is not None:
+                gain.divide(rows, top, out=rows)
+
+        evened = changed_bands(bands, even, threads=self._setup.threads)
+        return self._clock.bands("color" if gain is None else "illumination", evened)
+
+    def _illumination_gain(self) -> IlluminationGain | None:
+        bundle, placement = self._setup.bundle, self.prepared.placement
+        if bundle is None or placement is None or not self._setup.options.vignetting:
+            return None
+        if bundle.manifest.stage(Illumination) is None:
+            return None
+        return IlluminationGain(bundle.psf, placement.window)
+
+    def _undistorted(self, rows: RowSource) -> RowSource:
+        bundle, placement = self._setup.bundle, self.prepared.placement
+        if bundle is None or placement is None or bundle.manifest.stage(Undistort) is None:
             return rows
-        options, manifest, psf = self._setup.options, bundle.manifest, bundle.psf
-        window = self.prepared.placement.window
-        if options.vignetting and manifest.stage(Illumination) is not None:
-            rows = TimedRows(
-                self._mapped(rows, IlluminationGain(psf, window).divide),
-                self._clock,
-                "illumination",
-            )
         decided = self.prepared.decided
-        wanted = options.undistort if decided is None else decided.work.undistort
-        if wanted and manifest.stage(Undistort) is not None:
-            rows = self._rolled(
-                "undistort",
-                undistort_bands(rows, psf.distortion, window, threads=self._setup.threads),
-            )
-        return rows
-
-    def _mapped(
-        self, rows: RowSource, function: Callable[[FloatArray, int], FloatArray]
-    ) -> RowSource:
-        return MappedRows(rows, function, rows.shape[0], threads=self._setup.threads)
-
-    def _rolled(self, name: str, bands: Iterator[FloatArray]) -> RowSource:
-        return RollingRows(self.shape, self._clock.bands(name, bands)).reader()
+        if not (self._setup.options.undistort if decided is None else decided.work.undistort):
+            return rows
+        bands = undistort_bands(
+            rows, bundle.psf.distortion, placement.window, threads=self._setup.threads
+        )
+        return RollingRows(self.shape, self._clock.bands("undistort", bands)).reader()
 
 
 def _read_bands(source: RowSource) -> Iterator[FloatArray]:

@@ -11,6 +11,7 @@ import logging
 from collections.abc import Iterator
 from typing import Final
 
+import cv2
 import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ _OUTLIER_SPREADS: Final = 2.0
 """Of pure noise one sample in a hundred thousand is replaced by the median around it."""
 _OUTLIER_LEAST: Final = 0.02
 _GLOW_SHARE: Final = 0.1
+_CACHED_ROWS: Final = 16
+"""Rows looked at together: what is made of them stays in cache."""
 
 _BLOCK: Final = 16
 _BAND_ROWS: Final = 64
@@ -96,18 +99,24 @@ def _repair(plane: FloatArray, step: int) -> tuple[FloatArray, BoolArray]:
 
 def _pad(plane: FloatArray, margin: int) -> FloatArray:
     """Mirror without repeating the edge, which keeps the CFA phase; a single row is repeated."""
-    rows, cols = (_mirror(n, margin) for n in plane.shape)
-    return plane[rows][:, cols]
-
-
-def _mirror(size: int, margin: int) -> NDArray[np.intp]:
-    period = max(2 * (size - 1), 1)
-    folded = np.arange(-margin, size + margin) % period
-    return np.minimum(folded, period - folded) if size > 1 else np.zeros_like(folded)
+    sides = (margin,) * 4
+    return np.asarray(cv2.copyMakeBorder(plane, *sides, cv2.BORDER_REFLECT_101), dtype=np.float32)
 
 
 def _outliers(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
     """Find samples that stand alone; NaN around a sample hides it."""
+    alone = np.empty(plane.shape, dtype=bool)
+    for top in range(0, len(plane), _CACHED_ROWS):
+        bottom = min(top + _CACHED_ROWS, len(plane))
+        alone[top:bottom] = _apart(plane[top:bottom], padded[top : bottom + 4], step)
+    if step == 2 and alone.any():
+        rows, cols = np.nonzero(alone)
+        alone[rows, cols] = ~_glows(padded, rows, cols)
+    return alone
+
+
+def _apart(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
+    """Find samples that lie far outside all their neighbours."""
     high = _extreme(padded, step, np.maximum)
     low = _extreme(padded, step, np.minimum)
     limit = high - low
@@ -117,9 +126,6 @@ def _outliers(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
     low -= limit
     alone = plane > high
     alone |= plane < low
-    if step == 2 and alone.any():
-        rows, cols = np.nonzero(alone)
-        alone[rows, cols] = ~_glows(padded, rows, cols)
     return np.asarray(alone)
 
 

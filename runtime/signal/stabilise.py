@@ -1,6 +1,5 @@
 """The noise-stabilising transform before and behind the network: k-sigma, then square root."""
 
-from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -8,7 +7,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
-from camkit.runtime.rows import RowSource
+from camkit.runtime.rows import PiecedRows
 from camkit.runtime.slices import run_chunks
 
 DEFAULT_SCALE: Final = 64.0
@@ -74,28 +73,6 @@ def unstabilise(
     return np.asarray(planes)
 
 
-def unstabilise_bands(
-    bands: Iterator[FloatArray], noise: NoiseModel, *, scale: float, threads: int = 1
-) -> Iterator[FloatArray]:
-    """Undo `stabilise` band by band, in place: readers of the rows overlap, bands do not.
-
-    Args:
-        bands: (3, rows, w) float32, each an array of its own that nobody else reads.
-        noise: Noise after white balance; shot > 0.
-        scale: Divisor behind the square root.
-        threads: Threads that share the rows of a band; no influence on the bits.
-    """
-    for band in bands:
-
-        def undo(first: int, last: int, whole: FloatArray = band) -> None:
-            rows = whole[:, first:last]
-            unstabilise(rows, noise, scale=scale, out=rows)
-
-        run_chunks(undo, band.shape[1], band.shape[2], threads=threads)
-        yield band
-        del band, undo  # nothing may hold a band while the next one is made
-
-
 class NetworkRows:
     """What a network is given: the stabilised capture and, below it, the stabilised Wiener planes.
 
@@ -104,8 +81,8 @@ class NetworkRows:
 
     def __init__(
         self,
-        planes: RowSource,
-        restored: RowSource,
+        planes: PiecedRows,
+        restored: PiecedRows,
         noise: NoiseModel,
         *,
         scale: float,
@@ -139,17 +116,21 @@ class NetworkRows:
 
     def read(self, top: int, bottom: int) -> FloatArray:
         """Give the rows top..bottom, (6, rows, w)."""
-        halves = [source.read(top, bottom) for source in self._sources]
-        width = halves[0].shape[2]
-        stable = np.empty((6, bottom - top, width), dtype=np.float32)
-
-        def fill(first: int, last: int) -> None:
-            for half, out in zip(halves, (stable[:3], stable[3:]), strict=True):
-                rows = np.s_[:, first:last]
-                stabilise(half[rows], self._noise, scale=self._scale, out=out[rows])
-
-        run_chunks(fill, bottom - top, width, threads=self._threads)
+        halves = [source.pieces(top, bottom) for source in self._sources]
+        stable = np.empty((6, bottom - top, self.shape[2]), dtype=np.float32)
+        for pieces, half in zip(halves, (stable[:3], stable[3:]), strict=True):
+            filled = 0
+            for piece in pieces:
+                self._fill(half[:, filled : filled + piece.shape[1]], piece)
+                filled += piece.shape[1]
         return stable
+
+    def _fill(self, out: FloatArray, piece: FloatArray) -> None:
+        def work(first: int, last: int) -> None:
+            rows = np.s_[:, first:last]
+            stabilise(piece[rows], self._noise, scale=self._scale, out=out[rows])
+
+        run_chunks(work, piece.shape[1], piece.shape[2], threads=self._threads)
 
 
 def _line(planes: FloatArray, noise: NoiseModel, scale: float) -> tuple[FloatArray, FloatArray]:

@@ -1,6 +1,7 @@
 """Rows that are pulled: what is read equals the picture, and nothing is kept for longer."""
 
 import gc
+import weakref
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.rows import STALE_ROWS, ArrayRows, MappedRows, RollingRows
+from camkit.runtime.rows import STALE_ROWS, ArrayRows, RollingRows, changed_bands
 
 
 def _picture(height: int) -> FloatArray:
@@ -72,17 +73,20 @@ def test_rows_outside_the_picture_are_refused(top: int, bottom: int) -> None:
         rolling.reader().read(top, bottom)
 
 
-def test_mapped_rows_get_the_rows_and_the_first_of_them() -> None:
+def test_bands_are_changed_in_place_and_told_their_first_row() -> None:
     picture = _picture(6)
     tops: list[int] = []
 
-    def keep_top(rows: FloatArray, top: int) -> FloatArray:
+    def change(rows: FloatArray, top: int) -> None:
         tops.append(top)
-        return rows[:1] + rows[1:2]
+        rows += np.float32(top)
 
-    mapped = MappedRows(ArrayRows(picture), keep_top, 1)
-    np.testing.assert_array_equal(mapped.read(1, 4), picture[:1, 1:4] + picture[1:2, 1:4])
-    assert (mapped.shape, tops) == ((1, 6, 3), [1])
+    bands = [band.copy() for band in _bands(picture, [2, 4])]
+    changed = list(changed_bands(iter(bands), change))
+    assert tops == [0, 2]
+    for band, same, top in zip(changed, bands, (0, 2), strict=True):
+        assert band is same
+        np.testing.assert_array_equal(band, picture[:, top : top + band.shape[1]] + top)
 
 
 def test_array_rows_need_channels() -> None:
@@ -111,14 +115,15 @@ def test_rows_are_freed_with_their_last_reader() -> None:
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
-def test_mapped_rows_do_not_depend_on_threads(threads: int) -> None:
+def test_changed_bands_do_not_depend_on_threads(threads: int) -> None:
     picture = np.random.default_rng(0).random((2, 90, 40000), dtype=np.float32)
+    expected = picture * np.arange(90, dtype=np.float32)[:, None]
 
-    def shade(rows: FloatArray, top: int) -> FloatArray:
-        return rows * np.arange(top, top + rows.shape[1], dtype=np.float32)[:, None]
+    def shade(rows: FloatArray, top: int) -> None:
+        rows *= np.arange(top, top + rows.shape[1], dtype=np.float32)[:, None]
 
-    mapped = MappedRows(ArrayRows(picture), shade, 2, threads=threads)
-    np.testing.assert_array_equal(mapped.read(10, 77), shade(picture[:, 10:77], 10))
+    bands = changed_bands(_bands(picture, [67, 23]), shade, threads=threads)
+    np.testing.assert_array_equal(np.concatenate(list(bands), axis=1), expected)
 
 
 def test_of_a_tall_band_only_the_rows_still_needed_are_kept() -> None:
@@ -132,3 +137,20 @@ def test_of_a_tall_band_only_the_rows_still_needed_are_kept() -> None:
     kept = [band for _, band in rolling._kept]
     assert [band.shape[1] for band in kept] == [2, 1]
     assert kept[0].base is None
+
+
+def test_no_band_is_held_while_the_next_one_is_made() -> None:
+    held: list[weakref.ref[FloatArray]] = []
+
+    def bands() -> Iterator[FloatArray]:
+        for _ in range(2):
+            assert all(band() is None for band in held)
+            band = np.ones((3, 16, 16), np.float32)
+            held.append(weakref.ref(band))
+            yield band
+            del band
+
+    for band in changed_bands(bands(), lambda *_: None):
+        assert band.shape == (3, 16, 16)
+        del band
+    assert len(held) == 2
