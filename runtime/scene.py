@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel, cfa_channels
@@ -30,6 +31,9 @@ BLACK: Final = 0.0015
 LEAST_DETAIL: Final = 1e-7
 """Detail below this (a third of a step of 8 bits, squared) counts as none."""
 LEAST_NOISE: Final = 1e-9
+SPILL: Final = 0.3
+"""Share of the strongest detail around a cell that counts for it: blur carries light over borders,
+and a cell without a network keeps what its neighbours threw into it."""
 TELLABLE: Final = 0.03
 """Detail below this share of the noise cannot be told from noise (2 % is one standard deviation
 of a cell's steps) and counts as this much."""
@@ -80,6 +84,12 @@ class Scene:
     def cell_px(self) -> CellArray:
         """Give the pixels of every cell."""
         return cell_area_px(self.height_px, self.width_px)
+
+    @property
+    def blurred_detail(self) -> CellArray:
+        """Give the detail (row, column) that blur leaves in a cell: its own and its neighbours'."""
+        around = scipy.ndimage.maximum_filter(self.detail, size=3, mode="nearest")
+        return np.asarray(self.detail + SPILL * around)
 
     @property
     def clipped_fraction(self) -> float:

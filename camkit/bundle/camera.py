@@ -111,8 +111,9 @@ class Camera(Entry):
         """Give the noise of the linear signal (1.0 = white level) at one ISO.
 
         Between the stated ISOs, gain and read noise are interpolated over log ISO (the gain as
-        its logarithm). Beyond them the gain goes on as 1/ISO and the read noise in electrons
-        stays that of the nearest stated ISO.
+        its logarithm). Above them the gain goes on as 1/ISO and the read noise in electrons
+        stays. Below them both stay: at the lowest ISO a full pixel is at the white level, so a
+        camera that offers less only exposes longer.
 
         Args:
             iso: ISO speed, > 0.
@@ -131,7 +132,8 @@ class Camera(Entry):
         reads = [entry.read_noise_e for entry in self.noise]
         wanted = math.log(iso)
         inside = min(max(wanted, known[0]), known[-1])
-        gain = math.exp(float(np.interp(inside, known, gains)) - (wanted - inside))
+        above = max(wanted - known[-1], 0.0)
+        gain = math.exp(float(np.interp(inside, known, gains)) - above)
         shot = 1 / (gain * (self.white_level - self.black_level))
         read_variance = (float(np.interp(inside, known, reads)) * shot) ** 2
         return NoiseModel(shot=(shot,) * 3, read_variance=(read_variance,) * 3)

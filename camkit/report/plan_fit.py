@@ -91,7 +91,7 @@ def _counted(capture: CaptureCells) -> np.ndarray:
 
 def _design(capture: CaptureCells, mask: np.ndarray) -> np.ndarray:
     scene = capture.scene
-    terms = (np.ones(scene.shape), np.log(scene.detail), np.log(scene.noise), scene.field)
+    terms = (np.ones(scene.shape), np.log(scene.blurred_detail), np.log(scene.noise), scene.field)
     return np.stack([term[mask] for term in terms], axis=1)
 
 

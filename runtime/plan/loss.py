@@ -1,6 +1,7 @@
 """What a lattice cell would lose, predicted from the scene by the bundle's calibration.
 
-    error = exp(level + detail * log(scene.detail) + noise * log(scene.noise) + field * scene.field)
+    error = exp(level + detail * log(scene.blurred_detail) + noise * log(scene.noise)
+                + field * scene.field)
 
 One such line per target stands in the manifest's `plan` as four entries TARGET.TERM: `exact` is the
 squared error that size M leaves (sRGB values), every other target what is added to it when a cell
@@ -82,7 +83,7 @@ class LossModel:
 
 def _line(line: tuple[float, float, float, float], scene: Scene) -> CellArray:
     level, detail, noise, field = line
-    exponent = level + detail * np.log(scene.detail) + noise * np.log(scene.noise)
+    exponent = level + detail * np.log(scene.blurred_detail) + noise * np.log(scene.noise)
     return np.asarray(np.exp(np.clip(exponent + field * scene.field, -60, 20)))
 
 

@@ -10,6 +10,7 @@ from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.scene import (
     BLACK,
     CELL_PX,
+    SPILL,
     TELLABLE,
     Scene,
     cell_area_px,
@@ -118,6 +119,16 @@ def test_planes_are_measured_like_a_mosaic() -> None:
     )
     scene = measure_scene(capture, _noise(1e-6, 0.0), (1.0, 1.0, 1.0), window)
     assert scene.detail[0, 1] > 20 * scene.detail[0, 0]
+
+
+def test_blur_brings_detail_into_the_cells_around_but_no_further() -> None:
+    signal = np.full((CELL_PX, 4 * CELL_PX), 0.2, np.float32)
+    signal[:, :CELL_PX] += 0.2 * np.random.default_rng(5).random((CELL_PX, CELL_PX))
+    scene = _scene(signal, _noise(1e-6, 0.0), gains=(1.0, 1.0, 1.0))
+    own, blurred = scene.detail[0], scene.blurred_detail[0]
+    np.testing.assert_allclose(blurred[0], (1 + SPILL) * own[0])
+    np.testing.assert_allclose(blurred[1], own[1] + SPILL * own[0])
+    np.testing.assert_allclose(blurred[3], (1 + SPILL) * own[3])
 
 
 def test_cell_areas_fill_the_picture() -> None:

@@ -31,7 +31,7 @@ def _captures(count: int, *, spread: float = 0.0) -> list[CaptureCells]:
         area = scene.cell_px
         errors = {}
         for target, (level, detail, noise, field) in TARGETS.items():
-            exponent = level + detail * np.log(scene.detail) + noise * np.log(scene.noise)
+            exponent = level + detail * np.log(scene.blurred_detail) + noise * np.log(scene.noise)
             errors[target] = area * np.exp(
                 exponent + field * scene.field + spread * rng.standard_normal(area.shape)
             )
