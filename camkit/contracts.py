@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError
+from camkit.units import MM_PER_M
 
 CfaPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 CFA_PATTERNS: Final[tuple[CfaPattern, ...]] = get_args(CfaPattern)
@@ -20,6 +21,8 @@ CFA_PATTERNS: Final[tuple[CfaPattern, ...]] = get_args(CfaPattern)
 FloatArray = NDArray[np.float32]
 
 PSF_SUM_TOLERANCE: Final = 1e-4
+DEPTH_RTOL: Final = 1e-6
+"""A depth in metres is rarely the same number as in millimetres: 1.1 m is 1100.0000000000002 mm."""
 
 
 def cfa_channels(cfa: CfaPattern) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -144,6 +147,8 @@ class FrozenPsf:
             )
         if any((np.diff(a) <= 0).any() or np.isnan(a).any() for a in axes):
             raise ContractError("field heights, depths and wavelengths must increase")
+        if self.depths_mm[0] <= 0:
+            raise ContractError(f"depths lie in front of the lens, > 0; got {self.depths_mm[0]}")
         if self.field_heights_mm[0] != 0:
             raise ContractError(f"the first field must be 0; got {self.field_heights_mm[0]}")
         light = self.relative_illumination
@@ -154,3 +159,42 @@ class FrozenPsf:
             raise ContractError("relative illumination needs one finite value > 0 per field")
         if not (np.isfinite(self.pixel_pitch_um) and self.pixel_pitch_um > 0):
             raise ContractError(f"pixel_pitch_um must be > 0; got {self.pixel_pitch_um}")
+
+
+def depth_weights(depths_mm: NDArray[np.float64], depth_mm: float | None) -> NDArray[np.float64]:
+    """Give the share that every depth of a PSF has in the kernels of one object distance.
+
+    Between two depths kernels are linear in 1 / depth, as defocus is. Without a distance all
+    depths have the same share: the mean kernel.
+
+    Args:
+        depths_mm: (depth,), increasing; inf is allowed.
+        depth_mm: Object distance; None for the mean.
+
+    Returns:
+        (depth,) float64, >= 0, sums to 1.
+
+    Raises:
+        ContractError: If the distance lies outside the depths, where nothing is known.
+    """
+    if depth_mm is None:
+        return np.full(depths_mm.size, 1 / depths_mm.size)
+    nearest_mm, farthest_mm = depths_mm[0] * (1 - DEPTH_RTOL), depths_mm[-1] * (1 + DEPTH_RTOL)
+    if not nearest_mm <= depth_mm <= farthest_mm:
+        names = [depth_name(known_mm) for known_mm in depths_mm]
+        reach, instead = f"knows the one depth {names[0]}", ""
+        if len(names) > 1:
+            reach = f"reaches from {names[0]} to {names[-1]} ({', '.join(names)})"
+            instead = " for the mean kernel of all"
+        raise ContractError(
+            f"the PSF {reach}; got {depth_name(depth_mm)}: give a depth it knows, or none{instead}"
+        )
+    index = np.arange(depths_mm.size)
+    place = np.interp(1 / depth_mm, 1 / depths_mm[::-1], index[::-1])
+    shares: NDArray[np.float64] = np.maximum(1 - np.abs(index - place), 0.0)
+    return shares
+
+
+def depth_name(depth_mm: float) -> str:
+    """Give an object distance for people: "0.7 m" or "infinity"."""
+    return "infinity" if np.isinf(depth_mm) else f"{depth_mm / MM_PER_M:g} m"

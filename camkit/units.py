@@ -3,6 +3,7 @@
 import math
 
 UM_PER_MM = 1000.0
+MM_PER_M = 1000.0
 
 
 def to_radians(angle_deg: float) -> float:

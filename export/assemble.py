@@ -19,7 +19,6 @@ import numpy as np
 
 from camkit.bundle.golden import GoldenArrays, golden_to_bytes
 from camkit.bundle.manifest import (
-    Camera,
     Color,
     Demosaic,
     Illumination,
@@ -34,7 +33,7 @@ from camkit.bundle.manifest import (
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, PSF, STRESS_PSF, Bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError
 from camkit.export.card import card_text, preview_png
 from camkit.export.golden_cases import (
@@ -99,13 +98,12 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
     """
     checkpoints = _read_checkpoints(parts.checkpoints)
     recipe = _recipe(checkpoints)
-    psf = read_psf(parts.psf)
     members = _members(parts)
-    cases = _golden_cases(recipe.camera, psf)
     with tempfile.TemporaryDirectory() as folder:
         bare = write_bundle(
             Path(folder) / "bare.camkit", _manifest(recipe, parts, checkpoints, {}, {}), members
         )
+        cases = _golden_cases(bare)
         windows = _network_inputs(bare, cases, recipe.scale)
         networks = {
             size: measure_network(size, load_network(checkpoint), windows)
@@ -171,17 +169,17 @@ def _recipe(checkpoints: dict[NetworkSize, Checkpoint]) -> Recipe:
     return to_recipe(tomllib.loads(next(iter(checkpoints.values())).recipe_toml))
 
 
-def _golden_cases(camera: Camera, psf: FrozenPsf) -> Cases:
+def _golden_cases(bare: Bundle) -> Cases:
     cases: Cases = {}
     for name, recipe in GOLDEN_RECIPES.items():
-        case, capture, reference = photograph(name, recipe, camera, psf)
+        case, capture, reference = photograph(name, recipe, bare)
         cases[name] = case, GoldenArrays(capture=capture, reference=reference)
     return cases
 
 
 def _network_inputs(bare: Bundle, cases: Cases, scale: float) -> list[FloatArray]:
     """Give (1, 6, h, w) windows as the network sees them: a larger probe first, then the cases."""
-    probe, capture, _ = photograph("probe", PROBE_RECIPE, bare.manifest.camera, bare.psf)
+    probe, capture, _ = photograph("probe", PROBE_RECIPE, bare)
     captures = [(probe, capture), *((case, arrays.capture) for case, arrays in cases.values())]
     pipeline = Pipeline(bare, Options(method="wiener", threads=1))
     windows = []

@@ -8,7 +8,7 @@ import numpy as np
 from camkit.bundle.golden import GoldenArrays
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, depth_name
 from camkit.export.energy import energy_diameter_px, modulation
 
 BORDER_PX = 16
@@ -18,25 +18,27 @@ def card_text(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> str:
     """Write the card: what it is, what it was trained on, what was measured, where it fails."""
     manifest = bundle.manifest
     camera, psf = manifest.camera, bundle.psf
+    depths = ", ".join(map(depth_name, psf.depths_mm))
     lines = [
         f"# {manifest.name} {manifest.version}",
         "",
         f"Sensor {camera.width_px}x{camera.height_px} of {camera.pixel_pitch_um} um, "
         f"{camera.cfa or 'no mosaic'}, full well {camera.full_well_e:g} e-. "
         f"PSF frozen at {psf.field_heights_mm.size} field heights and "
-        f"{psf.wavelengths_um.size} wavelengths, {psf.kernels.shape[-1]} px a side.",
+        f"{psf.wavelengths_um.size} wavelengths, {psf.kernels.shape[-1]} px a side, "
+        f"for objects at {depths}.",
         "",
         f"Licence of the weights: {manifest.licence}. Trained on: {manifest.training_data}.",
         "",
         f"Response of the colours: {camera.channel_response.source}.",
         "",
-        "## PSF over the field",
+        "## PSF over the field" + (", mean of the depths" if psf.depths_mm.size > 1 else ""),
         "",
         "| field height (mm) | circle of 95 % energy (px) | MTF at 0.1 cycles/px | illumination |",
         "|---|---|---|---|",
     ]
     for i, height in enumerate(psf.field_heights_mm):
-        kernel = psf.kernels[i, 0].mean(axis=0)
+        kernel = psf.kernels[i].mean(axis=(0, 1))
         lines.append(
             f"| {height:.2f} | {energy_diameter_px(kernel, 0.95):.0f} | "
             f"{modulation(kernel, 0.1):.2f} | {psf.relative_illumination[i]:.3f} |"
@@ -68,7 +70,7 @@ def card_text(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> str:
         "",
         "## Where it fails",
         "",
-        "Depths other than infinity, sources that clip over more than the PSF, light of a narrow "
+        f"Depths other than {depths}, sources that clip over more than the PSF, light of a narrow "
         "band, and lenses off by more than the fabrication errors it was trained with "
         "(radius 0.2 %, thickness 0.03 mm, index 0.0005, focus 0.02 mm).",
         "",
@@ -85,7 +87,7 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
     figure = Figure(figsize=(10, 7.5), dpi=80, layout="constrained")
     axes = figure.subplots(3, 5)
     for column, i in enumerate(shown):
-        kernel = psf.kernels[i, 0]
+        kernel = psf.kernels[i].mean(axis=0)
         thirds = np.array_split(np.arange(kernel.shape[0]), 3)
         picture = np.stack([kernel[part].mean(axis=0) for part in reversed(thirds)], axis=-1)
         axes[0, column].imshow((picture / picture.max()) ** 0.5)

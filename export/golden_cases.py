@@ -47,18 +47,23 @@ GOLDEN_RECIPES: Final = {
 
 
 def photograph(
-    name: str, recipe: CaseRecipe, camera: Camera, psf: FrozenPsf
+    name: str, recipe: CaseRecipe, bundle: Bundle
 ) -> tuple[GoldenCase, np.ndarray, FloatArray]:
-    """Simulate one case.
+    """Simulate one case with the camera of a bundle, at its reference depth.
 
     Returns:
         The case, its capture (h, w) uint16, and the sharp scene (3, h, w) float32 in the
         geometry and colour of the output.
     """
+    camera, psf = bundle.manifest.camera, bundle.psf
     origin = _origin(camera, recipe)
     scene = procedural_scene(recipe.scene_seed, recipe.size_px, recipe.size_px)
     options = SimulationOptions(
-        iso=recipe.iso, seed=recipe.scene_seed, origin_px=origin, exposure=recipe.exposure
+        iso=recipe.iso,
+        seed=recipe.scene_seed,
+        origin_px=origin,
+        exposure=recipe.exposure,
+        depth_mm=bundle.reference_depth_mm,
     )
     simulation = simulate(scene, camera, psf, options)
     case = GoldenCase(

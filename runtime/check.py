@@ -19,8 +19,8 @@ from typing import Any, Final, Literal
 from camkit.bundle.container import read_container
 from camkit.bundle.golden import GoldenArrays
 from camkit.bundle.manifest import GoldenCase, NetworkFacts
-from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
-from camkit.contracts import FloatArray
+from camkit.bundle.reader import PSF, Bundle, open_bundle, read_container_manifest
+from camkit.contracts import FloatArray, depth_name
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.proofs import prove_golden, prove_range, prove_tiling
@@ -144,7 +144,10 @@ def _describe(path: Path) -> str:
 
 
 def _prove_hashes(bundle: Bundle) -> tuple[bool, str]:
-    return True, f"{len(bundle.names)} members as stated; bundle sha256 {bundle.sha256[:16]}"
+    found = f"{len(bundle.names)} members as stated; bundle sha256 {bundle.sha256[:16]}"
+    if PSF in bundle.names:
+        found += f"; objects at {', '.join(map(depth_name, bundle.psf.depths_mm))}"
+    return True, found
 
 
 def _prove_graphs(bundle: Bundle) -> tuple[bool, str]:

@@ -1,6 +1,7 @@
 """One capture file developed: decode, reconstruct, write, and say what was done in a sidecar."""
 
 import json
+import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -208,6 +209,8 @@ def _identity(
 
     free = ("threads", "max_mem_bytes", "tile_px")
     chosen = {k: v for k, v in asdict(pipeline.options).items() if k not in free}
+    if chosen["depth_m"] == math.inf:
+        chosen["depth_m"] = "inf"  # JSON knows no infinity
     chosen |= {"format": write.format, "linear": write.linear}
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
     identity = {

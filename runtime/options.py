@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 from camkit.errors import ContractError
+from camkit.units import MM_PER_M
 
 Method = Literal["net", "wiener", "rl", "admm-tv"]
 Mode = Literal["exact", "fast", "whole"]
@@ -31,6 +32,8 @@ class Options:
         max_seconds: Time that a capture may take on this machine; None for any.
         max_error_db: Loss against `exact` that a capture may have at worst; None for that of the
             quality.
+        depth_m: Object distance whose kernels the bank uses, where the bundle knows several (its
+            PSF must reach it); None for the mean kernel over the depths.
         method: The network behind the Wiener bank, or a classical method alone.
         mode: Tiling: exact (bits of the whole picture), fast (smaller halo), whole (one window).
         demosaic: fast or quality; None for the method of the bundle, fast without one.
@@ -55,6 +58,7 @@ class Options:
     quality: Quality = "exact"
     max_seconds: float | None = None
     max_error_db: float | None = None
+    depth_m: float | None = None
     method: Method = "net"
     mode: Mode = "exact"
     demosaic: DemosaicMethod | None = None
@@ -78,6 +82,7 @@ class Options:
         for name, value in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
             if value is not None and not 0 < value < 1e6:
                 raise ContractError(f"the most {name} must be > 0; got {value}")
+        _check_depth(self.depth_m)
         _check_choice("method", self.method, get_args(Method))
         _check_choice("mode", self.mode, get_args(Mode))
         _check_choice("dtype", self.dtype, get_args(Dtype))
@@ -99,6 +104,16 @@ class Options:
                 f"the memory cap must be at least {LEAST_MAX_MEM_BYTES // 10**6} MB; "
                 f"got {self.max_mem_bytes // 10**6} MB"
             )
+
+    @property
+    def depth_mm(self) -> float | None:
+        """Give the object distance as a PSF states it."""
+        return None if self.depth_m is None else self.depth_m * MM_PER_M
+
+
+def _check_depth(depth_m: float | None) -> None:
+    if depth_m is not None and not depth_m > 0:
+        raise ContractError(f"the depth must be > 0 m; got {depth_m}")
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Wiener
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, depth_weights
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.job.reconstruction import Reconstruction
@@ -76,6 +76,8 @@ class Pipeline:
         self.options = options
         self.threads = available_threads(options.threads)
         self.size = None if bundle is None else default_size(bundle, options)
+        if options.depth_m is not None:
+            _check_depth(bundle, options)
         self._lock = threading.Lock()
         self._engines: dict[str, NetworkEngine] = {}
         self._speeds: dict[str, float] = {}
@@ -321,6 +323,17 @@ def load(
     if bundle is None or str(bundle).lower() == "none":
         return Pipeline(None, chosen)
     return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
+
+
+def _check_depth(bundle: Bundle | None, options: Options) -> None:
+    """Refuse a depth before any work.
+
+    Raises:
+        ContractError: If no bank uses it, or the PSF does not reach it.
+    """
+    if bundle is None or bundle.manifest.stage(Wiener) is None:
+        raise ContractError("a depth chooses kernels of a bundle's bank, and there is none here")
+    depth_weights(bundle.psf.depths_mm, options.depth_mm)
 
 
 def _engine(bundle: Bundle, options: Options, threads: int) -> NetworkEngine:

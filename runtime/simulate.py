@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.camera import Camera
 from camkit.colorimetry import apply_matrix, camera_from_rec709
-from camkit.contracts import CfaPattern, FloatArray, FrozenPsf, NoiseModel, cfa_channels
+from camkit.contracts import CfaPattern, FloatArray, FrozenPsf, NoiseModel, cfa_channels, depth_name
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.bank.psf import color_kernels, kernel_at
 from camkit.runtime.geometry.illumination import illumination_band
@@ -40,6 +40,7 @@ class SimulationOptions:
         seed: Seed of the noise; the same seed gives the same mosaic.
         origin_px: (x, y) of the picture on the sensor, both even; None centres it.
         exposure: Factor on the scene.
+        depth_mm: Object distance; may only be left out where the PSF has one depth.
         distort: Apply the radial distortion.
         vignette: Apply the relative illumination.
         noise: Apply shot and read noise.
@@ -50,6 +51,7 @@ class SimulationOptions:
     seed: int = 0
     origin_px: tuple[int, int] | None = None
     exposure: float = 1.0
+    depth_mm: float | None = None
     distort: bool = True
     vignette: bool = True
     noise: bool = True
@@ -75,6 +77,7 @@ class Simulation:
         white_balance: Gains (R, G, B) of the scene light, G = 1.
         window: Where the picture lies on the sensor.
         iso: Sensitivity.
+        depth_mm: Object distance, where the PSF has several; else None.
     """
 
     mosaic: NDArray[np.uint16]
@@ -82,6 +85,7 @@ class Simulation:
     white_balance: tuple[float, float, float]
     window: SensorWindow
     iso: float
+    depth_mm: float | None = None
 
 
 def simulate(
@@ -97,14 +101,15 @@ def simulate(
         options: Sensitivity, seed, placement and which effects to apply.
 
     Raises:
-        ContractError: If the scene is not as stated or does not lie on the sensor.
+        ContractError: If the scene is not as stated or does not lie on the sensor, or the PSF
+            does not reach the depth.
         UnsupportedError: If the camera has no Bayer mosaic.
     """
     if camera.cfa is None:
         raise UnsupportedError("only cameras with a Bayer mosaic are simulated")
     window = scene_window(scene, camera, options.origin_px)
     matrix, gains = camera_from_rec709(np.array(camera.color_matrix, dtype=np.float64))
-    kernels_at = kernel_lookup(psf, camera)
+    kernels_at = kernel_lookup(psf, camera, depth_mm=options.depth_mm)
     margin = psf.kernels.shape[-1] // 2
     extended = sensor_scene(scene, matrix * options.exposure, psf, window, options, margin)
     planes = scatter(extended, kernels_at, window, margin_px=margin, workers=options.workers)
@@ -123,6 +128,7 @@ def simulate(
         white_balance=gains,
         window=window,
         iso=options.iso,
+        depth_mm=options.depth_mm if psf.depths_mm.size > 1 else None,
     )
 
 
@@ -156,15 +162,28 @@ def write_capture(path: Path, simulation: Simulation, camera: Camera, bundle_nam
             origin_px=(x0, y0),
             sensor_size_px=window.sensor_size_px,
             pixel_pitch_um=window.pitch_um,
+            object_distance_mm=simulation.depth_mm,
         ),
     )
     with atomic_output(path) as part:
         write_bayer_dng(part, simulation.mosaic, tags=tags)
 
 
-def kernel_lookup(psf: FrozenPsf, camera: Camera) -> KernelLookup:
-    """Give the function from a sensor position (x_mm, y_mm) to the kernels of the colours."""
-    kernels = color_kernels(psf, *camera.channel_response.to_arrays())
+def kernel_lookup(psf: FrozenPsf, camera: Camera, *, depth_mm: float | None = None) -> KernelLookup:
+    """Give the function from a sensor position (x_mm, y_mm) to the kernels of one depth.
+
+    Args:
+        psf: Of the lens.
+        camera: Response of its colours.
+        depth_mm: Object distance; may only be left out where there is one depth.
+
+    Raises:
+        ContractError: If there are several depths and none is given, or the PSF does not reach it.
+    """
+    if depth_mm is None and psf.depths_mm.size > 1:
+        known = ", ".join(map(depth_name, psf.depths_mm))
+        raise ContractError(f"light comes from one depth: give one of those the PSF knows, {known}")
+    kernels = color_kernels(psf, *camera.channel_response.to_arrays(), depth_mm=depth_mm)
     return lambda x_mm, y_mm: kernel_at(kernels, psf.field_heights_mm, x_mm, y_mm)
 
 

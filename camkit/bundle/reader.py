@@ -9,6 +9,7 @@ session is made, since `onnx` belongs to the runtime.
 import difflib
 import hashlib
 import importlib.resources
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -68,6 +69,13 @@ class Bundle:
         if self._psf is None:
             raise BundleError(f"{self.path.name} has no {PSF}")
         return self._psf
+
+    @property
+    def reference_depth_mm(self) -> float:
+        """The distance of focus; where the PSF does not reach it, the nearest that it knows."""
+        focus_mm = self.manifest.object_distance_mm or math.inf
+        depths_mm = self.psf.depths_mm
+        return float(min(max(focus_mm, depths_mm[0]), depths_mm[-1]))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -22,6 +22,10 @@ MaxErrorDb = Annotated[
     float | None,
     typer.Option(help="The cheapest plan that should lose no more against exact, in dB."),
 ]
+DepthM = Annotated[
+    float | None,
+    typer.Option(help="Object distance in m, where the bundle knows several; 'inf' is infinity."),
+]
 GlassFiles = Annotated[
     list[Path] | None,
     typer.Option("--glass", help="A glass catalogue (.agf) of yours; may be given again."),

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.errors import ContractError
 
 
 def freeze(
@@ -16,6 +17,15 @@ def freeze(
         Path | None,
         typer.Option(help="Recipe (TOML) with the camera and its Wiener bank; default: duet's."),
     ] = None,
+    depths_mm: Annotated[
+        str | None,
+        typer.Option(help="Object distances, near to far, such as 500,700,1500; default: lens's."),
+    ] = None,
+    limit_db: Annotated[float, typer.Option(help="Mean loss allowed for the samples.")] = 0.05,
+    energy: Annotated[
+        float, typer.Option(help="Least share of the light of a colour inside the kernels.")
+    ] = 0.995,
+    max_side_px: Annotated[int, typer.Option(help="Largest side of a kernel, odd.")] = 151,
     stress_out: Annotated[
         Path | None, typer.Option(help="Also write kernels off the design point there.")
     ] = None,
@@ -32,13 +42,21 @@ def freeze(
     require_torch("camkit freeze")
     refuse_existing([out, stress_out, report], overwrite=overwrite)
     from camkit.bundle.psf_file import write_psf
-    from camkit.models_def.optics.freeze import freeze_prescription, freeze_stress
+    from camkit.models_def.optics.freeze import FreezeGrid, freeze_prescription, freeze_stress
     from camkit.models_def.optics.lens_file.lens_file import read_lens
     from camkit.models_def.training.recipe import read_recipe
 
     plan = read_recipe(_default_recipe() if recipe is None else recipe)
     out.parent.mkdir(parents=True, exist_ok=True)
-    found = freeze_prescription(prescription, out, camera=plan.camera, settings=plan.wiener)
+    grid = FreezeGrid(depths_mm=_depths(depths_mm), energy=energy, max_side_px=max_side_px)
+    found = freeze_prescription(
+        prescription,
+        out,
+        camera=plan.camera,
+        settings=plan.wiener,
+        limit_db=limit_db,
+        grid=grid,
+    )
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
         write_psf(stress_out, freeze_stress(read_lens(prescription), plan.camera).psf)
@@ -46,6 +64,13 @@ def freeze(
         report.parent.mkdir(parents=True, exist_ok=True)
         report.write_text(json.dumps(found.to_json(), indent=2) + "\n", encoding="utf-8")
     print_report(found.to_json(), json_)
+
+
+def _depths(text: str | None) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(",")) if text is not None else ()
+    except ValueError:
+        raise ContractError(f"--depths-mm takes distances A,B,C in mm; got {text!r}") from None
 
 
 def _default_recipe() -> Path:

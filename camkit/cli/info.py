@@ -77,6 +77,7 @@ def _describe_bundle(file: str) -> dict[str, Any]:
 
 def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
     from camkit.bundle.reader import PSF
+    from camkit.contracts import depth_name
 
     if PSF not in bundle.names:
         return None
@@ -84,6 +85,7 @@ def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
     return {
         "kernels": list(psf.kernels.shape),
         "field_heights_mm": [round(float(v), 3) for v in psf.field_heights_mm],
+        "depths": [depth_name(v) for v in psf.depths_mm],
         "wavelengths_um": [round(float(v), 4) for v in psf.wavelengths_um],
     }
 

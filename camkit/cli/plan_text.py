@@ -78,6 +78,8 @@ def plan_lines(facts: dict[str, Any]) -> list[str]:
     if facts["status"] == "failed":
         return [*lines, f"  failed: {facts['error']}"]
     lines.append(f"  status: planned, bundle {facts['bundle']}")
+    if "depth" in facts["plan"]:
+        lines.append(f"  kernels: {facts['plan']['depth']}")
     for decision in facts["decisions"]:
         saving = decision["saving_s"] or 0.0
         lines.append(f"  {decision['what']}: {decision['choice']} ({decision['reason']})")

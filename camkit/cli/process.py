@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, MaxErrorDb, MaxSeconds, Quality
+from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality
 from camkit.cli.exit_code import ExitCode
 from camkit.errors import ContractError
 
@@ -42,6 +42,7 @@ def process(
     ] = None,
     black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
     white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
+    depth_m: DepthM = None,
     method: Annotated[str, typer.Option(help="net, wiener, rl or admm-tv.")] = "net",
     mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",
     assume: Annotated[
@@ -75,6 +76,7 @@ def process(
         quality=quality,  # type: ignore[arg-type]
         max_seconds=max_seconds,
         max_error_db=max_error_db,
+        depth_m=depth_m,
         method=method,  # type: ignore[arg-type]  # checked by Options
         mode=mode,  # type: ignore[arg-type]
         demosaic=demosaic,  # type: ignore[arg-type]

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, Overwrite
+from camkit.cli.choices import Debug, DepthM, Overwrite
 from camkit.errors import ContractError
+from camkit.units import MM_PER_M
 
 
 def simulate(
@@ -21,6 +22,7 @@ def simulate(
         str | None, typer.Option(help="X,Y of a crop on the sensor; default: centred.")
     ] = None,
     exposure: Annotated[float, typer.Option(help="Factor on the scene's radiance.")] = 1.0,
+    depth_m: DepthM = None,
     size_px: Annotated[
         str | None, typer.Option(help="W,H of a procedural scene; default: the sensor.")
     ] = None,
@@ -29,6 +31,7 @@ def simulate(
 ) -> None:
     """Photograph a scene with the bundle's camera: blur, vignetting, mosaic, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
+    from camkit.contracts import depth_name
     from camkit.runtime.network.engine import available_threads
     from camkit.runtime.simulate import SimulationOptions, write_capture
     from camkit.runtime.simulate import simulate as simulate_scene
@@ -45,12 +48,15 @@ def simulate(
         seed=seed,
         origin_px=None if origin_px is None else _pair(origin_px, "--origin-px"),
         exposure=exposure,
+        depth_mm=opened.reference_depth_mm if depth_m is None else depth_m * MM_PER_M,
         workers=available_threads(None),
     )
     simulation = simulate_scene(_scene(scene, size), camera, opened.psf, options)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_capture(out, simulation, camera, opened.manifest.name)
-    typer.echo(f"{out}: {simulation.mosaic.shape[1]}x{simulation.mosaic.shape[0]}, ISO {iso:g}")
+    height, width = simulation.mosaic.shape
+    depth = "" if simulation.depth_mm is None else f", {depth_name(simulation.depth_mm)} away"
+    typer.echo(f"{out}: {width}x{height}, ISO {iso:g}{depth}")
 
 
 def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def]  # numpy stays lazy

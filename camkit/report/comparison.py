@@ -8,7 +8,7 @@ import numpy as np
 
 from camkit.bundle.manifest import Network, Wiener
 from camkit.bundle.reader import PSF, Bundle
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
 from camkit.report.measurement import Row, identity_of
 from camkit.report.peers import PEERS, Setting, part_sides
@@ -163,7 +163,10 @@ def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
     shares = ", ".join(f"{share:g}" for share in FIELD_SHARES)
     seeds = ", ".join(map(str, FABRICATION_SEEDS))
     part_px, overlap_px = part_sides(psf.kernels.shape[-1])
+    where = f"Pictures lie at {depth_name(bundle.reference_depth_mm)}; methods have the mean kernel"
+    depths = [f"{where} of {psf.depths_mm.size} depths."] if psf.depths_mm.size > 1 else []
     return [
+        *depths,
         f"Each picture (sRGB decoded to linear light) is a crop of the {camera.width_px} x "
         f"{camera.height_px} sensor at {len(FIELD_SHARES)} places: {shares} of the way from "
         f"centred to touching a corner ({corner_mm:.1f} mm from the axis); picture i of a set "

@@ -25,9 +25,9 @@ def fabricated_psf(
 ) -> FrozenPsf:
     """Trace one fabricated copy of a bundle's lens, or read what an earlier call traced.
 
-    The field grid is twice and the wavelength grid three times as dense as the bundle's. Errors
-    are uniform: radius +-0.2 %, thickness +-0.03 mm, index +-0.0005; the copy is focused at
-    assembly to +-0.02 mm.
+    The field grid is twice and the wavelength grid three times as dense as the bundle's; the
+    object lies at its reference depth. Errors are uniform: radius +-0.2 %, thickness +-0.03 mm,
+    index +-0.0005; the copy is focused at assembly to +-0.02 mm.
 
     Args:
         bundle: Names the lens, the camera and the grid.
@@ -41,7 +41,7 @@ def fabricated_psf(
     text = lens_text(bundle, prescription)
     shape = bundle.psf.kernels.shape
     content = [text, bundle.manifest.camera.model_dump_json(), repr((shape[:3], seed))]
-    content.append(repr((MAX_SIDE_PX, ENERGY, bundle.psf.depths_mm.tolist())))
+    content.append(repr((MAX_SIDE_PX, ENERGY, [bundle.reference_depth_mm])))
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"psf-{seed}-{name}.safetensors"
     if not cached.exists():
@@ -75,7 +75,7 @@ def _trace(bundle: Bundle, text: str, seed: int) -> FrozenPsf:
     frozen_grid = FreezeGrid(
         fields=psf.field_heights_mm.size,
         wavelengths=psf.wavelengths_um.size,
-        depths_mm=tuple(psf.depths_mm.tolist()),
+        depths_mm=(bundle.reference_depth_mm,),
         energy=ENERGY,
         max_side_px=MAX_SIDE_PX,
     )

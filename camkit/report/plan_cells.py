@@ -63,7 +63,11 @@ def photograph(
     share = FIELD_SHARES[number % len(FIELD_SHARES)]
     origin = crop_origin(size, sensor, share, QUADRANTS[number % len(QUADRANTS)])
     options = SimulationOptions(
-        iso=iso, seed=1000 * number + int(iso), origin_px=origin, exposure=exposure
+        iso=iso,
+        seed=1000 * number + int(iso),
+        origin_px=origin,
+        exposure=exposure,
+        depth_mm=bundle.reference_depth_mm,
     )
     return simulate(scene, camera, bundle.psf, options)
 

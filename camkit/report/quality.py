@@ -159,7 +159,7 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Ex
         shot: Place, ISO and noise.
         scene: (3, h, w) float32 linear Rec.709.
         bundle: The camera; its PSF is what methods may know.
-        lens: The PSF that the light really takes.
+        lens: The PSF that the light really takes, at the bundle's reference depth.
     """
     camera = bundle.manifest.camera
     sensor = (camera.width_px, camera.height_px)
@@ -169,6 +169,7 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Ex
         iso=shot.iso,
         seed=shot.noise_seed,
         origin_px=crop_origin(size, sensor, FIELD_SHARES[shot.position], quadrant),
+        depth_mm=bundle.reference_depth_mm,
     )
     simulation = simulate(scene, camera, lens, options)
     matrix = rec709_from_camera(np.array(camera.color_matrix, dtype=np.float64))

@@ -2,9 +2,14 @@
 
 candidates -> frozen_loss (dB of the Wiener filter alone) -> FrozenPsf -> psf.safetensors,
 FrozenPsf -> block_loss of block grids -> FreezeReport
+
+Of several depths the nearest and the farthest are kept, and of those between them as few as the
+loss allows, with the depth known to the filter (interpolated kernels) and unknown to it (the mean
+kernel).
 """
 
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -22,7 +27,14 @@ from camkit.models_def.optics.frozen import (
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.sampling import Bench, Loss, block_loss, frozen_loss, make_bench
+from camkit.models_def.optics.sampling import (
+    Bench,
+    Loss,
+    block_loss,
+    frozen_loss,
+    make_bench,
+    mean_kernel_loss,
+)
 from camkit.models_def.sensors.wiener import PRIOR_EXPONENT, PRIOR_SCALE
 
 __all__ = [
@@ -38,6 +50,7 @@ __all__ = [
 ]
 
 LOSS_LIMIT_DB: Final = 0.05
+DEPTH_SHARE: Final = 0.75
 BLOCK_TOLERANCE_DB: Final = 0.1
 FIELD_COUNTS: Final = (7, 9, 11, 13, 17, 21, 25)
 WAVELENGTH_COUNTS: Final = (3, 5, 7, 9, 11, 13)
@@ -61,6 +74,10 @@ class FreezeReport:
         block_loss_db: Mean loss of one kernel per block.
         efl_mm: Of the lens.
         corner_illumination: Relative illumination at the corner.
+        depths_mm: Depths kept; one unless several were asked for.
+        between_loss_db: Mean loss of interpolated kernels half-way (in 1 / distance) between
+            the depths kept, against those traced there; 0 with one depth. Not limited: it says
+            what a depth given to `process` may cost.
     """
 
     fields: int
@@ -75,10 +92,18 @@ class FreezeReport:
     block_loss_db: float
     efl_mm: float
     corner_illumination: float
+    depths_mm: tuple[float, ...] = ()
+    between_loss_db: float = 0.0
 
     def to_json(self) -> dict[str, int | float | str]:
-        """Give the report as a flat mapping."""
-        return {k: round(v, 5) if isinstance(v, float) else v for k, v in asdict(self).items()}
+        """Give the report as a flat mapping; that of one depth does not speak of depths."""
+        facts = asdict(self)
+        depths_mm = facts.pop("depths_mm")
+        if len(depths_mm) > 1:
+            facts["depths_mm"] = ", ".join(f"{depth_mm:g}" for depth_mm in depths_mm)
+        else:
+            del facts["between_loss_db"]
+        return {k: round(v, 5) if isinstance(v, float) else v for k, v in facts.items()}
 
 
 def choose_samples(
@@ -89,14 +114,22 @@ def choose_samples(
     limit_db: float = LOSS_LIMIT_DB,
     grid: FreezeGrid | None = None,
 ) -> tuple[Frozen, Loss]:
-    """Freeze with the least wavelengths, then the least fields, whose mean loss is allowed.
+    """Freeze with the least wavelengths, then depths, then fields, whose mean loss is allowed.
 
-    Wavelengths are chosen with the most fields and half of the allowance.
+    Wavelengths are chosen with the most fields and half of the allowance, depths with three
+    quarters of it.
+
+    Args:
+        lens: Nominal.
+        camera: Response, size and noise.
+        bench: The lens where it is judged, at the depths that may be kept.
+        limit_db: Mean loss allowed.
+        grid: Rays, energy and largest side; the rest is chosen here.
 
     Raises:
         ContractError: If even the densest grid loses more.
     """
-    base = grid or FreezeGrid()
+    base = replace(grid or FreezeGrid(), depths_mm=bench.depths_mm)
     fields = FIELD_COUNTS[-1]
     waves = WAVELENGTH_COUNTS[-1]
     for count in WAVELENGTH_COUNTS:
@@ -104,6 +137,8 @@ def choose_samples(
         if frozen_loss(frozen.psf, bench).mean_db <= limit_db / 2:
             waves = count
             break
+    kept_mm = choose_depths(frozen.psf, bench, limit_db=DEPTH_SHARE * limit_db)
+    base = replace(base, depths_mm=kept_mm)
     loss = Loss(mean_db=0.0, worst_db=0.0)
     for count in FIELD_COUNTS:
         frozen = freeze(lens, camera, replace(base, fields=count, wavelengths=waves))
@@ -114,6 +149,32 @@ def choose_samples(
         f"{fields} fields and {waves} wavelengths lose {loss.mean_db:.3f} dB, more than the "
         f"allowed {limit_db}; allow more or use a smoother lens"
     )
+
+
+def choose_depths(psf: FrozenPsf, bench: Bench, *, limit_db: float) -> tuple[float, ...]:
+    """Give the nearest and the farthest depth, and as few between them as the loss allows.
+
+    Args:
+        psf: With all depths of the bench.
+        bench: The lens at its depths.
+        limit_db: Mean loss allowed, both of interpolated kernels and of the mean kernel.
+    """
+    count = len(bench.depths_mm)
+    kept = sorted({0, count - 1})
+    while len(kept) < count:
+        thin = replace(psf, kernels=psf.kernels[:, kept], depths_mm=psf.depths_mm[kept])
+        losses = frozen_loss(thin, bench), mean_kernel_loss(thin, psf, bench)
+        worst = max(losses, key=lambda loss: loss.mean_db)
+        if worst.mean_db <= limit_db:
+            break
+        left = (i for i in range(count) if i not in kept)
+        kept = sorted([*kept, max(left, key=worst.by_depth_db.__getitem__)])
+    return tuple(bench.depths_mm[i] for i in kept)
+
+
+def between_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
+    """Give the distances half-way in 1 / distance between neighbours."""
+    return tuple(2 / (1 / near + 1 / far) for near, far in pairwise(depths_mm))
 
 
 def choose_blocks(
@@ -155,7 +216,8 @@ def freeze_prescription(
         camera: Sensor size, pitch, response and noise.
         settings: Of the Wiener filter that measures the loss.
         limit_db: Mean loss allowed for the samples, and for the blocks.
-        grid: Rays, energy and depths; its fields and wavelengths are chosen here.
+        grid: Rays, energy, largest side and depths; fields, wavelengths and which of the depths
+            are kept are chosen here.
 
     Raises:
         ContractError: If the prescription is wrong or no grid keeps the loss.
@@ -164,12 +226,17 @@ def freeze_prescription(
 
     lens = read_lens(path)
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
-    rays = (grid or FreezeGrid()).rays
-    bench = make_bench(lens, camera, chosen, rays=rays)
+    wanted = grid or FreezeGrid()
+    bench = make_bench(lens, camera, chosen, grid=wanted)
     frozen, loss = choose_samples(lens, camera, bench, limit_db=limit_db, grid=grid)
     blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
+    kept_mm = tuple(frozen.psf.depths_mm.tolist())
+    between_db = 0.0
+    if between := between_mm(kept_mm):
+        there = make_bench(lens, camera, chosen, grid=replace(wanted, depths_mm=between))
+        between_db = frozen_loss(frozen.psf, there).mean_db
     return FreezeReport(
         fields=fields,
         wavelengths=wavelengths,
@@ -183,4 +250,6 @@ def freeze_prescription(
         block_loss_db=blocked.mean_db,
         efl_mm=paraxial_data(lens).efl_mm,
         corner_illumination=float(frozen.psf.relative_illumination[-1]),
+        depths_mm=kept_mm,
+        between_loss_db=between_db,
     )

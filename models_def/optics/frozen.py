@@ -11,6 +11,7 @@ camera it is frozen for is taken out by Richardson-Lucy steps, so few wavelength
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -44,7 +45,8 @@ class FreezeGrid:
     Attributes:
         fields: Heights from the axis to the corner, evenly spaced.
         wavelengths: Evenly spaced over the camera's response.
-        depths_mm: Object distances, increasing.
+        depths_mm: Object distances, increasing; the sensor stays where the lens has it. Empty
+            for that of the lens.
         energy: Least share of the light of every colour that the kernels must hold.
         max_side_px: Largest odd kernel side.
         rays: In half the pupil, per wavelength traced.
@@ -52,14 +54,16 @@ class FreezeGrid:
 
     fields: int = 13
     wavelengths: int = 7
-    depths_mm: tuple[float, ...] = (math.inf,)
+    depths_mm: tuple[float, ...] = ()
     energy: float = 0.995
     max_side_px: int = 151
     rays: int = 4096
 
     def __post_init__(self) -> None:
-        if self.fields < 2 or self.wavelengths < 1 or not self.depths_mm:
-            raise ContractError(f"a PSF needs 2 fields, 1 wavelength and 1 depth; got {self}")
+        if self.fields < 2 or self.wavelengths < 1:
+            raise ContractError(f"a PSF needs 2 fields and 1 wavelength; got {self}")
+        if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
+            raise ContractError(f"depths must increase from above 0 mm; got {self.depths_mm}")
         if self.max_side_px % 2 == 0 or not 0 < self.energy <= 1:
             raise ContractError(
                 f"need an odd side and an energy in 0..1; got {self.max_side_px}, {self.energy}"
@@ -88,10 +92,12 @@ def corner_height_mm(camera: Camera) -> float:
 def freeze(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) -> Frozen:
     """Trace the PSF of a lens on a grid of fields, depths and wavelengths.
 
+    Distortion and illumination are those at the lens's own object distance.
+
     Args:
         lens: The prescription.
         camera: Sensor size, pitch and colour response.
-        grid: 13 fields, 7 wavelengths, infinity by default.
+        grid: 13 fields, 7 wavelengths, the distance of the lens by default.
 
     Raises:
         ContractError: If the largest side does not hold the wanted light.
@@ -108,9 +114,10 @@ def freeze_at(lens: Lens, camera: Camera, grid: FreezeGrid, heights_mm: FloatGri
     if grid.wavelengths == 1:
         waves_um = np.array([lens.reference_wavelength_um])
     fine_um, bands = _bands(waves_um)
+    depths_mm = grid.depths_mm or (lens.object_distance_mm,)
     traced = [
         _trace(with_object_distance(lens, depth), camera, grid, (heights_mm, fine_um))
-        for depth in grid.depths_mm
+        for depth in depths_mm
     ]
     weights = torch.from_numpy(wavelength_weights(fine_um, response_um, response))
     side_px, kept = _smallest_side(traced, weights, grid)
@@ -126,7 +133,7 @@ def freeze_at(lens: Lens, camera: Camera, grid: FreezeGrid, heights_mm: FloatGri
     psf = FrozenPsf(
         kernels=kernels.to(torch.float32).numpy(),
         field_heights_mm=heights_mm,
-        depths_mm=np.array(grid.depths_mm, dtype=np.float64),
+        depths_mm=np.array(depths_mm, dtype=np.float64),
         wavelengths_um=waves_um,
         pixel_pitch_um=camera.pixel_pitch_um,
         distortion=trace_distortion(lens, corner_height_mm(camera)),

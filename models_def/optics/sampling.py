@@ -7,7 +7,7 @@ loss is 10 log10 of the ratio of the mean squared errors, averaged over copies, 
 these stand for equal areas of the picture.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -32,8 +32,8 @@ PATCH_PX: Final = 320
 MARGIN_PX: Final = 64
 PLACES: Final = 8
 TRUE_WAVELENGTHS: Final = 13
-TRUE_ENERGY: Final = 0.999
-TRUE_SIDE_PX: Final = 201
+TRUE_LOSS: Final = 0.2
+LARGER_SIDE_PX: Final = 50
 ISO_STEPS: Final = (1.0, 16.0)
 OFFSETS: Final = (-0.8, 0.0, 0.8)
 BLOCK_HEIGHTS: Final = (0.35, 0.65, 0.9)
@@ -46,12 +46,14 @@ class Loss:
     """A loss in dB.
 
     Attributes:
-        mean_db: Over places of equal area.
+        mean_db: Over places of equal area and the depths.
         worst_db: At the worst place.
+        by_depth_db: Over places, for each depth of the bench; empty for `block_loss`.
     """
 
     mean_db: float
     worst_db: float
+    by_depth_db: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,9 +63,10 @@ class Bench:
     Attributes:
         camera: Response, size and noise.
         nominal: The designed lens; its fields are the axis and the places.
-        copies: Fabricated copies, focused, the same fields.
+        copies: Fabricated copies, focused, the same fields and depths.
         settings: Of the Wiener filter.
         seed: Of scenes and noise.
+        focus_mm: The depth nearest to the focus of the lens.
     """
 
     camera: Camera
@@ -71,6 +74,12 @@ class Bench:
     copies: tuple[FrozenPsf, ...]
     settings: Wiener
     seed: int
+    focus_mm: float
+
+    @property
+    def depths_mm(self) -> tuple[float, ...]:
+        """Object distances at which the lens is judged."""
+        return tuple(self.nominal.depths_mm.tolist())
 
     @property
     def heights_mm(self) -> FloatGrid:
@@ -89,8 +98,8 @@ def make_bench(
     settings: Wiener,
     *,
     copies: int = 2,
-    rays: int = 4096,
     seed: int = 5,
+    grid: FreezeGrid | None = None,
 ) -> Bench:
     """Trace a lens and copies of it at the places where it will be judged.
 
@@ -99,47 +108,93 @@ def make_bench(
         camera: Response, size and noise.
         settings: Of the Wiener filter.
         copies: How many fabricated copies.
-        rays: In half the pupil.
         seed: Of the errors, scenes and noise.
+        grid: What will be frozen: its rays and depths are taken; kernels are larger here and
+            lose a fifth of the light that those to be frozen may lose.
     """
+    frozen = grid or FreezeGrid()
+    depths = frozen.depths_mm or (lens.object_distance_mm,)
     places = sample_heights(corner_height_mm(camera), PLACES)
     heights = np.concatenate([np.zeros(1), places])
-    grid = FreezeGrid(
-        wavelengths=TRUE_WAVELENGTHS, energy=TRUE_ENERGY, max_side_px=TRUE_SIDE_PX, rays=rays
+    true_grid = FreezeGrid(
+        wavelengths=TRUE_WAVELENGTHS,
+        depths_mm=depths,
+        energy=1 - TRUE_LOSS * (1 - frozen.energy),
+        max_side_px=min(frozen.max_side_px + LARGER_SIDE_PX, PATCH_PX - 1),
+        rays=frozen.rays,
     )
     traced = [
-        freeze_at(copy, camera, grid, heights).psf
+        freeze_at(copy, camera, true_grid, heights).psf
         for copy in focused_copies(lens, copies + 1, seed)
     ]
     return Bench(
-        camera=camera, nominal=traced[0], copies=tuple(traced[1:]), settings=settings, seed=seed
+        camera=camera,
+        nominal=traced[0],
+        copies=tuple(traced[1:]),
+        settings=settings,
+        seed=seed,
+        focus_mm=min(max(lens.object_distance_mm, depths[0]), depths[-1]),
     )
 
 
 def frozen_loss(frozen: FrozenPsf, bench: Bench) -> Loss:
-    """Measure what the samples of a frozen PSF cost against one traced where it is used."""
+    """Measure what the samples of a frozen PSF cost against one traced where it is used.
+
+    The depth is known to both; a frozen PSF without it is interpolated.
+    """
+    pairs = [
+        (_along_y(frozen, bench, depth_mm), _along_y(bench.nominal, bench, depth_mm))
+        for depth_mm in bench.depths_mm
+    ]
+    return _compare(pairs, bench)
+
+
+def mean_kernel_loss(frozen: FrozenPsf, whole: FrozenPsf, bench: Bench) -> Loss:
+    """Measure what the mean kernel over fewer depths costs against that over all of them.
+
+    Light comes from every depth of the bench, which neither is told.
+
+    Args:
+        frozen: With the depths under test.
+        whole: The same with all depths.
+        bench: Lens and copies at all depths.
+    """
+    pair = _along_y(frozen, bench, None), _along_y(whole, bench, None)
+    return _compare([pair] * len(bench.depths_mm), bench)
+
+
+def _along_y(psf: FrozenPsf, bench: Bench, depth_mm: float | None) -> Tensor:
+    """Give the kernels of the places, all of them at +y."""
     places = bench.heights_mm
-    zero = np.zeros_like(places)
-    test, ideal = (_kernels(p, bench.camera, zero, places) for p in (frozen, bench.nominal))
-    scenes = _scenes(places.size, PATCH_PX, bench.seed)
-    ratios = []
-    for copy in bench.copies:
-        blurred = _convolve(scenes, _kernels(copy, bench.camera, zero, places))
-        for step in ISO_STEPS:
-            noisy, shot, read = _noisy(blurred, bench.camera, step, bench.seed)
-            wrong, right = (
-                _error(wiener_restore(noisy, kernels, shot, read, bench.settings), scenes)
-                for kernels in (test, ideal)
-            )
-            ratios.append(wrong / right)
-    return _loss(torch.stack(ratios))
+    return _kernels(psf, bench.camera, (np.zeros_like(places), places), depth_mm)
+
+
+def _compare(pairs: list[tuple[Tensor, Tensor]], bench: Bench) -> Loss:
+    """Give the loss of the first kernels against the second, a pair for each depth."""
+    scenes = _scenes(bench.heights_mm.size, PATCH_PX, bench.seed)
+    by_depth = []
+    for depth_mm, pair in zip(bench.depths_mm, pairs, strict=True):
+        ratios = []
+        for copy in bench.copies:
+            blurred = _convolve(scenes, _along_y(copy, bench, depth_mm))
+            for step in ISO_STEPS:
+                noisy, shot, read = _noisy(blurred, bench.camera, step, bench.seed)
+                wrong, right = (
+                    _error(wiener_restore(noisy, kernels, shot, read, bench.settings), scenes)
+                    for kernels in pair
+                )
+                ratios.append(wrong / right)
+        by_depth.append(torch.stack(ratios))
+    loss = _loss(torch.cat(by_depth))
+    return replace(loss, by_depth_db=tuple(_loss(ratios).mean_db for ratios in by_depth))
 
 
 def block_loss(psf: FrozenPsf, bench: Bench, settings: Wiener) -> Loss:
     """Measure what one kernel per block, and the block's own border, cost.
 
     Blocks at three places of the diagonal are probed at nine points of the area they answer
-    for. The other restoration uses the kernel of the probed point and a larger block.
+    for. The other restoration uses the kernel of the probed point and a larger block. The scene
+    lies at the focus.
 
     Args:
         psf: The frozen PSF.
@@ -159,7 +214,7 @@ def block_loss(psf: FrozenPsf, bench: Bench, settings: Wiener) -> Loss:
     centres = np.stack([centre for centre, _ in places]) * pitch_mm
     probed = centres + np.stack([offset for _, offset in places]) * pitch_mm
     blocks, locals_, trues = (
-        _kernels(p, camera, at[:, 0], at[:, 1])
+        _kernels(p, camera, (at[:, 0], at[:, 1]), bench.focus_mm)
         for p, at in ((psf, centres), (psf, probed), (bench.copies[0], probed))
     )
     scene = _scenes(1, settings.block_px + LARGER_PX, bench.seed)
@@ -212,10 +267,13 @@ def _error(restored: Tensor, scenes: Tensor) -> Tensor:
     return (restored - scenes)[..., inside, inside].square().mean(dim=(1, 2, 3))
 
 
-def _kernels(psf: FrozenPsf, camera: Camera, x_mm: FloatGrid, y_mm: FloatGrid) -> Tensor:
-    colours = color_kernels(psf, *camera.channel_response.to_arrays())
+def _kernels(
+    psf: FrozenPsf, camera: Camera, at_mm: tuple[FloatGrid, FloatGrid], depth_mm: float | None
+) -> Tensor:
+    colours = color_kernels(psf, *camera.channel_response.to_arrays(), depth_mm=depth_mm)
     heights = torch.from_numpy(psf.field_heights_mm)
-    return kernel_at(colours, heights, torch.from_numpy(x_mm), torch.from_numpy(y_mm))
+    x_mm, y_mm = (torch.from_numpy(values) for values in at_mm)
+    return kernel_at(colours, heights, x_mm, y_mm)
 
 
 def _scenes(count: int, size_px: int, seed: int) -> Tensor:

@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from camkit.contracts import FrozenPsf
+from camkit.contracts import FrozenPsf, depth_weights
 from camkit.errors import ContractError
 
 PAD_PX = 2
@@ -63,7 +63,7 @@ def color_kernels(
     wavelengths_um: NDArray[np.float64],
     response: NDArray[np.float64],
     *,
-    depth_index: int = 0,
+    depth_mm: float | None = None,
 ) -> Tensor:
     """Weight the wavelength kernels into one kernel per field and colour.
 
@@ -74,21 +74,18 @@ def color_kernels(
         psf: The frozen PSF.
         wavelengths_um: (n,) grid of the response.
         response: (3, n) response of R, G, B.
-        depth_index: Which depth of the PSF.
+        depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
 
     Returns:
         (field, 3, h, w) float32; each kernel sums to 1.
 
     Raises:
-        ContractError: If the depth does not exist or the response does not fit.
+        ContractError: If the PSF does not reach the depth or the response does not fit.
     """
-    if not 0 <= depth_index < psf.depths_mm.size:
-        raise ContractError(
-            f"depth_index must be in 0..{psf.depths_mm.size - 1}; got {depth_index}"
-        )
     weights = torch.from_numpy(wavelength_weights(psf.wavelengths_um, wavelengths_um, response))
-    kernels = torch.from_numpy(psf.kernels[:, depth_index].astype(np.float64))
-    mixed = torch.einsum("cl,flhw->fchw", weights, kernels)
+    shares = torch.from_numpy(depth_weights(psf.depths_mm, depth_mm))
+    kernels = torch.from_numpy(psf.kernels.astype(np.float64))
+    mixed = torch.einsum("cl,flhw->fchw", weights, torch.einsum("d,fdlhw->flhw", shares, kernels))
     mixed = 0.5 * (mixed + mixed.flip(-1))
     return (mixed / mixed.sum(dim=(-2, -1), keepdim=True)).to(torch.float32)
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +16,7 @@ from camkit.models_def.optics.kernel_bank import (
     focused_copies,
 )
 from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.spot import relative_illumination
 from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.training.recipe import Recipe
@@ -39,7 +40,7 @@ def build_lens_bank(recipe: Recipe, cache_folder: Path | None = None) -> PsfBank
     path = PRESCRIPTIONS / f"{recipe.lens.prescription}.toml"
     if cache_folder is None:
         return _trace(recipe, path)
-    content = [path.read_text(encoding="utf-8"), json.dumps(asdict(recipe.lens))]
+    content = [path.read_text(encoding="utf-8"), json.dumps(recipe.lens.to_json())]
     content.append(recipe.camera.model_dump_json())
     name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"bank-{name}.npz"
@@ -54,10 +55,11 @@ def _trace(recipe: Recipe, path: Path) -> PsfBank:
     plan = recipe.lens
     heights = np.linspace(0.0, corner_height_mm(recipe), plan.fields)
     response = _response(recipe)
+    depths_mm = plan.depths_mm or (lens.object_distance_mm,)
     kernels = []
-    for copy in focused_copies(lens, plan.copies + 2, plan.seed):
+    for copy, depth_mm in product(focused_copies(lens, plan.copies + 2, plan.seed), depths_mm):
         traced, kept = colour_kernels(
-            copy,
+            with_object_distance(copy, depth_mm),
             response,
             heights,
             size_px=plan.kernel_px,
@@ -70,12 +72,15 @@ def _trace(recipe: Recipe, path: Path) -> PsfBank:
                 f"{LEAST_ENERGY}; raise lens.kernel_px"
             )
         kernels.append(traced)
+    depths = len(depths_mm)
+    nominal = kernels[0] if depths == 1 else np.mean(kernels[:depths], axis=0)
     return PsfBank(
-        copies=np.stack(kernels[1:]),
+        copies=np.stack(kernels[depths:]),
         copy_heights_mm=heights,
-        frozen=kernels[0],
+        frozen=nominal,
         frozen_heights_mm=heights,
         relative_illumination=relative_illumination(lens, torch.from_numpy(heights)).numpy(),
+        depths=depths,
     )
 
 

@@ -1,7 +1,9 @@
 """The PSFs that training samples are made with: fabricated copies, and the frozen one beside them.
 
 A capture is blurred by the kernels of a copy, as a lens from the line would; the Wiener filter in
-front of the network knows the frozen kernels only.
+front of the network knows the frozen kernels only. Where a camera sees several depths, every copy
+is there once per depth: whoever draws a copy draws its depth, and the frozen kernels are the mean
+over the depths.
 """
 
 import hashlib
@@ -23,11 +25,13 @@ class PsfBank:
     """Kernels of the colours for image points along +y; others by turning.
 
     Attributes:
-        copies: (copy, field, 3, h, w) float32, each sums to 1; the last copy is for validation.
+        copies: (copy * depth, field, 3, h, w) float32, each sums to 1; the depths of a copy lie
+            side by side, the last copy is for validation.
         copy_heights_mm: (field,) float64, increasing from 0.
         frozen: (field, 3, h, w) float32, what the bundle will hold.
         frozen_heights_mm: (field,) float64, increasing from 0.
         relative_illumination: (field,) float64 at `frozen_heights_mm`.
+        depths: Of every copy.
     """
 
     copies: FloatArray
@@ -35,12 +39,14 @@ class PsfBank:
     frozen: FloatArray
     frozen_heights_mm: NDArray[np.float64]
     relative_illumination: NDArray[np.float64]
+    depths: int = 1
 
     def __post_init__(self) -> None:
-        if self.copies.ndim != 5 or self.copies.shape[0] < 2:
+        count = self.copies.shape[0] if self.copies.ndim == 5 else 0
+        if self.depths < 1 or count % self.depths or count < 2 * self.depths:
             raise ContractError(
-                "copies must be (copy >= 2, field, 3, h, w), the last one for validation; "
-                f"got {self.copies.shape}"
+                "copies must be (copy >= 2 times depth, field, 3, h, w), the last copy for "
+                f"validation; got {self.copies.shape} with {self.depths} depth(s)"
             )
         if self.frozen.ndim != 4 or self.copies.shape[2] != 3 or self.frozen.shape[1] != 3:
             raise ContractError(
@@ -54,8 +60,8 @@ class PsfBank:
 
     @property
     def training_copies(self) -> int:
-        """How many copies may be trained on."""
-        return int(self.copies.shape[0]) - 1
+        """How many copies may be trained on, each depth of a copy counted."""
+        return int(self.copies.shape[0]) - self.depths
 
     def blur_kernels(self, copy: int, x_mm: float, y_mm: float) -> Tensor:
         """Give the (1, 3, h, w) kernels of one copy at a sensor position."""
@@ -71,7 +77,7 @@ class PsfBank:
 
     def digest(self) -> str:
         """Give the sha256 of all kernels and positions."""
-        total = hashlib.sha256()
+        total = hashlib.sha256(b"" if self.depths == 1 else str(self.depths).encode())
         for name in _ARRAYS:
             total.update(np.ascontiguousarray(getattr(self, name)).tobytes())
         return total.hexdigest()
@@ -88,13 +94,17 @@ _ARRAYS = (
 
 def write_bank(path: Path, bank: PsfBank) -> None:
     """Write a bank for another process."""
-    np.savez(path, **{name: getattr(bank, name) for name in _ARRAYS})
+    arrays = {name: getattr(bank, name) for name in _ARRAYS}
+    if bank.depths > 1:
+        arrays["depths"] = np.array(bank.depths)
+    np.savez(path, **arrays)
 
 
 def read_bank(path: Path) -> PsfBank:
     """Read what `write_bank` wrote."""
     with np.load(path, allow_pickle=False) as arrays:
-        return PsfBank(**{name: arrays[name] for name in _ARRAYS})
+        depths = int(arrays["depths"]) if "depths" in arrays else 1
+        return PsfBank(**{name: arrays[name] for name in _ARRAYS}, depths=depths)
 
 
 def gaussian_bank(*, sensor_height_mm: float, axis_px: float, corner_px: float) -> PsfBank:

@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -40,6 +41,9 @@ class LensRecipe:
         kernel_px: Side of its kernels, odd.
         rays: Rays in half the pupil.
         seed: Seed of the fabrication errors.
+        depths_mm: Object distances, increasing, with the sensor where the prescription has it; a
+            sample is taken at one of them by chance, the Wiener filter has their mean kernel.
+            Empty for the distance of the prescription.
     """
 
     prescription: str
@@ -48,6 +52,15 @@ class LensRecipe:
     kernel_px: int = 129
     rays: int = 4096
     seed: int = 101
+    depths_mm: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
+            raise ContractError(f"lens.depths_mm must increase from above 0; got {self.depths_mm}")
+
+    def to_json(self) -> dict[str, Any]:
+        """Give what decides the kernels, to name files by; depths only where there are any."""
+        return {name: value for name, value in asdict(self).items() if value != ()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -313,7 +326,7 @@ def samples_digest(recipe: Recipe, seed: int) -> str:
     content = {
         "camera": recipe.camera.model_dump(mode="json"),
         "wiener": recipe.wiener.model_dump(mode="json"),
-        "lens": asdict(recipe.lens),
+        "lens": recipe.lens.to_json(),
         "data": asdict(recipe.data),
         "scale": recipe.scale,
         "object_distance_mm": str(recipe.object_distance_mm),

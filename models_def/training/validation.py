@@ -61,7 +61,7 @@ class Score:
 
 
 def make_cases(recipe: Recipe, bank: PsfBank, pictures: Path | None) -> list[Case]:
-    """Photograph the middle of each picture at five field heights and two ISOs.
+    """Photograph the middle of each picture at five field heights, two ISOs, the depths in turn.
 
     The lens is the copy that is not trained on; each Wiener block lies off its place as a block
     of the bank does. Without a folder, procedural scenes are photographed.
@@ -97,6 +97,7 @@ def _middle(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
 
 def _exposure(recipe: Recipe, bank: PsfBank, share: float, iso: float, turn: int) -> Exposure:
     height = share * corner_height_mm(recipe)
+    depth = sum(divmod(turn, len(FIELD_SHARES))) % bank.depths
     azimuth = turn * GOLDEN_ANGLE_RAD
     x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
     offset = BLOCK_OFFSET_PX * recipe.camera.pixel_pitch_um / 1000
@@ -105,7 +106,7 @@ def _exposure(recipe: Recipe, bank: PsfBank, share: float, iso: float, turn: int
         y_mm=float(y_mm),
         block_x_mm=float(x_mm + offset * np.cos(3 * azimuth)),
         block_y_mm=float(y_mm + offset * np.sin(3 * azimuth)),
-        copy=bank.training_copies,
+        copy=bank.training_copies + depth,
         iso=iso,
     )
 

@@ -2,6 +2,8 @@
 
     FrozenPsf (field, depth, wavelength) -> color_kernels (field, 3) -> kernel_at (3) at (x, y)
 
+Several depths are blended into one first: those beside the object distance, or all of them.
+
 Kernels are stored for image points along +y (down the rows). A point in another direction gets
 the kernel turned so that its outward direction stays outward. Everything is computed for the
 quadrant x, y >= 0 and mirrored into the others, so mirrored points have mirrored bits.
@@ -12,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray, FrozenPsf, depth_weights
 from camkit.errors import ContractError
 
 FloatGrid = NDArray[np.float64]
@@ -64,7 +66,11 @@ def _hats(knots_um: FloatGrid, at_um: FloatGrid) -> FloatGrid:
 
 
 def color_kernels(
-    psf: FrozenPsf, wavelengths_um: FloatGrid, response: FloatGrid, *, depth_index: int = 0
+    psf: FrozenPsf,
+    wavelengths_um: FloatGrid,
+    response: FloatGrid,
+    *,
+    depth_mm: float | None = None,
 ) -> FloatArray:
     """Weight the wavelength kernels into one kernel per field and colour.
 
@@ -75,23 +81,29 @@ def color_kernels(
         psf: The frozen PSF.
         wavelengths_um: (n,) grid of the response.
         response: (3, n) response of R, G, B.
-        depth_index: Which depth of the PSF.
+        depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
 
     Returns:
         (field, 3, h, w) float32; each kernel sums to 1.
 
     Raises:
-        ContractError: If the depth does not exist or the response does not fit.
+        ContractError: If the PSF does not reach the depth or the response does not fit.
     """
-    depths = psf.depths_mm.size
-    if not 0 <= depth_index < depths:
-        raise ContractError(f"depth_index must lie in 0..{depths - 1}; got {depth_index}")
     weights = wavelength_weights(psf.wavelengths_um, wavelengths_um, response)
-    mixed = np.tensordot(psf.kernels[:, depth_index], weights, axes=([1], [1]))
+    mixed = np.tensordot(_at_depth(psf, depth_mm), weights, axes=([1], [1]))
     mixed = np.moveaxis(mixed, -1, 1)
     mixed = 0.5 * (mixed + mixed[..., ::-1])
     mixed /= mixed.sum(axis=(-2, -1), keepdims=True)
     return np.ascontiguousarray(mixed, dtype=np.float32)
+
+
+def _at_depth(psf: FrozenPsf, depth_mm: float | None) -> FloatArray | FloatGrid:
+    """Blend the depths; (field, wavelength, h, w)."""
+    shares = depth_weights(psf.depths_mm, depth_mm)
+    used = np.flatnonzero(shares)
+    if used.size == 1:
+        return psf.kernels[:, used[0]]
+    return np.tensordot(psf.kernels[:, used], shares[used], axes=([1], [0]))
 
 
 def kernel_at(

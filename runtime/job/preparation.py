@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.contracts import NoiseModel
+from camkit.bundle.manifest import Wiener
+from camkit.contracts import NoiseModel, depth_name
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock
@@ -58,6 +59,7 @@ class Preparation:
         )
         self.placement = self._place()
         self.noise = self._choose_noise()
+        self._note_depth()
         self.decided = self._decide(falls_back=self._falls_back())
         self.network = self._plan_network()
 
@@ -125,6 +127,16 @@ class Preparation:
         }
         self._sensor_noise = noise
         return noise.with_gains(self.white_balance)
+
+    def _note_depth(self) -> None:
+        """Record which kernels the bank takes, where there is a choice."""
+        bundle, depth_mm = self._setup.bundle, self._setup.options.depth_mm
+        if bundle is None or bundle.manifest.stage(Wiener) is None:
+            return
+        depths_mm = bundle.psf.depths_mm
+        if depths_mm.size > 1:
+            known = ", ".join(map(depth_name, depths_mm))
+            self.record["depth"] = f"mean of {known}" if depth_mm is None else depth_name(depth_mm)
 
     def _falls_back(self) -> bool:
         """Compare the capture with the bundle's envelope; tell whether the network is left out."""

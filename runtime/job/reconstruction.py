@@ -214,9 +214,10 @@ class Reconstruction:
         """
         bundle = self._setup.bundle
         bank = None if bundle is None else self._bank(bundle)
-        if bank is None or self.prepared.noise is None:
+        noise = self.prepared.noise
+        if bank is None or noise is None:
             raise ContractError("a network stands behind the Wiener bank of a bundle")
-        rows = self._network_rows(bank, self._front_rows(), self.prepared.noise, scale)
+        rows = self._network_rows(bank, self._front_rows(), noise, scale)
         return rows.read(0, self.capture.height)
 
     def _restored_bands(self, bundle: Bundle, front: RowSource) -> Iterator[FloatArray]:
@@ -273,7 +274,8 @@ class Reconstruction:
         if stage is None or self.prepared.placement is None or self.prepared.noise is None:
             return None
         psf = bundle.psf
-        kernels = color_kernels(psf, *bundle.manifest.camera.channel_response.to_arrays())
+        response = bundle.manifest.camera.channel_response.to_arrays()
+        kernels = color_kernels(psf, *response, depth_mm=self._setup.options.depth_mm)
         local = LocalPsf(
             kernels=scale_kernels(kernels, self.prepared.placement.kernel_scale),
             field_heights_mm=psf.field_heights_mm,

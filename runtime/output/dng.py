@@ -85,14 +85,21 @@ def camkit_description(
     origin_px: tuple[int, int],
     sensor_size_px: tuple[int, int],
     pixel_pitch_um: float,
+    object_distance_mm: float | None = None,
 ) -> str:
-    """Give the JSON that tells a later reader where on which sensor the capture lies."""
-    record = {
+    """Give the JSON that tells a later reader where on which sensor the capture lies.
+
+    The object distance (inf as "inf") is left out if None.
+    """
+    record: dict[str, Any] = {
         "bundle": bundle,
         "origin_px": list(origin_px),
         "sensor_size_px": list(sensor_size_px),
         "pixel_pitch_um": pixel_pitch_um,
     }
+    if object_distance_mm is not None:
+        finite = math.isfinite(object_distance_mm)
+        record["object_distance_mm"] = object_distance_mm if finite else "inf"
     return json.dumps({"camkit": record})
 
 

@@ -1,8 +1,10 @@
 import numpy as np
+import pytest
 import torch
 
 from camkit.models_def.sensors import psf as torch_psf
 from camkit.runtime.bank import psf as numpy_psf
+from tests.deep_bundle import deep_psf
 from tests.psf_factory import coma_kernels, frozen_psf
 
 KERNELS, HEIGHTS_MM = coma_kernels()
@@ -20,6 +22,17 @@ def test_colour_kernels_agree():
             numpy_psf.color_kernels(psf, wavelengths_um, response),
             atol=LOOKUP_TOLERANCE,
         )
+
+
+@pytest.mark.parametrize("depth_mm", [None, 500.0, 800.0, 2000.0])
+def test_colour_kernels_of_several_depths_agree(depth_mm):
+    psf, wavelengths_um = deep_psf(), np.linspace(0.42, 0.68, 5)
+    response = np.random.default_rng(4).random((3, 5))
+    np.testing.assert_allclose(
+        torch_psf.color_kernels(psf, wavelengths_um, response, depth_mm=depth_mm).numpy(),
+        numpy_psf.color_kernels(psf, wavelengths_um, response, depth_mm=depth_mm),
+        atol=LOOKUP_TOLERANCE,
+    )
 
 
 def test_kernels_of_image_points_agree():

@@ -17,6 +17,8 @@ from camkit.runtime.options import Options, parse_memory
         ({"assume": "center"}, "centre, scale"),
         ({"white_balance": (0.0, 1.0, 1.0)}, "gains"),
         ({"exposure_ev": 40.0}, "EV"),
+        ({"depth_m": 0.0}, "depth must be > 0"),
+        ({"depth_m": float("nan")}, "depth must be > 0"),
         ({"threads": 0}, "threads"),
         ({"max_mem_bytes": 1000}, "at least"),
     ],

@@ -1,18 +1,23 @@
 """The pipeline as an application uses it: same bits however it runs, clear refusals."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.tiling import Cancelled
-from camkit.runtime.options import Options
+from camkit.runtime.options import Method, Options
 from camkit.runtime.pipeline import Pipeline, load
+from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
+from tests.deep_bundle import write_deep_bundle
+from tests.psf_factory import psnr_db, texture
 
 
 @pytest.fixture(scope="module")
@@ -192,3 +197,54 @@ def test_streamed_bands_are_the_rows_of_the_picture(tmp_path: Path) -> None:
     assert next(top for top, _ in bands) == 0
     assert summary.shape == picture.image.shape
     assert set(summary.seconds) == set(picture.seconds)
+
+
+@pytest.fixture(scope="module")
+def deep(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    return write_deep_bundle(tmp_path_factory.mktemp("deep"))
+
+
+@pytest.fixture(scope="module")
+def near(deep: Bundle) -> Simulation:
+    """A capture of a scene half as far as the focus."""
+    scene = texture(96, 96)
+    options = SimulationOptions(depth_mm=500.0, origin_px=(80, 40), distort=False)
+    return simulate(scene, deep.manifest.camera, deep.psf, options)
+
+
+@pytest.mark.parametrize("method", ["wiener", "rl", "admm-tv"])
+def test_every_method_restores_best_with_the_kernels_of_the_depth(
+    method: Method, deep: Bundle, near: Simulation
+) -> None:
+    found = {}
+    for depth_m in (0.5, None, 1.0):
+        chosen = Options(method=method, depth_m=depth_m, color="camera", undistort=False)
+        image = Pipeline(deep, chosen).process_array(
+            near.mosaic, iso=100.0, white_balance=near.white_balance, origin_px=(80, 40)
+        )
+        found[depth_m] = psnr_db(image, near.clean, cut_px=16)
+    assert found[0.5] > found[None] + 0.1
+    assert found[None] > found[1.0]
+
+
+def test_without_a_depth_the_bank_has_the_mean_kernel(deep: Bundle, near: Simulation) -> None:
+    mean = np.stack([deep.psf.kernels.mean(axis=1)], axis=1)
+    shallow = replace(deep.psf, kernels=mean, depths_mm=np.array([1000.0]))
+    images = []
+    for bundle in (deep, replace(deep, _psf=shallow)):
+        pipeline = Pipeline(bundle, Options(method="wiener"))
+        images.append(pipeline.process_array(near.mosaic, iso=100.0, origin_px=(80, 40)))
+    np.testing.assert_allclose(images[0], images[1], atol=2e-5)
+
+
+def test_a_depth_without_kernels_is_refused_before_any_work(bundle: Path, deep: Bundle) -> None:
+    with pytest.raises(ContractError, match=r"0\.5 m to 2 m .*; got 3 m"):
+        Pipeline(deep, Options(depth_m=3.0))
+    with pytest.raises(ContractError, match="the one depth infinity; got 3 m"):
+        load(bundle, depth_m=3.0)
+    with pytest.raises(ContractError, match="there is none here"):
+        load(None, depth_m=3.0)
+
+
+def test_the_only_depth_may_be_named(bundle: Path, mosaic: np.ndarray) -> None:
+    np.testing.assert_array_equal(_run(bundle, mosaic, depth_m=np.inf), _run(bundle, mosaic))

@@ -1,8 +1,10 @@
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rawpy
+import tifffile
 
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, FrozenPsf
@@ -18,7 +20,9 @@ from camkit.runtime.simulate import (
     simulate,
     write_capture,
 )
+from tests.bundle_factory import tiny_camera
 from tests.camera_factory import delta_psf, make_camera, make_psf, whole_window
+from tests.deep_bundle import deep_psf
 
 CAMERA = make_camera()
 QUIET = SimulationOptions(noise=False, distort=False, vignette=False)
@@ -224,3 +228,42 @@ def test_capture_is_a_real_raw_file_that_knows_its_place(tmp_path: Path) -> None
     np.testing.assert_allclose(capture.white_balance, found.white_balance, rtol=1e-5)
     assert capture.noise is not None
     np.testing.assert_allclose(capture.noise.shot, camera.noise_at(400).shot, rtol=1e-5)
+
+
+def test_a_scene_is_blurred_by_the_kernel_of_its_depth() -> None:
+    point = np.zeros((3, 64, 96), dtype=np.float32)
+    point[:, 32, 48] = 0.5
+    camera, psf = tiny_camera(), deep_psf()
+    plain = {"noise": False, "distort": False, "vignette": False}
+    peaks = {}
+    for depth_mm in (500.0, 1000.0, 2000.0):
+        found = simulate(point, camera, psf, SimulationOptions(depth_mm=depth_mm, **plain))
+        assert found.depth_mm == depth_mm
+        peaks[depth_mm] = int(found.mosaic.max()) - 64
+    assert peaks[500.0] < 0.7 * peaks[2000.0]
+    assert peaks[2000.0] < 0.7 * peaks[1000.0]
+
+
+def test_several_depths_need_one_that_is_theirs() -> None:
+    camera = tiny_camera()
+    with pytest.raises(ContractError, match=r"0\.5 m, 1 m, 2 m"):
+        simulate(scene(), camera, deep_psf(), QUIET)
+    with pytest.raises(ContractError, match="got 3 m"):
+        simulate(scene(), camera, deep_psf(), SimulationOptions(depth_mm=3000.0))
+
+
+@pytest.mark.parametrize(
+    ("depths_mm", "depth_mm", "stated"),
+    [((500.0, 1000.0), 700.0, 700.0), ((500.0, np.inf), np.inf, "inf"), ((500.0,), 500.0, None)],
+)
+def test_a_capture_states_its_depth_where_there_are_several(
+    depths_mm: tuple[float, ...], depth_mm: float, stated: float | str | None, tmp_path: Path
+) -> None:
+    camera = tiny_camera()
+    options = SimulationOptions(depth_mm=depth_mm)
+    found = simulate(scene(), camera, deep_psf(depths_mm), options)
+    write_capture(tmp_path / "a.dng", found, camera, "deep")
+    with tifffile.TiffFile(tmp_path / "a.dng") as file:
+        record = json.loads(file.pages[0].description)["camkit"]
+    assert record.get("object_distance_mm") == stated
+    assert read_capture(tmp_path / "a.dng").bundle_name == "deep"

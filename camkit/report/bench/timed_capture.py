@@ -47,12 +47,17 @@ def timed_capture(
             f"got {width}x{height}"
         )
     lens = bundle.manifest.members[PSF].sha256
-    parts = (camera.model_dump_json(), lens, width, height, SCENE_TEXT, _VERSION)
+    depth_mm = bundle.reference_depth_mm
+    parts = (camera.model_dump_json(), lens, depth_mm, width, height, SCENE_TEXT, _VERSION)
     key = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
     path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}.dng"
     if not path.is_file():
         scene = np.minimum(procedural_scene(SCENE_SEED, height, width), np.float32(1))
-        options = SimulationOptions(exposure=EXPOSURE, workers=available_threads(None))
+        options = SimulationOptions(
+            exposure=EXPOSURE,
+            depth_mm=depth_mm,
+            workers=available_threads(None),
+        )
         simulation = simulate(scene, camera, bundle.psf, options)
         write_capture(path, simulation, camera, bundle.manifest.name)
     return path, (width, height)

@@ -65,7 +65,7 @@ def residual(planes: FloatArray, shot: Shot, lens: Lens) -> Residual | None:
     Args:
         planes: (3, h, w) restored, white-balanced camera space, vignetting still in.
         shot: The capture.
-        lens: As the bundle knows it.
+        lens: As the restoration assumed it.
 
     Returns:
         None where fewer than a tenth of the samples can be judged.

@@ -5,7 +5,7 @@ all methods share, is computed once; a test holds both to the same bits.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -27,7 +27,7 @@ from camkit.report.stress.twin import (
 )
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
-from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.bank.psf import color_kernels, kernel_at
 from camkit.runtime.capture import Capture
 from camkit.runtime.geometry.placement import place
 from camkit.runtime.network.engine import NetworkEngine
@@ -109,7 +109,13 @@ class Restored:
 
 
 class Rig:
-    """A bundle with its networks made ready, and the lights that its scenarios share."""
+    """A bundle with its networks made ready, and the lights that its scenarios share.
+
+    Attributes:
+        lens: Through which captures are taken: the bundle's, at its reference depth.
+        assumed_lens: What restorations go by: the kernels of the bank. Another one only where
+            the bundle knows several depths.
+    """
 
     def __init__(
         self, bundle: Bundle, sizes: tuple[str, ...], *, before: Bundle | None = None
@@ -134,7 +140,11 @@ class Rig:
         self._kernels = color_kernels(
             bundle.psf, *bundle.manifest.camera.channel_response.to_arrays()
         )
+        heights_mm = bundle.psf.field_heights_mm
         self.lens = nominal_lens(bundle)
+        self.assumed_lens = replace(
+            self.lens, kernels_at=lambda x, y: kernel_at(self._kernels, heights_mm, x, y)
+        )
         self._lights: dict[str, Light] = {}
         self._last: tuple[Capture, Restored] | None = None
 

@@ -99,7 +99,7 @@ def run_stress(
     sizes = options.sizes or tuple(bundle.manifest.networks)
     _check_same_camera(bundle, before)
     reasons = {s.name: s.applies(bundle) for s in options.scenarios}
-    taken = tuple(s for s in options.scenarios if reasons[s.name] is None)
+    taken = tuple(s.for_bundle(bundle) for s in options.scenarios if reasons[s.name] is None)
     judge = Judge(Rig(bundle, sizes, before=before))
     primary = judge.rig.primary
     scenes = _scenes(bundle, options)

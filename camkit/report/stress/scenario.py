@@ -49,6 +49,7 @@ class Scenario:
         log: Break points are interpolated over the logarithm.
         bounds: Quantities of the runtime's envelope that this scenario limits, and at which end.
         applies: Says why a bundle cannot take part; None if it can.
+        fit: Gives the scenario with the values of a bundle, where they depend on it.
         rival: Whether being below the input or the Wiener bank breaks a method here.
         note: What a reader of the page should know.
     """
@@ -66,6 +67,7 @@ class Scenario:
     log: bool = False
     bounds: Mapping[str, End] = field(default_factory=dict)
     applies: Applies = photographs
+    fit: Callable[[Bundle], "Scenario"] | None = None
     rival: bool = True
     note: str = ""
 
@@ -82,6 +84,10 @@ class Scenario:
             raise ContractError(f"{self.name}: {len(values)} values need as many labels")
         if self.shoot is None and self.measure is None:
             raise ContractError(f"{self.name}: a scenario shoots or measures")
+
+    def for_bundle(self, bundle: Bundle) -> "Scenario":
+        """Give the scenario with the values that a bundle asks for."""
+        return self if self.fit is None else self.fit(bundle)
 
     def take(self, judge: Judge, scene: Scene, value: float) -> Verdict:
         """Measure one value on one scene."""

@@ -111,13 +111,13 @@ class Judge:
         if (method, scene.name) not in self._model_errors:
             shot = self.rig.shoot(scene)
             for name, planes in self.rig.restore(shot).planes.items():
-                nominal = residual(planes, shot, self.rig.lens) if name != INPUT else None
+                nominal = residual(planes, shot, self.rig.assumed_lens) if name != INPUT else None
                 error = 0.0 if nominal is None else calibrate(nominal)
                 self._model_errors[name, scene.name] = error
         return self._model_errors.get((method, scene.name), 0.0)
 
     def _chi2(self, method: str, planes: FloatArray, shot: Shot) -> float | None:
-        found: Residual | None = residual(planes, shot, self.rig.lens)
+        found: Residual | None = residual(planes, shot, self.rig.assumed_lens)
         if found is None:
             return None
         return found.chi2(self.model_error(method, shot.light.scene))

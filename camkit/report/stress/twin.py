@@ -121,15 +121,16 @@ class Shot:
 
 
 def nominal_lens(bundle: Bundle) -> Lens:
-    """Give the lens as the bundle knows it."""
-    return lens_of(bundle, bundle.psf)
+    """Give the lens as the bundle knows it, at its reference depth."""
+    return lens_at(bundle, bundle.reference_depth_mm)
 
 
-def lens_of(bundle: Bundle, psf: FrozenPsf) -> Lens:
-    """Give a lens from a frozen PSF on the bundle's sensor."""
+def lens_at(bundle: Bundle, depth_mm: float) -> Lens:
+    """Give the lens as the bundle knows it, for one object distance."""
+    psf = bundle.psf
     return Lens(
         psf=psf,
-        kernels_at=kernel_lookup(psf, bundle.manifest.camera),
+        kernels_at=kernel_lookup(psf, bundle.manifest.camera, depth_mm=depth_mm),
         margin_px=psf.kernels.shape[-1] // 2,
     )
 

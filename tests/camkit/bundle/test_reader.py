@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import math
 import stat
 import threading
 import warnings
@@ -24,6 +25,7 @@ from camkit.bundle.reader import Bundle, bundle_from_bytes, find_bundle, open_bu
 from camkit.bundle.writer import bundle_to_bytes
 from camkit.errors import BundleError
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, write_tiny_bundle
+from tests.deep_bundle import write_deep_bundle
 from tests.disk_watch import nothing_written
 
 GOOD = bundle_to_bytes(tiny_manifest(), tiny_members())
@@ -434,3 +436,19 @@ def test_example_of_format_1_0_opens_for_ever() -> None:
     ]
     assert bundle.member("card.md").startswith(b"# tiny")
     assert hashlib.sha256(EXAMPLE.read_bytes()).hexdigest() == EXAMPLE_SHA256
+
+
+@pytest.mark.parametrize(
+    ("depths_mm", "expected_mm"),
+    [
+        ((500.0, 1000.0, 2000.0), 1000.0),
+        ((700.0, 1500.0), 1000.0),
+        ((1500.0, math.inf), 1500.0),
+        ((500.0,), 500.0),
+    ],
+)
+def test_the_reference_depth_is_the_focus_or_the_nearest_depth_of_the_psf(
+    depths_mm: tuple[float, ...], expected_mm: float, tmp_path: Path
+) -> None:
+    assert write_deep_bundle(tmp_path, depths_mm=depths_mm).reference_depth_mm == expected_mm
+    assert open_bundle(write_tiny_bundle(tmp_path)).reference_depth_mm == math.inf

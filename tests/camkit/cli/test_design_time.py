@@ -1,6 +1,7 @@
 """The commands that need torch: they say so, and otherwise hand their options on."""
 
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -135,9 +136,11 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
     outcome = camkit_command(
         *("freeze", "lens.toml", "-o", folder / "psf.safetensors"),
         *("--stress-out", folder / "stress.safetensors", "--report", folder / "freeze.json"),
-        "--json",
+        *("--depths-mm", "500,1e3,inf", "--max-side-px", 201, "--limit-db", 0.1, "--json"),
     )
     assert outcome.code == 0, outcome.err
+    assert seen["grid"].depths_mm == (500.0, 1000.0, math.inf)
+    assert (seen["grid"].max_side_px, seen["limit_db"]) == (201, 0.1)
     assert json.loads(outcome.out) == json.loads((folder / "freeze.json").read_text())
     assert json.loads(outcome.out)["block_px"] == 512
     assert (folder / "stress.safetensors").stat().st_size > 100
@@ -191,3 +194,10 @@ def test_files_of_the_final_stage_need_a_checkpoint_to_start_from(camkit_command
     outcome = camkit_command("train", RECIPE, "--vgg", "vgg19.pth")
     assert outcome.code == ExitCode.USAGE
     assert "say --final FROM.pt too" in outcome.err
+
+
+def test_depths_that_are_no_numbers_are_a_usage_error(camkit_command, tmp_path) -> None:
+    out = tmp_path / "psf.safetensors"
+    outcome = camkit_command("freeze", "lens.toml", "-o", out, "--depths-mm", "near,far")
+    assert outcome.code == ExitCode.USAGE
+    assert "--depths-mm takes distances" in outcome.err

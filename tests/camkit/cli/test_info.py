@@ -30,6 +30,7 @@ def test_a_bundle_is_described_without_its_list_of_hashes(captures, camkit_comma
     assert facts["name"] == "tiny"
     assert facts["sha256"] == open_bundle(captures / "tiny.camkit").sha256
     assert facts["psf"]["kernels"] == [2, 1, 3, 5, 5]
+    assert facts["psf"]["depths"] == ["infinity"]
     assert "members" not in facts
     text = camkit_command("info", "tiny.camkit").out
     assert "name: tiny" in text

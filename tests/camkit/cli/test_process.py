@@ -11,6 +11,7 @@ import pytest
 
 from camkit.cli.exit_code import ExitCode
 from camkit.runtime.output.sidecar import sidecar_path
+from tests.deep_bundle import write_deep_bundle
 
 JSON_KEYS = {
     "input",
@@ -228,3 +229,36 @@ def test_on_a_terminal_progress_goes_to_stderr_and_results_stay_on_stdout(
     assert [json.loads(line)["status"] for line in outcome.out.splitlines()] == ["ok", "ok"]
     assert "a.dng" in terminal.getvalue()
     assert "status" not in terminal.getvalue()
+
+
+def test_the_depth_decides_the_kernels_and_is_in_plan_and_sidecar(
+    tmp_path, monkeypatch, camkit_command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_deep_bundle(tmp_path)
+    bundle = ("--bundle", "deep.camkit")
+    camkit_command("simulate", "procedural:3", "--size-px", "64,48", *bundle, "-o", "a.dng")
+    call = ("process", "a.dng", *bundle, "--out-dir", "out")
+    assert camkit_command(*call).code == 0
+    mean = _record(tmp_path / "out")
+    assert mean["options"]["depth_m"] is None
+    assert mean["plan"]["depth"] == "mean of 0.5 m, 1 m, 2 m"
+    assert "done before" in camkit_command(*call, "--resume").out
+    planned = camkit_command("plan", *call[1:], "--depth-m", 0.7)
+    assert "kernels: 0.7 m" in planned.out
+    again = camkit_command(*call, "--resume", "--depth-m", 0.7)
+    assert (again.code, "done before" in again.out) == (0, False), "another depth is other work"
+    near = _record(tmp_path / "out")
+    assert (near["options"]["depth_m"], near["plan"]["depth"]) == (0.7, "0.7 m")
+    assert near["output_sha256"] != mean["output_sha256"]
+
+
+def test_infinity_is_a_depth_and_another_than_the_bundles_is_refused(
+    captures, camkit_command
+) -> None:
+    call = ("process", "a.dng", "--bundle", "tiny.camkit", "--out-dir", "out", "--depth-m")
+    assert camkit_command(*call, "inf").code == 0
+    assert _record(captures / "out")["options"]["depth_m"] == "inf"
+    outcome = camkit_command(*call, 3, "--overwrite")
+    assert outcome.code == ExitCode.USAGE
+    assert "the one depth infinity; got 3 m" in outcome.err

@@ -8,6 +8,7 @@ import pytest
 
 from camkit.cli.exit_code import ExitCode
 from camkit.runtime.raw import read_capture
+from tests.deep_bundle import write_deep_bundle
 
 
 def _simulate(camkit_command, *arguments: object, out: str = "s.dng"):
@@ -83,3 +84,29 @@ def test_a_negative_seed_is_a_usage_error(captures, camkit_command) -> None:
 
 def test_only_a_dng_is_written(captures, camkit_command) -> None:
     assert _simulate(camkit_command, "procedural:3", out="s.png").code == ExitCode.USAGE
+
+
+def test_a_depth_is_photographed_and_named_and_the_focus_without_one(
+    tmp_path, monkeypatch, camkit_command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_deep_bundle(tmp_path)
+    call = ("simulate", "procedural:3", "--size-px", "64,48", "--bundle", "deep.camkit")
+    found = {}
+    for name, depth in (("focus", ()), ("same", ("--depth-m", 1)), ("near", ("--depth-m", 0.7))):
+        outcome = camkit_command(*call, *depth, "-o", f"{name}.dng")
+        assert outcome.code == 0, outcome.err
+        found[name] = outcome.out, read_capture(f"{name}.dng").samples
+    assert found["focus"][0].endswith("ISO 100, 1 m away\n")
+    assert found["near"][0].endswith("0.7 m away\n")
+    np.testing.assert_array_equal(found["focus"][1], found["same"][1])
+    assert (found["focus"][1] != found["near"][1]).mean() > 0.1
+
+
+def test_a_depth_beyond_the_bundles_is_refused_and_nothing_is_written(
+    captures, camkit_command
+) -> None:
+    outcome = _simulate(camkit_command, "procedural:3", "--depth-m", 5)
+    assert outcome.code == ExitCode.USAGE
+    assert "the one depth infinity; got 5 m" in outcome.err
+    assert not (captures / "s.dng").exists()

@@ -12,6 +12,7 @@ from camkit.report.comparison import Rival, make_rows, protocol_text
 from camkit.report.quality import Shot, expose
 from camkit.report.tuning import Tuned
 from tests.bundle_factory import write_tiny_bundle
+from tests.deep_bundle import write_deep_bundle
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
 
@@ -112,7 +113,10 @@ def test_rows_that_cannot_be_made_say_what_to_do(
         make_rows(bundle, methods, [], {}, [100.0], "lens")
 
 
-def test_the_protocol_names_grids_and_seeds(bundle: Bundle) -> None:
+def test_the_protocol_names_grids_and_seeds(bundle: Bundle, tmp_path: Path) -> None:
     text = "\n".join(protocol_text(bundle, [100.0, 1600.0]))
+    assert "Pictures lie at" not in text
+    deep = write_deep_bundle(tmp_path)
+    assert protocol_text(deep, [100.0])[0].startswith("Pictures lie at 1 m;")
     assert "3 field heights and 7 wavelengths" in text
     assert "2001, 2002, 2003" in text

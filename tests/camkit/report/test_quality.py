@@ -25,6 +25,7 @@ from camkit.report.quality import (
     psnr,
     read_picture,
 )
+from tests.deep_bundle import write_deep_bundle
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
 
@@ -156,3 +157,13 @@ def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:
         list_set(tmp_path)
     with pytest.raises(ContractError, match="no folder"):
         list_set(tmp_path / "absent")
+
+
+def test_a_camera_of_several_depths_is_judged_at_its_focus(tmp_path: Path) -> None:
+    deep = write_deep_bundle(tmp_path)
+    scene = decode_srgb(texture(150, 170))
+    exposed = expose(make_shot(), scene, deep, deep.psf)
+    assert exposed.simulation.depth_mm == 1000.0
+    expected = deep.psf.kernels.mean(axis=1)[0, 0]
+    np.testing.assert_allclose(exposed.local.psf.kernels[0, 1], expected, atol=1e-6)
+    assert judge(bundle_restorer(deep, method="wiener")(exposed), exposed.sharp).psnr_db > 15

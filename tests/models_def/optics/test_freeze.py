@@ -1,8 +1,10 @@
 import json
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from camkit.bundle.camera import Camera
@@ -11,14 +13,22 @@ from camkit.bundle.stages import Wiener
 from camkit.errors import ContractError
 from camkit.models_def.optics import freeze as freeze_module
 from camkit.models_def.optics import sampling
+from camkit.models_def.optics.freeze import between_mm, choose_depths
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.prescription import read_prescription
-from camkit.models_def.optics.sampling import Bench, block_loss, frozen_loss, make_bench
+from camkit.models_def.optics.sampling import (
+    Bench,
+    block_loss,
+    frozen_loss,
+    make_bench,
+    mean_kernel_loss,
+)
 
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
 DUET = MODELS / "prescriptions" / "duet.toml"
 SETTINGS = Wiener(prior_scale=3e-4, prior_exponent=2.5)
 SMALL = FreezeGrid(rays=400)
+DEPTHS_MM = (2e4, 3e4, 6e4, math.inf)
 
 
 def _shrink(patch: pytest.MonkeyPatch) -> None:
@@ -39,7 +49,9 @@ def camera() -> Camera:
 def bench(camera: Camera) -> Bench:
     patch = pytest.MonkeyPatch()
     _shrink(patch)
-    made = make_bench(read_prescription(DUET), camera, SETTINGS, copies=1, rays=500)
+    made = make_bench(
+        read_prescription(DUET), camera, SETTINGS, copies=1, grid=replace(SMALL, rays=500)
+    )
     patch.undo()
     return made
 
@@ -119,3 +131,82 @@ def test_cheapest_block_grid_that_loses_little_is_taken(
     settings, loss = freeze_module.choose_blocks(bench.nominal, bench, limit_db=0.05)
     assert settings.block_px == chosen_px
     assert loss.mean_db == known[chosen_px]
+
+
+@pytest.fixture(scope="module")
+def deep(camera: Camera) -> Bench:
+    with pytest.MonkeyPatch.context() as patch:
+        _shrink(patch)
+        lens = read_prescription(DUET)
+        grid = FreezeGrid(rays=300, depths_mm=DEPTHS_MM)
+        return make_bench(lens, camera, SETTINGS, copies=1, grid=grid)
+
+
+def test_as_few_depths_between_the_ends_are_kept_as_the_loss_allows(deep: Bench) -> None:
+    assert deep.focus_mm == math.inf
+    kept = {db: choose_depths(deep.nominal, deep, limit_db=db) for db in (-9.0, 0.05, 9.0)}
+    assert kept[-9.0] == DEPTHS_MM
+    assert kept[9.0] == (DEPTHS_MM[0], DEPTHS_MM[-1])
+    assert set(kept[9.0]) <= set(kept[0.05]) <= set(DEPTHS_MM)
+
+
+def test_a_depth_left_out_costs_there_and_in_the_mean_kernel(deep: Bench) -> None:
+    nominal = deep.nominal
+    thin = replace(nominal, kernels=nominal.kernels[:, [0, 3]], depths_mm=nominal.depths_mm[[0, 3]])
+    known = frozen_loss(thin, deep)
+    assert known.by_depth_db[0] == known.by_depth_db[3] == 0
+    assert min(known.by_depth_db[1:3]) > 0
+    assert known.mean_db == pytest.approx(np.mean(known.by_depth_db))
+    unknown = mean_kernel_loss(thin, nominal, deep)
+    assert mean_kernel_loss(nominal, nominal, deep).by_depth_db == (0, 0, 0, 0)
+    assert unknown.mean_db > 0
+
+
+def test_the_mean_kernel_costs_less_than_that_of_one_end(deep: Bench) -> None:
+    """Light from every depth, restored with one kernel, against each with its own."""
+    kernels = deep.nominal.kernels
+    nearest, mean = (
+        frozen_loss(replace(deep.nominal, kernels=one.repeat(4, axis=1)), deep).mean_db
+        for one in (kernels[:, :1], kernels.mean(axis=1, keepdims=True))
+    )
+    assert nearest > 2 * mean > 0
+
+
+def test_half_way_is_half_way_in_diopters() -> None:
+    assert between_mm((1000.0,)) == ()
+    assert between_mm((500.0, 1000.0, math.inf)) == pytest.approx((2000 / 3, 2000.0))
+
+
+def test_freezing_at_several_depths_reports_those_kept_and_the_loss_between(
+    camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _shrink(monkeypatch)
+    monkeypatch.setattr(sampling, "PATCH_PX", 192)
+    monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (5,))
+    monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
+    monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
+    out = tmp_path / "psf.safetensors"
+    report = freeze_module.freeze_prescription(
+        DUET,
+        out,
+        camera=camera,
+        limit_db=20.0,
+        grid=FreezeGrid(rays=200, depths_mm=(2e4, 4e4, math.inf)),
+    )
+    psf = read_psf(out)
+    assert psf.depths_mm.tolist() == list(report.depths_mm) == [2e4, math.inf]
+    assert psf.kernels.shape[:3] == (5, 2, 3)
+    assert report.to_json()["depths_mm"] == "20000, inf"
+    assert report.between_loss_db > 0
+
+
+def test_without_depths_a_lens_is_frozen_at_its_own_distance(
+    camera: Camera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    near = replace(read_prescription(DUET), object_distance_mm=3e4)
+    monkeypatch.setattr(sampling, "PLACES", 1)
+    monkeypatch.setattr(sampling, "TRUE_WAVELENGTHS", 1)
+    bench = make_bench(near, camera, SETTINGS, copies=0, grid=FreezeGrid(rays=100))
+    assert (bench.depths_mm, bench.focus_mm) == ((3e4,), 3e4)
+    grid = FreezeGrid(rays=100, fields=2, wavelengths=1, energy=0.9)
+    assert freeze(near, camera, grid).psf.depths_mm.tolist() == [3e4]

@@ -79,7 +79,14 @@ def test_window_too_small_for_the_light_is_refused(camera: Camera) -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"fields": 1}, {"wavelengths": 0}, {"depths_mm": ()}, {"max_side_px": 64}, {"energy": 1.5}],
+    [
+        {"fields": 1},
+        {"wavelengths": 0},
+        {"depths_mm": (9.0, 5.0)},
+        {"depths_mm": (0.0,)},
+        {"max_side_px": 64},
+        {"energy": 1.5},
+    ],
 )
 def test_impossible_grid_is_refused(wrong: dict) -> None:
     with pytest.raises(ContractError):
@@ -120,3 +127,21 @@ def test_stress_kernels_spread_as_the_object_comes_near(camera: Camera) -> None:
     away = torch.arange(side) - side // 2
     width = (centre.sum(-1) * away**2).sum(-1)
     assert float(width[0]) > 2 * float(width[-1])
+
+
+def test_between_depths_kernels_follow_one_over_distance_better_than_distance(
+    camera: Camera,
+) -> None:
+    near_mm, far_mm = 2e4, 4e4
+    for share in (0.25, 0.5, 0.75):
+        there_mm = 1 / (share / near_mm + (1 - share) / far_mm)
+        grid = replace(SMALL, depths_mm=(near_mm, there_mm, far_mm), energy=0.98)
+        traced = freeze(read_prescription(DUET), camera, grid).psf.kernels.astype(float)
+        by_distance = (far_mm - there_mm) / (far_mm - near_mm)
+        errors = [
+            np.square(s * traced[:, 0] + (1 - s) * traced[:, 2] - traced[:, 1]).sum()
+            for s in (share, by_distance)
+        ]
+        assert errors[0] < 0.8 * errors[1]
+        signal = np.square(traced[:, 1]).sum()
+        assert errors[0] < 0.1**2 * signal

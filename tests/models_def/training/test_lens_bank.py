@@ -1,3 +1,6 @@
+import hashlib
+import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +10,9 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.kernel_bank import fabricated_copies
 from camkit.models_def.training import lens_bank
 from camkit.models_def.training.lens_bank import build_lens_bank
+from camkit.models_def.training.psf_bank import gaussian_bank
+
+GAUSSIAN = {"sensor_height_mm": 2.0, "axis_px": 1.0, "corner_px": 2.0}
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +52,28 @@ def test_kernels_that_lose_light_are_refused(small):
     narrow = replace(small, lens=replace(small.lens, kernel_px=3))
     with pytest.raises(ContractError, match=r"raise lens\.kernel_px"):
         build_lens_bank(narrow)
+
+
+def test_several_depths_give_every_copy_at_each_and_their_mean_kernel(small, traced):
+    lens = replace(small.lens, depths_mm=(2e4, math.inf), kernel_px=97)
+    deep = build_lens_bank(replace(small, lens=lens))
+    assert (deep.copies.shape[0], deep.training_copies, deep.depths) == (4, 2, 2)
+    far = deep.copies[:, :, :, 16:-16, 16:-16][1::2]
+    assert np.allclose(far / far.sum((-1, -2), keepdims=True), traced.copies, atol=1e-4)
+    near = replace(lens, depths_mm=(2e4,))
+    each = [build_lens_bank(replace(small, lens=near)).frozen]
+    each.append(build_lens_bank(replace(small, lens=replace(lens, depths_mm=()))).frozen)
+    assert np.allclose(deep.frozen, np.mean(each, axis=0), atol=1e-7)
+    assert np.abs(each[0] - each[1]).max() > 1e-3
+
+
+def test_banks_without_depths_keep_the_names_of_their_files(small, tmp_path, monkeypatch):
+    """A file made before there were depths is found again."""
+    monkeypatch.setattr(lens_bank, "_trace", lambda *_: gaussian_bank(**GAUSSIAN))
+    build_lens_bank(small, tmp_path)
+    (made,) = tmp_path.iterdir()
+    path = lens_bank.PRESCRIPTIONS / f"{small.lens.prescription}.toml"
+    names = ("prescription", "copies", "fields", "kernel_px", "rays", "seed")
+    plan = {name: getattr(small.lens, name) for name in names}
+    content = path.read_text(encoding="utf-8") + json.dumps(plan) + small.camera.model_dump_json()
+    assert made.name == f"bank-{hashlib.sha256(content.encode()).hexdigest()[:16]}.npz"

@@ -27,3 +27,23 @@ def test_kernels_are_normalised_everywhere_and_turn_with_the_azimuth(bank):
 def test_bank_without_a_copy_for_validation_is_refused(bank):
     with pytest.raises(ContractError, match="copy >= 2"):
         replace(bank, copies=bank.copies[:1])
+
+
+def test_depths_survive_the_disk_and_are_seen_by_the_digest(bank, tmp_path):
+    deep = replace(bank, depths=bank.copies.shape[0] // 2)
+    write_bank(tmp_path / "bank.npz", deep)
+    assert read_bank(tmp_path / "bank.npz").depths == deep.depths
+    other = replace(bank, copies=np.repeat(bank.copies, 2, axis=0))
+    assert replace(other, depths=2).digest() != other.digest()
+
+
+def test_the_copy_for_validation_is_kept_at_all_its_depths(bank):
+    deep = replace(bank, copies=np.repeat(bank.copies, 3, axis=0), depths=3)
+    assert deep.training_copies == 3 * bank.training_copies
+
+
+@pytest.mark.parametrize(("copies", "depths"), [(3, 2), (2, 2), (4, 0)])
+def test_copies_that_are_not_all_there_at_all_depths_are_refused(bank, copies, depths):
+    kernels = np.repeat(bank.copies[:1], copies, axis=0)
+    with pytest.raises(ContractError, match="depth"):
+        replace(bank, copies=kernels, depths=depths)

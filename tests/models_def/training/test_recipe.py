@@ -99,3 +99,18 @@ def test_training_may_differ_within_a_camera_but_nothing_else(recipe_path):
     assert differing_camera(one, longer) is None
     assert differing_camera(one, to_recipe(table(recipe_path, scale=32.0))) == "scale"
     assert differing_camera(one, to_recipe(table(recipe_path, wiener__overlap_px=16))) == "wiener"
+
+
+def test_depths_decide_the_samples_where_there_are_any(recipe_path):
+    deep = to_recipe(table(recipe_path, lens__depths_mm=[500, 1000.0]))
+    plain = to_recipe(table(recipe_path))
+    assert deep.lens.depths_mm == (500.0, 1000.0)
+    assert samples_digest(deep, 1) != samples_digest(plain, 1)
+    assert "depths_mm" not in plain.lens.to_json()
+    assert differing_camera(deep, plain) == "lens"
+
+
+@pytest.mark.parametrize("depths_mm", [[1000.0, 500.0], [0.0, 1.0], [700.0, 700.0]])
+def test_depths_that_do_not_increase_are_refused(recipe_path, depths_mm):
+    with pytest.raises(ContractError, match=r"lens\.depths_mm"):
+        to_recipe(table(recipe_path, lens__depths_mm=depths_mm))

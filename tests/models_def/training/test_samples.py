@@ -49,13 +49,22 @@ def test_noise_of_stabilised_samples_is_half_over_scale_at_any_iso(recipe, sharp
     assert abs(noise.mean()) < 0.1 * 0.5 / recipe.scale
 
 
+def with_wells(camera, factor):
+    """Give a camera whose pixels hold so many times the electrons."""
+    noise = tuple(
+        entry.model_copy(update={"gain_e_per_dn": factor * entry.gain_e_per_dn})
+        for entry in camera.noise
+    )
+    return camera.model_copy(update={"noise": noise, "full_well_e": factor * camera.full_well_e})
+
+
 def test_without_blur_and_with_little_noise_the_target_is_the_capture(recipe, sharp_bank):
     # A smooth scene, so that the demosaic is exact.
     side = scene_side_px(recipe, sharp_bank)
     ramp = np.linspace(0.2, 0.6, side, dtype=np.float32)
     crop = np.stack([np.tile(ramp, (side, 1))] * 3)
-    exposure = replace(CENTRE, iso=1e-3)
-    sample = make_sample(crop, exposure, recipe, sharp_bank, np.random.default_rng(0))
+    quiet = replace(recipe, camera=with_wells(recipe.camera, 1e5))
+    sample = make_sample(crop, CENTRE, quiet, sharp_bank, np.random.default_rng(0))
     top = float(sample.target.max())
     assert float((sample.planes[:3] - sample.target).abs().max()) < 1e-3 * top
 
@@ -124,6 +133,9 @@ def test_drawn_exposures_stay_in_their_ranges(recipe, bank):
     assert all(data.iso_min <= e.iso <= data.iso_max for e in drawn)
     assert all(2**data.exposure_min_ev <= e.factor <= 2**data.exposure_max_ev for e in drawn)
     assert {e.copy for e in drawn} == set(range(bank.training_copies))
+    deep = replace(bank, copies=np.repeat(bank.copies, 3, axis=0), depths=3)
+    drawn_deep = {draw_exposure(rng, recipe, deep).copy for _ in range(100)}
+    assert drawn_deep == set(range(3 * bank.training_copies)), "every depth of every copy"
     heights = [np.hypot(e.x_mm, e.y_mm) for e in drawn]
     assert max(heights) <= corner_height_mm(recipe)
     at_border = np.mean([any(e.borders) for e in drawn])

@@ -1,7 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
+from camkit.models_def.training import validation
+from camkit.models_def.training.samples import corner_height_mm
 from camkit.models_def.training.validation import (
     FIELD_SHARES,
     ISOS,
@@ -45,3 +49,25 @@ def test_score_means_agree_and_low_iso_is_easier(cases, recipe):
 def test_black_scores_far_below(cases, recipe):
     black = score(cases, recipe, lambda planes: torch.zeros_like(planes[:, :3]))
     assert black.mean_db < score_capture(cases, recipe).mean_db - 3
+
+
+def test_validation_goes_through_all_depths_of_the_unseen_copy_at_every_field(
+    recipe, bank, monkeypatch
+):
+    taken = []
+
+    def note(crop, exposure, *_):
+        taken.append(exposure)
+
+    monkeypatch.setattr(validation, "PROCEDURAL_PICTURES", 8)
+    monkeypatch.setattr(validation, "make_sample", note)
+    for depths in (1, 2, 5):
+        taken.clear()
+        deep = replace(bank, copies=np.repeat(bank.copies, depths, axis=0), depths=depths)
+        make_cases(recipe, deep, None)
+        unseen = set(range(deep.training_copies, len(deep.copies)))
+        for iso in ISOS:
+            for share in FIELD_SHARES:
+                height = share * corner_height_mm(recipe)
+                here = [e for e in taken if np.isclose(np.hypot(e.x_mm, e.y_mm), height)]
+                assert {e.copy for e in here if e.iso == iso} == unseen

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels, kernel_at, wavelength_weights
+from tests.deep_bundle import deep_psf
 from tests.psf_factory import coma_kernels, frozen_psf
 
 KERNELS, HEIGHTS_MM = coma_kernels()
@@ -76,10 +77,24 @@ def test_colour_kernels_are_normalised_and_symmetric_about_the_meridian():
     np.testing.assert_array_equal(mixed, mixed[..., ::-1])
 
 
-def test_a_depth_that_does_not_exist_is_refused():
+def test_a_depth_that_the_psf_does_not_reach_is_refused():
     psf = frozen_psf(KERNELS, HEIGHTS_MM, [0.45, 0.55, 0.65])
-    with pytest.raises(ContractError, match="depth_index"):
-        color_kernels(psf, np.array([0.4, 0.7]), FLAT, depth_index=1)
+    with pytest.raises(ContractError, match="the one depth infinity"):
+        color_kernels(psf, np.array([0.4, 0.7]), FLAT, depth_mm=1000.0)
+
+
+def test_without_a_depth_the_kernel_is_the_mean_of_all():
+    psf, response = deep_psf(), (np.array([0.4, 0.7]), FLAT)
+    each = [color_kernels(psf, *response, depth_mm=depth) for depth in psf.depths_mm]
+    np.testing.assert_allclose(color_kernels(psf, *response), np.mean(each, axis=0), atol=1e-7)
+    assert np.abs(each[0] - each[1]).max() > 0.1
+
+
+def test_between_depths_kernels_are_linear_in_the_vergence():
+    psf, response = deep_psf(), (np.array([0.4, 0.7]), FLAT)
+    near, far = (color_kernels(psf, *response, depth_mm=depth) for depth in (500.0, 1000.0))
+    between = color_kernels(psf, *response, depth_mm=1 / (0.75 / 500 + 0.25 / 1000))
+    np.testing.assert_allclose(between, 0.75 * near + 0.25 * far, atol=1e-7)
 
 
 def test_on_the_axis_nothing_is_turned():

@@ -15,6 +15,7 @@ from camkit.runtime.job.preparation import Preparation
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from tests.bundle_factory import tiny_camera, write_tiny_bundle
+from tests.deep_bundle import write_deep_bundle
 
 OWN_BALANCE = (2.0, 1.0, 1.5)
 OWN_MATRIX = np.diag([0.8, 1.0, 0.6])
@@ -138,3 +139,20 @@ def test_a_classical_method_plans_no_windows_and_the_network_does(bundle: Path) 
     assert made.record["quality"] == "exact"
     assert made.explain() is not None
     assert made.record["estimate"]["peak_mb"] > 260
+
+
+@pytest.mark.parametrize(
+    ("depth_m", "kernels"), [(None, "mean of 0.5 m, 1 m, 2 m"), (0.7, "0.7 m")]
+)
+def test_the_plan_says_whose_kernels_the_bank_has(
+    depth_m: float | None, kernels: str, tmp_path: Path
+) -> None:
+    deep = write_deep_bundle(tmp_path)
+    made = _prepare(
+        deep.path, _mosaic(origin_px=(0, 0), sensor_size_px=(320, 240)), depth_m=depth_m
+    )
+    assert made.record["depth"] == kernels
+
+
+def test_the_plan_of_one_depth_does_not_speak_of_it(bundle: Path) -> None:
+    assert "depth" not in _prepare(bundle, _mosaic()).record

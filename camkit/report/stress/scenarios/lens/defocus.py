@@ -8,32 +8,28 @@ from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.twin import Lens, Shot
 from camkit.runtime.bank.psf import color_kernels, kernel_at
-
-MM_PER_M = 1000.0
+from camkit.units import MM_PER_M
 
 
 def _applies(bundle: Bundle) -> str | None:
     psf = bundle.stress_psf()
     if psf is None:
         return "it holds no stress_psf.safetensors"
+    if bundle.manifest.object_distance_mm is not None:
+        return "it is not focused at infinity"
     if not np.isinf(psf.depths_mm[-1]):
         return "its stress PSF does not reach infinity"
     return photographs(bundle)
 
 
 def _lens_at(bundle: Bundle, inverse_m: float) -> Lens:
-    """Give the lens for one object distance, linear between the stored ones over 1 / distance."""
+    """Give the lens for one object distance."""
     psf = bundle.stress_psf()
     assert psf is not None
     camera = bundle.manifest.camera
     response = camera.channel_response.to_arrays()
-    inverses = MM_PER_M / psf.depths_mm[::-1]
-    at = float(np.interp(inverse_m, inverses, np.arange(inverses.size)))
-    low = min(int(at), inverses.size - 2)
-    deep, near = (
-        color_kernels(psf, *response, depth_index=inverses.size - 1 - i) for i in (low, low + 1)
-    )
-    kernels = (deep + np.float32(at - low) * (near - deep)).astype(np.float32)
+    depth_mm = MM_PER_M / inverse_m if inverse_m else np.inf
+    kernels = color_kernels(psf, *response, depth_mm=depth_mm)
     return Lens(
         psf=bundle.psf,
         kernels_at=lambda x, y: kernel_at(kernels, psf.field_heights_mm, x, y),

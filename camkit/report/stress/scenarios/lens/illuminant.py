@@ -59,7 +59,7 @@ def lens_under(rig: Rig, spectrum: Spectrum) -> Lens:
     wavelengths_um, response = rig.bundle.manifest.camera.channel_response.to_arrays()
     fine = np.stack([np.interp(GRID_UM, wavelengths_um, r, 0, 0) for r in response])
     lit = fine * spectrum(GRID_UM)
-    kernels = color_kernels(rig.bundle.psf, GRID_UM, lit)
+    kernels = color_kernels(rig.bundle.psf, GRID_UM, lit, depth_mm=rig.bundle.reference_depth_mm)
     heights_mm = rig.bundle.psf.field_heights_mm
     red, green, blue = fine.sum(axis=1) / lit.sum(axis=1)
     return replace(
