@@ -26,12 +26,12 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.report.plan_cells import CaptureCells, measure_cells, photograph, pipelines, start
-from camkit.report.plan_fit import Calibration, fit_model
+from camkit.report.plan_fit import Calibration, fit_model, saving_of_the_all_knowing
 from camkit.report.plan_scenes import GENERATORS, proof_scenes
 from camkit.report.quality import list_set, read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.plan.loss import plan_entries
+from camkit.runtime.plan.loss import EXACT, plan_entries
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.tiers import TierWork
 
@@ -93,6 +93,11 @@ def _calibrate(options: argparse.Namespace) -> int:
         made.model, adaptive_cost_db=made.adaptive[0], draft_cost_db=made.draft[0]
     )
     _print_calibration(made, captures)
+    known = [saving_of_the_all_knowing(c, *_work(bundle), 0.1) for c in captures]
+    print(f"were all losses known, 0.1 dB a capture would save {np.mean(known):.1%} of the work")
+    for target in made.model.lines:
+        sums = [c.errors[target].sum() / c.errors[EXACT].sum() for c in captures]
+        print(f"{target} everywhere loses {np.mean(10 * np.log10(sums)):.2f} dB")
     if options.out is not None:
         text = json.dumps({k: v.model_dump() for k, v in sorted(entries.items())}, indent=2)
         options.out.parent.mkdir(parents=True, exist_ok=True)
