@@ -141,7 +141,13 @@ def spots(
 
 def joint(parts: DesignParts, recipe: DesignRecipe, begin: Tensor) -> tuple[Tensor, dict[str, Any]]:
     """Give the best lens of a joint design from `begin`."""
-    lens = LensModule(parts.lens.problem, parts.lens.pixels, begin, whiten=recipe.optics.whiten)
+    lens = LensModule(
+        parts.lens.problem,
+        parts.lens.pixels,
+        begin,
+        whiten=recipe.optics.whiten,
+        units=recipe.optics.units,
+    )
     loop = DesignLoop(replace(parts, lens=lens), recipe.schedule)
     curve = [loop.judge().valid_db] + [moment.valid_db for moment in loop.run()]
     loop.take_best()

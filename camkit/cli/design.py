@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from camkit.models_def.design.loop import Progress
     from camkit.models_def.design.run import DesignRun
 
+MUCH_LOST = 0.02
+
 
 def design(
     recipe: Annotated[Path, typer.Argument(help="Design recipe (.toml).", metavar="RECIPE")],
@@ -72,9 +74,11 @@ def design(
 
 
 def _line(moment: "Progress") -> str:
+    lost = f", {moment.lost_light:.0%} of the light beyond kernel_px at the worst field"
     return (
         f"step {moment.step}: loss {moment.loss:.4f}, validation {moment.valid_db:.3f} dB "
         f"(best {moment.best_db:.3f}), {moment.seconds:.0f} s"
+        + (lost if moment.lost_light > MUCH_LOST else "")
     )
 
 

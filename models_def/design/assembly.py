@@ -10,12 +10,14 @@ from torch import Tensor, nn
 
 from camkit.errors import ContractError
 from camkit.models_def.design.loop import DesignParts
-from camkit.models_def.design.optics import LensModule
+from camkit.models_def.design.optics import WIDEST_PX, LensModule, fitting_window_px
 from camkit.models_def.design.recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.sensor import Recorder
+from camkit.models_def.design.starts import best_start
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.optics.lens_file.lens_file import read_lens
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.paraxial import paraxial_image
+from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
@@ -50,7 +52,7 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
     """Give the fields, wavelengths and depths of a recipe, and what is free of a lens."""
     optics = recipe.optics
     if optics.object_distances_mm:
-        lens = replace(lens, object_distance_mm=optics.object_distances_mm[0])
+        lens = refocused(lens, optics.focus_distance_mm or optics.object_distances_mm[0])
     if optics.f_number:
         lens = replace(lens, aperture_kind="f_number", aperture_value=optics.f_number)
     last = optics.solved_surface % len(lens.surfaces)
@@ -72,20 +74,31 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
     )
 
 
+def refocused(lens: Lens, distance_mm: float) -> Lens:
+    """Give the lens with its sensor moved as the paraxial image of an object at a distance is."""
+    placed = replace(lens, object_distance_mm=distance_mm)
+    return with_focus_shift(
+        placed, paraxial_image(placed).distance_mm - paraxial_image(lens).distance_mm
+    )
+
+
 def field_slopes(optics: OpticsRecipe) -> Tensor:
     """Give the fields (field,) as slopes, at equal steps of ideal image height."""
     far = math.tan(to_radians(optics.half_field_deg))
     return torch.linspace(0, far, optics.fields, dtype=torch.float64)
 
 
-def pixels_of(recipe: DesignRecipe) -> Pixels:
-    """Give the pixels and colours of a recipe."""
+def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
+    """Give the pixels and colours of a recipe, with a window that fits the lens at `begin`."""
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
-    return Pixels(
+    pixels = Pixels(
         pitch_um=recipe.pixels.pitch_um,
-        kernel_px=recipe.pixels.kernel_px,
+        kernel_px=recipe.pixels.kernel_px or WIDEST_PX,
         color_weights=weights / weights.sum(1, keepdim=True),
     )
+    if recipe.pixels.kernel_px:
+        return pixels
+    return replace(pixels, kernel_px=fitting_window_px(problem, begin, pixels))
 
 
 def network_of(recipe: DesignRecipe) -> nn.Module | None:
@@ -115,8 +128,13 @@ def parts_of(
         pictures: Folder of sharp pictures; None for procedural scenes alone.
     """
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
+    begin = best_start(problem, recipe.starts)
     lens = LensModule(
-        problem, pixels_of(recipe), problem.free.scaled(), whiten=recipe.optics.whiten
+        problem,
+        pixels_of(recipe, problem, begin),
+        begin,
+        whiten=recipe.optics.whiten,
+        units=recipe.optics.units,
     )
     return DesignParts(
         lens=lens,

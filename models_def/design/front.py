@@ -23,11 +23,14 @@ class Front:
         kind: none: the capture (3 planes); wiener: the capture and its Wiener result (6).
         signal_to_noise: Power of the signal at one cycle per pixel over that of the noise.
         exponent: Of the fall of the signal's power.
+        depth_known: Whether the filter is that of the depth of the patch; otherwise that of the
+            mean kernel over depths, as where a bundle is not told the depth.
     """
 
     kind: FrontKind = "none"
     signal_to_noise: float = 0.3
     exponent: float = 2.5
+    depth_known: bool = True
 
     def __post_init__(self) -> None:
         if self.kind not in ("none", "wiener"):

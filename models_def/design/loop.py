@@ -23,6 +23,7 @@ from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.loss import DesignLoss, design_loss
 from camkit.models_def.design.optics import LensModule
+from camkit.models_def.design.rest import LensAtRest
 from camkit.models_def.design.sensor import Recorder, capture
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.training.pictures import SceneSource
@@ -92,7 +93,7 @@ class DesignParts:
         source: Of sharp patches.
     """
 
-    lens: LensModule
+    lens: LensModule | LensAtRest
     network: nn.Module | None
     front: Front
     recorder: Recorder
@@ -118,7 +119,8 @@ class Progress:
         seconds: Since the loop was made or resumed.
         loss: Of the last step.
         valid_db: Mean PSNR of sRGB values over fixed patches.
-        best_db: The best so far.
+        best_db: That of the best lens so far.
+        lost_light: Share outside the window of a kernel, at the worst field, depth and colour.
     """
 
     step: int
@@ -126,6 +128,7 @@ class Progress:
     loss: float
     valid_db: float
     best_db: float
+    lost_light: float
 
 
 class DesignLoop:
@@ -135,6 +138,7 @@ class DesignLoop:
         self.parts, self.schedule = parts, schedule
         self.step = 0
         self.best_db = -math.inf
+        self.best_merit = -math.inf
         self.best: State = {}
         groups = [{"params": [parts.lens.moves], "lr": schedule.lens_rate}]
         if parts.network is not None:
@@ -193,7 +197,8 @@ class DesignLoop:
         for depth, of_depth in enumerate(kernels):
             chosen = of_depth[batch.fields]
             recorded = capture(batch.sharp, chosen, parts.recorder, batch.normal[depth])
-            planes = parts.front.planes(recorded, chosen)
+            known = chosen if parts.front.depth_known else kernels.mean(0)[batch.fields]
+            planes = parts.front.planes(recorded, known)
             made.append(planes[:, -3:] if parts.network is None else parts.network(planes))
         edge = (batch.sharp.shape[-1] - plan.patch_px) // 2
         sharp = batch.sharp[..., edge : edge + plan.patch_px, edge : edge + plan.patch_px]
@@ -217,36 +222,47 @@ class DesignLoop:
         )
 
     def judge(self, loss: float = math.nan, seconds: float = 0.0) -> Progress:
-        """Recover fixed patches with the present lens and network; the best are kept."""
+        """Recover fixed patches with the present lens and network; the best are kept.
+
+        The best have the largest PSNR; where captures are judged (`edof`), the least loss. What a
+        lens outside its limits pays in the loss counts against it.
+        """
         with torch.no_grad():
-            kernels, _ = self._kernels(moving=False)
-            found = [self._psnr_db(batch, kernels) for batch in self._valid]
-        valid_db = float(np.mean(found))
-        if valid_db > self.best_db:
-            self.best_db, self.best = valid_db, self._weights()
+            kernels, penalty = self._kernels(moving=False)
+            found = [self._judged(batch, kernels) for batch in self._valid]
+        valid_db, valid_loss = (float(np.mean(column)) for column in zip(*found, strict=True))
+        merit = valid_db if self.parts.loss.needs_network else -valid_loss
+        merit -= self.schedule.penalty_weight * float(penalty)
+        if merit > self.best_merit:
+            self.best_db, self.best_merit, self.best = valid_db, merit, self._weights()
         return Progress(
-            step=self.step, seconds=seconds, loss=loss, valid_db=valid_db, best_db=self.best_db
+            step=self.step,
+            seconds=seconds,
+            loss=loss,
+            valid_db=valid_db,
+            best_db=self.best_db,
+            lost_light=1 - float(kernels.sum((-2, -1)).amin()),
         )
 
-    def _psnr_db(self, batch: Batch, kernels: Tensor) -> float:
+    def _judged(self, batch: Batch, kernels: Tensor) -> tuple[float, float]:
+        """Give mean PSNR and loss of a batch."""
         pictures, sharp = self._pictures(batch, kernels)
-        error = (pictures.clamp(0, 1) - sharp).square().mean((2, 3, 4)).clamp_min(1e-10)
-        return float((-10 * torch.log10(error)).mean())
+        loss = float(design_loss(self.parts.loss, pictures, sharp))
+        return _psnr_db(pictures, sharp), loss
 
-    def field_psnr_db(self, patches: int) -> list[list[float]]:
-        """Give the PSNR of so many fixed patches at every field, drawn apart from all others."""
-        fields = len(self.parts.lens.problem.slopes)
+    def field_pictures(self, patches: int) -> Iterator[tuple[int, Tensor, Tensor]]:
+        """Give so many fixed patches at every field, drawn apart from all others.
+
+        Yields:
+            Field, recovered (depth, 1, 3, p, p) and sharp (1, 3, p, p), in sRGB tone.
+        """
         with torch.no_grad():
             kernels, _ = self._kernels(moving=False)
-            found: list[list[float]] = []
-            for field in range(fields):
+            for field in range(len(self.parts.lens.problem.slopes)):
                 at = torch.tensor([field])
-                drawn = [
-                    replace(self._draw(SCORE_SEED + field * patches + i, 1), fields=at)
-                    for i in range(patches)
-                ]
-                found.append([self._psnr_db(batch, kernels) for batch in drawn])
-        return found
+                for number in range(field * patches, (field + 1) * patches):
+                    batch = replace(self._draw(SCORE_SEED + number, 1), fields=at)
+                    yield field, *self._pictures(batch, kernels)
 
     def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
         """Give kernels and, for some fixed patches, (count, 3, h, w) captures, recovered, sharp."""
@@ -289,6 +305,7 @@ class DesignLoop:
         return {
             "step": self.step,
             "best_db": self.best_db,
+            "best_merit": self.best_merit,
             "best": self.best,
             "weights": self._weights(),
             "optimizer": self._optimizer.state_dict(),
@@ -296,7 +313,8 @@ class DesignLoop:
 
     def load(self, state: State) -> None:
         """Go back to a saved state."""
-        self.step, self.best_db, self.best = state["step"], state["best_db"], state["best"]
+        self.step, self.best = state["step"], state["best"]
+        self.best_db, self.best_merit = state["best_db"], state["best_merit"]
         self._set(state["weights"])
         self._optimizer.load_state_dict(state["optimizer"])
 
@@ -310,6 +328,11 @@ class DesignLoop:
             self.parts.lens.moves.copy_(weights["moves"])
         if self.parts.network is not None:
             self.parts.network.load_state_dict(weights["network"])
+
+
+def _psnr_db(pictures: Tensor, sharp: Tensor) -> float:
+    error = (pictures.clamp(0, 1) - sharp).square().mean((2, 3, 4)).clamp_min(1e-10)
+    return float((-10 * torch.log10(error)).mean())
 
 
 def _step_seed(seed: int, step: int) -> int:

@@ -1,7 +1,7 @@
 """The lens as a torch module: free numbers in, kernels over fields and depths out."""
 
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final, Literal
 
 import torch
 from torch import Tensor, nn
@@ -11,9 +11,33 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.least_squares import jacobian
 from camkit.models_def.optics.search.problem import Problem, limits_of, residuals, trace_batch
 from camkit.models_def.optics.search.splat import Pixels, splat_batch
+from camkit.models_def.optics.tolerance.landing import window_px
 
+MoveUnits = Literal["range", "own"]
+
+WIDEST_PX: Final = 385
+_LOST_LIGHT: Final = 0.01
+_SPARE: Final = 1.25
+_LEAST_PX: Final = 33
 _RIDGE: Final = 1e-3
 _AT_BOUND: Final = 1e-6
+
+
+class _Bounded(torch.autograd.Function):
+    """Numbers within 0..1; one beyond a bound still feels what leads back, which clamp forgets."""
+
+    @staticmethod
+    def forward(ctx: Any, free: Tensor) -> Tensor:
+        """Give the numbers within their bounds."""
+        ctx.save_for_backward(free)
+        return free.clamp(0, 1)
+
+    @staticmethod
+    def backward(ctx: Any, *slopes: Tensor) -> Tensor:
+        """Pass what does not lead further out."""
+        (free,), (slope,) = ctx.saved_tensors, slopes
+        outward = ((free < 0) & (slope > 0)) | ((free > 1) & (slope < 0))
+        return torch.where(outward, 0.0, slope)
 
 
 class LensModule(nn.Module):
@@ -21,6 +45,7 @@ class LensModule(nn.Module):
 
     The parameter `moves` is 0 for the lens as it began. With `whiten` one unit of any of its
     entries changes the spots alike, so that one learning rate serves stiff and soft numbers.
+    Without it `units` says whether 1 is the range of a number or 1 in its own unit.
 
     Attributes:
         problem: What is free, and which fields, wavelengths and depths are looked at.
@@ -31,7 +56,13 @@ class LensModule(nn.Module):
     basis: Tensor
 
     def __init__(
-        self, problem: Problem, pixels: Pixels, begin: Tensor, *, whiten: bool = True
+        self,
+        problem: Problem,
+        pixels: Pixels,
+        begin: Tensor,
+        *,
+        whiten: bool = True,
+        units: MoveUnits = "range",
     ) -> None:
         """Begin at `begin` (variable,), scaled.
 
@@ -43,29 +74,66 @@ class LensModule(nn.Module):
             raise ContractError("a joint design needs at least one free number of the lens")
         self.problem, self.pixels = problem, pixels
         self.register_buffer("begin", begin.clone())
-        basis = whitening(problem, begin) if whiten else torch.eye(len(begin), dtype=begin.dtype)
+        if whiten:
+            basis = whitening(problem, begin)
+        else:
+            span = problem.free.high - problem.free.low
+            own = torch.where(span > 0, 1 / span.clamp_min(1e-300), 0.0)
+            basis = torch.diag(torch.ones_like(begin) if units == "range" else own)
         self.register_buffer("basis", basis)
         self.moves = nn.Parameter(torch.zeros_like(begin))
 
     def scaled(self) -> Tensor:
         """Give the present lens (variable,), within its bounds."""
-        return (self.begin + self.basis @ self.moves).clamp(0, 1)
+        moved: Tensor = _Bounded.apply(self.begin + self.basis @ self.moves)  # type: ignore[no-untyped-call]
+        return moved
 
     def forward(self) -> tuple[Tensor, Tensor]:
         """Give kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
         scaled = self.scaled()[None]
-        free = self.problem.free
-        distances = self.problem.object_distances_mm or (free.lens.object_distance_mm,)
+        problem = self.problem
         kernels, penalty = [], torch.zeros((), dtype=scaled.dtype)
-        for distance_mm in distances:
-            traced = trace_batch(self.problem, scaled, distance_mm)
+        for distance_mm in problem.depths_mm:
+            traced = trace_batch(problem, scaled, distance_mm)
             kernels.append(splat_batch(traced.landed, self.pixels)[0])
-            penalty = penalty + limits_of(self.problem, traced, distance_mm).square().sum()
+            if distance_mm == problem.limited_mm:
+                penalty = limits_of(problem, traced, distance_mm).square().sum()
         return torch.stack(kernels), penalty
 
     def lens(self) -> Lens:
         """Give the present lens as a prescription."""
         return self.problem.free.made(self.scaled().detach())
+
+
+def fitting_window_px(problem: Problem, scaled: Tensor, pixels: Pixels) -> int:
+    """Give the odd window that holds 99 % of the light of every field, depth and colour.
+
+    A quarter is added, so that a design may spread light further than it found it.
+
+    Args:
+        problem: Fields, wavelengths and depths.
+        scaled: (variable,), the lens.
+        pixels: Their window is not used.
+
+    Raises:
+        ContractError: If the window would be wider than 385 px.
+    """
+    wide = replace(pixels, kernel_px=WIDEST_PX)
+    with torch.no_grad():
+        kernels = torch.stack(
+            [
+                splat_batch(trace_batch(problem, scaled[None], depth_mm).landed, wide)[0]
+                for depth_mm in problem.depths_mm
+            ]
+        )
+    held = float(kernels.sum((-2, -1)).amin())
+    if held < 1 - _LOST_LIGHT:
+        raise ContractError(
+            f"the lens is too blurred to begin with: {WIDEST_PX} px hold {held:.0%} of the light "
+            "of its worst field; begin from a sharper lens (or [starts]), or set kernel_px"
+        )
+    least = 2 * round(_SPARE * window_px(kernels, _LOST_LIGHT) / 2) + 1
+    return min(max(least, _LEAST_PX), WIDEST_PX)
 
 
 def whitening(problem: Problem, scaled: Tensor) -> Tensor:

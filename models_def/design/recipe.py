@@ -11,6 +11,8 @@ from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.loop import DesignSchedule
 from camkit.models_def.design.loss import DesignLoss
+from camkit.models_def.design.optics import MoveUnits
+from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
@@ -18,7 +20,7 @@ from camkit.models_def.toml_table import check_keys, read_table, section, typed
 
 _KEYS: Final = {
     *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
-    *("schedule", "data"),
+    *("schedule", "data", "starts"),
 }
 
 
@@ -29,23 +31,28 @@ class OpticsRecipe:
     Attributes:
         half_field_deg: Field angle of the far end of the strip.
         fields: How many fields from the axis, at equal steps of image height.
-        object_distances_mm: Depths, the first one focused on; empty for that of the lens.
+        object_distances_mm: Depths; empty for that of the lens.
+        focus_distance_mm: The depth that the sensor is focused on; 0 for the first one.
         efl_mm: Kept by the curvature of `solved_surface`; 0 keeps nothing.
         solved_surface: See there.
         rides: Whether the sensor rides on the paraxial image.
         pupil_rays: In half the pupil.
         whiten: Whether one unit of every move changes the spots alike.
+        units: Without whitening a move of 1 is the whole `range` of a number or 1 in its `own`
+            unit (1/mm, mm, 1 for a conic), which is what the rates of the thesis are in.
         f_number: Of the lens; 0 for that of the prescription.
     """
 
     half_field_deg: float
     fields: int = 9
     object_distances_mm: tuple[float, ...] = ()
+    focus_distance_mm: float = 0.0
     efl_mm: float = 0.0
     solved_surface: int = -1
     rides: bool = True
     pupil_rays: int = 512
     whiten: bool = True
+    units: MoveUnits = "range"
     f_number: float = 0.0
 
     def __post_init__(self) -> None:
@@ -53,6 +60,13 @@ class OpticsRecipe:
             raise ContractError(
                 "optics needs half_field_deg in 0..80, fields >= 2 and pupil_rays >= 1"
             )
+        if self.focus_distance_mm and self.focus_distance_mm not in self.object_distances_mm:
+            raise ContractError(
+                f"focus_distance_mm must be one of object_distances_mm "
+                f"{list(self.object_distances_mm)} (or 0); got {self.focus_distance_mm}"
+            )
+        if self.whiten and self.units != "range":
+            raise ContractError("whitened moves have no units: set whiten = false or leave units")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +75,7 @@ class PixelRecipe:
 
     Attributes:
         pitch_um: Of the pixels.
-        kernel_px: Odd window of a PSF.
+        kernel_px: Odd window of a PSF; 0 takes what the lens at the start needs.
         wavelengths_um: Increasing, an odd number.
         color_weights: One row of weights for R, G and B, as many as wavelengths.
         noise: Standard deviation, 1.0 = white level.
@@ -127,6 +141,7 @@ class DesignRecipe:
         name: Of the camera.
         prescription: Name of a built-in prescription or path of a lens file.
         variables: What of the lens is free.
+        starts: How many lenses near it are tried first.
     """
 
     name: str
@@ -140,6 +155,7 @@ class DesignRecipe:
     loss: DesignLoss
     schedule: DesignSchedule
     data: DesignData
+    starts: Starts
 
 
 def read_design(path: Path) -> DesignRecipe:
@@ -173,6 +189,7 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         loss=section("loss", DesignLoss, table.get("loss", {})),
         schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
         data=section("data", DesignData, table.get("data", {})),
+        starts=section("starts", Starts, table.get("starts", {})),
     )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of
@@ -19,8 +19,9 @@ from camkit.models_def.design.recipe import DesignRecipe, recipe_digest
 from camkit.models_def.optics.lens_file.lens_file import write_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.finish import finished
+from camkit.models_def.optics.search.problem import valid_share
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +81,7 @@ class DesignRun:
                 f"{self.checkpoint} is there already: give --resume to go on or --overwrite"
             )
         parts = parts_of(recipe, folder=options.recipe_folder, pictures=options.pictures)
+        _share_lens(parts.lens)
         self.loop = DesignLoop(parts, recipe.schedule)
         self._spent_s = 0.0
         self._spent_cpu_s = 0.0
@@ -109,12 +111,14 @@ class DesignRun:
     def _record(self, moment: Progress) -> None:
         if not self.leads:
             return
+        lens = self.loop.parts.lens
         self.options.out_dir.mkdir(parents=True, exist_ok=True)
         table = {
             "format": FORMAT,
             "digest": recipe_digest(self.recipe),
             "spent_s": self._spent_s,
             "spent_cpu_s": self._spent_cpu_s,
+            "lens": lens.state_dict(),
             **self.loop.state(),
         }
         part = self.checkpoint.with_name(self.checkpoint.name + ".part")
@@ -127,6 +131,8 @@ class DesignRun:
             "loss": moment.loss,
             "valid_db": moment.valid_db,
             "best_db": moment.best_db,
+            "lost_light": moment.lost_light,
+            "valid_rays": float(valid_share(lens.problem, lens.scaled().detach()[None])),
         }
         with self.log.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
@@ -147,6 +153,7 @@ class DesignRun:
                 f"{self.checkpoint} belongs to another recipe; give --overwrite or --out-dir"
             )
         self._spent_s, self._spent_cpu_s = table["spent_s"], table["spent_cpu_s"]
+        self.loop.parts.lens.load_state_dict(table["lens"])
         self.loop.load(table)
 
     def finish(self) -> dict[str, Any]:
@@ -177,3 +184,10 @@ def _join_workers() -> None:
     """Join the process group that torchrun describes; without one there is a single process."""
     if int(os.environ.get("WORLD_SIZE", "1")) > 1 and not torch.distributed.is_initialized():
         torch.distributed.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
+
+
+def _share_lens(lens: nn.Module) -> None:
+    """Let all processes begin at the lens of the first: another machine may find another start."""
+    if torch.distributed.is_initialized():
+        for value in lens.state_dict().values():
+            torch.distributed.broadcast(value, 0)

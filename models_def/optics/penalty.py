@@ -6,7 +6,7 @@ and 0 at the border. A ray pays ((barrier - margin) / barrier)^2 for margins bel
 every surface up to the first where it fails and not beyond, where nothing it says has a meaning.
 What a ray pays is continuous where it begins to fail; it falls by a step where a ray that failed
 further back begins to fail here.
-The limits of thickness take their heights from living rays alone, for the same reason.
+Heights for limits of thickness are taken from living rays alone, for the same reason.
 """
 
 from collections.abc import Sequence
@@ -20,6 +20,7 @@ from camkit.models_def.optics.trace import Rays, SurfaceTensors, sag, sag_slope
 
 BARRIER: Final = 0.05
 _TINY: Final = 1e-6
+_WITHIN: Final = 1 - 1e-3
 
 
 def ray_penalty(
@@ -44,7 +45,9 @@ def ray_penalty(
     before, depth = launched, launched.z
     for i, on in enumerate(seen):
         margins = _margins(tensors, before, depth, on, i)
-        cost = torch.stack([torch.relu(1 - m / barrier) ** 2 for m in margins]).sum(0)
+        cost = torch.zeros_like(on.x)
+        for margin in margins:
+            cost = cost + torch.relu(1 - margin / barrier) ** 2
         # a lost ray whose margins do not say why, as one that did not converge
         cost = torch.where(on.valid | (cost > 0), cost, 1.0)
         total = total + torch.where(before.valid, cost, 0.0)
@@ -79,42 +82,42 @@ def _margins(
     return margins if tensors.aspheric[i] else [square, *margins]
 
 
-def thickness_penalty(
-    tensors: SurfaceTensors, seen: Sequence[Rays], least_mm: Sequence[float]
-) -> Tensor:
-    """Give what too thin elements and gaps cost: squares in mm^2, differentiable.
-
-    Args:
-        tensors: The lens.
-        seen: From `trace`, all surfaces.
-        least_mm: Per gap between two surfaces, at the centre and at the edge. The edge lies at
-            the larger of the heights that living rays reach on the two surfaces.
-
-    Returns:
-        (gap, ...), the rest as in the tensors' thickness.
-
-    Raises:
-        ContractError: If a gap has no limit.
-    """
-    if len(least_mm) != len(seen) - 1:
-        raise ContractError(f"expected {len(seen) - 1} limits in mm; got {len(least_mm)}")
-    rows = []
-    for i, least in enumerate(least_mm):
-        gap = tensors.thickness_mm[i]
-        rho = torch.maximum(_reach(seen[i], gap), _reach(seen[i + 1], gap))
-        edge = gap + _height(tensors, i + 1, rho) - _height(tensors, i, rho)
-        rows.append(torch.relu(least - gap) ** 2 + torch.relu(least - edge) ** 2)
-    return torch.stack(rows)
-
-
-def _height(tensors: SurfaceTensors, i: int, rho: Tensor) -> Tensor:
-    terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
-    return sag(tensors.curvature_per_mm[i], tensors.conic[i], terms, rho)
-
-
-def _reach(rays: Rays, like: Tensor) -> Tensor:
-    """Give the largest rho of living rays, in the shape of a number of the lens."""
+def reach_rho(rays: Rays, like: Tensor) -> Tensor:
+    """Give the largest r^2 in mm^2 of living rays, in the shape of a number of the lens."""
     rho = torch.where(rays.valid, rays.x**2 + rays.y**2, 0.0)
     extra = rho.ndim - like.ndim
     dims = [d for d in range(rho.ndim) if d < extra or like.shape[d - extra] == 1]
     return rho.amax(dims, keepdim=True).reshape(like.shape) if dims else rho
+
+
+def edge_gaps(tensors: SurfaceTensors, reaches: Sequence[Tensor]) -> Tensor:
+    """Give the thickness of elements and gaps at their edges in mm, differentiable.
+
+    The edge lies at the larger of the heights that living rays reach on the two surfaces; a
+    conic that ends further in counts with the height of its rim.
+
+    Args:
+        tensors: The lens.
+        reaches: Of each surface, see `reach_rho`.
+
+    Returns:
+        (gap, ...), the rest as in the tensors' thickness; gaps are those between two surfaces.
+
+    Raises:
+        ContractError: If a surface has no reach.
+    """
+    if len(reaches) != len(tensors.aspheric):
+        raise ContractError(f"expected {len(tensors.aspheric)} reaches; got {len(reaches)}")
+    rows = []
+    for i in range(len(reaches) - 1):
+        rho = torch.maximum(reaches[i], reaches[i + 1])
+        bend = _height(tensors, i + 1, rho) - _height(tensors, i, rho)
+        rows.append(tensors.thickness_mm[i] + bend)
+    return torch.stack(rows)
+
+
+def _height(tensors: SurfaceTensors, i: int, rho: Tensor) -> Tensor:
+    c, k = tensors.curvature_per_mm[i], tensors.conic[i]
+    rim = _WITHIN / ((1 + k) * c**2).clamp_min(_TINY)
+    terms = tensors.even_asphere[i] if tensors.aspheric[i] else tensors.even_asphere[i][:0]
+    return sag(c, k, terms, torch.minimum(rho, rim))

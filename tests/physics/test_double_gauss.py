@@ -5,7 +5,12 @@ import math
 import pytest
 import torch
 
-from camkit.models_def.optics.paraxial import focal_lengths, trace_paraxial
+from camkit.models_def.optics.paraxial import (
+    entrance_pupil,
+    focal_lengths,
+    image_of_stop,
+    trace_paraxial,
+)
 from camkit.models_def.optics.pupil import PupilSamples, aim, launch
 from camkit.models_def.optics.reverse import reverse
 from camkit.models_def.optics.trace import Rays, trace
@@ -27,6 +32,20 @@ def test_focal_lengths_are_those_of_the_listing() -> None:
     assert float(efl) == pytest.approx(100.00375703, abs=1e-8)
     assert float(bfl) == pytest.approx(61.48753642, abs=1e-8)
     assert float(ffl) == pytest.approx(-29.32078245, abs=1e-8)
+
+
+def test_pupils_and_lengths_are_those_of_the_listing() -> None:
+    lens, four_digits = double_gauss(), 6e-5
+    stop_mm = 15.852527
+    place, scale = entrance_pupil(lens, STOP)
+    assert (float(place), 2 * stop_mm * float(scale)) == pytest.approx((57.9120, 50), abs=6e-5)
+    place, scale = image_of_stop(lens, STOP)
+    assert float(place) == pytest.approx(EXIT_PUPIL_MM, abs=four_digits)
+    assert 2 * stop_mm * float(scale) == pytest.approx(57.3201, abs=four_digits)
+    assert float(lens.thickness_mm[:-1].sum()) == pytest.approx(77.9674, abs=four_digits)
+    efl = float(focal_lengths(lens)[0])
+    assert efl / 50 == pytest.approx(2.0001, abs=four_digits)
+    assert efl * math.tan(math.radians(14)) == pytest.approx(24.9337, abs=four_digits)
 
 
 def test_paraxial_marginal_heights_are_those_of_the_listing() -> None:

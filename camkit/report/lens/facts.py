@@ -9,8 +9,9 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.curves import distortion, relative_illumination_of
+from camkit.models_def.optics.analysis.curves import distortion
 from camkit.models_def.optics.analysis.first_order import airy_radius_mm
+from camkit.models_def.optics.analysis.illumination import relative_illumination_of
 from camkit.models_def.optics.analysis.psf_model import PsfModel, psf_model
 from camkit.models_def.optics.analysis.sampling import Pupil, disc_quadrature
 from camkit.models_def.optics.analysis.seidel import Seidel, seidel_sums

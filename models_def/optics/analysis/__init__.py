@@ -5,7 +5,8 @@ In the order in which data flows (every result states its pupil, see `camkit...o
 - `sampling`: samplings of the pupil by name; which pupil an analysis uses
 - `first_order`: paraxial marginal and chief ray, invariant, ideal image height, Airy radius
 - `spots`: spot diagrams, their RMS and maximum, and how these converge with the sampling
-- `curves`: distortion, relative illumination, field curvature, axial and lateral colour
+- `curves`: distortion, field curvature, axial and lateral colour
+- `illumination`: light of an even scene on the sensor, by rays traced back from it
 - `seidel`: third-order and chromatic sums by surface
 - `wavefront`: optical path differences at the exit pupil
 - `wave_psf`: the diffraction PSF summed from them

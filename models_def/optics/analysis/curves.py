@@ -14,16 +14,10 @@ from camkit.models_def.optics.analysis.first_order import ideal_heights
 from camkit.models_def.optics.analysis.spots import analysis_tensors, chief_landings, launch_beams
 from camkit.models_def.optics.paraxial import focal_lengths
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.pupil import (
-    PupilDefinition,
-    PupilSamples,
-    half_disc,
-)
-from camkit.models_def.optics.spot import ANGLE_STEP_RAD, field_light
+from camkit.models_def.optics.pupil import PupilDefinition, PupilSamples
 from camkit.models_def.optics.trace import Rays, trace
 
 _CLOSE: Final = 1e-4
-_NEAR_AXIS_RAD: Final = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,29 +120,3 @@ def longitudinal_mm(lens: Lens, pupil: Tensor, wavelengths_um: Tensor) -> Tensor
 
 def _crossing(rays: Rays) -> Tensor:
     return -rays.y * rays.n / rays.m
-
-
-def relative_illumination_of(
-    lens: Lens, slopes: Tensor, wavelengths_um: Tensor, rays: int = 1024
-) -> Tensor:
-    """Give the light (field, wavelength) of a uniform scene, 1 on the axis; NaN without chief ray.
-
-    The rule of `spot.field_light`, with every ray aimed at the stop whatever the pupil of the
-    spots: it is the stop that lets light through. Losses of coating and bulk are not counted.
-
-    Args:
-        lens: The prescription.
-        slopes: (field,), tan of the field angles.
-        wavelengths_um: (wavelength,).
-        rays: In half the stop.
-    """
-    angles = torch.cat([torch.zeros(1, dtype=torch.float64), torch.atan(slopes)])
-    angles = angles.clamp_min(_NEAR_AXIS_RAD)
-    beams = launch_beams(lens, torch.tan(angles), wavelengths_um, half_disc(rays), "stop")
-    area = torch.where(trace(beams.tensors, beams.rays).valid, beams.area_mm2, 0.0).sum(-1)
-    heights, ahead, behind = (
-        chief_landings(lens, torch.tan(angles + step), wavelengths_um, "stop")
-        for step in (0.0, ANGLE_STEP_RAD, -ANGLE_STEP_RAD)
-    )
-    light = field_light(area, angles[:, None], heights, ahead - behind)
-    return light[1:] / light[:1]

@@ -66,3 +66,10 @@ def launch_beam(
     share = object_distance_mm / (object_distance_mm + place)
     top = -slope * object_distance_mm
     return launch(px * share, top + (py - top) * share, slope, object_distance_mm)
+
+
+def leading(rays: Rays) -> Rays:
+    """Give the rays that bound the beam, of rays (..., LEAD + ray)."""
+    parts = (rays.x, rays.y, rays.z, rays.l, rays.m, rays.n)
+    x, y, z, along_x, along_y, along_z = (part[..., :LEAD] for part in parts)
+    return Rays(x=x, y=y, z=z, l=along_x, m=along_y, n=along_z, fate=rays.fate[..., :LEAD])

@@ -75,19 +75,25 @@ def problem_of(recipe: LensRecipe) -> Problem:
         samples=half_disc(recipe.pupil_rays),
         core_mm=recipe.blur_floor_um / UM_PER_MM,
         limits=limits,
+        merit_fields=recipe.merit_fields,
     )
 
 
 def _variables(recipe: LensRecipe) -> tuple[Variable, ...]:
     inner = range(len(recipe.surfaces) - 1)
     surfaces = recipe.surfaces
-    free = [("curvature", i, surfaces[i].curvature_range_per_mm) for i in inner]
-    free += [("thickness", i, surfaces[i].thickness_range_mm) for i in inner]
-    free.append(("defocus", 0, recipe.focus_range_mm))
-    free += [("conic", i, s.conic_range) for i, s in enumerate(surfaces)]
+    free = [("curvature", i, 0, surfaces[i].curvature_range_per_mm) for i in inner]
+    free += [("thickness", i, 0, surfaces[i].thickness_range_mm) for i in inner]
+    free.append(("defocus", 0, 0, recipe.focus_range_mm))
+    free += [("conic", i, 0, s.conic_range) for i, s in enumerate(surfaces)]
+    free += [
+        ("even_asphere", i, term, bounds)
+        for i, s in enumerate(surfaces)
+        for term, bounds in enumerate(s.even_asphere_ranges)
+    ]
     return tuple(
-        Variable(kind=kind, surface=i, low=bounds[0], high=bounds[1])  # type: ignore[arg-type]
-        for kind, i, bounds in free
+        Variable(kind=kind, surface=i, term=term, low=bounds[0], high=bounds[1])  # type: ignore[arg-type]
+        for kind, i, term, bounds in free
     )
 
 
@@ -108,6 +114,7 @@ def _middle(recipe: LensRecipe, slopes: Tensor) -> Lens:
         stop=0,
         aperture_kind="stop_semi_diameter_mm",
         aperture_value=recipe.efl_mm / recipe.f_number / 2,
+        object_distance_mm=recipe.object_distance_mm,
         field_angles_rad=tuple(torch.atan(slopes).tolist()),
         wavelengths_um=recipe.wavelengths_um,
         reference_wavelength_um=recipe.reference_wavelength_um,

@@ -21,10 +21,10 @@ def finished(problem: Problem, scaled: Tensor) -> Lens:
     lens = problem.free.made(scaled)
     rim = torch.linspace(-1, 1, _RIM_RAYS, dtype=torch.float64)
     samples = replace(problem.samples, x=torch.zeros_like(rim), y=rim, weight=None)
-    distances = problem.object_distances_mm or (lens.object_distance_mm,)
     with torch.no_grad():
         seen = [
-            trace_batch(replace(problem, samples=samples), scaled[None], d).seen for d in distances
+            trace_batch(replace(problem, samples=samples), scaled[None], d).seen
+            for d in problem.depths_mm
         ]
     surfaces = []
     for i, surface in enumerate(lens.surfaces):
@@ -39,7 +39,7 @@ def finished(problem: Problem, scaled: Tensor) -> Lens:
 
 
 def with_rounded_numbers(lens: Lens) -> Lens:
-    """Give the lens as a drawing would state it: 0.1 um, conics to four digits."""
+    """Give the lens as a drawing would state it: 0.1 um, conics to 4 places, terms to 6 digits."""
     return replace(
         lens,
         surfaces=tuple(
@@ -48,6 +48,7 @@ def with_rounded_numbers(lens: Lens) -> Lens:
                 curvature_per_mm=1 / round(s.radius_mm, 4) if s.curvature_per_mm else 0.0,
                 thickness_mm=round(s.thickness_mm, 4),
                 conic=round(s.conic, 4),
+                even_asphere=tuple(float(f"{a:.6g}") for a in s.even_asphere),
             )
             for s in lens.surfaces
         ),

@@ -1,6 +1,7 @@
 """What a lens must not be, as residuals that vanish inside the limits."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -8,9 +9,11 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.trace import Rays, SurfaceTensors, sag
+from camkit.models_def.optics.penalty import edge_gaps, ray_penalty, reach_rho
+from camkit.models_def.optics.trace import Rays, SurfaceTensors
 
 _PENALTY_PER_MM: Final = 3.0
+_SOFT: Final = 1e-3
 _STEEPEST: Final = 0.8
 
 
@@ -45,30 +48,25 @@ def limit_residuals(
     solved: int | None,
     glass: tuple[bool, ...],
 ) -> Tensor:
-    """Give residuals (start, residual).
+    """Give residuals (start, residual). Thickness at the centre is a matter of bounds.
 
     Args:
         limits: The limits.
         tensors: (surface, start, 1, 1, 1).
-        seen: Rays on every surface, (start, field, wave, ray). Lost rays rest on the axis, so
-            heights are those of living rays.
+        seen: Rays on every surface, (start, field, wave, ray); heights are those of living rays.
         solved: The surface whose curvature is solved for.
         glass: Whether the medium after each surface is glass.
     """
-    # the root behind the maximum: its slope is finite though some rays lie on the axis
-    reach = torch.stack(
-        [(r.x**2 + r.y**2).flatten(1).amax(1).clamp_min(1e-12) for r in seen]
-    ).sqrt()
-    wide = torch.maximum(reach[:-1], reach[1:])
-    front = torch.stack([_height(tensors, i, wide[i]) for i in range(len(wide))])
-    back = torch.stack([_height(tensors, i + 1, wide[i]) for i in range(len(wide))])
-    gaps = tensors.thickness_mm[..., 0, 0, 0]
+    gaps, curvature = (t[..., 0, 0, 0] for t in (tensors.thickness_mm, tensors.curvature_per_mm))
+    rho = [reach_rho(rays, tensors.thickness_mm[0]) for rays in seen]
     least = [limits.min_edge_mm if inside else limits.min_air_mm for inside in glass[:-1]]
     # a stop is a plane in air: it may stand where a surface bulges through it
     real = [before or after for before, after in zip((False, *glass), glass, strict=False)]
     least = [edge if real[i] and real[i + 1] else -math.inf for i, edge in enumerate(least)]
-    thin = torch.relu(torch.tensor(least, dtype=gaps.dtype)[:, None] - (gaps[:-1] + back - front))
-    curvature = tensors.curvature_per_mm[..., 0, 0, 0]
+    edges = edge_gaps(tensors, rho)[..., 0, 0, 0]
+    thin = torch.relu(torch.tensor(least, dtype=gaps.dtype)[:, None] - edges)
+    # the root behind a floor: its slope is finite though all living rays may lie on the axis
+    reach = torch.stack(rho)[..., 0, 0, 0].clamp_min(1e-12).sqrt()
     steep = torch.relu(torch.abs(curvature * reach) - _STEEPEST)
     short = torch.relu(limits.min_bfl_mm - gaps[-1])[None]
     rows = [thin, steep, short]
@@ -79,9 +77,18 @@ def limit_residuals(
     return torch.cat([row.T for row in rows], dim=1) * _PENALTY_PER_MM
 
 
-def _height(tensors: SurfaceTensors, i: int, radius_mm: Tensor) -> Tensor:
-    curvature, conic = (t[i, :, 0, 0, 0] for t in (tensors.curvature_per_mm, tensors.conic))
-    return sag(curvature, conic, tensors.even_asphere[i, ..., 0, 0, 0], radius_mm**2)
+def ray_residuals(tensors: SurfaceTensors, launched: Rays, seen: Sequence[Rays]) -> Tensor:
+    """Give residuals (start, field) of rays that are lost or near to it.
+
+    Args:
+        tensors: (surface, start, 1, 1, 1).
+        launched: (start, field, 1, ray), those that bound the beam.
+        seen: On every surface, (start, field, wave, ray).
+    """
+    # the logarithm, as rays that pass far beyond a surface would drown all else
+    paid = torch.log1p(ray_penalty(tensors, launched, seen)).mean((-2, -1))
+    # the root has a finite slope where nothing is paid
+    return _PENALTY_PER_MM * (torch.sqrt(paid + _SOFT**2) - _SOFT)
 
 
 def distortion_residuals(limits: Limits, chief_y: Tensor, ideal_y: Tensor) -> Tensor:

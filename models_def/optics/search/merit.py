@@ -22,7 +22,9 @@ MERITS: Final[tuple[Merit, ...]] = get_args(Merit)
 _LOST_RAY: Final = 1.0
 
 
-def spot_residuals(landed: Rays, core_mm: float, merit: Merit = "sum_abs") -> Tensor:
+def spot_residuals(
+    landed: Rays, core_mm: float, merit: Merit = "sum_abs", *, fields: int = 0
+) -> Tensor:
     """Give residuals (start, residual) in mm (sqrt(mm) for `sum_abs`).
 
     Args:
@@ -30,15 +32,18 @@ def spot_residuals(landed: Rays, core_mm: float, merit: Merit = "sum_abs") -> Te
             x >= 0, so that the centroid lies on x = 0.
         core_mm: s.
         merit: Which.
+        fields: How many fields, from the axis, count; 0 for all. Of the others only lost rays do.
     """
     alive = landed.valid[..., LEAD:].to(landed.x.dtype)
     x, y = landed.x[..., LEAD:], landed.y[..., LEAD:]
     count = alive.sum((-2, -1), keepdim=True).clamp_min(1)
     dy = y - (y * alive).sum((-2, -1), keepdim=True) / count
     scale = _scale(x**2 + dy**2, core_mm, merit) * alive
+    counted = fields or scale.shape[1]
+    scale = scale * (torch.arange(scale.shape[1]) < counted)[:, None, None]
     lost = (1 - alive) * _LOST_RAY
     pairs = torch.stack([x * scale + lost, dy * scale], dim=-1)
-    each = pairs[0].numel() // 2
+    each = pairs[0, :counted].numel() // 2
     residuals: Tensor = pairs.flatten(1) / each**0.5
     return residuals
 

@@ -9,8 +9,13 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import trace_paraxial
 from camkit.models_def.optics.pupil import PupilSamples, half_disc
-from camkit.models_def.optics.search.beam import launch_beam
-from camkit.models_def.optics.search.limits import Limits, distortion_residuals, limit_residuals
+from camkit.models_def.optics.search.beam import LEAD, launch_beam, leading
+from camkit.models_def.optics.search.limits import (
+    Limits,
+    distortion_residuals,
+    limit_residuals,
+    ray_residuals,
+)
 from camkit.models_def.optics.search.merit import MERITS, Merit, spot_residuals
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
@@ -29,7 +34,10 @@ class Problem:
         samples: Of half the unit disc.
         merit: Which merit of spots.
         core_mm: Its s.
-        limits: What a lens must not be.
+        limits: What a lens must not be, seen from the depth that the sensor is focused on where
+            that is looked at, else from the first one.
+        merit_fields: How many fields, from the axis, the merit counts; 0 for all. The others only
+            must pass their rays.
     """
 
     free: FreeLens
@@ -40,6 +48,7 @@ class Problem:
     merit: Merit = "sum_abs"
     core_mm: float = 6e-3
     limits: Limits = field(default_factory=Limits)
+    merit_fields: int = 0
 
     def __post_init__(self) -> None:
         if self.merit not in MERITS:
@@ -49,6 +58,20 @@ class Problem:
         if not (self.core_mm > 0 and len(self.slopes) > 0 and float(self.slopes[0]) == 0):
             raise ContractError("a problem needs a core > 0 and fields that start at the axis")
 
+    @property
+    def depths_mm(self) -> tuple[float, ...]:
+        """Give the object distances that are looked at."""
+        return self.object_distances_mm or (self.free.lens.object_distance_mm,)
+
+    @property
+    def limited_mm(self) -> float:
+        """Give the object distance from which the limits are judged.
+
+        From another one the image lies off the sensor, larger or smaller: that is no distortion.
+        """
+        own = self.free.lens.object_distance_mm
+        return own if own in self.depths_mm else self.depths_mm[0]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Traced:
@@ -57,12 +80,14 @@ class Traced:
     Attributes:
         reference: The lenses at the reference wavelength.
         tensors: The lenses at all wavelengths.
+        launched: The rays before the first surface, (start, field, 1, LEAD + ray).
         landed: (start, field, wave, LEAD + ray) on the sensor, see `beam`.
         seen: The same on every surface.
     """
 
     reference: SurfaceTensors
     tensors: SurfaceTensors
+    launched: Rays
     landed: Rays
     seen: list[Rays]
 
@@ -76,19 +101,29 @@ def trace_batch(problem: Problem, scaled: Tensor, object_distance_mm: float) -> 
     rays = launch_beam(free.lens, reference, problem.slopes, problem.samples, object_distance_mm)
     seen: list[Rays] = []
     landed = trace(tensors, rays, seen=seen)
-    return Traced(reference=reference, tensors=tensors, landed=landed, seen=seen)
+    return Traced(reference=reference, tensors=tensors, launched=rays, landed=landed, seen=seen)
+
+
+def valid_share(problem: Problem, scaled: Tensor) -> Tensor:
+    """Give the share of rays that reach the sensor (start,), over fields, colours and depths."""
+    with torch.no_grad():
+        shares = [
+            trace_batch(problem, scaled, d).landed.valid[..., LEAD:].double().flatten(1).mean(1)
+            for d in problem.depths_mm
+        ]
+    return torch.stack(shares).mean(0)
 
 
 def residuals(problem: Problem, scaled: Tensor) -> Tensor:
     """Give residuals (start, residual) of a batch (start, variable)."""
-    own = problem.free.lens.object_distance_mm
     parts: list[Tensor] = []
-    distances = problem.object_distances_mm or (own,)
-    for number, distance_mm in enumerate(distances):
+    for distance_mm in problem.depths_mm:
         traced = trace_batch(problem, scaled, distance_mm)
-        spots = spot_residuals(traced.landed, problem.core_mm, problem.merit)
-        parts.append(spots / math.sqrt(len(distances)))
-        if number == 0:
+        spots = spot_residuals(
+            traced.landed, problem.core_mm, problem.merit, fields=problem.merit_fields
+        )
+        parts.append(spots / math.sqrt(len(problem.depths_mm)))
+        if distance_mm == problem.limited_mm:
             parts.append(limits_of(problem, traced, distance_mm))
     return torch.cat(parts, dim=1)
 
@@ -103,7 +138,10 @@ def limits_of(problem: Problem, traced: Traced, distance_mm: float) -> Tensor:
             traced.seen,
             solved=free.solved,
             glass=tuple(s.glass != "air" for s in free.lens.surfaces),
-        )
+        ),
+        ray_residuals(
+            traced.tensors, leading(traced.launched), [leading(rays) for rays in traced.seen]
+        ),
     ]
     if math.isfinite(limits.distortion) and len(problem.slopes) > 1:
         middle = len(problem.wavelengths_um) // 2

@@ -1,5 +1,6 @@
 """The recipe of a lens search: what is free, within which ranges, from which seed (TOML)."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,16 +13,26 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceRecipe:
-    """One surface: its glass (after it), ranges of curvature, thickness and conic (0: sphere)."""
+    """One surface.
+
+    Attributes:
+        glass: After it.
+        curvature_range_per_mm: See there.
+        thickness_range_mm: After it.
+        conic_range: [0, 0] is a sphere.
+        even_asphere_ranges: Of the coefficients of r^2, r^4, ...
+    """
 
     glass: str
     curvature_range_per_mm: Range
     thickness_range_mm: Range
     conic_range: Range = (0.0, 0.0)
+    even_asphere_ranges: tuple[Range, ...] = ()
 
     def __post_init__(self) -> None:
         find_glass(self.glass)
-        for bounds in (self.curvature_range_per_mm, self.thickness_range_mm, self.conic_range):
+        ranges = (self.curvature_range_per_mm, self.thickness_range_mm, self.conic_range)
+        for bounds in (*ranges, *self.even_asphere_ranges):
             _check_range(bounds)
 
 
@@ -49,6 +60,9 @@ class LensRecipe:
         steps: Steps of those.
         focus_range_mm: Of the sensor about the paraxial focus.
         surfaces: In the order of the light.
+        object_distance_mm: The sensor is focused on it, with `focus_range_mm`.
+        merit_fields: How many of the fields, from the axis, should be sharp; 0 for all. The others
+            only must pass their rays.
     """
 
     name: str
@@ -70,6 +84,8 @@ class LensRecipe:
     steps: int
     focus_range_mm: Range
     surfaces: tuple[SurfaceRecipe, ...]
+    object_distance_mm: float = math.inf
+    merit_fields: int = 0
 
     def __post_init__(self) -> None:
         if len(self.surfaces) < 3 or self.surfaces[0].curvature_range_per_mm != (0.0, 0.0):
@@ -77,6 +93,10 @@ class LensRecipe:
         _check_range(self.focus_range_mm)
         if not 1 <= self.kept <= self.starts:
             raise ContractError(f"kept must be 1..starts; got {self.kept} of {self.starts}")
+        if not 0 <= self.merit_fields <= self.fields:
+            raise ContractError(f"merit_fields must be 0..fields; got {self.merit_fields}")
+        if not self.object_distance_mm > 0:
+            raise ContractError(f"object_distance_mm must be > 0; got {self.object_distance_mm}")
 
 
 def read_recipe(path: Path) -> LensRecipe:

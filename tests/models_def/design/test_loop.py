@@ -1,9 +1,12 @@
+import math
 from dataclasses import replace
 
+import pytest
 import torch
 
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.loop import DesignLoop
+from camkit.models_def.design.loss import design_loss
 from camkit.models_def.design.recipe import DesignRecipe
 
 
@@ -67,6 +70,59 @@ def test_a_defocused_lens_is_brought_back_by_its_pictures(recipe: DesignRecipe) 
         loop.parts.lens.begin[-1] += 0.25
     begin = loop.judge().valid_db
     assert max(finish(loop)) > begin + 1.0
+
+
+def test_where_captures_are_judged_the_best_has_the_least_loss(recipe: DesignRecipe) -> None:
+    optics = replace(recipe.optics, object_distances_mm=(700.0, 1000.0), focus_distance_mm=1000.0)
+    judged = replace(
+        recipe,
+        optics=optics,
+        loss=replace(recipe.loss, kind="edof", reference_depth=1),
+        network=replace(recipe.network, name="", config={}),
+        schedule=replace(recipe.schedule, steps=4, hold_steps=0, lens_rate=0.5, valid_steps=1),
+    )
+    loop = make_loop(judged)
+    merits = []
+    for step in range(5):
+        finish(loop, until=step)
+        merits.append(loop.best_merit if step else -math.inf)
+        with torch.no_grad():
+            kernels, penalty = loop.parts.lens()
+            kernels = kernels.float()
+            losses = [
+                float(design_loss(judged.loss, *loop._pictures(batch, kernels)))
+                for batch in loop._valid
+            ]
+        here = -sum(losses) / len(losses) - judged.schedule.penalty_weight * float(penalty)
+        if step:
+            assert merits[-1] == pytest.approx(max(merits[-2], here), abs=1e-5)
+
+
+def test_a_front_that_is_told_no_depth_filters_with_the_mean_kernel(recipe: DesignRecipe) -> None:
+    optics = replace(recipe.optics, object_distances_mm=(600.0, 1000.0), focus_distance_mm=1000.0)
+    told = replace(
+        recipe,
+        optics=optics,
+        front=replace(recipe.front, kind="wiener"),
+        network=replace(recipe.network, name="", config={}),
+    )
+    untold = replace(told, front=replace(told.front, depth_known=False))
+    known, mean = make_loop(told), make_loop(untold)
+    assert known.judge().valid_db > mean.judge().valid_db
+    with torch.no_grad():
+        kernels = mean.parts.lens()[0].float()
+        same = kernels.mean(0, keepdim=True).expand_as(kernels)
+        # where all depths have one kernel there is nothing to be told
+        batch = mean._valid[0]
+        one, other = (loop._pictures(batch, same)[0] for loop in (known, mean))
+    torch.testing.assert_close(one, other)
+
+
+def test_light_beyond_the_window_is_counted(recipe: DesignRecipe) -> None:
+    cut = make_loop(replace(recipe, pixels=replace(recipe.pixels, kernel_px=9))).judge()
+    whole = make_loop(replace(recipe, pixels=replace(recipe.pixels, kernel_px=0))).judge()
+    assert whole.lost_light < 0.01
+    assert cut.lost_light > 0.3
 
 
 def test_the_best_lens_is_kept_and_put_in_place(recipe: DesignRecipe) -> None:

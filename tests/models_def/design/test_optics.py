@@ -36,12 +36,41 @@ def test_a_number_at_its_bound_has_an_axis_of_its_own(recipe: DesignRecipe) -> N
     assert abs(float(basis[0, 2])) > 1e-6
 
 
+def test_a_number_beyond_its_bound_feels_only_what_leads_back(recipe: DesignRecipe) -> None:
+    lens = parts_of(replace(recipe, optics=replace(recipe.optics, whiten=False))).lens
+    with torch.no_grad():
+        lens.moves.copy_(torch.tensor([-9.0, 9.0, 0.1]))
+    for sign, felt in ((1.0, [0.0, 1.0, 1.0]), (-1.0, [-1.0, 0.0, -1.0])):
+        (slope,) = torch.autograd.grad(sign * lens.scaled().sum(), lens.moves)
+        assert slope.tolist() == felt
+
+
 def test_numbers_stay_within_their_bounds(recipe: DesignRecipe) -> None:
     lens = parts_of(recipe).lens
     with torch.no_grad():
         lens.moves.fill_(1e6)
     assert float(lens.scaled().detach().max()) <= 1
     assert float(lens.scaled().detach().min()) >= 0
+
+
+def test_a_move_in_own_units_is_one_of_the_number(recipe: DesignRecipe) -> None:
+    optics = replace(recipe.optics, whiten=False, units="own")
+    lens = parts_of(replace(recipe, optics=optics)).lens
+    before = lens.lens().surfaces[2].conic
+    with torch.no_grad():
+        lens.moves[0] += 0.08
+    assert abs(lens.lens().surfaces[2].conic - before - 0.08) < 1e-12
+
+
+def test_depths_out_of_focus_are_not_taken_for_distorted(recipe: DesignRecipe) -> None:
+    optics = replace(recipe.optics, object_distances_mm=(400.0, 1000.0), focus_distance_mm=1000.0)
+    limits = replace(recipe.limits, distortion=0.05)
+    near = replace(recipe, optics=optics, limits=limits)
+    assert float(parts_of(near).lens()[1].detach()) < 1e-6
+    # seen from 0.4 m the picture on this sensor is 8 % smaller than its image
+    problem = parts_of(near).lens.problem
+    assert problem.limited_mm == 1000.0
+    assert problem.depths_mm == (400.0, 1000.0)
 
 
 def test_a_score_is_the_same_every_time_and_falls_with_defocus(recipe: DesignRecipe) -> None:

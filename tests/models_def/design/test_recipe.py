@@ -1,22 +1,63 @@
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import parts_of
+from camkit.models_def.design.assembly import find_lens, parts_of, problem_of
+from camkit.models_def.design.loop import DesignLoop
 from camkit.models_def.design.recipe import read_design, recipe_digest, to_design, with_choices
+from camkit.models_def.design.starts import Starts
+from camkit.models_def.optics.paraxial import paraxial_data
 
 RECIPES = Path(__file__).resolve().parents[3] / "models_def" / "recipes"
 
 
-@pytest.mark.parametrize("name", ["duet_joint"])
-def test_recipes_that_are_shipped_can_be_run(name: str) -> None:
-    parts = parts_of(read_design(RECIPES / f"{name}.toml"), folder=RECIPES)
-    kernels, penalty = parts.lens()
-    assert kernels.shape[2] == 3
-    assert float(penalty.detach()) < 0.1
+@pytest.mark.parametrize("name", ["duet_joint", "lfov", "lfov_joint", "edof", "edof_joint"])
+def test_recipes_that_are_shipped_take_steps(name: str) -> None:
+    recipe = read_design(RECIPES / f"{name}.toml")
+    small = replace(
+        recipe,
+        optics=replace(recipe.optics, fields=3, pupil_rays=32),
+        pixels=replace(recipe.pixels, kernel_px=65),
+        schedule=replace(
+            recipe.schedule, steps=2, batch=1, patch_px=24, valid_steps=2, valid_patches=1
+        ),
+        data=replace(recipe.data, procedural_scenes=1, scene_px=192),
+        starts=Starts(),
+    )
+    parts = parts_of(small, folder=RECIPES)
+    # a coarse start may bend the picture more than its limits allow
+    assert float(parts.lens()[1].detach()) < 1
+    loop = DesignLoop(parts, replace(small.schedule, hold_steps=0, freeze_share=0.0))
+    (moment,) = loop.run()
+    assert math.isfinite(moment.loss)
+    assert bool(parts.lens.moves.detach().all())
+
+
+def test_the_sensor_stands_where_the_chosen_depth_is_sharp(table: dict[str, Any]) -> None:
+    table["optics"] |= {"object_distances_mm": [500.0, 1000.0], "focus_distance_mm": 1000.0}
+    given = find_lens("duet")
+    lens = problem_of(to_design(table), given).free.lens
+    assert lens.object_distance_mm == 1000.0
+    moved = lens.surfaces[-1].thickness_mm - given.surfaces[-1].thickness_mm
+    # Newton's equation about the front focal point
+    ffl_mm = paraxial_data(given).ffl_mm
+    assert moved == pytest.approx(50.0**2 / (1000.0 + ffl_mm), rel=1e-4)
+
+
+def test_a_window_fits_the_lens_or_says_that_none_does(table: dict[str, Any]) -> None:
+    table["pixels"]["kernel_px"] = 0
+    lens = parts_of(to_design(table)).lens
+    held = lens()[0].sum((-2, -1)).detach()
+    assert float(held.min()) > 0.99
+    assert 33 <= lens.pixels.kernel_px < 129
+    table["optics"]["object_distances_mm"] = [200.0, 4000.0]
+    with pytest.raises(ContractError, match="385 px hold"):
+        parts_of(to_design(table))
 
 
 def change(key: str, **entries: Any) -> Callable[[dict[str, Any]], None]:
@@ -38,6 +79,9 @@ def change(key: str, **entries: Any) -> Callable[[dict[str, Any]], None]:
         (change("pixels", kernel_px=32), "odd"),
         (change("pixels", wavelengths_um=[0.5]), "three rows"),
         (change("optics", half_field_deg=95.0), "half_field_deg"),
+        (change("optics", focus_distance_mm=700.0), "one of object_distances_mm"),
+        (change("optics", units="own"), "whitened moves have no units"),
+        (change("optics", units="inch"), "one of range, own"),
         (lambda t: t.__setitem__("prescription", "nowhere"), "no lens 'nowhere'"),
         (change("front", kind="wiener"), "takes 3 planes"),
     ],

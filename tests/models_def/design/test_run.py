@@ -31,8 +31,9 @@ def test_a_stopped_run_goes_on_and_leaves_lens_log_and_checkpoint(
     report = resumed.finish()
     lens = read_lens(Path(report["lens"]))
     assert paraxial_data(lens).efl_mm == pytest.approx(50, abs=2)
-    steps = [json.loads(line)["step"] for line in resumed.log.read_text().splitlines()]
-    assert steps == [0, 3, 6]
+    entries = [json.loads(line) for line in resumed.log.read_text().splitlines()]
+    assert [entry["step"] for entry in entries] == [0, 3, 6]
+    assert [entry["valid_rays"] for entry in entries] == [1, 1, 1]
     assert report["best_db"] >= report["begin_db"]
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.penalty import ray_penalty, thickness_penalty
+from camkit.models_def.optics.penalty import edge_gaps, ray_penalty, reach_rho
 from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, trace
 from tests.physics.printed_lenses import cooke_tensors, lens_tensors, rays_at
 
@@ -70,7 +70,7 @@ def test_surfaces_behind_the_first_failure_are_silent() -> None:
     assert float(_pays(front, y)[0]) == float(_pays(steep, y)[0])
 
 
-def test_thin_edges_cost_their_square_at_the_height_of_living_rays() -> None:
+def test_an_edge_lies_at_the_height_of_living_rays() -> None:
     """Two equal spheres back to back: the edge is the gap less two sags."""
     lens = lens_tensors([1 / 20, -1 / 20], [1.0, 10.0], [1, 1.5, 1])
     lens = replace(lens, thickness_mm=lens.thickness_mm.requires_grad_())
@@ -78,18 +78,23 @@ def test_thin_edges_cost_their_square_at_the_height_of_living_rays() -> None:
     seen: list[Rays] = []
     landed = trace(lens, rays_at(0 * y, y, 0.0), seen=seen)
     assert landed.fate.tolist() == [Fate.VALID, Fate.MISSED]
-    cost = thickness_penalty(lens, seen, [0.6])
+    edges = edge_gaps(lens, [reach_rho(rays, lens.thickness_mm[0]) for rays in seen])
     sag = 20 - math.sqrt(20**2 - 3**2)
-    assert float(cost.detach()[0]) == pytest.approx((0.6 - (1 - 2 * sag)) ** 2, rel=1e-9)
-    (slope,) = torch.autograd.grad(cost.sum(), lens.thickness_mm)
-    assert float(slope[0]) < 0
+    assert edges.tolist() == pytest.approx([1 - 2 * sag], rel=1e-9)
+    (slope,) = torch.autograd.grad(edges.sum(), lens.thickness_mm)
+    assert slope.tolist() == [1, 0]
+
+
+def test_an_edge_beyond_the_end_of_a_sphere_lies_at_its_rim() -> None:
+    lens = lens_tensors([0.0, 1 / 5], [1.0, 10.0], [1, 1.5, 1])
+    wide = torch.tensor(8.0**2, dtype=F64)
+    (edge,) = edge_gaps(lens, [wide, wide]).tolist()
+    assert edge == pytest.approx(1 + 5, abs=0.2)
 
 
 def test_wrong_lists_are_refused() -> None:
     y = torch.tensor([1.0], dtype=F64)
     with pytest.raises(ContractError, match="surfaces"):
         ray_penalty(_ball(0.1), rays_at(y, y, 0.0), [])
-    seen: list[Rays] = []
-    trace(_ball(0.1), rays_at(y, y, 0.0), seen=seen)
-    with pytest.raises(ContractError, match="limits"):
-        thickness_penalty(_ball(0.1), seen, [])
+    with pytest.raises(ContractError, match="reaches"):
+        edge_gaps(_ball(0.1), [])

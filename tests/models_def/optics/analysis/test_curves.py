@@ -13,12 +13,11 @@ from camkit.models_def.optics.analysis.curves import (
     field_curvature,
     lateral_colour_mm,
     longitudinal_mm,
-    relative_illumination_of,
 )
 from camkit.models_def.optics.analysis.spots import field_slopes
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription
-from camkit.models_def.optics.spot import chief_heights, relative_illumination
+from camkit.models_def.optics.spot import chief_heights
 from tests.physics.reference_lenses import cooke_triplet, thorlabs_al2550
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
@@ -84,19 +83,6 @@ def test_defocus_is_not_taken_for_distortion() -> None:
     found = distortion(lens, field_slopes(lens), _waves(0.55), "paraxial")[:, 0]
     assert abs(float(found[1])) < 2e-6
     assert float(found[2]) == pytest.approx(18.136025932761 / 18.124758 - 1, abs=2e-6)
-
-
-def test_light_equals_that_of_the_sensor_heights_and_cos4_for_a_pinhole() -> None:
-    lens = _pinhole()
-    found = relative_illumination_of(lens, field_slopes(lens), _waves(0.55), rays=16)
-    cos4 = torch.cos(torch.tensor(lens.field_angles_rad, dtype=torch.float64)) ** 4
-    assert torch.allclose(found[:, 0], cos4, rtol=1e-6)
-    duet = read_prescription(PRESCRIPTIONS / "duet.toml")
-    slopes = field_slopes(duet)[::4]
-    reference = torch.tensor([duet.reference_wavelength_um], dtype=torch.float64)
-    by_angle = relative_illumination_of(duet, slopes, reference, rays=256)[:, 0]
-    by_height = relative_illumination(duet, chief_heights(duet, slopes), rays=256)
-    assert torch.allclose(by_angle, by_height, rtol=1e-4)
 
 
 def test_perfect_lens_has_one_focus_for_all_heights() -> None:

@@ -11,7 +11,7 @@ from camkit.models_def.optics.psf import energy_diameter
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.design import design
 from camkit.models_def.optics.search.recipe import LensRecipe, read_recipe
-from camkit.models_def.optics.spot import slopes_for_heights, trace_spots
+from camkit.models_def.optics.spot import rms_radius, slopes_for_heights, trace_spots
 
 MODELS = Path(__file__).resolve().parents[4] / "models_def"
 RECIPE = MODELS / "recipes" / "duet_lens.toml"
@@ -43,6 +43,35 @@ def test_found_lens_has_the_wanted_focal_length_and_respects_its_ranges(
         assert low - 1e-9 <= surface.thickness_mm <= high + 1e-9
         low, high = free.curvature_range_per_mm
         assert low - 1e-6 <= surface.curvature_per_mm <= high + 1e-6
+
+
+def test_aspheres_are_searched_within_their_ranges(recipe: LensRecipe) -> None:
+    ranges = ((0.0, 0.0), (-2e-5, 2e-5))
+    bent = replace(recipe.surfaces[2], even_asphere_ranges=ranges)
+    surfaces = (*recipe.surfaces[:2], bent, *recipe.surfaces[3:])
+    small = replace(
+        recipe, surfaces=surfaces, starts=3, scout_steps=2, kept=1, steps=3, fields=3, pupil_rays=6
+    )
+    lens = design(small).lens
+    flat, fourth = lens.surfaces[2].even_asphere
+    assert flat == 0
+    assert 0 < abs(fourth) <= 2e-5
+    assert paraxial_data(lens).efl_mm == pytest.approx(50.0, abs=2e-3)
+
+
+def test_a_search_may_care_for_the_axis_alone(recipe: LensRecipe) -> None:
+    """The axis gets sharper at the cost of the corner, which keeps its rays."""
+    few = replace(recipe, starts=12, scout_steps=3, kept=3, steps=12, fields=3, pupil_rays=8)
+    near = replace(few, object_distance_mm=1000.0)
+    found = [design(replace(near, merit_fields=count)).lens for count in (0, 1)]
+    waves = torch.tensor(recipe.wavelengths_um, dtype=torch.float64)
+    slopes = torch.tensor([0.0, 0.43], dtype=torch.float64)
+    spots = [trace_spots(lens, slopes, waves, half_disc(200)) for lens in found]
+    (axis, corner), (axis_alone, corner_alone) = (rms_radius(s).mean(1).tolist() for s in spots)
+    assert axis_alone < 0.9 * axis
+    assert corner_alone > corner
+    assert all(lens.object_distance_mm == 1000.0 for lens in found)
+    assert bool((spots[1].fate == 0).all())
 
 
 def test_same_seed_finds_the_same_lens(recipe: LensRecipe) -> None:
@@ -82,7 +111,9 @@ def test_duet_is_found_again_by_its_recipe(recipe: LensRecipe) -> None:
         (("seed = 11", 'seed = "x"'), "of type int"),
         (("efl_mm = 50.0", "efl_mm = [50.0]"), "of type float"),
         (("efl_mm = 50.0", "efl_mm = true"), "of type float"),
+        (("efl_mm = 50.0", "efl_mm = 50.0\nobject_distance_mm = -1.0"), "must be > 0"),
         (("kept = 16", "kept = 999"), "kept must be"),
+        (("fields = 9", "fields = 9\nmerit_fields = 10"), "merit_fields must be"),
         (("[0.5, 20.0]", "[9.0, 2.0]"), "range is"),
         (("curvature_range_per_mm = [0.0, 0.0]", "curvature_range_per_mm = [0.0, 1.0]"), "stop"),
         (('"PC-Sultanova2009"', '"PC"'), "known name"),

@@ -1,0 +1,34 @@
+"""The check of a design by rays: agreement of a known lens, and what cannot be checked."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from camkit.errors import ContractError
+from camkit.models_def.design.recipe import read_design
+from camkit.models_def.optics.search.variables import Variable
+from tools.design_check import check, parse
+
+RECIPE = Path(__file__).resolve().parents[2] / "models_def" / "recipes" / "duet_joint.toml"
+SMALL = ("--fields", "2", "--patch-px", "16", "--spp", "32", "--passes", "2")
+
+
+def test_rays_and_kernels_of_a_known_lens_agree() -> None:
+    arguments = parse([str(RECIPE), "duet", "--depth-mm", "1000", *SMALL])
+    rows = list(check(read_design(RECIPE), arguments))
+    assert [row["height_mm"] for row in rows] == [0.0, pytest.approx(21.7, abs=1.0)]
+    for row in rows:
+        assert row["agree_db"] > 30
+        assert row["ray_noise_db"] > row["agree_db"]
+        assert row["rays_db"] == pytest.approx(row["map_db"], abs=1.0)
+
+
+def test_an_infinite_object_and_a_foreign_lens_are_refused() -> None:
+    recipe = read_design(RECIPE)
+    with pytest.raises(ContractError, match="--depth-mm"):
+        next(check(recipe, parse([str(RECIPE), "duet"])))
+    # the duet's conic is negative
+    narrow = replace(recipe, variables=(Variable(kind="conic", surface=4, low=0.0, high=1.0),))
+    with pytest.raises(ContractError, match="outside the bounds"):
+        next(check(narrow, parse([str(RECIPE), "duet", "--depth-mm", "1000"])))

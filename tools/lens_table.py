@@ -1,0 +1,344 @@
+"""Which lens gives the best picture after recovery? Table 6.1 and figures 6.5, 6.7, 6.8 re-done.
+
+    python tools/lens_table.py RECIPE --lens al2550-a aca254-050-a cooke-triplet ours=lens.toml \
+        --data PICTURES --fresh OTHERS --steps 2000 --out-dir out/lens-table
+
+Every lens is set to F/4 and focused at 1 m. The recipe states the strip of the sensor (fields),
+the pixels, noise, front, loss and network; its lens does not matter. The same network is trained
+for each lens at rest with the same budget, for every seed, and judged on fresh pictures over the
+fields; with `--depths-mm 500,700,1000,1500` one network serves all depths and each is judged.
+What is finished is in the journal of the folder and not done again.
+"""
+
+import argparse
+import hashlib
+import json
+import sys
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import nn
+
+from camkit.models_def.design.assembly import field_slopes, find_lens, network_of
+from camkit.models_def.design.edge import ACROSS
+from camkit.models_def.design.loop import DesignLoop, DesignParts
+from camkit.models_def.design.loss import DesignLoss
+from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design
+from camkit.models_def.design.rest import Seen, at_rest, at_work, window_of
+from camkit.models_def.design.score import Captures, edge_contrasts, score_parts
+from camkit.models_def.design.sensor import Recorder
+from camkit.models_def.optics.lens_file.lens_file import write_lens
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.search.problem import Problem
+from camkit.models_def.optics.search.splat import Pixels
+from camkit.models_def.optics.search.variables import FreeLens
+from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.report.journal import append_journal, read_journal
+from camkit.report.lens.lens_table import (
+    draw_lens_table,
+    lens_table,
+    mean_and_spread,
+    worst_contrast,
+)
+from camkit.units import to_degrees
+
+Entry = dict[str, Any]
+JOURNAL: Final = "journal.jsonl"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What is the same for all lenses."""
+
+    recipe: DesignRecipe
+    depths_mm: tuple[float, ...]
+    f_number: float
+    object_mm: float
+    focus: str
+    largest_px: int
+    patches: int
+    data: Path | None
+    fresh: Path | None
+
+    def digest(self, *more: Any) -> str:
+        """Give a hash of all that decides a measurement."""
+        table = [asdict(self), *more]
+        return hashlib.sha256(json.dumps(table, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def main() -> int:
+    arguments = parse()
+    torch.set_num_threads(arguments.threads)
+    plan = plan_of(arguments)
+    folder: Path = arguments.out_dir
+    folder.mkdir(parents=True, exist_ok=True)
+    report: Entry = {
+        "recipe": plan.recipe.name,
+        "steps": plan.recipe.schedule.steps,
+        "network": plan.recipe.network.name,
+        "front": plan.recipe.front.kind,
+        "recovered_px": plan.recipe.schedule.patch_px + 2 * plan.recipe.front.margin_px,
+        "f_number": plan.f_number,
+        "object_mm": plan.object_mm,
+        "focus": plan.focus,
+        "depths_mm": plan.depths_mm,
+        "field_angles_deg": [
+            round(to_degrees(float(s)), 3) for s in torch.atan(field_slopes(plan.recipe.optics))
+        ],
+        "lenses": {},
+    }
+    for name, place in named(arguments.lens).items():
+        lens = working_lens(place, plan)
+        write_lens(lens, folder / f"{name}.toml")
+        entry = kept(folder, plan.digest(asdict(lens)), lambda lens=lens: before(lens, plan))
+        entry["recovered"] = [
+            kept(
+                folder,
+                plan.digest(asdict(lens), seed),
+                lambda lens=lens, seed=seed: after(lens, plan, seed, folder),
+            )
+            for seed in range(1, arguments.seeds + 1)
+        ]
+        report["lenses"][name] = entry
+        print(row(name, entry), flush=True)
+    (folder / "lens_table.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+    (folder / "lens_table.md").write_text(lens_table(report), encoding="utf-8")
+    (folder / "lens_table.png").write_bytes(draw_lens_table(report, folder))
+    print(f"{folder / 'lens_table.md'}, .json, .png")
+    return 0
+
+
+def parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("recipe", type=Path)
+    parser.add_argument("--lens", nargs="+", required=True, help="names, files or NAME=FILE")
+    parser.add_argument("--data", type=Path, help="pictures to train on")
+    parser.add_argument("--fresh", type=Path, help="pictures to judge on")
+    parser.add_argument("--out-dir", type=Path, default=Path("out/lens-table"))
+    parser.add_argument("--steps", type=int, help="of every network; the recipe's by default")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--network", help="name in the catalogue, in place of the recipe's")
+    parser.add_argument("--front", choices=("none", "wiener"), help="in place of the recipe's")
+    parser.add_argument("--depths-mm", help="such as 500,700,1000,1500")
+    parser.add_argument("--object-mm", type=float, default=1000.0)
+    parser.add_argument("--f-number", type=float, default=4.0)
+    parser.add_argument(
+        "--focus",
+        choices=("own", "paraxial", "spot", "wavefront"),
+        default="own",
+        help="own: a lens made for this distance keeps its sensor, others are focused paraxially",
+    )
+    parser.add_argument("--largest-kernel-px", type=int, default=257)
+    parser.add_argument("--patches", type=int, default=8, help="fresh patches at every field")
+    parser.add_argument("--threads", type=int, default=1)
+    return parser.parse_args()
+
+
+def named(lenses: list[str]) -> dict[str, str]:
+    """Give built-in names or paths by the name that the table shows."""
+    found: dict[str, str] = {}
+    for text in lenses:
+        name, _, place = text.rpartition("=")
+        name = name or Path(place).stem
+        if name in found:
+            raise SystemExit(f"two lenses are called {name}; write NAME=FILE for one of them")
+        found[name] = place
+    return found
+
+
+def plan_of(arguments: argparse.Namespace) -> Plan:
+    recipe = read_design(arguments.recipe)
+    schedule = recipe.schedule
+    steps = arguments.steps or schedule.steps
+    # the rates fall over the run as they do in the recipe's
+    schedule = replace(
+        schedule,
+        steps=steps,
+        lens_rate=0.0,
+        epoch_steps=max(1, round(schedule.epoch_steps * steps / schedule.steps)),
+        valid_steps=max(1, steps // 10),
+    )
+    front = replace(recipe.front, kind=arguments.front or recipe.front.kind)
+    config = {**recipe.network.config, "in_channels": front.channels}
+    network = replace(recipe.network, config=config)
+    if arguments.network:
+        network = NetworkChoice(name=arguments.network, config={"in_channels": front.channels})
+    loss = recipe.loss if recipe.loss.needs_network else DesignLoss(kind="l1")
+    depths = (arguments.object_mm,)
+    if arguments.depths_mm:
+        depths = tuple(float(word) for word in arguments.depths_mm.split(","))
+    return Plan(
+        recipe=replace(recipe, schedule=schedule, front=front, network=network, loss=loss),
+        depths_mm=depths,
+        f_number=arguments.f_number,
+        object_mm=arguments.object_mm,
+        focus=arguments.focus,
+        largest_px=arguments.largest_kernel_px,
+        patches=arguments.patches,
+        data=arguments.data,
+        fresh=arguments.fresh,
+    )
+
+
+def working_lens(name: str, plan: Plan) -> Lens:
+    """Give the lens as it works; foci on spots count the fields of the strip."""
+    slopes = field_slopes(plan.recipe.optics)
+    lens = replace(
+        find_lens(name),
+        field_angles_rad=tuple(torch.atan(slopes).tolist()),
+        wavelengths_um=plan.recipe.pixels.wavelengths_um,
+    )
+    focus = None if plan.focus == "own" else plan.focus
+    return at_work(
+        lens,
+        f_number=plan.f_number,
+        object_distance_mm=plan.object_mm,
+        focus=focus,  # type: ignore[arg-type]
+    )
+
+
+def kept(folder: Path, key: str, make: Any) -> Entry:
+    """Give the entry of the journal, or make it and write it down."""
+    path = folder / JOURNAL
+    for entry in read_journal(path, lambda m: {**m, "key": m["key"]}, "measurement"):
+        if entry["key"] == key:
+            return dict(entry)
+    begin = time.process_time()
+    made = {"key": key, **make(), "cpu_s": 0.0}
+    made["cpu_s"] = round(time.process_time() - begin, 1)
+    append_journal(path, [made])
+    return made
+
+
+def parts(
+    lens: Lens, plan: Plan, source: SceneSource, network: nn.Module | None, *, widest: bool
+) -> tuple[DesignParts, Seen]:
+    """Give a loop's parts: to judge in the widest window, so that patches are the same for all."""
+    recipe = plan.recipe
+    weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
+    pixels = Pixels(
+        pitch_um=recipe.pixels.pitch_um,
+        kernel_px=plan.largest_px,
+        color_weights=weights / weights.sum(1, keepdim=True),
+    )
+    problem = Problem(
+        free=FreeLens(lens=lens, variables=(), rides=False),
+        slopes=field_slopes(recipe.optics),
+        wavelengths_um=torch.tensor(recipe.pixels.wavelengths_um, dtype=torch.float64),
+        object_distances_mm=plan.depths_mm,
+    )
+    if not widest:
+        pixels = replace(pixels, kernel_px=window_of(problem, pixels, plan.largest_px))
+    rest, seen = at_rest(lens, problem, pixels)
+    made = DesignParts(
+        lens=rest,
+        network=network,
+        front=recipe.front,
+        recorder=Recorder(noise=recipe.pixels.noise),
+        loss=recipe.loss,
+        source=source,
+    )
+    return made, seen
+
+
+def fresh_source(plan: Plan) -> SceneSource:
+    share = 0.0 if plan.fresh is None else 1.0
+    return open_source(plan.fresh, picture_share=share, scenes=4, scene_px=512)
+
+
+def before(lens: Lens, plan: Plan) -> Entry:
+    """Judge captures, and what the front alone makes of them."""
+    judged, seen = parts(lens, plan, fresh_source(plan), Captures(), widest=True)
+    fitting, _ = parts(lens, plan, judged.source, None, widest=False)
+    entry = {
+        "window_px": fitting.lens.pixels.kernel_px,
+        "held": seen.held.tolist(),
+        "arriving": seen.arriving.tolist(),
+        "rms_um": (1000 * seen.rms_mm.nan_to_num(-1e-3)).tolist(),
+        "capture": scores(judged, plan),
+        "contrast": contrasts(judged),
+    }
+    if plan.recipe.front.kind != "none":
+        entry["front"] = scores(replace(judged, network=None), plan)
+    return entry
+
+
+def after(lens: Lens, plan: Plan, seed: int, folder: Path) -> Entry:
+    """Train a network for the lens at rest, and judge it."""
+    recipe = replace(plan.recipe, schedule=replace(plan.recipe.schedule, seed=seed))
+    network = network_of(recipe)
+    if network is None:
+        raise SystemExit("the recipe has no network: give --network")
+    source = open_source(
+        plan.data,
+        picture_share=recipe.data.picture_share,
+        scenes=recipe.data.procedural_scenes,
+        scene_px=recipe.data.scene_px,
+    )
+    trained, _ = parts(lens, plan, source, network, widest=False)
+    loop = DesignLoop(trained, recipe.schedule)
+    for moment in loop.run():
+        if sys.stderr.isatty():
+            print(
+                f"{lens.name} seed {seed}: step {moment.step}, {moment.valid_db:.2f} dB",
+                file=sys.stderr,
+            )
+    loop.take_best()
+    judged, _ = parts(lens, plan, fresh_source(plan), network.eval(), widest=True)
+    pictures = f"{plan.digest(asdict(lens), seed)[:16]}.npz"
+    keep_pictures(judged, recipe, folder / pictures)
+    return {
+        "seed": seed,
+        "pictures": pictures,
+        "valid_db": loop.best_db,
+        **scores(judged, plan),
+        "contrast": contrasts(judged),
+    }
+
+
+def scores(judged: DesignParts, plan: Plan) -> Entry:
+    found = score_parts(judged, plan.recipe.schedule, plan.patches)
+    return {"db": found.db, "ssim": found.ssim}
+
+
+def contrasts(judged: DesignParts) -> Entry:
+    found = {across: edge_contrasts(judged, across) for across in ACROSS}
+    return {
+        "cycles_per_px": found["tangential"].cycles_per_px.tolist(),
+        **{across: one.contrast.tolist() for across, one in found.items()},
+    }
+
+
+def keep_pictures(judged: DesignParts, recipe: DesignRecipe, path: Path) -> None:
+    """Keep PSFs and one patch a field as captured, recovered and sharp, for the picture."""
+
+    def shown(network: nn.Module | None) -> list[Any]:
+        loop = DesignLoop(replace(judged, network=network), recipe.schedule)
+        return list(loop.field_pictures(1))
+
+    captured, recovered = shown(Captures()), shown(judged.network)
+    np.savez_compressed(
+        path,
+        kernels=judged.lens.kernels.numpy()[:, :, 1],
+        captured=np.stack([p[:, 0].numpy() for _, p, _ in captured], axis=1),
+        recovered=np.stack([p[:, 0].numpy() for _, p, _ in recovered], axis=1),
+        sharp=np.stack([s[0].numpy() for _, _, s in recovered]),
+    )
+
+
+def row(name: str, entry: Entry) -> str:
+    db, spread = mean_and_spread(entry["recovered"], "db")
+    alike, _ = mean_and_spread(entry["recovered"], "ssim")
+    largest, rise, _ = worst_contrast(entry["recovered"])
+    return (
+        f"{name:20} capture {np.mean(entry['capture']['db']):.2f} dB, recovered {db:.2f} +- "
+        f"{spread:.2f} dB, SSIM {alike:.3f}, contrast <= {largest:.2f}, rise {rise:.2f}"
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
