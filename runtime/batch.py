@@ -19,7 +19,7 @@ from camkit.errors import CamkitError, ContractError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.network.tiling import Cancel, Cancelled
-from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, LEAST_MAX_MEM_BYTES, Options
+from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
 from camkit.runtime.output.sidecar import read_sidecar
 from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.raw import named_bundle
@@ -207,19 +207,26 @@ def _with_choices(
 
 
 def _shared(options: Options, jobs: int) -> Options:
-    """Share threads and memory among the jobs, so that together they keep to the caller's."""
+    """Share threads and memory among the jobs, so that together they keep to the caller's.
+
+    What the process holds anyway counts once; without a cap every job takes the default.
+    """
     if jobs == 1:
         return options
+    from camkit.runtime.job.preparation import FIXED_BYTES
     from camkit.runtime.network.engine import available_threads
 
     threads = max(1, available_threads(options.threads) // jobs)
-    memory = options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
-    if memory // jobs < LEAST_MAX_MEM_BYTES:
+    if options.max_mem_bytes is None:
+        return replace(options, threads=threads)
+    each = FIXED_BYTES + (options.max_mem_bytes - FIXED_BYTES) // jobs
+    if each < LEAST_MAX_MEM_BYTES:
         raise ContractError(
-            f"{memory // 10**6} MB shared by {jobs} jobs are {memory // jobs // 10**6} MB each; a "
-            f"job needs at least {LEAST_MAX_MEM_BYTES // 10**6} MB: raise --max-mem or lower --jobs"
+            f"{options.max_mem_bytes // 10**6} MB shared by {jobs} jobs are {each // 10**6} MB "
+            f"each, {FIXED_BYTES // 10**6} of them in common; a job needs at least "
+            f"{LEAST_MAX_MEM_BYTES // 10**6} MB: raise --max-mem or lower --jobs"
         )
-    return replace(options, threads=threads, max_mem_bytes=memory // jobs)
+    return replace(options, threads=threads, max_mem_bytes=each)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from camkit.contracts import FloatArray
+from camkit.errors import ContractError
 from camkit.report.quality import read_picture
 from camkit.scenes import procedural_scene
 
@@ -31,13 +32,13 @@ WORDS: Final = (
     "lumen",
 )
 PICTURES: Final = {
-    "night": ("valid_open/night_02-", "hdr/dikhololo_night_1k.hdr"),
-    "bokeh": ("valid_open/macro_01-", "valid_open/text_04-"),
-    "texture": ("valid_open/texture_19-", "valid_open/plants_03-"),
-    "sky": ("valid_open/coast_07-", "valid_open/city_09-", "valid_open/landscape_03-"),
-    "text": ("valid_open/text_09-",),
+    "night": ("valid_open/night_02_", "hdr/dikhololo_night_1k.hdr"),
+    "bokeh": ("valid_open/macro_01_", "valid_open/text_04_"),
+    "texture": ("valid_open/texture_19_", "valid_open/plants_03_"),
+    "sky": ("valid_open/coast_07_", "valid_open/city_09_", "valid_open/landscape_03_"),
+    "text": ("valid_open/text_09_",),
 }
-"""Kind -> pictures below the data folder; a name that ends with "-" is a beginning."""
+"""Kind -> pictures below the data folder; a name that ends with "_" is a beginning."""
 
 PAPER: Final = 200
 INK: Final = 10
@@ -71,6 +72,9 @@ def proof_scenes(
         width: Their columns.
         data: Folder with the pictures; None for procedural scenes only.
         kinds: Only these; all when empty.
+
+    Raises:
+        ContractError: If a picture is not there.
     """
     for number, (kind, generator) in enumerate(GENERATORS.items()):
         if kinds and kind not in kinds:
@@ -93,12 +97,14 @@ def proof_scenes(
 def _pictures(kind: str, data: Path | None) -> list[Path]:
     if data is None:
         return []
-    found = []
-    for name in PICTURES[kind]:
-        folder, start = (data / name).parent, Path(name).name
-        if folder.is_dir():
-            found += [p for p in sorted(folder.iterdir()) if p.name.startswith(start)][:1]
-    return found
+    return [_picture(data / name) for name in PICTURES[kind]]
+
+
+def _picture(start: Path) -> Path:
+    found = sorted(start.parent.glob(f"{start.name}*"))
+    if not found:
+        raise ContractError(f"no picture {start}*: give the folder that holds valid_open and hdr")
+    return found[0]
 
 
 def _even_picture(path: Path, most_px: int) -> FloatArray:

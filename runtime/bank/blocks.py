@@ -13,7 +13,6 @@ from left to right, whatever thread restored them, so the bits depend on nothing
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
@@ -332,19 +331,18 @@ class BlockBank:
         """Add the windowed blocks of one block row to its rows, from left to right."""
         # The threads end with the block row: a generator that waits for its next reader must not
         # own any, since the garbage collector may close it while another thread is starting.
-        pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
-        with pool or nullcontext():
-            run: Callable[..., Iterator[Any]] = map if pool is None else pool.map
-            for column, part in zip(self._columns, self._restore(strip, run), strict=True):
+        with ThreadPoolExecutor(self._threads) as pool:
+            for column, part in zip(self._columns, self._restore(strip, pool), strict=True):
                 x = column.start + column.inner.start
                 total[:, :, x : x + part.shape[2]] += part
 
-    def _restore(self, strip: "_Strip", run: Callable[..., Iterator[Any]]) -> Iterator[FloatArray]:
+    def _restore(self, strip: "_Strip", pool: ThreadPoolExecutor) -> Iterator[FloatArray]:
         """Give the windowed blocks of one block row, from left to right."""
         places = [self._psf.position_mm(c.centre, strip.span.centre) for c in self._columns]
         filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
         keys = sorted({(abs(x_mm), abs(y_mm)) for x_mm, y_mm in filtered})
-        otfs = dict(zip(keys, run(self._otf, keys), strict=True))
+        # The pool takes tasks in order: no block waits for an OTF that nobody is making.
+        otfs = {key: pool.submit(self._otf, key) for key in keys}
         # One PSF for all places has no direction that a quadrant could mirror.
         turns = self._psf.field_heights_mm.size > 1
 
@@ -354,7 +352,9 @@ class BlockBank:
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
             x_mm, y_mm = place_mm
             otf = mirror_otf(
-                otfs[abs(x_mm), abs(y_mm)], flip_x=turns and x_mm < 0, flip_y=turns and y_mm < 0
+                otfs[abs(x_mm), abs(y_mm)].result(),
+                flip_x=turns and x_mm < 0,
+                flip_y=turns and y_mm < 0,
             )
             samples, unknown = strip.cut(column)
             samples = taper_edges(samples, otf, self._guard_px)
@@ -362,7 +362,7 @@ class BlockBank:
             sharp = self._filter(block)[:, strip.span.inner, column.inner]
             return sharp * window
 
-        return run(restore, self._columns, places)
+        return pool.map(restore, self._columns, places)
 
     def _otf(self, place_mm: tuple[float, float]) -> ComplexArray:
         kernel = kernel_at(self._psf.kernels, self._psf.field_heights_mm, *place_mm)

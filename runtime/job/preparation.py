@@ -29,8 +29,8 @@ from camkit.runtime.signal.noise import measure_noise
 
 FIXED_BYTES: Final = 260_000_000
 """Interpreter, libraries and what the stages keep besides planes (measured, see docs)."""
-ROW_BYTES_PER_COLUMN: Final = 60_000
-"""Rolling rows of all stages together, per column of the picture (measured, see docs)."""
+ROW_BYTES_PER_COLUMN: Final = 40_000
+"""Rolling rows of all stages but the network, per column of the picture (measured, see docs)."""
 
 
 class Preparation:

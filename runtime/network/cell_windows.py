@@ -24,7 +24,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.guard import TileGuard, is_finite
 from camkit.runtime.network.row_buffer import RowBuffer
-from camkit.runtime.network.tiling import Cancel, Cancelled, Progress, Run, is_cancelled
+from camkit.runtime.network.tiling import BANDS_HELD, Cancel, Cancelled, Progress, Run, is_cancelled
 from camkit.runtime.rows import RowSource
 
 RAMP_PX: Final = 32
@@ -124,9 +124,10 @@ class CellPlan:
         return min(self.padded_px[0], self.strip_cells * self.cell_px + 2 * self.halo_px)
 
     def needed_bytes(self, bytes_per_px: Sequence[float]) -> int:
-        """Estimate the memory: rows held, one output strip, every network's largest window."""
+        """Estimate the memory: rows and output strips held, every network's largest window."""
         width = self.padded_px[1]
-        held = (24 * self.buffer_rows + 12 * self.strip_cells * self.cell_px) * width
+        strips = BANDS_HELD * self.strip_cells * self.cell_px
+        held = (24 * self.buffer_rows + 12 * strips) * width
         largest = [0] * len(bytes_per_px)
         for windows in self.strips:
             for window in windows:

@@ -32,6 +32,9 @@ from camkit.runtime.rows import RowSource
 DEFAULT_MAX_BYTES: Final = 640 * 2**20
 _FLOAT_BYTES: Final = 4
 _MOST_COUNTS: Final = 64
+BANDS_HELD: Final = 3
+"""Output bands of a network in memory at a time: the one being filled, the one that the next stage
+reads, and what it still needs of the one before."""
 
 Run = Callable[[FloatArray], FloatArray]
 Progress = Callable[[int, int], None]
@@ -117,7 +120,7 @@ class TilePlan:
         return self.window_count * window / (self.height_px * self.width_px)
 
     def needed_bytes(self, bytes_per_px: float, channels: int = 6) -> int:
-        """Estimate the memory of a run: one window and its arena, row buffer, one output band."""
+        """Estimate the memory of a run: one window and its arena, row buffer, output bands."""
         window = self.window_height_px, self.window_width_px
         return _needed_bytes(window, self.rows, self.padded_width_px, bytes_per_px, channels)
 
@@ -133,7 +136,7 @@ def _needed_bytes(
     row_bytes = _FLOAT_BYTES * width_px
     ends = _FLOAT_BYTES * (channels + 3)
     arena = int(window[0] * window[1] * (bytes_per_px + ends))
-    return arena + row_bytes * (channels * window[0] + 3 * band)
+    return arena + row_bytes * (channels * window[0] + 3 * BANDS_HELD * band)
 
 
 def _check_axis(spans: tuple[Span, ...], window: int, plan: TilePlan) -> None:

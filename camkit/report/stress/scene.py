@@ -26,15 +26,20 @@ class Scene:
         name: For reports and journals.
         number: Decides place and noise.
         linear: (3, h, w) float32 linear Rec.709, 0..`WHITE`.
+        share: Its place between the middle of the sensor (0) and its corner (1); None for one
+            that its number decides.
     """
 
     name: str
     number: int
     linear: FloatArray
+    share: float | None = None
 
     @property
     def field_share(self) -> float:
         """Give the place between the middle of the sensor (0) and its corner (1)."""
+        if self.share is not None:
+            return self.share
         return FIELD_SHARES[self.number % len(FIELD_SHARES)]
 
     @property

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.errors import ContractError
 from camkit.report.plan_scenes import GENERATORS, PER_KIND, SEED, proof_scenes
 
 
@@ -29,11 +30,16 @@ def test_night_is_mostly_dark_and_sky_mostly_smooth() -> None:
 
 
 def test_every_kind_has_its_scenes_and_pictures_are_cut_to_even_sides(tmp_path: Path) -> None:
-    folder = tmp_path / "valid_open"
-    folder.mkdir()
-    cv2.imwrite(str(folder / "text_09-sign.png"), np.full((41, 61, 3), 90, np.uint8))
-    scenes = list(proof_scenes(64, 64, tmp_path))
-    counts = Counter(scene.kind for scene in scenes)
-    assert counts == {"night": 5, "bokeh": 5, "texture": 5, "sky": 5, "text": PER_KIND + 1}
+    for name in ("coast_07_a", "city_09_b", "landscape_03_c"):
+        (tmp_path / "valid_open").mkdir(exist_ok=True)
+        path = tmp_path / "valid_open" / f"{name}.png"
+        cv2.imwrite(str(path), np.full((41, 61, 3), 90, np.uint8))
+    scenes = list(proof_scenes(64, 64, tmp_path, ("sky",)))
+    assert len(scenes) == PER_KIND + 3
     assert scenes[-1].make().shape == (3, 40, 60)
-    assert {s.kind for s in proof_scenes(64, 64, None, ("sky",))} == {"sky"}
+    assert Counter(s.kind for s in proof_scenes(64, 64)) == dict.fromkeys(GENERATORS, PER_KIND)
+
+
+def test_a_folder_without_the_pictures_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ContractError, match="night_02_"):
+        list(proof_scenes(64, 64, tmp_path))

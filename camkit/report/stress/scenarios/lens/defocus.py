@@ -1,14 +1,17 @@
 """Nearer than the focus: the kernels of other object distances from the bundle."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from camkit.bundle.reader import Bundle
+from camkit.contracts import FloatArray
 from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.twin import Lens, Shot
 from camkit.runtime.bank.psf import color_kernels, kernel_at
-from camkit.units import MM_PER_M
+from camkit.units import MM_PER_M, to_mm
 
 
 def _applies(bundle: Bundle) -> str | None:
@@ -22,25 +25,40 @@ def _applies(bundle: Bundle) -> str | None:
     return photographs(bundle)
 
 
-def _lens_at(bundle: Bundle, inverse_m: float) -> Lens:
-    """Give the lens for one object distance."""
+def _at_known_field(scene: Scene, bundle: Bundle) -> tuple[Scene, float]:
+    """Put a scene where the stress PSF has a field, since far between its few it says nothing.
+
+    Returns:
+        The scene and the height of that field in millimetres.
+    """
+    psf, camera = bundle.stress_psf(), bundle.manifest.camera
+    assert psf is not None
+    free_px = np.hypot(camera.width_px - scene.size_px[0], camera.height_px - scene.size_px[1])
+    reach_mm = max(to_mm(camera.pixel_pitch_um) * float(free_px) / 2, 1e-9)
+    within = psf.field_heights_mm[psf.field_heights_mm <= reach_mm]
+    height_mm = float(within[scene.number % within.size])
+    return replace(scene, share=height_mm / reach_mm), height_mm
+
+
+def _lens_at(bundle: Bundle, inverse_m: float, height_mm: float) -> Lens:
+    """Give the lens for one object distance, with the kernels of one field all around it."""
     psf = bundle.stress_psf()
     assert psf is not None
-    camera = bundle.manifest.camera
-    response = camera.channel_response.to_arrays()
+    response = bundle.manifest.camera.channel_response.to_arrays()
     depth_mm = MM_PER_M / inverse_m if inverse_m else np.inf
     kernels = color_kernels(psf, *response, depth_mm=depth_mm)
-    return Lens(
-        psf=bundle.psf,
-        kernels_at=lambda x, y: kernel_at(kernels, psf.field_heights_mm, x, y),
-        margin_px=kernels.shape[-1] // 2,
-    )
+
+    def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
+        scale = height_mm / max(np.hypot(x_mm, y_mm), 1e-9)
+        return kernel_at(kernels, psf.field_heights_mm, scale * x_mm, scale * y_mm)
+
+    return Lens(psf=bundle.psf, kernels_at=kernels_at, margin_px=kernels.shape[-1] // 2)
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
-    light = rig.light(scene, _lens_at(rig.bundle, value))
-    return rig.record(light)
+    placed, height_mm = _at_known_field(scene, rig.bundle)
+    return rig.record(rig.light(placed, _lens_at(rig.bundle, value, height_mm)))
 
 
 SCENARIO = Scenario(
@@ -53,5 +71,5 @@ SCENARIO = Scenario(
     quick=(0.0, 0.2),
     shoot=_shoot,
     applies=_applies,
-    note="0 is infinity, 0.2 is 5 m; kernels from the bundle's stress PSF, which has fewer fields.",
+    note="0 is infinity, 0.2 is 5 m; at the fields of the bundle's stress PSF, which has few.",
 )
