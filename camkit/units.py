@@ -19,8 +19,3 @@ def to_degrees(angle_rad: float) -> float:
 def to_mm(length_um: float) -> float:
     """Convert micrometres to millimetres."""
     return length_um / UM_PER_MM
-
-
-def to_um(length_mm: float) -> float:
-    """Convert millimetres to micrometres."""
-    return length_mm * UM_PER_MM

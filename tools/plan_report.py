@@ -88,12 +88,13 @@ def _calibrate(options: argparse.Namespace) -> int:
         captures.append(measure_cells(bundle, targets, f"{name} ISO {iso:g}", simulation))
         spent = time.process_time() - began
         print(f"{number + 1:3d} {captures[-1].name}: {spent:.0f} CPU s", file=sys.stderr)
-    made = fit_model(captures, *_work(bundle))
+    work, small = _work(bundle)
+    made = fit_model(captures, work, small)
     entries = plan_entries(
         made.model, adaptive_cost_db=made.adaptive[0], draft_cost_db=made.draft[0]
     )
     _print_calibration(made, captures)
-    known = [saving_of_the_all_knowing(c, *_work(bundle), 0.1) for c in captures]
+    known = [saving_of_the_all_knowing(c, work, small, 0.1) for c in captures]
     print(f"were all losses known, 0.1 dB a capture would save {np.mean(known):.1%} of the work")
     for target in made.model.lines:
         sums = [c.errors[target].sum() / c.errors[EXACT].sum() for c in captures]

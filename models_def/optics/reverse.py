@@ -48,15 +48,20 @@ def launch_from_sensor(x_mm: Tensor, y_mm: Tensor, target: tuple[Tensor, Tensor,
     target_x, target_y, distance_mm = target
     if not (math.isfinite(distance_mm) and distance_mm != 0):
         raise ContractError(f"the target distance must be finite and not 0; got {distance_mm} mm")
-    dx, dy = (target_x - x_mm) / distance_mm, (target_y - y_mm) / distance_mm
-    blank = torch.zeros_like(dx + dy)
-    n = 1 / torch.sqrt(1 + dx**2 + dy**2) + blank
+    slopes = (target_x - x_mm) / distance_mm, (target_y - y_mm) / distance_mm
+    return launch_with_slopes(x_mm, y_mm, *slopes)
+
+
+def launch_with_slopes(x_mm: Tensor, y_mm: Tensor, slope_x: Tensor, slope_y: Tensor) -> Rays:
+    """Start rays on the sensor (z = 0) with slopes towards the scene; all broadcast."""
+    n = torch.rsqrt(1 + slope_x**2 + slope_y**2)
+    blank = torch.zeros_like(n)
     return Rays(
         x=x_mm + blank,
         y=y_mm + blank,
         z=blank,
-        l=dx * n,
-        m=dy * n,
+        l=slope_x * n,
+        m=slope_y * n,
         n=n,
         fate=torch.zeros_like(n, dtype=torch.int8),
     )

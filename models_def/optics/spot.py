@@ -19,7 +19,7 @@ from camkit.models_def.optics.trace import surface_tensors, trace
 _SLOPE_STEPS: Final = 12
 _SLOPE_TOLERANCE_MM: Final = 1e-9
 _SLOPE_DIFFERENCE: Final = 1e-6
-ANGLE_STEP_RAD: Final = 1e-6
+_ANGLE_STEP_RAD: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,13 +145,13 @@ def relative_illumination(lens: Lens, heights_mm: Tensor, rays: int = 2048) -> T
         spots = trace_spots(lens, slopes, wave, half_disc(rays))
         area = spots.weight.sum((-2, -1))
         angle = torch.atan(slopes)
-        ahead = chief_heights(lens, torch.tan(angle + ANGLE_STEP_RAD))
-        behind = chief_heights(lens, torch.tan(angle - ANGLE_STEP_RAD))
-        light = field_light(area, angle, near, ahead - behind)
+        ahead = chief_heights(lens, torch.tan(angle + _ANGLE_STEP_RAD))
+        behind = chief_heights(lens, torch.tan(angle - _ANGLE_STEP_RAD))
+        light = _field_light(area, angle, near, ahead - behind)
     return light[1:] / light[0]
 
 
-def field_light(area: Tensor, angle_rad: Tensor, heights_mm: Tensor, growth_mm: Tensor) -> Tensor:
+def _field_light(area: Tensor, angle_rad: Tensor, heights_mm: Tensor, growth_mm: Tensor) -> Tensor:
     """Give the light of a uniform scene, in equal units, where fields land.
 
     A distant scene of radiance L sends L * A cos(angle) dOmega through a beam of area A in the
@@ -163,7 +163,7 @@ def field_light(area: Tensor, angle_rad: Tensor, heights_mm: Tensor, growth_mm: 
         area: Of the beams in the entrance plane.
         angle_rad: Field angles > 0.
         heights_mm: Where their chief rays land.
-        growth_mm: How much the heights grow over 2 `ANGLE_STEP_RAD`.
+        growth_mm: How much the heights grow over 2 `_ANGLE_STEP_RAD`.
     """
     light = area * torch.cos(angle_rad) * torch.sin(angle_rad)
-    return light * (2 * ANGLE_STEP_RAD) / (heights_mm * growth_mm)
+    return light * (2 * _ANGLE_STEP_RAD) / (heights_mm * growth_mm)

@@ -26,7 +26,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import trace_paraxial
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.render.optics import Optics
-from camkit.models_def.optics.reverse import reverse, trace_to_scene
+from camkit.models_def.optics.reverse import launch_with_slopes, reverse, trace_to_scene
 from camkit.models_def.optics.trace import Rays, SurfaceTensors
 
 # Farther out a lens without rims lets stray rays pass the stop (the Cooke triplet beyond 2).
@@ -106,18 +106,7 @@ def stop_labels(optics: Optics) -> Labels:
 
 def rays_from(labels: Labels, x_mm: Tensor, y_mm: Tensor, label_x: Tensor, label_y: Tensor) -> Rays:
     """Start rays on the sensor (z = 0) towards labels of the stop; all broadcast."""
-    p, q = labels.slope(label_x, x_mm), labels.slope(label_y, y_mm)
-    n = torch.rsqrt(1 + p**2 + q**2)
-    blank = torch.zeros_like(n)
-    return Rays(
-        x=x_mm + blank,
-        y=y_mm + blank,
-        z=blank,
-        l=p * n,
-        m=q * n,
-        n=n,
-        fate=torch.zeros_like(n, dtype=torch.int8),
-    )
+    return launch_with_slopes(x_mm, y_mm, labels.slope(label_x, x_mm), labels.slope(label_y, y_mm))
 
 
 def light_of(start: Rays, end: Rays) -> Tensor:
