@@ -23,12 +23,12 @@ from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.network.engine import available_threads
-from camkit.runtime.output.sidecar import read_sidecar
 from camkit.runtime.signal.demosaic import demosaic
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate, write_capture
 from camkit.scenes import procedural_scene
 
 CROP_PX = 512
+BORDER_PX = 32
 EXPOSURE = 0.5
 FIELDS = (0.0, 0.25, 0.5, 0.75, 0.95)
 
@@ -65,6 +65,8 @@ def main() -> None:
     write_capture(capture, simulation, camera, bundle.manifest.name)
     print(f"{capture}: photographed in {time.perf_counter() - began:.1f} s")
 
+    plan = ("plan", str(capture), "--bundle", arguments.bundle)
+    subprocess.run([sys.executable, "-m", "camkit", *plan], check=True)
     for kind in ("exr", "png"):
         _process(capture, arguments.bundle, out_dir, kind)
     _show_quality(simulation, arguments.bundle, arguments.iso, out_dir / "before_after.png")
@@ -84,9 +86,6 @@ def _process(capture: Path, bundle: str, out_dir: Path, kind: str) -> None:
     seconds = result["seconds"]
     print(f"{result['output']}: {sum(seconds.values()):.1f} s, {result['peak_rss_mb']:.0f} MB")
     print("  " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
-    plan = (read_sidecar(Path(result["output"])) or {}).get("plan", {})
-    for name, decided in plan.items():
-        print(f"  plan, {name}: " + ", ".join(f"{key} {value}" for key, value in decided.items()))
     for warning in result["warnings"]:
         print(f"  note: {warning}")
 
@@ -137,8 +136,8 @@ def _seen(
     return apply_matrix(rec709_from_camera(np.array(camera.color_matrix)), planes)
 
 
-def _psnr(image: FloatArray, sharp: FloatArray, border_px: int = 32) -> float:
-    inside = np.s_[:, border_px:-border_px, border_px:-border_px]
+def _psnr(image: FloatArray, sharp: FloatArray) -> float:
+    inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     error = float(np.mean((np.clip(image, 0, 1)[inside] - sharp[inside]) ** 2))
     return -10 * np.log10(max(error, 1e-12))
 
