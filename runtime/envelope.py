@@ -23,10 +23,10 @@ SAMPLE_BANDS: Final = 32
 SAMPLE_ROWS: Final = 12
 """A capture is looked at in this many bands of so many rows, spread over its height."""
 QUANTITIES: Final = {
-    "grey_noise": "standard deviation of the noise at a signal of 0.18",
-    "signal_level": "mean signal",
-    "clipped_fraction": "share of clipped samples",
-    "broken_fraction": "share of dead and invalid samples",
+    "grey_noise": "standard deviation of the noise at a signal of 0.18, white = 1",
+    "signal_level": "mean signal, white = 1",
+    "clipped_fraction": "share of clipped samples, 0 to 1",
+    "broken_fraction": "share of dead and invalid samples, 0 to 1",
     "bit_depth": "bits between black and white level",
     "side_px": "shorter side in pixels",
 }

@@ -1,7 +1,7 @@
 """Is a joint design better than the best lens that spots alone can find?
 
-    python tools/joint_report.py models_def/recipes/duet_joint.toml --data PICTURES --fresh OTHERS \
-        --out-dir out/joint
+    python tools/joint_report.py models_def/recipes/duet_joint_lens.toml --data PICTURES \
+        --fresh OTHERS --out-dir out/joint
 
 Same start, same variables, same bounds. The spots lenses (every merit, many starts) may trace ten
 times as many lenses as the joint design; the joint design begins at the best of them and, apart

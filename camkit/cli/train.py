@@ -32,6 +32,10 @@ def train(
     out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint, log and samples.")] = Path(
         "runs"
     ),
+    start: Annotated[
+        Path | None,
+        typer.Option(help="First weights: a checkpoint of the same network, of any camera."),
+    ] = None,
     final: Annotated[
         Path | None,
         typer.Option(help="Final stage: fine-tune this checkpoint against two discriminators."),
@@ -59,6 +63,8 @@ def train(
     stage: Stage | None = None
     if final is not None:
         stage = _final_stage(recipe, final, vgg, pairs, device)
+        if start is not None:
+            raise ContractError("--final FROM.pt has its own start; leave --start away")
     elif vgg is not None or pairs is not None:
         raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM.pt too")
     result = run(
@@ -70,6 +76,7 @@ def train(
             valid_folder=valid,
             steps=steps,
             max_minutes=max_minutes,
+            start=start,
             resume=resume,
             threads=threads,
             workers=workers,

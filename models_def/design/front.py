@@ -11,7 +11,6 @@ from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.sensors.wiener import to_otf
 
 FrontKind = Literal["none", "wiener"]
-_MARGIN_PX: Final = 32
 _CORNER: Final = 1 / 512
 
 
@@ -23,6 +22,7 @@ class Front:
         kind: none: the capture (3 planes); wiener: the capture and its Wiener result (6).
         signal_to_noise: Power of the signal at one cycle per pixel over that of the noise.
         exponent: Of the fall of the signal's power.
+        filter_margin_px: Pixels recorded around a patch for the filter and cut off again.
         depth_known: Whether the filter is that of the depth of the patch; otherwise that of the
             mean kernel over depths, as where a bundle is not told the depth.
     """
@@ -30,11 +30,14 @@ class Front:
     kind: FrontKind = "none"
     signal_to_noise: float = 0.3
     exponent: float = 2.5
+    filter_margin_px: int = 32
     depth_known: bool = True
 
     def __post_init__(self) -> None:
         if self.kind not in ("none", "wiener"):
             raise ContractError(f"a front is none or wiener; got {self.kind!r}")
+        if self.filter_margin_px < 1:
+            raise ContractError(f"filter_margin_px must be >= 1; got {self.filter_margin_px}")
         if not self.signal_to_noise > 0:
             raise ContractError(f"signal_to_noise must be > 0; got {self.signal_to_noise}")
 
@@ -46,13 +49,13 @@ class Front:
     @property
     def margin_px(self) -> int:
         """Give what is recorded around a patch and cut off again."""
-        return 0 if self.kind == "none" else _MARGIN_PX
+        return 0 if self.kind == "none" else self.filter_margin_px
 
     def planes(self, recorded: Tensor, kernels: Tensor) -> Tensor:
         """Give (b, channels, p, p) from (b, 3, p + 2 margin, ...) and kernels (b, 3, k, k)."""
         if self.kind == "none":
             return encode_srgb(recorded)
-        inner = slice(_MARGIN_PX, -_MARGIN_PX)
+        inner = slice(self.filter_margin_px, -self.filter_margin_px)
         both = torch.cat([recorded, self._restore(recorded, kernels)], dim=1)
         return encode_srgb(both[..., inner, inner])
 

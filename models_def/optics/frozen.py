@@ -22,10 +22,10 @@ from torch import Tensor
 from camkit.bundle.camera import Camera
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
+from camkit.models_def.optics.analysis.illumination import relative_illumination_at
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
-from camkit.models_def.optics.spot import relative_illumination
 from camkit.models_def.sensors.psf import wavelength_weights
 from camkit.units import UM_PER_MM
 
@@ -129,7 +129,7 @@ def freeze_at(lens: Lens, camera: Camera, grid: FreezeGrid, heights_mm: FloatGri
         ],
         dim=1,
     )
-    light = relative_illumination(lens, torch.from_numpy(heights_mm))
+    light = relative_illumination_at(lens, torch.from_numpy(heights_mm))
     psf = FrozenPsf(
         kernels=kernels.to(torch.float32).numpy(),
         field_heights_mm=heights_mm,

@@ -1,4 +1,4 @@
-"""Where rays land on the sensor: chief rays, field slopes for sensor heights, spots, light."""
+"""Where rays land on the sensor: chief rays, field slopes for sensor heights, spots."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -11,7 +11,6 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import (
     PupilDefinition,
     PupilSamples,
-    half_disc,
     pupil_rays,
 )
 from camkit.models_def.optics.trace import surface_tensors, trace
@@ -19,7 +18,6 @@ from camkit.models_def.optics.trace import surface_tensors, trace
 _SLOPE_STEPS: Final = 12
 _SLOPE_TOLERANCE_MM: Final = 1e-9
 _SLOPE_DIFFERENCE: Final = 1e-6
-_ANGLE_STEP_RAD: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,44 +124,3 @@ def rms_radius(spots: Spots) -> Tensor:
     dx = spots.x_mm - (share * spots.x_mm).sum(-1, keepdim=True)
     dy = spots.y_mm - (share * spots.y_mm).sum(-1, keepdim=True)
     return torch.sqrt((share * (dx**2 + dy**2)).sum(-1))
-
-
-def relative_illumination(lens: Lens, heights_mm: Tensor, rays: int = 2048) -> Tensor:
-    """Give the light (field,) of a uniform scene at sensor heights, 1 on the axis.
-
-    Every ray is aimed at the stop. Losses of coating and bulk are not counted. The whole beam of
-    a field counts where its chief ray lands, which is off for blurred fields (0.875 for 0.897 at
-    the corner of `duet`, seen from 1 m); frozen PSFs keep it, `analysis.illumination` does not.
-    """
-    with torch.no_grad():
-        heights = heights_mm.to(torch.float64)
-        # the axis has no ring of its own: a height near it stands for it
-        near = heights.clamp_min(1e-3)
-        near = torch.cat([torch.full((1,), 1e-3, dtype=torch.float64), near])
-        slopes = slopes_for_heights(lens, near)
-        wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
-        spots = trace_spots(lens, slopes, wave, half_disc(rays))
-        area = spots.weight.sum((-2, -1))
-        angle = torch.atan(slopes)
-        ahead = chief_heights(lens, torch.tan(angle + _ANGLE_STEP_RAD))
-        behind = chief_heights(lens, torch.tan(angle - _ANGLE_STEP_RAD))
-        light = _field_light(area, angle, near, ahead - behind)
-    return light[1:] / light[0]
-
-
-def _field_light(area: Tensor, angle_rad: Tensor, heights_mm: Tensor, growth_mm: Tensor) -> Tensor:
-    """Give the light of a uniform scene, in equal units, where fields land.
-
-    A distant scene of radiance L sends L * A cos(angle) dOmega through a beam of area A in the
-    entrance plane; dOmega falls on h dh dphi of the sensor. So
-    E(h) ~ A(angle) cos(angle) sin(angle) d(angle) / (h dh): vignetting, pupil aberration and
-    distortion included; for A constant and h = f tan(angle) it is the cos^4 law.
-
-    Args:
-        area: Of the beams in the entrance plane.
-        angle_rad: Field angles > 0.
-        heights_mm: Where their chief rays land.
-        growth_mm: How much the heights grow over 2 `_ANGLE_STEP_RAD`.
-    """
-    light = area * torch.cos(angle_rad) * torch.sin(angle_rad)
-    return light * (2 * _ANGLE_STEP_RAD) / (heights_mm * growth_mm)

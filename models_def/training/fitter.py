@@ -49,10 +49,13 @@ class Fits(Protocol):
 class Fitter:
     """Fits one network to batches; holds no clock, no file and no random state."""
 
-    def __init__(self, entry: NetworkRecipe, device: str) -> None:
+    def __init__(self, entry: NetworkRecipe, device: str, start: State | None = None) -> None:
+        """Build the network with random weights, or with those of `start`."""
         self.schedule, self.device = entry.schedule, torch.device(device)
         torch.manual_seed(entry.schedule.seed)
         self.network = _to_device(build_network(entry.network, **entry.config), self.device)
+        if start is not None:
+            self.network.load_state_dict(start)
         self.averaged = _to_device(build_network(entry.network, **entry.config), self.device)
         self.averaged.load_state_dict(self.network.state_dict())
         self._average = [p.detach() for p in self.averaged.parameters()]

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.analysis.illumination import relative_illumination_at
 from camkit.models_def.optics.kernel_bank import (
     ChannelResponse,
     colour_kernels,
@@ -17,7 +18,6 @@ from camkit.models_def.optics.kernel_bank import (
 )
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.optics.psf import with_object_distance
-from camkit.models_def.optics.spot import relative_illumination
 from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.samples import corner_height_mm
@@ -79,7 +79,7 @@ def _trace(recipe: Recipe, path: Path) -> PsfBank:
         copy_heights_mm=heights,
         frozen=nominal,
         frozen_heights_mm=heights,
-        relative_illumination=relative_illumination(lens, torch.from_numpy(heights)).numpy(),
+        relative_illumination=relative_illumination_at(lens, torch.from_numpy(heights)).numpy(),
         depths=depths,
     )
 

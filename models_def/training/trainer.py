@@ -5,6 +5,7 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
 """
 
 import time
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,12 @@ from typing import Any, Final
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from camkit.models_def.training.checkpoint import (
+    Checkpoint,
+    State,
+    read_checkpoint,
+    write_checkpoint,
+)
 from camkit.models_def.training.credits import describe_data
 from camkit.models_def.training.fitter import Fits, Fitter
 from camkit.models_def.training.lens_bank import build_lens_bank
@@ -21,7 +27,13 @@ from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.progress import TrainingBar
 from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.recipe import NetworkRecipe, Recipe, ScheduleRecipe, read_recipe
+from camkit.models_def.training.recipe import (
+    NetworkRecipe,
+    Recipe,
+    ScheduleRecipe,
+    read_recipe,
+    to_recipe,
+)
 from camkit.models_def.training.schedule import progress_of
 from camkit.models_def.training.validation import (
     Case,
@@ -46,6 +58,8 @@ class TrainOptions:
         valid_folder: Pictures to choose by; None for procedural scenes.
         steps: Steps of the whole schedule; None for the recipe's.
         max_minutes: Wall time after which the schedule, decay included, ends; None for its steps.
+        start: Checkpoint of the same network, of another camera say, whose averaged weights are
+            the first ones; None for random weights.
         stop_at_step: Stop there though the schedule goes on, as an interruption would.
         resume: Go on from the checkpoint in `out_dir`.
         threads: Threads of torch.
@@ -61,6 +75,7 @@ class TrainOptions:
     valid_folder: Path | None = None
     steps: int | None = None
     max_minutes: float | None = None
+    start: Path | None = None
     stop_at_step: int | None = None
     resume: bool = False
     threads: int = 1
@@ -74,6 +89,8 @@ class TrainOptions:
             raise ContractError(f"max_minutes must be > 0; got {self.max_minutes}")
         if self.steps is not None and self.steps < 1:
             raise ContractError(f"steps must be >= 1; got {self.steps}")
+        if self.start is not None and self.resume:
+            raise ContractError("a run that is resumed has begun; leave start away")
         if self.threads < 1 or self.workers < 0:
             raise ContractError(
                 f"threads must be >= 1, workers >= 0; got {self.threads}, {self.workers}"
@@ -160,6 +177,20 @@ def train(
         return run.result()
 
 
+def _start(path: Path | None, entry: NetworkRecipe) -> tuple[State | None, str]:
+    """Give the first weights and what the card says of them."""
+    if path is None:
+        return None, ""
+    saved = read_checkpoint(path)
+    if (saved.network, saved.config) != (entry.network, dict(entry.config)):
+        raise ContractError(
+            f"{path} holds {saved.network} with {saved.config}; the recipe wants {entry.network} "
+            f"with {dict(entry.config)}"
+        )
+    camera = to_recipe(tomllib.loads(saved.recipe_toml)).name
+    return saved.average, f"; first weights: {camera} {saved.size} ({saved.training_data})"
+
+
 class _Run:
     """A run in time: the loop with its clock, log, validation and checkpoints."""
 
@@ -175,15 +206,17 @@ class _Run:
         self.toml = recipe_path.read_text(encoding="utf-8")
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
-        name, self.credit = f"{self.recipe.name}_{options.size}", ""
+        name, credit = f"{self.recipe.name}_{options.size}", ""
         if stage is None:
-            self.fitter: Fits = Fitter(self.entry, options.device)
+            weights, credit = _start(options.start, self.entry)
+            self.fitter: Fits = Fitter(self.entry, options.device, weights)
         else:
-            name, self.credit = f"{name}_{stage.name}", stage.credit
+            name, credit = f"{name}_{stage.name}", stage.credit
             self.entry = replace(self.entry, schedule=stage.schedule)
             self.fitter = stage.make_fitter(self.entry, bank)
         self.steps = options.steps or self.entry.schedule.steps
         self.path = options.out_dir / f"{name}.pt"
+        self.data = describe_data(self.recipe, options.data_folder) + credit
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
         if options.resume:
@@ -202,6 +235,10 @@ class _Run:
                 "start without resume"
             )
         self.fitter.load(saved.weights, saved.average, saved.optimizer)
+        if saved.training_data.startswith(self.data):
+            self.data = saved.training_data
+        else:
+            self.data = f"{saved.training_data}; then {self.data}"
         self.step = saved.step
         self.elapsed_before_s, self.cpu_before_s = saved.elapsed_s, saved.cpu_s
 
@@ -273,7 +310,7 @@ class _Run:
             network=self.entry.network,
             config=dict(self.entry.config),
             bank_digest=self.bank_digest,
-            training_data=describe_data(self.recipe, self.options.data_folder) + self.credit,
+            training_data=self.data,
             step=self.step,
             elapsed_s=self.elapsed_s(),
             cpu_s=self.cpu_s(pool),

@@ -10,7 +10,7 @@ from camkit.models_def.design.recipe import read_design
 from camkit.models_def.optics.search.variables import Variable
 from tools.design_check import check, parse
 
-RECIPE = Path(__file__).resolve().parents[2] / "models_def" / "recipes" / "duet_joint.toml"
+RECIPE = Path(__file__).resolve().parents[2] / "models_def" / "recipes" / "duet_joint_lens.toml"
 SMALL = ("--fields", "2", "--patch-px", "16", "--spp", "32", "--passes", "2")
 
 

@@ -1,6 +1,7 @@
 """One picture per scenario: PSNR of every method over the knob, chi^2 below, breaks marked."""
 
 import io
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -25,7 +26,11 @@ OTHER: Final = "#2a9d5c"
 
 
 def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
-    """Draw a scenario as PNG; the band is the standard error over the scenes."""
+    """Draw a scenario as PNG.
+
+    The band is the standard error over the scenes of what sets a method apart: how hard a scene
+    is for all methods alike is taken out (Cousineau 2005).
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.6), layout="constrained")
@@ -34,8 +39,9 @@ def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
     rows += [(grids, name.replace("_", " ")) for name, grids in curve.extra.items()]
     axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (grids, label) in zip(axes, rows, strict=True):
+        common = _common(list(grids.values()))
         for method, grid in grids.items():
-            _line(axis, curve, method, grid)
+            _line(axis, curve, method, (grid, common))
         axis.set_ylabel(label)
         axis.grid(alpha=0.25)
         for found in breaks:
@@ -44,21 +50,34 @@ def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
                 axis.axvline(place, color=COLOURS[found.method], lw=1, ls=":")
     if len(rows) > 1 and rows[1][0] is curve.chi2:
         axes[1].axhline(LIMIT, color="#b00020", lw=0.8)
-    axes[0].legend(fontsize=8, ncols=3)
+        axes[1].set_yscale("log")
+    handles, names = axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", fontsize=8, ncols=len(names))
     _ticks(axes[-1], curve)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     return buffer.getvalue()
 
 
-def _line(axis: "Axes", curve: Curve, method: str, grid: Grid) -> None:
+def _common(grids: Sequence[Grid]) -> Grid:
+    """Give how far each scene lies from the others in the mean over the methods."""
+    known = np.stack([np.where(np.isfinite(grid), grid, np.nan) for grid in grids])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # nothing is known: stays NaN
+        scenes = np.nanmean(known, axis=0)
+        return np.asarray(np.nan_to_num(scenes - np.nanmean(scenes, axis=1, keepdims=True)))
+
+
+def _line(axis: "Axes", curve: Curve, method: str, found: tuple[Grid, Grid]) -> None:
+    grid, common = found
     known = np.isfinite(grid).any(axis=1)
     if not known.any():
         return
     x = np.arange(len(curve.values))[known]
     rows = [row[np.isfinite(row)] for row in grid[known]]
     mean = np.array([row.mean() for row in rows])
-    error = np.array([row.std() / np.sqrt(row.size) for row in rows])
+    apart = [row[np.isfinite(row)] for row in (grid - common)[known]]
+    error = np.array([row.std() / np.sqrt(row.size) for row in apart])
     name = method.split(" ", maxsplit=1)[0]
     dashed = BEFORE in method
     colour = COLOURS.get(name, OTHER)

@@ -7,7 +7,7 @@ from html import escape
 from typing import Final
 
 from camkit.bundle.manifest import Range
-from camkit.report.stress.break_point import TIE_DB, Break
+from camkit.report.stress.break_point import CHI2, TIE_DB, Break
 from camkit.report.stress.consistency import LIMIT
 from camkit.report.stress.curve import Curve
 from camkit.report.stress.patch import Patches
@@ -22,6 +22,9 @@ td.broken { color: #b00020 } section { border-top: 2px solid #ddd; margin-top: 2
 figure { display: inline-block; margin: 0 .5em .5em 0 } figcaption { font-size: 12px; color: #555 }
 img { max-width: 100% } .note { color: #555 }
 """
+
+REASONS: Final = {CHI2: "the capture is not explained: chi²", "fault": "something that cannot be"}
+"""Rules of `Break.reason` that are not words yet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,11 +101,12 @@ def describe_break(curve: Curve, found: Break) -> str:
         ends = (curve.values[0], curve.values[-1])
         last = ends[0] if found.side == "down" else ends[1]
         return f"sound to {curve.label(last)}"
+    reason = REASONS.get(found.reason, found.reason)
     if curve.scenario.labels:
-        return f"at {curve.label(found.point)} ({found.reason})"
+        return f"at {curve.label(found.point)} ({reason})"
     unit = f" {curve.scenario.unit}".rstrip()
     low, high = ("∞" if end is None else f"{end:.3g}" for end in found.ci)
-    return f"{side} {found.point:.3g}{unit} [{low} to {high}] ({found.reason})"
+    return f"{side} {found.point:.3g}{unit} [{low} to {high}] ({reason})"
 
 
 def _ranges(envelope: Mapping[str, Range]) -> str:
@@ -125,7 +129,10 @@ def _section(section: Section) -> str:
     if section.patches is not None:
         patches = section.patches
         place = f"{section.curve.label(patches.value)}, {patches.scene}"
-        parts.append(f"<p>Worst patch at {escape(place)}, x {patches.x_px}, y {patches.y_px}:</p>")
+        parts.append(
+            f"<p>Where it fails most against input and Wiener bank: {escape(place)}, "
+            f"x {patches.x_px}, y {patches.y_px}:</p>"
+        )
         parts += [
             f"<figure>{_image(png, name)}<figcaption>{escape(name)}</figcaption></figure>"
             for name, png in patches.pictures.items()

@@ -9,6 +9,7 @@ import numpy as np
 from camkit.contracts import FloatArray
 from camkit.report.stress.break_point import sound_values
 from camkit.report.stress.curve import Curve, margins
+from camkit.report.stress.rig import INPUT, WIENER
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import PATCH_PX, Comparison, Judge
 
@@ -74,11 +75,13 @@ def worst_patches(
 def worst_place(curve: Curve, method: str) -> tuple[int, int] | None:
     """Give (value index, scene index) of the capture to look at; None if nothing was compared.
 
-    The value is the first broken one, else that of the least PSNR; the scene that of least PSNR.
+    The value is the first broken one, else that of the least gain in PSNR over the input and the
+    Wiener bank; the scene is that of the least gain.
     """
     if method not in curve.methods:
         return None
-    grid = curve.psnr_db[method]
+    plain = [curve.psnr_db[m] for m in (INPUT, WIENER) if m in curve.psnr_db and m != method]
+    grid = curve.psnr_db[method] - (np.fmax.reduce(plain) if plain else 0.0)
     known = np.isfinite(grid)
     if not known.any():
         return None

@@ -22,7 +22,7 @@ from camkit.report.stress.consistency import (
     near,
     residual,
 )
-from camkit.report.stress.rig import INPUT, Restored, Rig
+from camkit.report.stress.rig import INPUT, WIENER, Restored, Rig
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.twin import Shot
 from camkit.runtime.color import recover_highlights
@@ -96,8 +96,11 @@ class Judge:
         """
         compare = Comparison(shot, self.rig)
         outcomes = {}
+        errors = {method: compare.errors(planes) for method, planes in restored.planes.items()}
+        plain = [errors[method] for method in (INPUT, WIENER) if method in errors]
         for method, planes in restored.planes.items():
-            psnr_db, patch_px = compare.rate(planes)
+            least = np.minimum.reduce(plain) if method not in (INPUT, WIENER) and plain else 0.0
+            psnr_db, patch_px = compare.rate(errors[method], least)
             judged = with_chi2 and method != INPUT
             chi2 = self._chi2(method, planes, shot) if judged else None
             fault = None if np.isfinite(planes).all() else "NaN or inf in the picture"
@@ -161,16 +164,28 @@ class Comparison:
         even /= np.float32(self._shot.exposure)
         return encode_srgb(apply_matrix(self._matrix, even))
 
-    def rate(self, planes: FloatArray) -> tuple[float | None, tuple[int, int] | None]:
-        """Give the PSNR in dB and the (x, y) of the worst patch."""
+    def errors(self, planes: FloatArray) -> NDArray[np.float64]:
+        """Give (h, w) squared errors of planes, the mean over the colours."""
+        error = self.finish(planes).astype(np.float64) - self.sharp
+        return np.asarray(np.square(error).mean(axis=0))
+
+    def rate(
+        self, error: NDArray[np.float64], least: NDArray[np.float64] | float = 0.0
+    ) -> tuple[float | None, tuple[int, int] | None]:
+        """Give the PSNR in dB and the (x, y) of the worst patch.
+
+        Args:
+            error: Of the method, from `errors`.
+            least: What simpler methods leave: the worst patch is where `error` exceeds it most,
+                so that it shows where the method fails and not where the scene is hard.
+        """
         if self._judged.mean() < LEAST_SHARE:
             return None, None
-        error = np.square(self.finish(planes).astype(np.float64) - self.sharp).mean(axis=0)
         mean = float(error[self._judged].mean())
         if not np.isfinite(mean):
             return None, None
         psnr_db = BEST_DB if mean == 0 else min(-10 * float(np.log10(mean)), BEST_DB)
-        return psnr_db, worst_patch(np.where(self._judged, error, 0))
+        return psnr_db, worst_patch(np.where(self._judged, error - least, 0))
 
 
 def worst_patch(error: NDArray[np.float64]) -> tuple[int, int]:

@@ -2,8 +2,8 @@
 
 Rays run backwards, from a point of the sensor to points of the stop. Each brings the radiance of
 the scene through its own share of the solid angle, wherever in the scene it ends: right for
-blurred images too, where `spot.relative_illumination`, which lets the whole beam land where its
-chief ray does, is not.
+blurred images too, where it would not do to let the whole beam of a field land where its chief ray
+does (0.875 for 0.897 at the corner of `duet`, seen from 1 m).
 """
 
 from dataclasses import replace
@@ -47,6 +47,17 @@ def relative_illumination_of(
     axis = torch.zeros_like(heights[:1])
     light = sensor_light(lens, torch.cat([axis, heights]), wavelengths_um, rays)
     return light[1:] / light[:1]
+
+
+def relative_illumination_at(lens: Lens, heights_mm: Tensor, rays: int = 1024) -> Tensor:
+    """Give the light (point,) of an even scene at sensor heights (point,), 1 on the axis.
+
+    At the reference wavelength; otherwise as `relative_illumination_of`.
+    """
+    heights = torch.cat([heights_mm.new_zeros(1), heights_mm]).to(torch.float64)[:, None]
+    wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    light = sensor_light(lens, heights, wave, rays)[:, 0]
+    return light[1:] / light[0]
 
 
 def sensor_light(

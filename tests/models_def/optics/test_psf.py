@@ -12,7 +12,6 @@ from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import (
     Spots,
     chief_heights,
-    relative_illumination,
     slopes_for_heights,
     trace_spots,
 )
@@ -153,30 +152,6 @@ def test_slopes_are_found_for_sensor_heights() -> None:
 def test_unreachable_sensor_height_is_refused() -> None:
     with pytest.raises(ContractError, match=r"chief ray is lost|no field reaches"):
         slopes_for_heights(read_prescription(DUET), _f64(200.0))
-
-
-def test_distortion_free_unvignetted_light_falls_as_cos4() -> None:
-    """A stop with air only: a pinhole camera."""
-    pinhole = Lens(
-        name="pinhole",
-        surfaces=(Surface(curvature_per_mm=0.0, thickness_mm=50.0),),
-        stop=0,
-        aperture_kind="stop_semi_diameter_mm",
-        aperture_value=1.0,
-    )
-    heights = _f64(0, 10, 20, 40)
-    found = relative_illumination(pinhole, heights, rays=64)
-    assert torch.allclose(found, torch.cos(torch.atan(heights / 50)) ** 4, rtol=0, atol=1e-6)
-
-
-def test_vignetting_takes_light_from_the_corner() -> None:
-    lens = read_prescription(DUET)
-    last = replace(lens.surfaces[-1], semi_diameter_mm=8.0)
-    narrow = replace(lens, surfaces=(*lens.surfaces[:-1], last))
-    heights = _f64(0, 21)
-    assert float(relative_illumination(narrow, heights)[1]) < 0.95 * float(
-        relative_illumination(lens, heights)[1]
-    )
 
 
 def test_energy_kept_grows_with_the_window() -> None:

@@ -89,6 +89,27 @@ def test_checkpoint_with_other_kernels_is_not_resumed(tmp_path, recipe_path, ban
         train(recipe_path, options(tmp_path, resume=True), bank=other)
 
 
+def test_weights_of_another_camera_are_the_first_ones_and_the_card_says_so(
+    tmp_path, recipe_path, bank, whole
+):
+    begun = options(tmp_path, start=whole.checkpoint, stop_at_step=1)
+    train(recipe_path, begun, bank=bank)
+    first, saved = read_checkpoint(whole.checkpoint), read_checkpoint(tmp_path / "tiny_S.pt")
+    moved = max(float((saved.weights[k] - v).abs().max()) for k, v in first.average.items())
+    assert 0 < moved < 1e-3  # one step of warm-up away
+    assert saved.step == 1
+    assert "; first weights: tiny S (" in saved.training_data
+    train(recipe_path, options(tmp_path, resume=True, stop_at_step=2), bank=bank)
+    assert read_checkpoint(tmp_path / "tiny_S.pt").training_data == saved.training_data
+
+
+def test_weights_of_another_network_are_refused(tmp_path, recipe_path, bank, whole):
+    with pytest.raises(ContractError, match="the recipe wants"):
+        train(recipe_path, options(tmp_path, start=whole.checkpoint, size="M"), bank=bank)
+    with pytest.raises(ContractError, match="has begun"):
+        options(tmp_path, start=whole.checkpoint, resume=True)
+
+
 def test_network_from_a_checkpoint_has_the_averaged_weights(whole):
     saved = read_checkpoint(whole.checkpoint)
     network = load_network(saved)

@@ -8,7 +8,11 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.illumination import relative_illumination_of, sensor_light
+from camkit.models_def.optics.analysis.illumination import (
+    relative_illumination_at,
+    relative_illumination_of,
+    sensor_light,
+)
 from camkit.models_def.optics.paraxial import with_paraxial_focus
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription
 from camkit.models_def.optics.psf import with_object_distance
@@ -55,6 +59,8 @@ def test_a_pinhole_obeys_the_cos4_law() -> None:
     angles = torch.tensor([0.0, 0.3, 0.6], dtype=torch.float64)
     found = relative_illumination_of(_hole(1e-3), torch.tan(angles), WAVE, rays=16)
     assert torch.allclose(found[:, 0], torch.cos(angles) ** 4, rtol=1e-6)
+    at_heights = relative_illumination_at(_hole(1e-3), 50 * torch.tan(angles), rays=16)
+    assert torch.allclose(at_heights, torch.cos(angles) ** 4, rtol=1e-6)
 
 
 def test_a_blurred_lens_is_as_bright_as_the_renderer_s_integral_says(near_duet: Lens) -> None:
