@@ -56,5 +56,6 @@ def make_facts(**changes: Any) -> Facts:
         "metrics": registered_metrics(),
         "base": [make_run(4.0), make_run(6.0)],
         "base_label": "M",
+        "base_key": make_case().accuracy_key,
     }
     return Facts(**(fields | changes))

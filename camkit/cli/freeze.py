@@ -59,7 +59,7 @@ def freeze(
     )
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
-        write_psf(stress_out, freeze_stress(read_lens(prescription), plan.camera).psf)
+        write_psf(stress_out, freeze_stress(read_lens(prescription), plan.camera, grid).psf)
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
         report.write_text(json.dumps(found.to_json(), indent=2) + "\n", encoding="utf-8")

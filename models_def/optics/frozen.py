@@ -34,6 +34,8 @@ FloatGrid = NDArray[np.float64]
 STRESS_DEPTHS_MM: Final = (5e3, 1e4, 2e4, 5e4, math.inf)
 STRESS_FIELDS: Final = (0.0, 0.7, 1.0)
 STRESS_WAVELENGTHS: Final = 3
+STRESS_LOSS: Final = 4.0
+"""Of the light that a grid may lose, since out of focus it spreads further."""
 FINE_WAVELENGTHS: Final = 25
 _MATCH_STEPS: Final = 40
 
@@ -153,7 +155,12 @@ def freeze_stress(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) ->
     The sensor stays where it is, so a distance d is also a focus error of EFL^2 / d.
     """
     base = grid or FreezeGrid()
-    stress = replace(base, depths_mm=STRESS_DEPTHS_MM, wavelengths=STRESS_WAVELENGTHS, energy=0.98)
+    stress = replace(
+        base,
+        depths_mm=STRESS_DEPTHS_MM,
+        wavelengths=STRESS_WAVELENGTHS,
+        energy=1 - STRESS_LOSS * (1 - base.energy),
+    )
     heights_mm = np.array(STRESS_FIELDS) * corner_height_mm(camera)
     return freeze_at(lens, camera, stress, heights_mm)
 

@@ -136,14 +136,22 @@ def mean_and_spread(values: Iterable[float]) -> tuple[float | None, float | None
     return mean, statistics.stdev(known) if len(known) > 1 else None
 
 
-def standard_error_of_gain(scores: Scores, of_input: Scores, column: str) -> float | None:
-    """Give the standard error over pictures of the gain over the input; None for fewer than two.
+def mean_gain(scores: Scores, other: Scores, column: str) -> float | None:
+    """Give the mean over pictures of the gain over another method; None without pictures."""
+    gains = _gains(scores, other, column)
+    return statistics.fmean(gains) if gains else None
+
+
+def standard_error_of_gain(scores: Scores, other: Scores, column: str) -> float | None:
+    """Give the standard error over pictures of the gain over another; None for fewer than two.
 
     The gain is taken picture by picture, so that the contents of the pictures, which move all
     methods alike, cancel.
     """
-    base = of_input.picture_means(column)
-    gains = [v - base[p] for p, v in scores.picture_means(column).items() if p in base]
-    if len(gains) < 2:
-        return None
-    return statistics.stdev(gains) / math.sqrt(len(gains))
+    gains = _gains(scores, other, column)
+    return statistics.stdev(gains) / math.sqrt(len(gains)) if len(gains) > 1 else None
+
+
+def _gains(scores: Scores, other: Scores, column: str) -> list[float]:
+    base = other.picture_means(column)
+    return [v - base[p] for p, v in scores.picture_means(column).items() if p in base]

@@ -9,6 +9,7 @@ from camkit.report.bench.accuracy import (
     Key,
     Scores,
     mean_and_spread,
+    mean_gain,
     standard_error_of_gain,
 )
 from camkit.report.bench.case import Case
@@ -32,6 +33,7 @@ class Facts:
         metrics: Of that camera.
         base: Runs of the case that others are compared with.
         base_label: Its label.
+        base_key: Key of its scores.
     """
 
     size_px: tuple[int, int]
@@ -41,6 +43,7 @@ class Facts:
     metrics: Sequence[Metric]
     base: Sequence[Run]
     base_label: str
+    base_key: Key
 
 
 def make_row(case: Case, runs: Sequence[Run], facts: Facts) -> Row:
@@ -127,6 +130,7 @@ def _network_share(case: Case, runs: Sequence[Run], facts: Facts) -> Row:
 
 def _accuracy(case: Case, facts: Facts) -> Row:
     scores, of_input = facts.scores.get(_key(case)), facts.scores.get(INPUT)
+    of_base = facts.scores.get(facts.base_key)
     lenses = set() if scores is None else scores.psf
     row: Row = {
         "psf": "+".join(sorted(lenses)) or None,
@@ -139,15 +143,20 @@ def _accuracy(case: Case, facts: Facts) -> Row:
             mean, spread = _means(scores, name)
             base, _ = _means(of_input, name)
             row |= {name: mean, column.spread: spread, column.of_input: base}
-            both = scores is not None and of_input is not None and scores is not of_input
-            row[f"gain_se_{name}"] = (
-                standard_error_of_gain(scores, of_input, name)
-                if both and scores is not None and of_input is not None
-                else None
-            )
+            row[f"gain_se_{name}"] = _gain(scores, of_input, name)[1]
+            row[f"over_base_{name}"], row[f"over_base_se_{name}"] = _gain(scores, of_base, name)
             if scores is not None:
                 row["captures"] = sum(len(v.get(name, ())) for v in scores.by_picture.values())
     return row
+
+
+def _gain(
+    scores: Scores | None, other: Scores | None, column: str
+) -> tuple[float | None, float | None]:
+    """Give mean and standard error over pictures of the gain over another method."""
+    if scores is None or other is None or scores is other:
+        return None, None
+    return mean_gain(scores, other, column), standard_error_of_gain(scores, other, column)
 
 
 def _key(case: Case) -> Key:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.errors import ContractError
-from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy
+from camkit.report.bench.accuracy import INPUT, Key, Restorers, Scores, measure_accuracy
 from camkit.report.bench.case import BASE_SIZE, Case, Entrant, Ground, Skip
 from camkit.report.bench.crops import MOST_SAMPLES, CropCollector, Patch
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
@@ -248,6 +248,7 @@ def _join(
             metrics=judged[case.camera].metrics,
             base=runs[base],
             base_label=base.label,
+            base_key=INPUT if base.path is None else base.accuracy_key,
         )
         rows.append(make_row(case, runs[case], facts))
     report = {
