@@ -5,9 +5,10 @@
 
 Same start, same variables, same bounds. The spots lenses (every merit, many starts) may trace ten
 times as many lenses as the joint design; the joint design begins at the best of them and, apart
-from it, at the recipe's lens. Every lens is then judged by the front alone, and by a network of
-its own, trained with the lens at rest, the same budget and several seeds, on fresh pictures. What
-is finished is kept in the folder and not done again.
+from it, at the recipe's lens. Every lens is then judged by the front alone on fresh pictures; the
+start, the best lens on spots and the best joint lens also by networks of their own, trained with
+the lens at rest and the same budget for every seed. What is finished is kept in the folder and not
+done again: several processes may share it, each with seeds of its own.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +45,9 @@ def main() -> None:
     arguments = parse()
     torch.set_num_threads(1)
     recipe = read_design(arguments.recipe)
+    if arguments.network:
+        choice = NetworkChoice(name=arguments.network, config={})
+        recipe = replace(recipe, network=choice)
     alone = replace(recipe, network=NetworkChoice(config={}))
     parts = parts_of(alone, folder=arguments.recipe.parent, pictures=arguments.data)
     fresh = open_source(arguments.fresh, picture_share=1.0, scenes=1, scene_px=64)
@@ -65,22 +70,32 @@ def main() -> None:
         path = arguments.out_dir / f"{name.replace(' ', '_')}.json"
         lenses[name] = kept(path, lambda begin=begin: joint(parts, alone, begin))
     for name, scaled in lenses.items():
-        entry: dict[str, Any] = {"front_db": front_db(parts, recipe, scaled, fresh)}
         lens = finished(parts.lens.problem, scaled)
         write_lens(lens, arguments.out_dir / f"{name.replace(' ', '_')}.toml")
-        entry["networks"] = [
-            kept_number(
-                arguments.out_dir / f"{name.replace(' ', '_')}_network_{seed}.json",
-                lambda scaled=scaled, seed=seed: network_score(
-                    parts, recipe, scaled, seed, arguments.network_steps, fresh
-                ),
-            )
-            for seed in range(1, arguments.seeds + 1)
-        ]
-        report["lenses"][name] = entry
-        print(line(name, entry), flush=True)
+        found = score_design(parts, recipe.schedule, scaled, source=fresh)
+        entry = {"front_db": found.psnr_db, "front_by_field_db": found.by_field_db}
+        report["lenses"][name] = entry | {"networks": []}
+        print(line(name, report["lenses"][name]), flush=True)
+    judged = ["start", best, best_of(report, "joint")]
+    for seed, name in product(arguments.seeds if arguments.network else (), judged):
+        path = arguments.out_dir / f"{name.replace(' ', '_')}_network_{seed}.json"
+        entry = kept_number(
+            path,
+            lambda name=name, seed=seed: network_score(
+                parts, recipe, lenses[name], seed, arguments.network_steps, fresh
+            ),
+        )
+        report["lenses"][name]["networks"].append(entry)
+        print(f"seed {seed}:", line(name, report["lenses"][name]), flush=True)
     path = arguments.out_dir / "joint.json"
     path.write_text(json.dumps(report, indent=1))
+
+
+def best_of(report: dict[str, Any], kind: str) -> str:
+    """Give the lens of a kind that the front alone recovers best."""
+    lenses = report["lenses"]
+    own = [name for name in lenses if name.startswith(kind)]
+    return max(own, key=lambda name: float(lenses[name]["front_db"]))
 
 
 def parse() -> argparse.Namespace:
@@ -91,9 +106,14 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--out-dir", type=Path, default=Path("out/joint"))
     parser.add_argument("--starts", type=int, default=96)
     parser.add_argument("--spot-steps", type=int, default=80)
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--network-steps", type=int, default=0, help="0: the front alone")
+    parser.add_argument("--network", help="of the catalogue; without it the front alone judges")
+    parser.add_argument("--network-steps", type=int, default=1000)
+    parser.add_argument("--seeds", type=numbers, default=(1, 2, 3), help="of networks: 1,2,3")
     return parser.parse_args()
+
+
+def numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
 
 
 def kept(path: Path, make: Callable[[], tuple[Tensor, dict[str, Any]]]) -> Tensor:
@@ -168,8 +188,6 @@ def network_score(
     fresh: SceneSource,
 ) -> dict[str, Any]:
     """Train a network of its own for a lens at rest, and judge it on fresh pictures."""
-    if not steps:
-        return {}
     schedule = replace(
         recipe.schedule, steps=steps, lens_rate=0.0, seed=seed, epoch_steps=max(1, steps // 12)
     )

@@ -25,7 +25,9 @@ COLUMNS: Final = (
     Shown("method", "label", "", "a size of network, or the name of a method"),
     Shown("PSNR dB", "psnr_db", ".2f", "mean over pictures, on sRGB values"),
     Shown("SSIM", "ssim", ".3f", "mean over pictures, on sRGB values"),
-    Shown("over base dB", "over_base_psnr_db", "+.2f", "mean over pictures of the gain over size M"),
+    Shown(
+        "over base dB", "over_base_psnr_db", "+.2f", "mean over pictures of the gain over size M"
+    ),
     Shown("+-", "over_base_se_psnr_db", ".2f", "standard error of that gain over pictures"),
     Shown("s", "seconds_median", ".2f", "median, file to EXR in a fresh process"),
     Shown("p90 s", "seconds_p90", ".2f", "0.9 quantile, interpolated where processes are few"),

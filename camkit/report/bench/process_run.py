@@ -24,6 +24,8 @@ import camkit
 
 POLL_S: Final = 0.02
 TIMEOUT_S: Final = 3600.0
+REPEAT_WITHIN_S: Final = 60.0
+"""A file that takes longer is not repeated: what a process pays once does not show in it."""
 SILENT: Final = "the process ended without a picture and without a word"
 _PROC: Final = Path("/proc")
 
@@ -37,12 +39,14 @@ class Job:
         bundle: Path of the bundle, or "none".
         out_dir: Folder of the pictures.
         options: Fields of `Options`, plain JSON values.
+        repeat_within_s: The process ends early once a file has taken longer.
     """
 
     files: tuple[Path, ...]
     bundle: str
     out_dir: Path
     options: dict[str, Any]
+    repeat_within_s: float = REPEAT_WITHIN_S
 
     def to_json(self) -> str:
         """Encode for the worker's command line."""
@@ -52,6 +56,7 @@ class Job:
                 "bundle": self.bundle,
                 "out_dir": str(self.out_dir),
                 "options": self.options,
+                "repeat_within_s": self.repeat_within_s,
             }
         )
 

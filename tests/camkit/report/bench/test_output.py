@@ -60,7 +60,13 @@ def result() -> Result:
         },
         "repeat": 2,
         "cameras": {
-            "duet": {"width": 4000, "height": 3000, "capture": "a scene", "accuracy": "2 pictures"}
+            "duet": {
+                "width": 4000,
+                "height": 3000,
+                "capture": "a scene",
+                "accuracy": "2 pictures",
+                "bundle_sha256": "ab" * 32,
+            }
         },
         "rows": rows,
         "skipped": [{"what": "M cuda", "reason": "onnxruntime here computes on cpu"}],

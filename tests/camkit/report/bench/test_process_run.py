@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -73,6 +74,16 @@ def test_a_job_gives_first_and_steady_seconds_and_its_stages(tmp_path: Path) -> 
     assert run.peak_rss_mb is not None
     assert run.peak_rss_mb > 50
     assert (tmp_path / "out" / "b.exr").is_file()
+
+
+def test_a_slow_file_is_not_repeated(tmp_path: Path) -> None:
+    bundle = write_tiny_captures(tmp_path, ["a", "b"])
+    files = (tmp_path / "a.dng", tmp_path / "b.dng")
+    job = Job(files=files, bundle=str(bundle), out_dir=tmp_path / "out", options={"size": "M"})
+    run = run_job(replace(job, repeat_within_s=0.0))
+    assert run.error is None
+    assert run.seconds is not None
+    assert run.steady_s == ()
 
 
 def test_a_job_that_takes_too_long_is_ended(
