@@ -8,6 +8,7 @@ from typing import Final
 import torch
 from torch import Tensor, nn
 
+from camkit.contracts import CFA_PATTERNS
 from camkit.errors import ContractError
 from camkit.models_def.design.loop import DesignParts
 from camkit.models_def.design.optics import WIDEST_PX, LensModule, fitting_window_px
@@ -101,6 +102,16 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
     return replace(pixels, kernel_px=fitting_window_px(problem, begin, pixels))
 
 
+def recorder_of(recipe: DesignRecipe) -> Recorder:
+    """Give what the pixels of a recipe do; raises ContractError for unknown colour filters."""
+    wanted, known = recipe.pixels.cfa, {str(cfa): cfa for cfa in CFA_PATTERNS}
+    if wanted and wanted not in known:
+        raise ContractError(
+            f"pixels.cfa must be one of {', '.join(known)}, or empty; got {wanted!r}"
+        )
+    return Recorder(noise=recipe.pixels.noise, cfa=known.get(wanted))
+
+
 def network_of(recipe: DesignRecipe) -> nn.Module | None:
     """Build the network of a recipe for the planes of its front; None without one."""
     choice = recipe.network
@@ -140,7 +151,7 @@ def parts_of(
         lens=lens,
         network=network_of(recipe),
         front=recipe.front,
-        recorder=Recorder(noise=recipe.pixels.noise),
+        recorder=recorder_of(recipe),
         loss=recipe.loss,
         source=open_source(
             pictures,

@@ -79,6 +79,7 @@ class PixelRecipe:
         wavelengths_um: Increasing, an odd number.
         color_weights: One row of weights for R, G and B, as many as wavelengths.
         noise: Standard deviation, 1.0 = white level.
+        cfa: RGGB or another order of the colour filters; empty for three colours in each pixel.
     """
 
     pitch_um: float
@@ -90,6 +91,7 @@ class PixelRecipe:
         (0.85, 0.14, 0.01),
     )
     noise: float = 0.01
+    cfa: str = ""
 
     def __post_init__(self) -> None:
         rows = {len(row) for row in self.color_weights}

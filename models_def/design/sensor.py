@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
+from camkit.contracts import CfaPattern
 from camkit.errors import ContractError
+from camkit.models_def.sensors.demosaic import demosaic, mosaic
 from camkit.models_def.sensors.forward import blur
 
 
@@ -14,9 +16,12 @@ class Recorder:
 
     Attributes:
         noise: Standard deviation, 1.0 = white level.
+        cfa: Colour filters of the pixels, demosaicked linearly; None for three colours in each
+            pixel. Without it a design believes in detail that a mosaic cannot record.
     """
 
     noise: float = 0.01
+    cfa: CfaPattern | None = None
 
     def __post_init__(self) -> None:
         if not self.noise >= 0:
@@ -33,9 +38,12 @@ def capture(sharp: Tensor, kernels: Tensor, recorder: Recorder, normal: Tensor) 
         normal: (b, 3, h, w) standard normal numbers.
 
     Returns:
-        (b, 3, h, w) linear, clipped to 0..1 with gradients passed on.
+        (b, 3, h, w) linear, clipped to 0..1 with gradients passed on, then demosaicked.
 
     References: Sun 2021, eq. (6.9).
     """
     light = blur(sharp, kernels.to(sharp.dtype)) + recorder.noise * normal
-    return light + (light.clamp(0, 1) - light).detach()
+    recorded = light + (light.clamp(0, 1) - light).detach()
+    if recorder.cfa is None:
+        return recorded
+    return demosaic(mosaic(recorded, recorder.cfa), recorder.cfa)

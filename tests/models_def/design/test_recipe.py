@@ -78,6 +78,7 @@ def change(key: str, **entries: Any) -> Callable[[dict[str, Any]], None]:
         (change("schedule", lens_rate="fast"), "type float"),
         (change("pixels", kernel_px=32), "odd"),
         (change("pixels", wavelengths_um=[0.5]), "three rows"),
+        (change("pixels", cfa="RGBW"), "cfa must be one of RGGB"),
         (change("optics", half_field_deg=95.0), "half_field_deg"),
         (change("optics", focus_distance_mm=700.0), "one of object_distances_mm"),
         (change("optics", units="own"), "whitened moves have no units"),

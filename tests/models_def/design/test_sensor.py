@@ -32,6 +32,23 @@ def test_clipping_lets_gradients_through() -> None:
     assert bool((sharp.grad == 1).all())
 
 
+def test_colour_filters_keep_one_colour_a_pixel_and_the_rest_is_interpolated() -> None:
+    generator = torch.Generator().manual_seed(3)
+    sharp = torch.rand(1, 3, 24, 24, generator=generator, requires_grad=True)
+    flat = torch.tensor([0.2, 0.5, 0.7]).reshape(1, 3, 1, 1).expand(1, 3, 24, 24)
+    none, grbg = torch.zeros(1, 3, 24, 24), Recorder(noise=0.0, cfa="GRBG")
+    # 2x2 cells G R / B G: an even colour stays itself, a texture keeps what was sampled
+    torch.testing.assert_close(capture(flat, dot(1), grbg, none), flat, rtol=0, atol=1e-6)
+    seen = capture(sharp, dot(1), grbg, none)
+    for colour, row, column in ((1, 0, 0), (0, 0, 1), (2, 1, 0), (1, 1, 1)):
+        kept = (slice(None), colour, slice(row, None, 2), slice(column, None, 2))
+        torch.testing.assert_close(seen[kept], sharp[kept], rtol=0, atol=1e-6)
+    assert float((seen[:, 0] - sharp[:, 0]).detach().abs().max()) > 0.1
+    seen.sum().backward()  # type: ignore[no-untyped-call]
+    assert sharp.grad is not None
+    assert bool(torch.isfinite(sharp.grad).all())
+
+
 def test_the_tone_is_srgb_with_a_finite_slope_everywhere() -> None:
     values = torch.tensor([-0.1, 0.0, 1e-4, 0.0031308, 0.2, 1.0], requires_grad=True)
     found = encode_srgb(values)
