@@ -11,6 +11,7 @@ from camkit.bundle.psf_file import read_psf, write_psf
 from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
+    _rounded,
     corner_height_mm,
     dense_grid,
     freeze,
@@ -107,6 +108,15 @@ def test_frozen_colours_equal_a_dense_trace(camera: Camera) -> None:
     )
     apart = np.abs(found - expected).sum((-2, -1))
     assert apart.max() < 0.05
+
+
+def test_kernels_are_rounded_to_what_a_picture_shows() -> None:
+    kernels = np.random.default_rng(0).random((2, 3, 9, 9), dtype=np.float32) ** 8
+    found = _rounded(kernels)
+    assert float((np.abs(found - kernels) / kernels).max()) <= 2.0**-13
+    assert not (found.view(np.uint32) & 0x7FF).any()
+    assert np.array_equal(_rounded(found), found)
+    assert not _rounded(np.zeros((1, 1), np.float32)).any()
 
 
 def test_one_wavelength_can_be_frozen(camera: Camera) -> None:
