@@ -49,7 +49,7 @@ def _write_member(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     packed = len(zlib.compress(data, _DEFLATE_LEVEL))
     # Near-empty members (kernels with wide zero borders) would pass the ratio that readers
     # refuse; those, and what does not shrink, are stored.
-    shrinks = packed < len(data) and len(data) < MAX_RATIO * packed // 2
+    shrinks = packed < len(data) and len(data) < MAX_RATIO * packed * 4 // 5
     info.compress_type = zipfile.ZIP_DEFLATED if shrinks else zipfile.ZIP_STORED
     archive.writestr(info, data, compresslevel=_DEFLATE_LEVEL)
 
