@@ -152,6 +152,7 @@ def parts_of(
         network=network_of(recipe),
         front=recipe.front,
         recorder=recorder_of(recipe),
+        fabrication=recipe.fabrication,
         loss=recipe.loss,
         source=open_source(
             pictures,

@@ -20,16 +20,19 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
+from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.loss import DesignLoss, design_loss
 from camkit.models_def.design.optics import LensModule
 from camkit.models_def.design.rest import LensAtRest
 from camkit.models_def.design.sensor import Recorder, capture
+from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.training.pictures import SceneSource
 
 VALID_SEED: Final = 900_000
 SCORE_SEED: Final = 950_000
+VALID_COPIES: Final = 8
 _CLIP: Final = 1.0
 
 State = dict[str, Any]
@@ -91,6 +94,8 @@ class DesignParts:
         recorder: The pixels.
         loss: What is minimised.
         source: Of sharp patches.
+        fabrication: Errors of the copies that captures are made with; the filter knows the
+            nominal lens. None makes them with the lens itself.
     """
 
     lens: LensModule | LensAtRest
@@ -99,6 +104,7 @@ class DesignParts:
     recorder: Recorder
     loss: DesignLoss
     source: SceneSource
+    fabrication: FabricationErrors | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +173,8 @@ class DesignLoop:
         with torch.set_grad_enabled(True):
             parts.lens.moves.requires_grad_(moving)
             kernels, penalty = self._kernels(moving=moving)
-            pictures, sharp = self._pictures(batch, kernels)
+            made = self._made(kernels, _step_seed(plan.seed, self.step), moving=moving)
+            pictures, sharp = self._pictures(batch, kernels, made)
             loss = design_loss(parts.loss, pictures, sharp)
             total = loss + plan.penalty_weight * penalty
         self._optimizer.zero_grad(set_to_none=True)
@@ -190,19 +197,41 @@ class DesignLoop:
             kernels, penalty = self.parts.lens()
         return kernels.float(), penalty
 
-    def _pictures(self, batch: Batch, kernels: Tensor) -> tuple[Tensor, Tensor]:
-        """Give recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone."""
+    def _made(self, kernels: Tensor, number: int, *, moving: bool) -> Tensor:
+        """Give the kernels that captures are made with: those of copy `number`, if there are any.
+
+        Args:
+            kernels: Of the nominal lens.
+            number: Of the copy.
+            moving: Whether gradients flow.
+        """
+        lens, errors = self.parts.lens, self.parts.fabrication
+        if errors is None:
+            return kernels
+        with torch.set_grad_enabled(moving):
+            return lens.made_kernels(draw_copy(lens.problem.free.lens, errors, number)).float()
+
+    def _pictures(
+        self, batch: Batch, kernels: Tensor, made: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """Give recovered pictures (depth, b, 3, p, p) and the sharp ones in sRGB tone.
+
+        Args:
+            batch: Patches.
+            kernels: That the filter knows.
+            made: That captures are made with; None for the same.
+        """
         parts, plan = self.parts, self.schedule
-        made = []
-        for depth, of_depth in enumerate(kernels):
+        found = []
+        for depth, of_depth in enumerate(kernels if made is None else made):
             chosen = of_depth[batch.fields]
             recorded = capture(batch.sharp, chosen, parts.recorder, batch.normal[depth])
-            known = chosen if parts.front.depth_known else kernels.mean(0)[batch.fields]
-            planes = parts.front.planes(recorded, known)
-            made.append(planes[:, -3:] if parts.network is None else parts.network(planes))
+            told = kernels[depth] if parts.front.depth_known else kernels.mean(0)
+            planes = parts.front.planes(recorded, told[batch.fields])
+            found.append(planes[:, -3:] if parts.network is None else parts.network(planes))
         edge = (batch.sharp.shape[-1] - plan.patch_px) // 2
         sharp = batch.sharp[..., edge : edge + plan.patch_px, edge : edge + plan.patch_px]
-        return torch.stack(made), encode_srgb(sharp)
+        return torch.stack(found), encode_srgb(sharp)
 
     def _draw(self, seed: int, count: int) -> Batch:
         parts, plan = self.parts, self.schedule
@@ -229,7 +258,11 @@ class DesignLoop:
         """
         with torch.no_grad():
             kernels, penalty = self._kernels(moving=False)
-            found = [self._judged(batch, kernels) for batch in self._valid]
+            copies = self._valid_copies(kernels)
+            found = [
+                self._judged(batch, kernels, copies[i % len(copies)])
+                for i, batch in enumerate(self._valid)
+            ]
         valid_db, valid_loss = (float(np.mean(column)) for column in zip(*found, strict=True))
         merit = valid_db if self.parts.loss.needs_network else -valid_loss
         merit -= self.schedule.penalty_weight * float(penalty)
@@ -244,9 +277,14 @@ class DesignLoop:
             lost_light=1 - float(kernels.sum((-2, -1)).amin()),
         )
 
-    def _judged(self, batch: Batch, kernels: Tensor) -> tuple[float, float]:
+    def _valid_copies(self, kernels: Tensor) -> list[Tensor]:
+        """Give the kernels of the copies that lenses are judged by, drawn apart from all others."""
+        count = 1 if self.parts.fabrication is None else VALID_COPIES
+        return [self._made(kernels, VALID_SEED + i, moving=False) for i in range(count)]
+
+    def _judged(self, batch: Batch, kernels: Tensor, made: Tensor) -> tuple[float, float]:
         """Give mean PSNR and loss of a batch."""
-        pictures, sharp = self._pictures(batch, kernels)
+        pictures, sharp = self._pictures(batch, kernels, made)
         loss = float(design_loss(self.parts.loss, pictures, sharp))
         return _psnr_db(pictures, sharp), loss
 
@@ -258,11 +296,13 @@ class DesignLoop:
         """
         with torch.no_grad():
             kernels, _ = self._kernels(moving=False)
+            copies = self._valid_copies(kernels)
             for field in range(len(self.parts.lens.problem.slopes)):
                 at = torch.tensor([field])
                 for number in range(field * patches, (field + 1) * patches):
                     batch = replace(self._draw(SCORE_SEED + number, 1), fields=at)
-                    yield field, *self._pictures(batch, kernels)
+                    made = copies[number % len(copies)]
+                    yield field, *self._pictures(batch, kernels, made)
 
     def look(self, count: int = 4) -> tuple[Tensor, tuple[Tensor, Tensor, Tensor]]:
         """Give kernels and, for some fixed patches, (count, 3, h, w) captures, recovered, sharp."""

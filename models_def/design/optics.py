@@ -7,11 +7,13 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
+from camkit.models_def.design.fabrication import Copy, made_with
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.least_squares import jacobian
 from camkit.models_def.optics.search.problem import Problem, limits_of, residuals, trace_batch
 from camkit.models_def.optics.search.splat import Pixels, splat_batch
 from camkit.models_def.optics.tolerance.landing import window_px
+from camkit.models_def.optics.trace import SurfaceTensors
 
 MoveUnits = Literal["range", "own"]
 
@@ -99,6 +101,17 @@ class LensModule(nn.Module):
             if distance_mm == problem.limited_mm:
                 penalty = limits_of(problem, traced, distance_mm).square().sum()
         return torch.stack(kernels), penalty
+
+    def made_kernels(self, copy: Copy) -> Tensor:
+        """Give the kernels (depth, field, 3, k, k) of a copy of the present lens."""
+        scaled, problem = self.scaled()[None], self.problem
+        focused_mm = problem.free.lens.object_distance_mm
+
+        def change(tensors: SurfaceTensors, reference: SurfaceTensors) -> SurfaceTensors:
+            return made_with(tensors, copy, reference=reference, object_distance_mm=focused_mm)
+
+        traced = (trace_batch(problem, scaled, mm, change) for mm in problem.depths_mm)
+        return torch.stack([splat_batch(found.landed, self.pixels)[0] for found in traced])
 
     def lens(self) -> Lens:
         """Give the present lens as a prescription."""

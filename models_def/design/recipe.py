@@ -14,13 +14,14 @@ from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.design.optics import MoveUnits
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.networks.catalog import NETWORK_NAMES
+from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.toml_table import check_keys, read_table, section, typed
 
 _KEYS: Final = {
     *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
-    *("schedule", "data", "starts"),
+    *("schedule", "data", "starts", "fabrication"),
 }
 
 
@@ -144,6 +145,7 @@ class DesignRecipe:
         prescription: Name of a built-in prescription or path of a lens file.
         variables: What of the lens is free.
         starts: How many lenses near it are tried first.
+        fabrication: Errors of the copies that captures are made with; None for the lens itself.
     """
 
     name: str
@@ -158,6 +160,7 @@ class DesignRecipe:
     schedule: DesignSchedule
     data: DesignData
     starts: Starts
+    fabrication: FabricationErrors | None = None
 
 
 def read_design(path: Path) -> DesignRecipe:
@@ -192,6 +195,11 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
         schedule=section("schedule", DesignSchedule, table.get("schedule", {})),
         data=section("data", DesignData, table.get("data", {})),
         starts=section("starts", Starts, table.get("starts", {})),
+        fabrication=(
+            section("fabrication", FabricationErrors, table["fabrication"])
+            if "fabrication" in table
+            else None
+        ),
     )
 
 
@@ -212,4 +220,5 @@ def with_choices(
 
 def recipe_digest(recipe: DesignRecipe) -> str:
     """Give a hash of all that decides a run."""
-    return hashlib.sha256(json.dumps(asdict(recipe), sort_keys=True).encode()).hexdigest()
+    table = {name: value for name, value in asdict(recipe).items() if value is not None}
+    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()

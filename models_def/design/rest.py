@@ -12,6 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
+from camkit.models_def.design.fabrication import Copy
 from camkit.models_def.optics.focus import FocusMerit, with_focus
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import energy_diameter, splat, with_object_distance
@@ -54,6 +55,10 @@ class LensAtRest(nn.Module):
     def forward(self) -> tuple[Tensor, Tensor]:
         """Give kernels (depth, field, 3, k, k) and no penalty."""
         return self.kernels, torch.zeros((), dtype=self.kernels.dtype)
+
+    def made_kernels(self, copy: Copy) -> Tensor:
+        """Refuse: a lens at rest is judged as it was traced."""
+        raise ContractError(f"a lens at rest has no copies; got {copy}")
 
     def lens(self) -> Lens:
         """Give the lens as a prescription."""

@@ -1,6 +1,7 @@
 """A lens problem: what is free, what is looked at, what is good; one residual function."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import torch
@@ -19,6 +20,8 @@ from camkit.models_def.optics.search.limits import (
 from camkit.models_def.optics.search.merit import MERITS, Merit, spot_residuals
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.optics.trace import Rays, SurfaceTensors, trace
+
+Change = Callable[[SurfaceTensors, SurfaceTensors], SurfaceTensors]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,12 +95,24 @@ class Traced:
     seen: list[Rays]
 
 
-def trace_batch(problem: Problem, scaled: Tensor, object_distance_mm: float) -> Traced:
-    """Trace a batch (start, variable) from every field; gradients flow."""
+def trace_batch(
+    problem: Problem, scaled: Tensor, object_distance_mm: float, change: Change | None = None
+) -> Traced:
+    """Trace a batch (start, variable) from every field; gradients flow.
+
+    Args:
+        problem: Fields and wavelengths.
+        scaled: The lenses.
+        object_distance_mm: Of the object.
+        change: Takes the lenses at all wavelengths and at the reference one, and gives the former
+            as they are to be traced; None traces them as they are.
+    """
     free = problem.free
     reference_um = torch.tensor([free.lens.reference_wavelength_um], dtype=torch.float64)
     reference = free.tensors(scaled, reference_um)
     tensors = free.tensors(scaled, problem.wavelengths_um)
+    if change is not None:
+        tensors = change(tensors, reference)
     rays = launch_beam(free.lens, reference, problem.slopes, problem.samples, object_distance_mm)
     seen: list[Rays] = []
     landed = trace(tensors, rays, seen=seen)
