@@ -177,8 +177,8 @@ def train(
         return run.result()
 
 
-def _start(path: Path | None, entry: NetworkRecipe) -> tuple[State | None, str]:
-    """Give the first weights and what the card says of them."""
+def _start(path: Path | None, entry: NetworkRecipe, data: str) -> tuple[State | None, str]:
+    """Give the first weights and what the card says of them beside the data of this run."""
     if path is None:
         return None, ""
     saved = read_checkpoint(path)
@@ -188,7 +188,8 @@ def _start(path: Path | None, entry: NetworkRecipe) -> tuple[State | None, str]:
             f"with {dict(entry.config)}"
         )
     camera = to_recipe(tomllib.loads(saved.recipe_toml)).name
-    return saved.average, f"; first weights: {camera} {saved.size} ({saved.training_data})"
+    before = "the same" if saved.training_data == data else saved.training_data
+    return saved.average, f"; first weights: {camera} {saved.size}, trained on {before}"
 
 
 class _Run:
@@ -207,8 +208,9 @@ class _Run:
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
         name, credit = f"{self.recipe.name}_{options.size}", ""
+        data = describe_data(self.recipe, options.data_folder)
         if stage is None:
-            weights, credit = _start(options.start, self.entry)
+            weights, credit = _start(options.start, self.entry, data)
             self.fitter: Fits = Fitter(self.entry, options.device, weights)
         else:
             name, credit = f"{name}_{stage.name}", stage.credit
@@ -216,7 +218,7 @@ class _Run:
             self.fitter = stage.make_fitter(self.entry, bank)
         self.steps = options.steps or self.entry.schedule.steps
         self.path = options.out_dir / f"{name}.pt"
-        self.data = describe_data(self.recipe, options.data_folder) + credit
+        self.data = data + credit
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
         if options.resume:

@@ -98,7 +98,7 @@ def test_weights_of_another_camera_are_the_first_ones_and_the_card_says_so(
     moved = max(float((saved.weights[k] - v).abs().max()) for k, v in first.average.items())
     assert 0 < moved < 1.1e-3  # one step away, of half the rate
     assert saved.step == 1
-    assert "; first weights: tiny S (" in saved.training_data
+    assert saved.training_data.endswith("; first weights: tiny S, trained on the same")
     train(recipe_path, options(tmp_path, resume=True, stop_at_step=2), bank=bank)
     assert read_checkpoint(tmp_path / "tiny_S.pt").training_data == saved.training_data
 
