@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 from camkit.models_def.optics.paraxial import image_distance
-from camkit.models_def.optics.prescription import FabricationErrors, Lens
+from camkit.models_def.optics.prescription import FabricationErrors, Lens, perturb
 from camkit.models_def.optics.trace import SurfaceTensors
 
 Array = NDArray[np.float64]
@@ -36,16 +36,16 @@ class Copy:
 
 
 def draw_copy(lens: Lens, errors: FabricationErrors, number: int) -> Copy:
-    """Draw the uniform errors of a copy; the same number gives the same copy."""
-    rng, count = np.random.default_rng((number, 77)), len(lens.surfaces)
-    radius, thickness, index = rng.uniform(-1, 1, (3, count))
-    glass = np.array([surface.glass != "air" for surface in lens.surfaces])
-    gaps = np.arange(count) < count - 1
+    """Draw the errors of a copy, those of `perturb`; the same number gives the same copy."""
+    made = perturb(lens, errors, np.random.default_rng((number, 77)))
+    pairs = list(zip(lens.surfaces, made.surfaces, strict=True))
+    bent = [(s.curvature_per_mm, m.curvature_per_mm) for s, m in pairs]
+    moved_mm = np.array([m.thickness_mm - s.thickness_mm for s, m in pairs])
     return Copy(
-        radius=errors.radius_relative * radius,
-        thickness_mm=errors.thickness_mm * thickness * gaps,
-        index=errors.index * index * glass,
-        focus_mm=errors.focus_mm * float(rng.uniform(-1, 1)),
+        radius=np.array([nominal / own - 1 if own else 0.0 for nominal, own in bent]),
+        thickness_mm=np.append(moved_mm[:-1], 0.0),
+        index=np.array([m.index_offset - s.index_offset for s, m in pairs]),
+        focus_mm=float(moved_mm[-1]),
     )
 
 

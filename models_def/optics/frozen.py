@@ -172,7 +172,7 @@ def freeze_stress(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) ->
         base,
         depths_mm=STRESS_DEPTHS_MM,
         wavelengths=STRESS_WAVELENGTHS,
-        energy=1 - STRESS_LOSS * (1 - base.energy),
+        energy=max(1 - STRESS_LOSS * (1 - base.energy), base.energy / 2),
     )
     heights_mm = np.array(STRESS_FIELDS) * corner_height_mm(camera)
     return freeze_at(lens, camera, stress, heights_mm)

@@ -25,6 +25,8 @@ from camkit.models_def.training.samples import corner_height_mm
 PRESCRIPTIONS: Final = Path(__file__).resolve().parents[1] / "prescriptions"
 WAVELENGTHS: Final = 27
 LEAST_ENERGY: Final = 0.97
+TRACING: Final = 2
+"""Counts how kernels and light have been traced so far: what was kept before is traced again."""
 
 
 def build_lens_bank(recipe: Recipe, cache_folder: Path | None = None) -> PsfBank:
@@ -41,7 +43,7 @@ def build_lens_bank(recipe: Recipe, cache_folder: Path | None = None) -> PsfBank
     if cache_folder is None:
         return _trace(recipe, path)
     content = [path.read_text(encoding="utf-8"), json.dumps(recipe.lens.to_json())]
-    content.append(recipe.camera.model_dump_json())
+    content += [recipe.camera.model_dump_json(), str(TRACING)]
     name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"bank-{name}.npz"
     if not cached.exists():

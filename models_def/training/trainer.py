@@ -237,10 +237,8 @@ class _Run:
                 "start without resume"
             )
         self.fitter.load(saved.weights, saved.average, saved.optimizer)
-        if saved.training_data.startswith(self.data):
-            self.data = saved.training_data
-        else:
-            self.data = f"{saved.training_data}; then {self.data}"
+        added = "" if self.data in saved.training_data else f"; then {self.data}"
+        self.data = saved.training_data + added
         self.step = saved.step
         self.elapsed_before_s, self.cpu_before_s = saved.elapsed_s, saved.cpu_s
 

@@ -68,7 +68,7 @@ def test_several_depths_give_every_copy_at_each_and_their_mean_kernel(small, tra
 
 
 def test_banks_without_depths_keep_the_names_of_their_files(small, tmp_path, monkeypatch):
-    """A file made before there were depths is found again."""
+    """Named by prescription, plan, camera and way of tracing; a plan without depths has no word."""
     monkeypatch.setattr(lens_bank, "_trace", lambda *_: gaussian_bank(**GAUSSIAN))
     build_lens_bank(small, tmp_path)
     (made,) = tmp_path.iterdir()
@@ -76,4 +76,8 @@ def test_banks_without_depths_keep_the_names_of_their_files(small, tmp_path, mon
     names = ("prescription", "copies", "fields", "kernel_px", "rays", "seed")
     plan = {name: getattr(small.lens, name) for name in names}
     content = path.read_text(encoding="utf-8") + json.dumps(plan) + small.camera.model_dump_json()
+    content += str(lens_bank.TRACING)
     assert made.name == f"bank-{hashlib.sha256(content.encode()).hexdigest()[:16]}.npz"
+    monkeypatch.setattr(lens_bank, "TRACING", lens_bank.TRACING + 1)
+    build_lens_bank(small, tmp_path)
+    assert len([*tmp_path.iterdir()]) == 2
