@@ -1,4 +1,4 @@
-"""How far off may a start be? The same disturbed lenses designed two or three ways.
+"""How far off may a start be? The same disturbed lenses designed in several ways.
 
     python -m tools.design_stability models_def/recipes/duet_joint_lens.toml \
         --data PICTURES --fresh OTHERS --out-dir out/stability
@@ -9,9 +9,11 @@ steps (as many as fit into `--minutes` of CPU on this machine, or `--steps`), in
 
 before      plain steps in the lens's own numbers, focal length free, sensor where it stands, no
             limits
-after       focal length solved, sensor riding on the image, limits, whitened moves, the best of
-            several starts by damped least squares
-curriculum  the same, opened from part of the aperture and field to the whole in stages
+spots       focal length solved, sensor riding on the image, limits, whitened moves, the best of
+            eight lenses near the start by damped least squares, spots judging
+after       the same with the recipe's own search: more lenses, from further off, judged by what
+            is recovered
+curriculum  as after, opened from part of the aperture and field to the whole in stages
 
 The best three of each arm run to the recipe's end. Every lens is judged by the Wiener front on
 fresh pictures. What is finished is kept in `trials.jsonl` and not done again.
@@ -31,7 +33,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import find_lens, parts_of
+from camkit.models_def.design.assembly import find_lens, parts_of, source_of
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.optics import LensModule
@@ -50,10 +52,15 @@ from camkit.report.lens.stability_chart import Rules, Trial, best_trials, to_tex
 
 LEVELS: Final = (0.05, 0.1, 0.2, 0.5)
 FOCUS_MM: Final = 2.0
-STAGES: Final = {"before": (1.0,), "after": (1.0,), "curriculum": (0.4, 0.7, 1.0)}
+STAGES: Final = {
+    "before": (1.0,),
+    "spots": (1.0,),
+    "after": (1.0,),
+    "curriculum": (0.4, 0.7, 1.0),
+}
 PLAIN_FOCUS_MM: Final = 10.0
 JUDGE_RAYS: Final = 1000
-DEFAULT_STARTS: Final = Starts(count=8)
+SPOTS_STARTS: Final = Starts(count=8)
 WHITENED_RATE: Final = 0.1
 WARM_STEPS, TIMED_STEPS = 4, 8
 
@@ -66,7 +73,7 @@ class Bench:
         recipe: Without a network.
         folder: Of the recipe.
         out_dir: Of the results.
-        pictures: To design on.
+        pictures: To design on, opened once for all.
         fresh: To judge on.
         plain_rate: Learning rate of the plain arm, in shares of the bounds.
         seed: Of the starts.
@@ -75,7 +82,7 @@ class Bench:
     recipe: DesignRecipe
     folder: Path
     out_dir: Path
-    pictures: Path | None
+    pictures: SceneSource
     fresh: SceneSource
     plain_rate: float
     seed: int
@@ -95,7 +102,8 @@ class Bench:
         solved = self.recipe.optics.solved_surface % len(self.lens.surfaces)
         if arm == "before":
             return plain(self.recipe, solved, self.plain_rate)
-        return steady(self.recipe, solved, self.efl_mm)
+        own = steady(self.recipe, solved, self.efl_mm)
+        return replace(own, starts=SPOTS_STARTS) if arm == "spots" else own
 
     def parts(self, arm: str, number: int) -> DesignParts:
         """Give the parts of an arm at a disturbed lens, the same one for every arm."""
@@ -106,7 +114,7 @@ class Bench:
             share = level_of(number)
             write_lens(disturbed(self.lens, rng, curvature_share=share, focus_mm=FOCUS_MM), path)
         recipe = replace(self.of_arm(arm), prescription=str(path))
-        return parts_of(recipe, folder=self.folder, pictures=self.pictures)
+        return parts_of(recipe, folder=self.folder, source=self.pictures)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,7 +202,7 @@ def bench_of(arguments: argparse.Namespace) -> Bench:
         recipe=recipe,
         folder=arguments.recipe.parent,
         out_dir=arguments.out_dir,
-        pictures=arguments.data,
+        pictures=source_of(recipe, arguments.data),
         fresh=open_source(
             arguments.fresh,
             picture_share=1.0,
@@ -280,7 +288,7 @@ def steady(recipe: DesignRecipe, solved: int, efl_mm: float) -> DesignRecipe:
         ),
         optics=replace(optics, efl_mm=efl_mm, rides=True, whiten=True, units="range"),
         schedule=plan if optics.whiten else replace(plan, lens_rate=WHITENED_RATE),
-        starts=recipe.starts if recipe.starts.count else DEFAULT_STARTS,
+        starts=recipe.starts if recipe.starts.count else SPOTS_STARTS,
     )
 
 

@@ -10,11 +10,11 @@ from torch import Tensor, nn
 
 from camkit.contracts import CFA_PATTERNS
 from camkit.errors import ContractError
-from camkit.models_def.design.loop import DesignParts
+from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.optics import WIDEST_PX, LensModule, fitting_window_px
 from camkit.models_def.design.recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.sensor import Recorder
-from camkit.models_def.design.starts import best_start
+from camkit.models_def.design.starts import best_judged, best_starts
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_image
@@ -23,7 +23,7 @@ from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
-from camkit.models_def.training.pictures import open_source
+from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.units import to_radians
 
 PRESCRIPTIONS: Final = Path(__file__).resolve().parents[1] / "prescriptions"
@@ -84,9 +84,11 @@ def refocused(lens: Lens, distance_mm: float) -> Lens:
 
 
 def field_slopes(optics: OpticsRecipe) -> Tensor:
-    """Give the fields (field,) as slopes, at equal steps of ideal image height."""
+    """Give the fields (field,) as slopes, spaced as the recipe says."""
     far = math.tan(to_radians(optics.half_field_deg))
-    return torch.linspace(0, far, optics.fields, dtype=torch.float64)
+    steps = torch.linspace(0, 1, optics.fields, dtype=torch.float64)
+    slopes: Tensor = far * (steps.sqrt() if optics.spacing == "area" else steps)
+    return slopes
 
 
 def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
@@ -129,7 +131,11 @@ def network_of(recipe: DesignRecipe) -> nn.Module | None:
 
 
 def parts_of(
-    recipe: DesignRecipe, *, folder: Path | None = None, pictures: Path | None = None
+    recipe: DesignRecipe,
+    *,
+    folder: Path | None = None,
+    pictures: Path | None = None,
+    source: SceneSource | None = None,
 ) -> DesignParts:
     """Give what a loop joins.
 
@@ -137,27 +143,38 @@ def parts_of(
         recipe: The design.
         folder: Of the recipe, for relative paths.
         pictures: Folder of sharp pictures; None for procedural scenes alone.
+        source: Of sharp patches, already open, in the place of `pictures`.
     """
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
-    begin = best_start(problem, recipe.starts)
-    lens = LensModule(
-        problem,
-        pixels_of(recipe, problem, begin),
-        begin,
-        whiten=recipe.optics.whiten,
-        units=recipe.optics.units,
-    )
-    return DesignParts(
-        lens=lens,
-        network=network_of(recipe),
-        front=recipe.front,
-        recorder=recorder_of(recipe),
-        fabrication=recipe.fabrication,
-        loss=recipe.loss,
-        source=open_source(
-            pictures,
-            picture_share=recipe.data.picture_share,
-            scenes=recipe.data.procedural_scenes,
-            scene_px=recipe.data.scene_px,
-        ),
+    lenses = best_starts(problem, recipe.starts)
+    pixels = pixels_of(recipe, problem, lenses[0])
+    source = source or source_of(recipe, pictures)
+
+    def parts_at(begin: Tensor, network: nn.Module | None, *, whiten: bool) -> DesignParts:
+        return DesignParts(
+            lens=LensModule(problem, pixels, begin, whiten=whiten, units=recipe.optics.units),
+            network=network,
+            front=recipe.front,
+            recorder=recorder_of(recipe),
+            fabrication=recipe.fabrication,
+            loss=recipe.loss,
+            source=source,
+        )
+
+    def judge(scaled: Tensor) -> float:
+        loop = DesignLoop(parts_at(scaled, None, whiten=False), recipe.schedule)
+        loop.judge()
+        return loop.best_merit
+
+    begin = best_judged(lenses, judge)
+    return parts_at(begin, network_of(recipe), whiten=recipe.optics.whiten)
+
+
+def source_of(recipe: DesignRecipe, pictures: Path | None) -> SceneSource:
+    """Open the pictures of a folder and the procedural scenes of a recipe."""
+    return open_source(
+        pictures,
+        picture_share=recipe.data.picture_share,
+        scenes=recipe.data.procedural_scenes,
+        scene_px=recipe.data.scene_px,
     )

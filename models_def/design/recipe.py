@@ -5,7 +5,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal, get_args
 
 from camkit.errors import ContractError
 from camkit.models_def.design.front import Front
@@ -19,6 +19,8 @@ from camkit.models_def.optics.search.limits import Limits
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.toml_table import check_keys, read_table, section, typed
 
+Spacing = Literal["height", "area"]
+
 _KEYS: Final = {
     *("name", "prescription", "vary", "optics", "limits", "pixels", "front", "network", "loss"),
     *("schedule", "data", "starts", "fabrication"),
@@ -31,7 +33,9 @@ class OpticsRecipe:
 
     Attributes:
         half_field_deg: Field angle of the far end of the strip.
-        fields: How many fields from the axis, at equal steps of image height.
+        fields: How many fields from the axis.
+        spacing: Of the fields: equal steps of ideal image height, or of its square, so that every
+            field stands for an equal area of the picture.
         object_distances_mm: Depths; empty for that of the lens.
         focus_distance_mm: The depth that the sensor is focused on; 0 for the first one.
         efl_mm: Kept by the curvature of `solved_surface`; 0 keeps nothing.
@@ -46,6 +50,7 @@ class OpticsRecipe:
 
     half_field_deg: float
     fields: int = 9
+    spacing: Spacing = "height"
     object_distances_mm: tuple[float, ...] = ()
     focus_distance_mm: float = 0.0
     efl_mm: float = 0.0
@@ -60,6 +65,10 @@ class OpticsRecipe:
         if not 0 < self.half_field_deg < 80 or self.fields < 2 or self.pupil_rays < 1:
             raise ContractError(
                 "optics needs half_field_deg in 0..80, fields >= 2 and pupil_rays >= 1"
+            )
+        if self.spacing not in get_args(Spacing):
+            raise ContractError(
+                f"spacing must be one of {', '.join(get_args(Spacing))}; got {self.spacing!r}"
             )
         if self.focus_distance_mm and self.focus_distance_mm not in self.object_distances_mm:
             raise ContractError(

@@ -2,19 +2,24 @@
 
 A joint design goes downhill from where it begins, and its pictures say little about a lens whose
 rays are lost. Damped least squares on spots costs a fraction of a second a start, takes stiff and
-soft numbers alike, and keeps the limits: so several lenses near the given one are brought down
-first, and the best of them goes into the loop.
+soft numbers alike, and keeps the limits: so several lenses near the given one, or from all over the
+bounds, are brought down first. Their spots say little about which of them is recovered best (lenses
+of equal merit lie decibels apart), so that the design's own front may judge those with the best
+spots; the winner goes into the loop.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.improvement import improve
+from camkit.models_def.optics.search.merit import MERITS, Merit
 from camkit.models_def.optics.search.problem import Problem
 
 _PUPIL_RAYS = 24
@@ -27,6 +32,10 @@ class Starts:
     Attributes:
         count: Lenses that are tried, the given one among them; 0 begins at it as it is.
         spread: Half-width of the draws about the given lens, as a share of each number's bounds.
+        anywhere: Share of the lenses that are drawn from the whole bounds instead.
+        merit: Of their spots.
+        core_um: The size that the merit compares spots with; 0 for the pixel pitch.
+        judged: How many of those with the best spots the recovery judges; below 2 spots decide.
         scout_steps: Steps of damped least squares for each.
         dls_steps: Further steps for the best quarter.
         seed: Of the draws.
@@ -34,33 +43,49 @@ class Starts:
 
     count: int = 0
     spread: float = 0.1
+    anywhere: float = 0.0
+    merit: Merit = "sum_abs"
+    core_um: float = 0.0
+    judged: int = 0
     scout_steps: int = 5
     dls_steps: int = 20
     seed: int = 1
 
     def __post_init__(self) -> None:
-        if min(self.count, self.scout_steps, self.dls_steps) < 0 or not 0 <= self.spread <= 1:
-            raise ContractError(f"starts needs counts >= 0 and a spread in 0..1; got {self}")
+        least = min(self.count, self.scout_steps, self.dls_steps, self.judged, self.core_um)
+        if least < 0 or not (0 <= self.spread <= 1 and 0 <= self.anywhere <= 1):
+            raise ContractError(
+                f"starts needs counts >= 0, core_um >= 0, spread and anywhere in 0..1; got {self}"
+            )
+        if self.merit not in MERITS:
+            raise ContractError(f"starts.merit is one of {', '.join(MERITS)}; got {self.merit!r}")
 
 
-def best_start(problem: Problem, starts: Starts) -> Tensor:
-    """Give the lens (variable,), scaled, that a design begins at.
+def best_starts(problem: Problem, starts: Starts) -> Tensor:
+    """Give the lenses (start, variable), scaled, that a design may begin at, best spots first.
 
     Args:
         problem: Its lens is the given one.
-        starts: How many are tried.
+        starts: How many are tried. The best comes back; where the recovery judges, so many and
+            the given one.
 
     Raises:
         ContractError: If no start has finite spots.
     """
     begin = problem.free.scaled()
     if starts.count == 0:
-        return begin
+        return begin[None]
     found = improve(
-        replace(problem, samples=half_disc(_PUPIL_RAYS)),
+        replace(
+            problem,
+            samples=half_disc(_PUPIL_RAYS),
+            merit=starts.merit,
+            core_mm=starts.core_um / 1000 or problem.core_mm,
+        ),
         begin,
         starts=starts.count,
         spread=starts.spread,
+        anywhere=starts.anywhere,
         scout_steps=starts.scout_steps,
         steps=starts.dls_steps,
         seed=starts.seed,
@@ -70,7 +95,16 @@ def best_start(problem: Problem, starts: Starts) -> Tensor:
             f"none of {starts.count} starts near {problem.free.lens.name} forms an image; give "
             "another lens to start from, or tighter bounds"
         )
-    return found.scaled
+    formed = found.ends[np.isfinite(found.merits)]
+    return formed[:1] if starts.judged < 2 else torch.cat([formed[: starts.judged], begin[None]])
+
+
+def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:
+    """Give the lens (variable,) of (start, variable) that a judge gives most."""
+    if len(lenses) == 1:
+        return lenses[0]
+    marks = [judge(scaled) for scaled in lenses]
+    return lenses[int(np.nanargmax(marks))]
 
 
 def disturbed(

@@ -9,10 +9,14 @@ scene, kernels and gains. Clipping and rounding let gradients through unchanged.
 
 from dataclasses import dataclass
 from math import cos, pi
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
 import torch
+from scipy.fft import next_fast_len
 from torch import Tensor
+from torch.autograd.function import once_differentiable
+from torch.nn.functional import pad
 
 from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError
@@ -62,10 +66,49 @@ def blur(planes: Tensor, kernels: Tensor) -> Tensor:
     (h, w), (kh, kw) = planes.shape[-2:], kernels.shape[-2:]
     if kh > h or kw > w:
         raise ContractError(f"kernels of {kh}x{kw} px exceed the planes of {h}x{w} px")
-    # A circular product is free of wrapping where the kernel lies wholly inside.
-    product = _spectrum(planes, (h, w)) * _spectrum(kernels, (h, w))
-    spread: Tensor = torch.fft.irfft2(product, (h, w))
-    return spread[..., kh - 1 :, kw - 1 :]
+    lead = np.broadcast_shapes(planes.shape[:-2], kernels.shape[:-2])
+    spread: Tensor = _Convolution.apply(  # type: ignore[no-untyped-call]
+        planes.expand(*lead, h, w), kernels.expand(*lead, kh, kw)
+    )
+    return spread
+
+
+class _Convolution(torch.autograd.Function):
+    """What has full support in the convolution of (..., h, w) with (..., kh, kw).
+
+    The slopes are correlations, by real transforms too: torch would go back through a real
+    transform by a complex one, at twice the work.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, planes: Tensor, kernels: Tensor) -> Tensor:
+        """Convolve; a circular product is free of wrapping where the kernel lies wholly inside."""
+        (h, w), (kh, kw) = planes.shape[-2:], kernels.shape[-2:]
+        size = next_fast_len(h, real=True), next_fast_len(w, real=True)
+        spectra = _spectrum(planes, size), _spectrum(kernels, size)
+        ctx.save_for_backward(*spectra)
+        ctx.sides = (h, w), (kh, kw), size
+        spread: Tensor = torch.fft.irfft2(spectra[0] * spectra[1], size)
+        return spread[..., kh - 1 : h, kw - 1 : w]
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, Tensor | None]:
+        """Correlate the slope with the other factor."""
+        (slope,) = slopes
+        (h, w), (kh, kw), size = ctx.sides
+        of_planes, of_kernels = ctx.saved_tensors
+        placed = pad(slope, (kw - 1, size[1] - w, kh - 1, size[0] - h))
+        spectrum = _spectrum(placed, size)
+
+        def correlated(other: Tensor, height: int, width: int) -> Tensor:
+            found: Tensor = torch.fft.irfft2(spectrum * other.conj(), size)
+            return found[..., :height, :width]
+
+        return (
+            correlated(of_kernels, h, w) if ctx.needs_input_grad[0] else None,
+            correlated(of_planes, kh, kw) if ctx.needs_input_grad[1] else None,
+        )
 
 
 def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) -> Tensor:

@@ -29,13 +29,15 @@ class Improvement:
 
     Attributes:
         scaled: (variable,), the best.
+        ends: (start, variable), where every start that went to the end came to, best first.
         merit_before: Sum of squares of the given lens.
         merit: Of the best.
-        merits: Of every start that went to the end, best first.
+        merits: Of `ends`.
         evaluations: Lenses traced.
     """
 
     scaled: Tensor
+    ends: Tensor
     merit_before: float
     merit: float
     merits: tuple[float, ...]
@@ -126,6 +128,7 @@ def improve(
     *,
     starts: int = 8,
     spread: float = 0.05,
+    anywhere: float = 0.0,
     scout_steps: int = 5,
     steps: int = 60,
     seed: int = 1,
@@ -137,16 +140,20 @@ def improve(
         begin: (variable,), the lens; it is one of the starts, so the result is never worse.
         starts: How many.
         spread: Half-width of the draws about `begin`, as a share of the bounds.
+        anywhere: Share of the starts that are drawn from the whole bounds instead.
         scout_steps: Steps of each start.
         steps: Steps of the best quarter.
         seed: Of the draws.
     """
     function = _function(merit)
     rng = np.random.default_rng(seed)
-    drawn = torch.from_numpy(rng.uniform(-spread, spread, (max(starts, 1), len(begin))))
-    drawn[0] = 0
+    near = rng.uniform(-spread, spread, (max(starts, 1), len(begin)))
+    near[0] = 0
+    drawn = (begin + torch.from_numpy(near)).clamp(0, 1)
+    free = min(round(anywhere * len(near)), len(near) - 1)
+    drawn[len(near) - free :] = torch.from_numpy(rng.uniform(0, 1, (free, len(begin))))
     held = torch.zeros(len(begin), dtype=torch.bool)
-    scouted = descend(function, (begin + drawn).clamp(0, 1), scout_steps, held)
+    scouted = descend(function, drawn, scout_steps, held)
     kept = torch.cat([begin[None], scouted.scaled[: max(1, starts // 4)]])
     found = descend(function, kept, steps, held)
     with torch.no_grad():
@@ -154,6 +161,7 @@ def improve(
     merits = tuple(found.merits.tolist())
     return Improvement(
         scaled=found.scaled[0],
+        ends=found.scaled,
         merit_before=before,
         merit=merits[0],
         merits=merits,

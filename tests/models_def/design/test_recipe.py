@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import find_lens, parts_of, problem_of
@@ -102,3 +103,13 @@ def test_choices_of_a_caller_win_and_change_the_digest(table: dict[str, Any]) ->
     assert (changed.schedule.seed, changed.prescription) == (4, "cooke-triplet")
     assert recipe_digest(changed) != recipe_digest(recipe)
     assert recipe_digest(with_choices(recipe)) == recipe_digest(recipe)
+
+
+def test_fields_at_equal_areas_stand_for_equal_parts_of_the_picture(table: dict[str, Any]) -> None:
+    table["optics"] |= {"fields": 5, "spacing": "area"}
+    slopes = problem_of(to_design(table), find_lens("duet")).slopes
+    areas = (slopes / slopes[-1]) ** 2
+    torch.testing.assert_close(areas.diff(), torch.full((4,), 0.25, dtype=torch.float64))
+    table["optics"]["spacing"] = "angle"
+    with pytest.raises(ContractError, match="height, area"):
+        to_design(table)

@@ -7,8 +7,9 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import find_lens, parts_of, problem_of
+from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.recipe import DesignRecipe, to_design
-from camkit.models_def.design.starts import Starts, best_start, disturbed
+from camkit.models_def.design.starts import Starts, best_judged, best_starts, disturbed
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem, residuals, valid_share
@@ -54,7 +55,7 @@ def test_from_far_off_the_best_start_loses_no_ray_and_keeps_the_focal_length(
 ) -> None:
     problem = far_off(recipe, lens, seed)
     begin = problem.free.scaled()
-    found = best_start(problem, Starts(count=8))
+    found = best_starts(problem, Starts(count=8))[0]
     assert float(valid_share(problem, found[None])) == 1
     assert paraxial_data(problem.free.made(found)).efl_mm == pytest.approx(50, abs=1e-6)
     assert merit(problem, found) < 0.6 * merit(problem, begin)
@@ -64,10 +65,47 @@ def test_more_starts_are_never_worse_than_the_given_one_alone(
     recipe: DesignRecipe, lens: Lens
 ) -> None:
     problem = far_off(recipe, lens, 4)
-    alone = best_start(problem, Starts(count=1, scout_steps=0, dls_steps=0))
+    alone = best_starts(problem, Starts(count=1, scout_steps=0, dls_steps=0))[0]
     torch.testing.assert_close(alone, problem.free.scaled(), rtol=0, atol=0)
-    some = best_start(problem, Starts(count=6, scout_steps=2, dls_steps=2))
+    some = best_starts(problem, Starts(count=6, scout_steps=2, dls_steps=2))[0]
     assert merit(problem, some) <= merit(problem, alone)
+
+
+def test_starts_from_anywhere_leave_the_neighbourhood_and_keep_their_order(
+    recipe: DesignRecipe, lens: Lens
+) -> None:
+    problem = far_off(recipe, lens, 5)
+    begin = problem.free.scaled()
+    near = Starts(count=8, spread=0.02, scout_steps=0, dls_steps=0, judged=2)
+    assert (best_starts(problem, near) - begin).abs().max() <= 0.02 + 1e-12
+    found = best_starts(problem, replace(near, anywhere=0.9, scout_steps=4, judged=3))
+    assert found.shape == (4, len(begin))
+    torch.testing.assert_close(found[-1], begin, rtol=0, atol=0)
+    marks = [merit(problem, scaled) for scaled in found[:-1]]
+    assert marks == sorted(marks)
+    assert (found[:-1] - begin).abs().max() > 0.1
+
+
+def test_the_judge_decides_among_the_best_spots() -> None:
+    lenses = torch.tensor([[0.1], [0.9], [0.4]])
+    assert best_judged(lenses, lambda scaled: -abs(float(scaled[0]) - 0.5)) == 0.4
+    marks = {0.1: float("nan"), 0.9: 1.0, 0.4: 2.0}
+    assert best_judged(lenses, lambda scaled: marks[round(float(scaled[0]), 1)]) == 0.4
+
+
+def test_a_design_begins_at_the_start_that_is_recovered_best(table: dict[str, Any]) -> None:
+    table["starts"] = {"count": 8, "spread": 0.3, "scout_steps": 2, "dls_steps": 2}
+    by_spots = parts_of(to_design(table))
+    table["starts"]["judged"] = 3
+    judged = parts_of(to_design(table))
+    plan = to_design(table).schedule
+
+    def marked(parts: DesignParts) -> float:
+        return DesignLoop(replace(parts, network=None), plan).judge().best_db
+
+    assert marked(judged) >= marked(by_spots)
+    among = best_starts(judged.lens.problem, to_design(table).starts)
+    assert any(torch.equal(judged.lens.begin, one) for one in among)
 
 
 def test_a_disturbed_lens_is_off_by_no_more_than_asked(lens: Lens) -> None:
@@ -84,8 +122,18 @@ def test_a_disturbed_lens_is_off_by_no_more_than_asked(lens: Lens) -> None:
     assert inner == {tuple(s.thickness_mm for s in lens.surfaces[:-1])}
 
 
-@pytest.mark.parametrize("entry", [{"count": -1}, {"spread": 1.5}, {"dls_steps": -1}])
-def test_wrong_starts_are_refused(table: dict[str, Any], entry: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("entry", "word"),
+    [
+        ({"count": -1}, "counts >= 0"),
+        ({"spread": 1.5}, "counts >= 0"),
+        ({"dls_steps": -1}, "counts >= 0"),
+        ({"anywhere": 1.1}, "anywhere in 0..1"),
+        ({"core_um": -1.0}, "core_um"),
+        ({"merit": "area"}, "sum_abs"),
+    ],
+)
+def test_wrong_starts_are_refused(table: dict[str, Any], entry: dict[str, Any], word: str) -> None:
     table["starts"] = entry
-    with pytest.raises(ContractError, match="counts >= 0"):
+    with pytest.raises(ContractError, match=word):
         to_design(table)

@@ -42,6 +42,13 @@ def test_blur_is_the_valid_convolution(side: int) -> None:
             np.testing.assert_allclose(found[b, c], expected, atol=FFT_ERROR)
 
 
+def test_blur_passes_the_slopes_of_a_convolution() -> None:
+    planes = random(2, 3, 11, 14).double().requires_grad_()
+    k = random(1, 3, 3, 4, seed=2).double().requires_grad_()
+    assert torch.autograd.gradcheck(blur, (planes, k))
+    assert torch.autograd.gradcheck(lambda k: blur(planes.detach(), k), (k,))
+
+
 def test_one_kernel_everywhere_makes_scatter_a_blur() -> None:
     planes, k = random(3, 48, 70), kernels(3, 9, 9)
     count = [len(block_centres_px(n, 4, step_px=16)) for n in (48, 70)]
