@@ -91,8 +91,20 @@ def field_slopes(optics: OpticsRecipe) -> Tensor:
     return slopes
 
 
-def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
-    """Give the pixels and colours of a recipe, with a window that fits the lens at `begin`."""
+def pixels_of(recipe: DesignRecipe, problem: Problem, lenses: Tensor) -> Pixels:
+    """Give the pixels and colours of a recipe, with a window that fits one of the lenses.
+
+    Where the recipe sets none it is the least that any of them needs: the others then lose light,
+    and are judged so.
+
+    Args:
+        recipe: The design.
+        problem: Fields, wavelengths and depths.
+        lenses: (start, variable), scaled, that the design may begin at.
+
+    Raises:
+        ContractError: If every lens needs a wider window than there is.
+    """
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
     pixels = Pixels(
         pitch_um=recipe.pixels.pitch_um,
@@ -101,7 +113,15 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
     )
     if recipe.pixels.kernel_px:
         return pixels
-    return replace(pixels, kernel_px=fitting_window_px(problem, begin, pixels))
+    fitting, refusal = [], ContractError("a design needs a lens to begin at")
+    for begin in lenses:
+        try:
+            fitting.append(fitting_window_px(problem, begin, pixels))
+        except ContractError as too_blurred:
+            refusal = too_blurred
+    if not fitting:
+        raise refusal
+    return replace(pixels, kernel_px=min(fitting))
 
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
@@ -147,7 +167,7 @@ def parts_of(
     """
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
     lenses = best_starts(problem, recipe.starts)
-    pixels = pixels_of(recipe, problem, lenses[0])
+    pixels = pixels_of(recipe, problem, lenses)
     source = source or source_of(recipe, pictures)
 
     def parts_at(begin: Tensor, network: nn.Module | None, *, whiten: bool) -> DesignParts:
