@@ -1,6 +1,6 @@
 """How far off may a start be? The same disturbed lenses designed in several ways.
 
-    python -m tools.design_stability models_def/recipes/duet_joint_lens.toml \
+    python -m tools.design_stability models_def/recipes/lfov_joint.toml \
         --data PICTURES --fresh OTHERS --out-dir out/stability
 
 Every curvature of the recipe's lens is multiplied by 1 + u, u uniform within a level, and the

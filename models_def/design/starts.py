@@ -19,6 +19,7 @@ from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.improvement import improve
+from camkit.models_def.optics.search.least_squares import evaluations
 from camkit.models_def.optics.search.merit import MERITS, Merit
 from camkit.models_def.optics.search.problem import Problem
 
@@ -97,6 +98,16 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
         )
     formed = found.ends[np.isfinite(found.merits)]
     return formed[:1] if starts.judged < 2 else torch.cat([formed[: starts.judged], begin[None]])
+
+
+def traced_lenses(starts: Starts, variables: int) -> int:
+    """Give how many lenses a search traces, those that the recovery judges among them."""
+    if starts.count == 0:
+        return 0
+    kept = max(1, starts.count // 4) + 1
+    scouted = evaluations(starts.count, starts.scout_steps, variables)
+    judged = min(starts.judged, kept) + 1 if starts.judged > 1 else 0
+    return scouted + evaluations(kept, starts.dls_steps, variables) + judged
 
 
 def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:

@@ -63,8 +63,13 @@ def descend(residuals: Residuals, scaled: Tensor, steps: int, held: Tensor) -> D
             damping = (damping * factor).clamp(*_DAMPING_RANGE)
         merits = (residuals(scaled) ** 2).sum(1)
     order = torch.argsort(merits)
-    count = scaled.shape[0] * (steps * (scaled.shape[1] + 2) + 1)
+    count = evaluations(len(scaled), steps, scaled.shape[1])
     return Descent(scaled=scaled[order], merits=merits[order], evaluations=count)
+
+
+def evaluations(starts: int, steps: int, variables: int) -> int:
+    """Give how many lenses `descend` traces."""
+    return starts * (steps * (variables + 2) + 1)
 
 
 def _step(value: Tensor, slope: Tensor, scaled: Tensor, damping: Tensor, held: Tensor) -> Tensor:
