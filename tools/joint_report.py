@@ -6,9 +6,10 @@
 Same start, same variables, same bounds. The lenses on spots, one a merit, are the best of descents
 that trace ten times as many lenses as the joint design did, its own search included. The joint lens
 is that of the recipe, or the one that `--joint` names. All are judged by the front alone on fresh
-pictures; the start, the best lens on spots and the joint lens also by networks of their own,
-trained with the lens at rest and the same budget for every seed. What is finished is kept in the
-folder and not done again: several processes may share it, each with seeds of its own.
+pictures, and so are the ends of the best eight descents of each merit. The start, the best lens on
+spots and the joint lens are judged by networks of their own too, trained with the lens at rest and
+the same budget for every seed. What is finished is kept in the folder and not done again: several
+processes may share it, each with seeds of its own.
 """
 
 import argparse
@@ -44,6 +45,7 @@ CORE_MM = {"rms": 6e-3, "sum_abs": 6e-3, "energy": 3e-2}
 SCOUT_STEPS, DLS_STEPS = 10, 80
 KEPT_SHARE = 1 / 8
 BATCH = 96
+ENDS = 8
 
 
 def main() -> None:
@@ -77,6 +79,15 @@ def main() -> None:
         entry = {"front_db": found.psnr_db, "front_by_field_db": found.by_field_db}
         report["lenses"][name] = entry | {"networks": []}
         print(line(name, report["lenses"][name]), flush=True)
+    for merit in MERITS:
+        path = out / f"spots_{merit}_ends.json"
+        ends = json.loads((out / f"spots_{merit}.json").read_text())
+        entry = kept(path, lambda ends=ends: judged_ends(parts, recipe, ends, fresh))
+        report["lenses"][f"spots {merit}"]["ends"] = entry
+        print(f"spots {merit}: ends of merit", *(f"{m:.3g}" for m in entry["merits"]))
+        print(
+            "    recovered by the front, dB", *(f"{db:.2f}" for db in entry["front_db"]), flush=True
+        )
     best = max((n for n in lenses if n.startswith("spots")), key=lambda n: front_db(report, n))
     judged = ("start", best, "joint") if recipe.network.name else ()
     for seed, name in product(arguments.seeds, judged):
@@ -154,7 +165,13 @@ def spots(parts: DesignParts, merit: Merit, least: int) -> Entry:
     drawn[0] = parts.lens.begin
     scouted, _ = in_batches(problem, drawn, SCOUT_STEPS)
     found, merits = in_batches(problem, scouted[: max(1, round(KEPT_SHARE * starts))], DLS_STEPS)
-    return {"scaled": found[0].tolist(), "merit": float(merits[0]), "evaluations": starts * each}
+    return {
+        "scaled": found[0].tolist(),
+        "merit": float(merits[0]),
+        "evaluations": starts * each,
+        "ends": found[:ENDS].tolist(),
+        "end_merits": merits[:ENDS].tolist(),
+    }
 
 
 def in_batches(problem: Problem, begin: Tensor, steps: int) -> tuple[Tensor, Tensor]:
@@ -166,6 +183,15 @@ def in_batches(problem: Problem, begin: Tensor, steps: int) -> tuple[Tensor, Ten
     merits = torch.cat([end.merits for end in ends])
     order = merits.nan_to_num(torch.inf).argsort()
     return torch.cat([end.scaled for end in ends])[order], merits[order]
+
+
+def judged_ends(parts: DesignParts, recipe: DesignRecipe, ends: Entry, fresh: SceneSource) -> Entry:
+    """Give what the front makes of the lenses that the best descents ended at."""
+    scores = [
+        score_design(parts, recipe.schedule, torch.tensor(end, dtype=torch.float64), source=fresh)
+        for end in ends["ends"]
+    ]
+    return {"merits": ends["end_merits"], "front_db": [score.psnr_db for score in scores]}
 
 
 def joint(recipe: DesignRecipe, folder: Path, pictures: Path | None) -> Entry:
