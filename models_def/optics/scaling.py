@@ -44,7 +44,13 @@ def scale_to_efl(lens: Lens, efl_mm: float) -> Lens:
     Raises:
         ContractError: If the focal length is not finite or has the other sign.
     """
-    return scale_lens(lens, efl_mm / paraxial_data(lens).efl_mm)
+    own_mm = paraxial_data(lens).efl_mm
+    factor = efl_mm / own_mm
+    if not (math.isfinite(factor) and factor > 0):
+        raise ContractError(
+            f"a lens with a focal length of {own_mm:.6g} mm cannot be scaled to {efl_mm} mm"
+        )
+    return scale_lens(lens, factor)
 
 
 def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens:

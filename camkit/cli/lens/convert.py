@@ -1,4 +1,4 @@
-"""`camkit lens convert`: a lens file in the other format."""
+"""`camkit lens convert`: a lens file in the other format, scaled or stopped where asked."""
 
 import json
 from pathlib import Path
@@ -12,21 +12,35 @@ from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
 def convert(
     source: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="IN")],
     out: Annotated[Path, typer.Argument(help="The same lens (.toml or .zmx).", metavar="OUT")],
+    efl_mm: Annotated[
+        float | None, typer.Option(help="Scale the lens to this focal length.")
+    ] = None,
+    f_number: Annotated[
+        float | None, typer.Option(help="Stop the lens to this F-number, after scaling.")
+    ] = None,
     glass: GlassFiles = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Write a lens in the other format; what is left out is said on stderr (needs torch)."""
+    """Write a lens in the other format; what is left out is said on stderr (needs torch).
+
+    A finite object distance is scaled with the lens.
+    """
     from camkit.cli.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens convert")
     refuse_existing([out], overwrite=overwrite)
     from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens, write_lens
+    from camkit.models_def.optics.scaling import scale_to_efl, with_f_number
 
     catalogues = [read_agf(path) for path in glass or ()]
     lens, notes = read_noted_lens(source, catalogues)
+    if efl_mm is not None:
+        lens = scale_to_efl(lens, efl_mm)
+    if f_number is not None:
+        lens = with_f_number(lens, f_number)
     write_lens(lens, out)
     for note in notes:
         typer.echo(f"{source.name}: {note}", err=True)

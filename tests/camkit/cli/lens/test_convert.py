@@ -17,6 +17,21 @@ def test_lens_goes_to_zmx_and_back_unchanged(camkit_command, tmp_path: Path) -> 
     assert back.read_text() == (PRESCRIPTIONS / "duet.toml").read_text()
 
 
+def test_a_lens_is_scaled_to_a_focal_length_and_then_stopped(
+    camkit_command, tmp_path: Path
+) -> None:
+    out = tmp_path / "long.zmx"
+    asked = ("--efl-mm", 85, "--f-number", 5.6)
+    assert camkit_command("lens", "convert", PRESCRIPTIONS / "duet.toml", out, *asked).code == 0
+    shown = json.loads(camkit_command("lens", "show", out, "--json").out)
+    assert shown["efl_mm"] == pytest.approx(85, rel=1e-9)
+    assert shown["f_number"] == pytest.approx(5.6, rel=1e-9)
+    wrong = camkit_command("lens", "convert", out, tmp_path / "x.toml", "--efl-mm", -85)
+    assert wrong.code == ExitCode.USAGE
+    assert "focal length" in wrong.err
+    assert not (tmp_path / "x.toml").exists()
+
+
 def test_what_is_left_out_is_said_on_stderr(camkit_command, tmp_path: Path) -> None:
     source = tmp_path / "vendor.zmx"
     source.write_text(LA1131.replace("VCYN 0 0", "VCYN 0 0.2"), encoding="latin-1")
