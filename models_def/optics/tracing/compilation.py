@@ -34,6 +34,8 @@ from camkit.models_def.optics.tracing.kernel import (
 _LOG = logging.getLogger(__name__)
 _COMPILERS: Final = ("g++", "clang++", "c++", "cl")
 _RECOMPILATIONS: Final = 64
+_FORWARD_RAYS: Final = 131_072
+_BACKWARD_RAYS: Final = 32_768
 
 Loop = Callable[..., tuple[Tensor, ...]]
 
@@ -62,17 +64,20 @@ def compiled_engine() -> Engine:
 class Fused:
     """One loop over the rays for the whole lens; a loop per wavelength or lens of a batch."""
 
+    def block_rays(self, *, gradient: bool) -> int:
+        """Give large blocks: rays stay in registers; a backward loop writes a column a number."""
+        return _BACKWARD_RAYS if gradient else _FORWARD_RAYS
+
     def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block; the plain way if three Newton steps are not enough for some ray."""
         loop = _forward(replace(plan, adaptive=False))
-        end = [torch.empty_like(rays.x, memory_format=torch.contiguous_format) for _ in range(7)]
-        end.insert(6, torch.empty_like(fate, memory_format=torch.contiguous_format))
-        for row in _rows(lens, fate.shape):
+        parts = []
+        rows = [*_rows(lens, fate.shape)]
+        for row in rows:
             values = [v[row.rays].flatten() for v in (*rays, fate)]
             with _patience():
-                found = loop(row.lens, State(*values[:6]), values[6])
-            for whole, part in zip(end, found, strict=False):
-                whole[row.rays] = part.reshape(whole[row.rays].shape)
+                parts.append(loop(row.lens, State(*values[:6]), values[6]))
+        end = [_joined(column, rows, fate.shape) for column in zip(*parts, strict=True)]
         if any(plan.aspheric) and bool((end[6] == NOT_CONVERGED).any()):
             return Eager().run(plan, lens, rays, fate)
         return Result(State(*end[:6]), end[7] if plan.path else None, Kept(end[6], [], []))
@@ -101,6 +106,16 @@ class Fused:
             list(of_lens.thickness),
             list(of_lens.indices),
         )
+
+
+def _joined(parts: Sequence[Tensor], rows: Sequence["_Row"], shape: torch.Size) -> Tensor:
+    """Put what rows of rays gave in its place."""
+    if len(parts) == 1:
+        return parts[0].reshape(shape)
+    whole = parts[0].new_empty(shape)
+    for part, row in zip(parts, rows, strict=True):
+        whole[row.rays] = part.reshape(whole[row.rays].shape)
+    return whole
 
 
 class _Row(NamedTuple):

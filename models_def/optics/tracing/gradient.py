@@ -40,6 +40,10 @@ class Task(NamedTuple):
 class Engine(Protocol):
     """What computes a block: eager here, compiled in `compilation`."""
 
+    def block_rays(self, *, gradient: bool) -> int:
+        """Give how many rays a block has at most; `gradient` if it will be pulled back."""
+        ...
+
     def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block; an empty `kept.seen` means that it need not be kept."""
         ...
@@ -51,6 +55,10 @@ class Engine(Protocol):
 
 class Eager:
     """One torch operation after the other."""
+
+    def block_rays(self, *, gradient: bool) -> int:  # noqa: ARG002
+        """Give what fits the cache: every operation writes its result."""
+        return BLOCK_RAYS
 
     def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block."""
@@ -89,10 +97,10 @@ class _Block(NamedTuple):
         return value.narrow(self.dim, self.start, self.size)
 
 
-def _blocks(shape: torch.Size, device: torch.device) -> list[_Block]:
-    """Cut the longest dimension so that a block has about `BLOCK_RAYS` rays."""
+def _blocks(shape: torch.Size, device: torch.device, limit: int) -> list[_Block]:
+    """Cut the longest dimension so that a block has about `limit` rays, more off the CPU."""
     count = shape.numel()
-    limit = BLOCK_RAYS if device.type == "cpu" else BLOCK_RAYS * 64
+    limit *= 1 if device.type == "cpu" else 64
     if count <= limit:
         return []
     dim = max(range(len(shape)), key=lambda d: shape[d])
@@ -169,8 +177,9 @@ class _Trace(torch.autograd.Function):
         shape: torch.Size = torch.broadcast_shapes(*shapes)  # type: ignore[no-untyped-call]
         rays, fate = State(*(v.expand(shape) for v in rays)), fate.expand(shape)
         size = shape.numel() * len(spec.plan.aspheric) * 6 * rays.x.element_size()
-        keep = any(ctx.needs_input_grad) and size <= KEEP_BYTES
-        blocks = _blocks(shape, fate.device)
+        gradient = any(ctx.needs_input_grad)
+        keep = gradient and size <= KEEP_BYTES
+        blocks = _blocks(shape, fate.device, spec.engine.block_rays(gradient=gradient))
         parts: list[list[Tensor]] = []
         saved: list[Tensor] = []
         counts: list[int] = []
