@@ -11,7 +11,7 @@ recovery. Distances of the object must be finite; `--depth-mm` looks from anothe
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -55,6 +55,7 @@ class Spot:
     """One field of one depth: its kernels, where it lies, and what the recovery knows of it.
 
     Attributes:
+        field: Its number.
         depth_mm: Object distance.
         kernels: (3, k, k), about the centroid.
         known: (3, k, k), what the front filters with.
@@ -62,6 +63,7 @@ class Spot:
         coma_mm: From the chief ray to the centroid.
     """
 
+    field: int
     depth_mm: float
     kernels: Tensor
     known: Tensor
@@ -106,7 +108,7 @@ def check(recipe: DesignRecipe, arguments: argparse.Namespace) -> Iterator[dict[
     """
     parts = dense_parts(recipe, arguments)
     rng = np.random.default_rng(arguments.seed)
-    for spot in spots(parts, arguments.fields):
+    for spot in spots(parts, arguments):
         yield judged(parts, spot, arguments, rng)
 
 
@@ -135,18 +137,42 @@ def dense_parts(recipe: DesignRecipe, arguments: argparse.Namespace) -> DesignPa
     return at_lens(parts, begin, rays=DENSE_RAYS)
 
 
-def spots(parts: DesignParts, fields: int) -> list[Spot]:
-    """Give some fields, evenly over those of the design, of all depths."""
+def spots(parts: DesignParts, arguments: argparse.Namespace) -> list[Spot]:
+    """Give some fields of all depths, evenly over those about which the lens passes a patch."""
     problem = parts.lens.problem
     with torch.no_grad():
         kernels = parts.lens()[0].float()
-    chosen = np.unique(np.linspace(0, len(problem.slopes) - 1, fields).round().astype(int))
+    every = spots_at(parts, kernels, range(len(problem.slopes)))
+    passed = [s for s in every if passes(parts, s, arguments)]
+    heights = sorted({s.field for s in passed})
+    if not heights:
+        raise ContractError("the lens passes no whole patch at any field; give fewer --patch-px")
+    chosen = np.linspace(0, len(heights) - 1, arguments.fields).round().astype(int)
+    wanted = {heights[i] for i in chosen.tolist()}
+    return [s for s in passed if s.field in wanted]
+
+
+def passes(parts: DesignParts, spot: Spot, arguments: argparse.Namespace) -> bool:
+    """Tell whether rays reach all that the kernels of a patch reach: one sample a pixel says."""
+    window = window_of(parts, spot, arguments)
+    one = argparse.Namespace(**{**vars(arguments), "spp": 1, "passes": 1})
+    try:
+        texture = hung(parts, aligned(parts, spot, window), window, np.random.default_rng(0))
+        by_rays(parts, spot, texture, window, one)
+    except ContractError:
+        return False
+    return True
+
+
+def spots_at(parts: DesignParts, kernels: Tensor, fields: Iterable[int]) -> list[Spot]:
+    """Give fields of all depths, with kernels (depth, field, 3, k, k)."""
+    problem = parts.lens.problem
     found = []
     for depth, depth_mm in enumerate(problem.depths_mm):
         with torch.no_grad():
             landed = trace_batch(problem, parts.lens.begin[None], depth_mm).landed
         reference = landed.y.shape[2] // 2
-        for field in chosen.tolist():
+        for field in fields:
             alive = landed.valid[0, field, :, LEAD:]
             centroid = float(landed.y[0, field, :, LEAD:][alive].mean())
             chief = float(landed.y[0, field, reference, 0])
@@ -154,6 +180,7 @@ def spots(parts: DesignParts, fields: int) -> list[Spot]:
             known = own if parts.front.depth_known else kernels[:, field].mean(0)
             found.append(
                 Spot(
+                    field=field,
                     depth_mm=depth_mm,
                     kernels=own,
                     known=known,
@@ -168,9 +195,8 @@ def judged(
     parts: DesignParts, spot: Spot, arguments: argparse.Namespace, rng: np.random.Generator
 ) -> dict[str, float]:
     """Render one patch both ways and recover both."""
-    side = arguments.patch_px + 2 * parts.front.margin_px
-    window = centred_window(side, side, parts.lens.pixels.pitch_um)
-    window = replace(window, top_mm=window.top_mm + spot.chief_mm)
+    window = window_of(parts, spot, arguments)
+    side = window.height_px
     alignment = aligned(parts, spot, window)
     texture = hung(parts, alignment, window, rng)
     halves = by_rays(parts, spot, texture, window, arguments)
@@ -188,6 +214,13 @@ def judged(
         "rays_db": recovered_db(parts, rays + noise, spot.known, sharp),
         "map_db": recovered_db(parts, mapped + noise, spot.known, sharp),
     }
+
+
+def window_of(parts: DesignParts, spot: Spot, arguments: argparse.Namespace) -> Window:
+    """Give a patch and what its front needs around it."""
+    side = arguments.patch_px + 2 * parts.front.margin_px
+    window = centred_window(side, side, parts.lens.pixels.pitch_um)
+    return replace(window, top_mm=window.top_mm + spot.chief_mm)
 
 
 def aligned(parts: DesignParts, spot: Spot, window: Window) -> Alignment:

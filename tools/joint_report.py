@@ -6,10 +6,10 @@
 Same start, same variables, same bounds. The lenses on spots, one a merit, are the best of descents
 that trace ten times as many lenses as the joint design did, its own search included. The joint lens
 is that of the recipe, or the one that `--joint` names. All are judged by the front alone on fresh
-pictures, and so are the ends of the best eight descents of each merit. The start, the best lens on
-spots and the joint lens are judged by networks of their own too, trained with the lens at rest and
-the same budget for every seed. What is finished is kept in the folder and not done again: several
-processes may share it, each with seeds of its own.
+pictures, and so are eight different ends of the best descents of each merit. The start, the best
+lens on spots and the joint lens are judged by networks of their own too, trained with the lens at
+rest and the same budget for every seed. What is finished is kept in the folder and not done again:
+once the lenses are there, several processes may share it, each with seeds of its own.
 """
 
 import argparse
@@ -25,12 +25,19 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from camkit.errors import ContractError
 from camkit.models_def.design.assembly import find_lens, network_of, parts_of, problem_of
 from camkit.models_def.design.loop import DesignLoop, DesignParts
-from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design
+from camkit.models_def.design.recipe import (
+    DesignRecipe,
+    NetworkChoice,
+    read_design,
+    recipe_digest,
+)
 from camkit.models_def.design.score import at_lens, score_design
 from camkit.models_def.design.starts import Starts, traced_lenses
 from camkit.models_def.optics.lens_file.lens_file import write_lens
+from camkit.models_def.optics.prescription import Surface
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.finish import finished
 from camkit.models_def.optics.search.least_squares import descend, evaluations
@@ -46,28 +53,36 @@ SCOUT_STEPS, DLS_STEPS = 10, 80
 KEPT_SHARE = 1 / 8
 BATCH = 96
 ENDS = 8
+OTHER = 0.1
+SAME = 1e-4
+RIM_MM = 8.0
+ASPHERE_TERMS = 8
 
 
 def main() -> None:
     arguments = parse()
     torch.set_num_threads(1)
     recipe = read_design(arguments.recipe)
-    if arguments.network:
-        recipe = replace(recipe, network=NetworkChoice(name=arguments.network, config={}))
+    judges = judges_of(recipe, arguments.network)
     folder, out = arguments.recipe.parent, arguments.out_dir
     alone = replace(recipe, network=NetworkChoice(config={}), starts=Starts())
     parts = parts_of(alone, folder=folder, pictures=arguments.data)
+    # one window for all: equal windows give equal patches
+    one = replace(recipe.pixels, kernel_px=parts.lens.pixels.kernel_px)
+    recipe, alone = replace(recipe, pixels=one), replace(alone, pixels=one)
     fresh = open_source(arguments.fresh, picture_share=1.0, scenes=1, scene_px=64)
     out.mkdir(parents=True, exist_ok=True)
+    refuse_other_settings(recipe, judges, arguments)
     searched = traced_lenses(recipe.starts, len(recipe.variables))
     least = arguments.times * (searched + recipe.schedule.steps)
     lenses: dict[str, Tensor] = {"start": parts.lens.begin.clone()}
     for merit in MERITS:
         lenses[f"spots {merit}"] = kept_lens(
-            out / f"spots_{merit}.json", lambda merit=merit: spots(parts, merit, least)
+            out / f"spots_{merit}.json",
+            lambda merit=merit: spots(parts, merit, core_mm(recipe.starts, merit), least),
         )
     lenses["joint"] = (
-        problem_of(alone, find_lens(arguments.joint, Path())).free.scaled()
+        given_lens(alone, parts, arguments.joint)
         if arguments.joint
         else kept_lens(out / "joint_lens.json", lambda: joint(recipe, folder, arguments.data))
     )
@@ -89,17 +104,33 @@ def main() -> None:
             "    recovered by the front, dB", *(f"{db:.2f}" for db in entry["front_db"]), flush=True
         )
     best = max((n for n in lenses if n.startswith("spots")), key=lambda n: front_db(report, n))
-    judged = ("start", best, "joint") if recipe.network.name else ()
+    judged = ("start", best, "joint") if judges.name else ()
     for seed, name in product(arguments.seeds, judged):
         entry = kept(
-            out / f"{slug(name)}_network_{seed}.json",
+            network_file(out, name, seed),
             lambda name=name, seed=seed: network_score(
-                parts, recipe, lenses[name], seed, arguments.network_steps, fresh
+                parts,
+                replace(recipe, network=judges),
+                lenses[name],
+                seed,
+                arguments.network_steps,
+                fresh,
             ),
         )
-        report["lenses"][name]["networks"].append(entry)
-        print(f"seed {seed}:", line(name, report["lenses"][name]), flush=True)
-    (out / "joint.json").write_text(json.dumps(report, indent=1))
+        print(f"seed {seed}: {name}: {entry['psnr_db']:.2f} dB", flush=True)
+    for name in judged:
+        # those of other processes too
+        made = sorted(out.glob(network_file(Path(), name, "*").name))
+        report["lenses"][name]["networks"] = [json.loads(path.read_text()) for path in made]
+        print(line(name, report["lenses"][name]))
+    written(out / "joint.json", json.dumps(report, indent=1))
+
+
+def judges_of(recipe: DesignRecipe, name: str | None) -> NetworkChoice:
+    """Give the network that judges: the recipe's, another one, or none."""
+    if name is None:
+        return recipe.network
+    return NetworkChoice(name="" if name == "none" else name, config={})
 
 
 def parse() -> argparse.Namespace:
@@ -110,7 +141,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--out-dir", type=Path, default=Path("out/joint"))
     parser.add_argument("--joint", help="a finished joint lens: a name or a file")
     parser.add_argument("--times", type=int, default=10, help="lenses that spots may trace more")
-    parser.add_argument("--network", help="of the catalogue, in place of the recipe's")
+    parser.add_argument("--network", help="that judges, in place of the recipe's; or none")
     parser.add_argument("--network-steps", type=int, default=1000)
     parser.add_argument("--seeds", type=numbers, default=(1, 2, 3), help="of networks: 1,2,3")
     return parser.parse_args()
@@ -134,25 +165,79 @@ def kept(path: Path, make: Callable[[], Entry]) -> Entry:
         begin = time.process_time()
         made = make()
         made["cpu_s"] = round(time.process_time() - begin, 1)
-        path.write_text(json.dumps(made))
+        written(path, json.dumps(made))
     found: Entry = json.loads(path.read_text())
     return found
+
+
+def written(path: Path, text: str) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_text(text)
+    part.replace(path)
+
+
+def network_file(out: Path, name: str, seed: int | str) -> Path:
+    return out / f"{slug(name)}_network_{seed}.json"
+
+
+def refuse_other_settings(
+    recipe: DesignRecipe, judges: NetworkChoice, arguments: argparse.Namespace
+) -> None:
+    """Keep what the folder's results depend on; raise ContractError where it is another."""
+    path: Path = arguments.out_dir / "settings.json"
+    asked = {
+        "recipe": recipe_digest(recipe),
+        "network": judges.name,
+        "network_steps": arguments.network_steps,
+        "times": arguments.times,
+        "joint": arguments.joint,
+        "data": str(arguments.data),
+        "fresh": str(arguments.fresh),
+    }
+    if not path.exists():
+        written(path, json.dumps(asked))
+    elif json.loads(path.read_text()) != asked:
+        raise ContractError(f"{path} belongs to other settings; give another --out-dir")
+
+
+def given_lens(recipe: DesignRecipe, parts: DesignParts, name: str) -> Tensor:
+    """Give the numbers of a finished lens; raises ContractError if the recipe cannot make it."""
+    lens = find_lens(name, Path())
+    problem = problem_of(recipe, lens)
+    scaled = problem.free.scaled()
+    made = parts.lens.problem.free.made(scaled)
+    pairs = zip(made.surfaces, lens.surfaces, strict=False)
+    same = len(made.surfaces) == len(lens.surfaces) and all(
+        one.glass == other.glass and np.allclose(shape(one), shape(other), rtol=SAME, atol=SAME)
+        for one, other in pairs
+    )
+    if not same:
+        raise ContractError(f"{lens.name} is no lens that {recipe.name} can become")
+    return scaled
+
+
+def shape(surface: Surface) -> list[float]:
+    """Give what light meets, in numbers of the order of 1."""
+    terms = [*surface.even_asphere, *[0.0] * ASPHERE_TERMS][:ASPHERE_TERMS]
+    bends = [a * RIM_MM ** (2 * j) for j, a in enumerate(terms, start=1)]
+    return [surface.curvature_per_mm * RIM_MM, surface.conic, surface.thickness_mm, *bends]
 
 
 def kept_lens(path: Path, make: Callable[[], Entry]) -> Tensor:
     return torch.tensor(kept(path, make)["scaled"], dtype=torch.float64)
 
 
-def spots(parts: DesignParts, merit: Merit, least: int) -> Entry:
+def spots(parts: DesignParts, merit: Merit, core_mm: float, least: int) -> Entry:
     """Give the best lens on spots: from the start itself, from near it, and from anywhere.
 
     Args:
         parts: What is free, and what is looked at.
         merit: Of the spots.
+        core_mm: Its core.
         least: Lenses to trace, at least.
     """
     problem = replace(
-        parts.lens.problem, samples=half_disc(SPOT_RAYS), merit=merit, core_mm=CORE_MM[merit]
+        parts.lens.problem, samples=half_disc(SPOT_RAYS), merit=merit, core_mm=core_mm
     )
     variables = len(problem.free.variables)
     each = evaluations(1, SCOUT_STEPS, variables)
@@ -165,13 +250,32 @@ def spots(parts: DesignParts, merit: Merit, least: int) -> Entry:
     drawn[0] = parts.lens.begin
     scouted, _ = in_batches(problem, drawn, SCOUT_STEPS)
     found, merits = in_batches(problem, scouted[: max(1, round(KEPT_SHARE * starts))], DLS_STEPS)
+    ends = distinct(found)
     return {
         "scaled": found[0].tolist(),
         "merit": float(merits[0]),
-        "evaluations": starts * each,
-        "ends": found[:ENDS].tolist(),
-        "end_merits": merits[:ENDS].tolist(),
+        "evaluations": evaluations(starts, SCOUT_STEPS, variables)
+        + evaluations(len(found), DLS_STEPS, variables),
+        "ends": found[ends].tolist(),
+        "end_merits": merits[ends].tolist(),
     }
+
+
+def core_mm(starts: Starts, merit: Merit) -> float:
+    """Give the core of a merit: that of the recipe's search where it has the same merit."""
+    own_mm = starts.core_um / 1000
+    return own_mm if starts.merit == merit and own_mm else CORE_MM[merit]
+
+
+def distinct(lenses: Tensor) -> list[int]:
+    """Give the first few of (start, variable) that differ from each other in some number."""
+    chosen: list[int] = []
+    for i, scaled in enumerate(lenses):
+        if all(float((scaled - lenses[j]).abs().max()) > OTHER for j in chosen):
+            chosen.append(i)
+        if len(chosen) == ENDS:
+            break
+    return chosen
 
 
 def in_batches(problem: Problem, begin: Tensor, steps: int) -> tuple[Tensor, Tensor]:

@@ -31,7 +31,10 @@ def design(
     prescription: Annotated[
         str | None, typer.Option(help="Another start than the recipe's: a name or a lens file.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of weights and draws.")] = None,
+    search: Annotated[
+        bool, typer.Option(help="Try the recipe's [starts]; without, begin at the lens itself.")
+    ] = True,
+    seed: Annotated[int | None, typer.Option(help="Of weights and draws, not of [starts].")] = None,
     pictures: Annotated[
         int, typer.Option(min=0, help="Draw lens, PSFs and a recovered patch every N steps.")
     ] = 0,
@@ -51,8 +54,15 @@ def design(
     if resume and overwrite:
         raise ContractError("--resume goes on, --overwrite starts anew: give one of them")
     chosen = with_choices(
-        read_design(recipe), steps=steps, lens_rate=lens_rate, prescription=prescription, seed=seed
+        read_design(recipe),
+        steps=steps,
+        lens_rate=lens_rate,
+        prescription=prescription,
+        seed=seed,
+        search=search,
     )
+    if chosen.starts.count and chosen.schedule.lens_rate and not resume:
+        typer.echo(f"trying {chosen.starts.count} starts", err=True)
     run = DesignRun(
         chosen,
         DesignOptions(
@@ -64,6 +74,8 @@ def design(
             overwrite=overwrite,
         ),
     )
+    if run.searched_s:
+        typer.echo(f"starts tried in {run.searched_s:.0f} s", err=True)
     for moment in run.go():
         typer.echo(_line(moment), err=True)
         if pictures and run.leads and moment.step % pictures == 0:

@@ -14,7 +14,7 @@ from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.optics import WIDEST_PX, LensModule, fitting_window_px
 from camkit.models_def.design.recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.sensor import Recorder
-from camkit.models_def.design.starts import best_judged, best_starts
+from camkit.models_def.design.starts import Starts, best_judged, best_starts
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_image
@@ -91,20 +91,8 @@ def field_slopes(optics: OpticsRecipe) -> Tensor:
     return slopes
 
 
-def pixels_of(recipe: DesignRecipe, problem: Problem, lenses: Tensor) -> Pixels:
-    """Give the pixels and colours of a recipe, with a window that fits one of the lenses.
-
-    Where the recipe sets none it is the least that any of them needs: the others then lose light,
-    and are judged so.
-
-    Args:
-        recipe: The design.
-        problem: Fields, wavelengths and depths.
-        lenses: (start, variable), scaled, that the design may begin at.
-
-    Raises:
-        ContractError: If every lens needs a wider window than there is.
-    """
+def pixels_of(recipe: DesignRecipe, problem: Problem, begin: Tensor) -> Pixels:
+    """Give the pixels and colours of a recipe, with a window that fits the lens at `begin`."""
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
     pixels = Pixels(
         pitch_um=recipe.pixels.pitch_um,
@@ -113,15 +101,7 @@ def pixels_of(recipe: DesignRecipe, problem: Problem, lenses: Tensor) -> Pixels:
     )
     if recipe.pixels.kernel_px:
         return pixels
-    fitting, refusal = [], ContractError("a design needs a lens to begin at")
-    for begin in lenses:
-        try:
-            fitting.append(fitting_window_px(problem, begin, pixels))
-        except ContractError as too_blurred:
-            refusal = too_blurred
-    if not fitting:
-        raise refusal
-    return replace(pixels, kernel_px=min(fitting))
+    return replace(pixels, kernel_px=fitting_window_px(problem, begin, pixels))
 
 
 def recorder_of(recipe: DesignRecipe) -> Recorder:
@@ -157,7 +137,7 @@ def parts_of(
     pictures: Path | None = None,
     source: SceneSource | None = None,
 ) -> DesignParts:
-    """Give what a loop joins.
+    """Give what a loop joins; a lens that is to stay (`lens_rate` 0) is not searched for.
 
     Args:
         recipe: The design.
@@ -166,8 +146,8 @@ def parts_of(
         source: Of sharp patches, already open, in the place of `pictures`.
     """
     problem = problem_of(recipe, find_lens(recipe.prescription, folder))
-    lenses = best_starts(problem, recipe.starts)
-    pixels = pixels_of(recipe, problem, lenses)
+    lenses = best_starts(problem, recipe.starts if recipe.schedule.lens_rate else Starts())
+    pixels = pixels_of(recipe, problem, lenses[0])
     source = source or source_of(recipe, pictures)
 
     def parts_at(begin: Tensor, network: nn.Module | None, *, whiten: bool) -> DesignParts:

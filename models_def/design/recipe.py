@@ -35,7 +35,7 @@ class OpticsRecipe:
         half_field_deg: Field angle of the far end of the strip.
         fields: How many fields from the axis.
         spacing: Of the fields: equal steps of ideal image height, or of its square, so that every
-            field stands for an equal area of the picture.
+            field stands for an equal area of the image circle.
         object_distances_mm: Depths; empty for that of the lens.
         focus_distance_mm: The depth that the sensor is focused on; 0 for the first one.
         efl_mm: Kept by the curvature of `solved_surface`; 0 keeps nothing.
@@ -191,7 +191,7 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
     if not isinstance(free, list):
         raise ContractError("what varies must be written as [[vary]] tables")
     network = {"config": {}, **dict(table.get("network", {}))}
-    return DesignRecipe(
+    recipe = DesignRecipe(
         name=typed("name", table["name"], str),
         prescription=typed("prescription", table["prescription"], str),
         variables=tuple(section(f"vary[{i}]", Variable, v) for i, v in enumerate(free)),
@@ -210,6 +210,11 @@ def to_design(table: Mapping[str, Any]) -> DesignRecipe:
             else None
         ),
     )
+    if recipe.starts.judged and not recipe.pixels.kernel_px:
+        raise ContractError("judged starts need one window for all: set pixels.kernel_px")
+    if recipe.starts.judged and recipe.loss.needs_network and recipe.front.kind == "none":
+        raise ContractError("judged starts need a front that recovers: set front.kind")
+    return recipe
 
 
 def with_choices(
@@ -219,12 +224,21 @@ def with_choices(
     lens_rate: float | None = None,
     prescription: str | None = None,
     seed: int | None = None,
+    search: bool = True,
 ) -> DesignRecipe:
-    """Give the recipe with what a caller chose instead; None keeps what it says."""
+    """Give the recipe with what a caller chose instead; None keeps what it says.
+
+    Without `search` the design begins at the prescription itself.
+    """
     changes = {"steps": steps, "lens_rate": lens_rate, "seed": seed}
     chosen = {key: value for key, value in changes.items() if value is not None}
     schedule = replace(recipe.schedule, **chosen)  # type: ignore[arg-type]
-    return replace(recipe, schedule=schedule, prescription=prescription or recipe.prescription)
+    return replace(
+        recipe,
+        schedule=schedule,
+        prescription=prescription or recipe.prescription,
+        starts=recipe.starts if search else Starts(),
+    )
 
 
 def recipe_digest(recipe: DesignRecipe) -> str:

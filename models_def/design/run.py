@@ -16,6 +16,7 @@ from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.loop import DesignLoop, Progress
 from camkit.models_def.design.recipe import DesignRecipe, recipe_digest
+from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import write_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.finish import finished
@@ -80,11 +81,17 @@ class DesignRun:
             raise ContractError(
                 f"{self.checkpoint} is there already: give --resume to go on or --overwrite"
             )
-        parts = parts_of(recipe, folder=options.recipe_folder, pictures=options.pictures)
+        begin, cpu = time.monotonic(), time.process_time()
+        # with a window of its own a checkpoint holds all that a search would find again
+        held = options.resume and self.checkpoint.exists() and recipe.pixels.kernel_px > 0
+        given = replace(recipe, starts=Starts()) if held else recipe
+        parts = parts_of(given, folder=options.recipe_folder, pictures=options.pictures)
         _share_lens(parts.lens)
         self.loop = DesignLoop(parts, recipe.schedule)
-        self._spent_s = 0.0
-        self._spent_cpu_s = 0.0
+        searched = bool(given.starts.count and recipe.schedule.lens_rate)
+        self.searched_s = time.monotonic() - begin if searched else 0.0
+        self._spent_s = self.searched_s
+        self._spent_cpu_s = time.process_time() - cpu if searched else 0.0
         if options.resume:
             self._load()
         elif self.leads:

@@ -3,9 +3,8 @@
 A joint design goes downhill from where it begins, and its pictures say little about a lens whose
 rays are lost. Damped least squares on spots costs a fraction of a second a start, takes stiff and
 soft numbers alike, and keeps the limits: so several lenses near the given one, or from all over the
-bounds, are brought down first. Their spots say little about which of them is recovered best (lenses
-of equal merit lie decibels apart), so that the design's own front may judge those with the best
-spots; the winner goes into the loop.
+bounds, are brought down first. The best spots are not the best recovered picture, so that the
+design's own front may judge the lenses with the best spots; the winner goes into the loop.
 """
 
 from collections.abc import Callable
@@ -36,7 +35,8 @@ class Starts:
         anywhere: Share of the lenses that are drawn from the whole bounds instead.
         merit: Of their spots.
         core_um: The size that the merit compares spots with; 0 for the pixel pitch.
-        judged: How many of those with the best spots the recovery judges; below 2 spots decide.
+        judged: How many of those with the best spots the recovery judges, at most the quarter
+            that goes to the end; 0: spots decide.
         scout_steps: Steps of damped least squares for each.
         dls_steps: Further steps for the best quarter.
         seed: Of the draws.
@@ -60,6 +60,16 @@ class Starts:
             )
         if self.merit not in MERITS:
             raise ContractError(f"starts.merit is one of {', '.join(MERITS)}; got {self.merit!r}")
+        if self.judged and not 2 <= self.judged <= self.ends:
+            raise ContractError(
+                f"starts.judged must be 0, or 2 to {self.ends} with a count of {self.count}: a "
+                f"quarter of them and the given lens go to the end; got {self.judged}"
+            )
+
+    @property
+    def ends(self) -> int:
+        """Give how many descents go to the end."""
+        return max(1, self.count // 4) + 1 if self.count else 0
 
 
 def best_starts(problem: Problem, starts: Starts) -> Tensor:
@@ -97,17 +107,16 @@ def best_starts(problem: Problem, starts: Starts) -> Tensor:
             "another lens to start from, or tighter bounds"
         )
     formed = found.ends[np.isfinite(found.merits)]
-    return formed[:1] if starts.judged < 2 else torch.cat([formed[: starts.judged], begin[None]])
+    return formed[:1] if not starts.judged else torch.cat([formed[: starts.judged], begin[None]])
 
 
 def traced_lenses(starts: Starts, variables: int) -> int:
     """Give how many lenses a search traces, those that the recovery judges among them."""
     if starts.count == 0:
         return 0
-    kept = max(1, starts.count // 4) + 1
     scouted = evaluations(starts.count, starts.scout_steps, variables)
-    judged = min(starts.judged, kept) + 1 if starts.judged > 1 else 0
-    return scouted + evaluations(kept, starts.dls_steps, variables) + judged
+    ended = evaluations(starts.ends, starts.dls_steps, variables)
+    return scouted + ended + (starts.judged + 1 if starts.judged else 0)
 
 
 def best_judged(lenses: Tensor, judge: Callable[[Tensor], float]) -> Tensor:

@@ -25,13 +25,18 @@ TAPER_SHRINK = 4
 def to_otf(kernels: Tensor, size: tuple[int, int]) -> Tensor:
     """Transform (b, 3, kh, kw) kernels to the OTF of a periodic (h, w) block.
 
+    A kernel that is wider than the block wraps around it, as light in a periodic picture does.
+
     Returns:
         (b, 3, h, w // 2 + 1) complex; the kernel's centre is the origin.
     """
     kh, kw = kernels.shape[-2:]
     h, w = size
-    padded = torch.nn.functional.pad(kernels, (0, w - kw, 0, h - kh))
-    origin_first: Tensor = torch.roll(padded, (-(kh // 2), -(kw // 2)), dims=(-2, -1))
+    turns = -(-kh // h), -(-kw // w)
+    padded = torch.nn.functional.pad(kernels, (0, turns[1] * w - kw, 0, turns[0] * h - kh))
+    lead = padded.shape[:-2]
+    wrapped = padded.reshape(*lead, turns[0], h, turns[1], w).sum((-4, -2))
+    origin_first: Tensor = torch.roll(wrapped, (-(kh // 2), -(kw // 2)), dims=(-2, -1))
     otf: Tensor = torch.fft.rfft2(origin_first)
     return otf
 

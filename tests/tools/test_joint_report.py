@@ -68,8 +68,9 @@ def test_a_finished_joint_lens_may_be_given(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
-    recipe.write_text(RECIPE.replace('network = { name = "lean_s" }', ""), encoding="utf-8")
-    run(monkeypatch, recipe, "--out-dir", out, "--times", 1, "--joint", "duet")
+    recipe.write_text(RECIPE, encoding="utf-8")
+    alone = ("--times", 1, "--network", "none")
+    run(monkeypatch, recipe, "--out-dir", out, *alone, "--joint", "duet")
     lenses = json.loads((out / "joint.json").read_text(encoding="utf-8"))["lenses"]
     assert lenses["joint"]["front_db"] == lenses["start"]["front_db"]
     assert not (out / "joint_lens.json").exists()
