@@ -5,7 +5,8 @@
 
 Every curvature of the recipe's lens is multiplied by 1 + u, u uniform within a level, and the
 sensor is moved by up to +- 2 mm. From each such start the design runs for the same number of
-steps (as many as fit into `--minutes` of CPU on this machine, or `--steps`), in every arm:
+steps (as many as fit into `--minutes` of CPU on this machine, or `--steps`), in every arm; the
+search of an arm comes on top:
 
 before      plain steps in the lens's own numbers, focal length free, sensor where it stands, no
             limits
@@ -105,7 +106,7 @@ class Bench:
         own = steady(self.recipe, solved, self.efl_mm)
         return replace(own, starts=SPOTS_STARTS) if arm == "spots" else own
 
-    def parts(self, arm: str, number: int) -> DesignParts:
+    def parts(self, arm: str, number: int, *, search: bool = True) -> DesignParts:
         """Give the parts of an arm at a disturbed lens, the same one for every arm."""
         path = (self.out_dir / "starts" / f"{number:02}.toml").resolve()
         if not path.exists():
@@ -114,6 +115,7 @@ class Bench:
             share = level_of(number)
             write_lens(disturbed(self.lens, rng, curvature_share=share, focus_mm=FOCUS_MM), path)
         recipe = replace(self.of_arm(arm), prescription=str(path))
+        recipe = recipe if search else replace(recipe, starts=Starts())
         return parts_of(recipe, folder=self.folder, source=self.pictures)
 
 
@@ -318,7 +320,8 @@ def from_start(bench: Bench, arm: str, number: int, steps: int) -> Trial:
 def to_the_end(bench: Bench, trial: Trial) -> Trial:
     """Go on from where a trial came to, with the whole schedule of the recipe."""
     begin = time.process_time()
-    parts, recipe = bench.parts(trial.arm, trial.number), bench.of_arm(trial.arm)
+    parts = bench.parts(trial.arm, trial.number, search=False)
+    recipe = bench.of_arm(trial.arm)
     given = torch.tensor(trial.scaled, dtype=torch.float64)
     plan = short(recipe.schedule, recipe.schedule.steps)
     scaled = descended(parts, parts.lens.problem, given, plan, whiten=recipe.optics.whiten)

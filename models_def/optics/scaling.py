@@ -56,7 +56,8 @@ def scale_to_efl(lens: Lens, efl_mm: float) -> Lens:
 def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens:
     """Give the lens stopped to an F-number, stated as its entrance pupil diameter.
 
-    Rims stay as they are, so a lens that is opened may be vignetted by its own glass.
+    The rim of the stop opens as far as the beam needs; the others stay as they are, so a lens that
+    is opened may be vignetted by its own glass.
 
     Args:
         lens: The prescription.
@@ -68,8 +69,13 @@ def with_f_number(lens: Lens, f_number: float, *, working: bool = False) -> Lens
         raise ContractError(f"the F-number must be > 0; got {f_number}")
     data = paraxial_data(lens)
     now = paraxial_image(lens).working_f_number if working else abs(data.f_number)
-    return replace(
+    stopped = replace(
         lens,
         aperture_kind="entrance_pupil_diameter_mm",
         aperture_value=data.entrance_pupil_diameter_mm * now / f_number,
     )
+    needed_mm = paraxial_data(stopped).stop_semi_diameter_mm
+    surfaces = list(lens.surfaces)
+    rim_mm = max(surfaces[lens.stop].semi_diameter_mm, needed_mm)
+    surfaces[lens.stop] = replace(surfaces[lens.stop], semi_diameter_mm=rim_mm)
+    return replace(stopped, surfaces=tuple(surfaces))

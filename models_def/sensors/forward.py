@@ -61,15 +61,18 @@ def blur(planes: Tensor, kernels: Tensor) -> Tensor:
         (b, 3, h - kh + 1, w - kw + 1).
 
     Raises:
-        ContractError: If a kernel is larger than the planes.
+        ContractError: If a kernel is larger than the planes, or their numbers do not match.
     """
     (h, w), (kh, kw) = planes.shape[-2:], kernels.shape[-2:]
     if kh > h or kw > w:
         raise ContractError(f"kernels of {kh}x{kw} px exceed the planes of {h}x{w} px")
-    lead = np.broadcast_shapes(planes.shape[:-2], kernels.shape[:-2])
-    spread: Tensor = _Convolution.apply(  # type: ignore[no-untyped-call]
-        planes.expand(*lead, h, w), kernels.expand(*lead, kh, kw)
-    )
+    try:
+        np.broadcast_shapes(planes.shape[:-2], kernels.shape[:-2])
+    except ValueError as error:
+        raise ContractError(
+            f"planes {tuple(planes.shape)} and kernels {tuple(kernels.shape)} do not match"
+        ) from error
+    spread: Tensor = _Convolution.apply(planes, kernels)  # type: ignore[no-untyped-call]
     return spread
 
 
@@ -86,8 +89,10 @@ class _Convolution(torch.autograd.Function):
         (h, w), (kh, kw) = planes.shape[-2:], kernels.shape[-2:]
         size = next_fast_len(h, real=True), next_fast_len(w, real=True)
         spectra = _spectrum(planes, size), _spectrum(kernels, size)
-        ctx.save_for_backward(*spectra)
-        ctx.sides = (h, w), (kh, kw), size
+        # each factor is what leads the slope to the other one
+        needed = zip(reversed(spectra), ctx.needs_input_grad, strict=True)
+        ctx.save_for_backward(*(s if need else None for s, need in needed))
+        ctx.sides = planes.shape, kernels.shape, size
         spread: Tensor = torch.fft.irfft2(spectra[0] * spectra[1], size)
         return spread[..., kh - 1 : h, kw - 1 : w]
 
@@ -96,19 +101,21 @@ class _Convolution(torch.autograd.Function):
     def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, Tensor | None]:
         """Correlate the slope with the other factor."""
         (slope,) = slopes
-        (h, w), (kh, kw), size = ctx.sides
-        of_planes, of_kernels = ctx.saved_tensors
+        planes, kernels, size = ctx.sides
+        (h, w), (kh, kw) = planes[-2:], kernels[-2:]
+        of_kernels, of_planes = ctx.saved_tensors
         placed = pad(slope, (kw - 1, size[1] - w, kh - 1, size[0] - h))
         spectrum = _spectrum(placed, size)
 
-        def correlated(other: Tensor, height: int, width: int) -> Tensor:
-            found: Tensor = torch.fft.irfft2(spectrum * other.conj(), size)
-            return found[..., :height, :width]
+        def correlated(other: Tensor | None, shape: torch.Size) -> Tensor | None:
+            if other is None:
+                return None
+            product = spectrum * other.conj()
+            lead = (*shape[:-2], *product.shape[-2:])
+            found: Tensor = torch.fft.irfft2(product.sum_to_size(lead), size)
+            return found[..., : shape[-2], : shape[-1]]
 
-        return (
-            correlated(of_kernels, h, w) if ctx.needs_input_grad[0] else None,
-            correlated(of_planes, kh, kw) if ctx.needs_input_grad[1] else None,
-        )
+        return correlated(of_kernels, planes), correlated(of_planes, kernels)
 
 
 def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) -> Tensor:

@@ -8,8 +8,10 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.design import starts
 from camkit.models_def.design.recipe import DesignRecipe
 from camkit.models_def.design.run import DesignOptions, DesignRun
+from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 
@@ -35,6 +37,21 @@ def test_a_stopped_run_goes_on_and_leaves_lens_log_and_checkpoint(
     assert [entry["step"] for entry in entries] == [0, 3, 6]
     assert [entry["valid_rays"] for entry in entries] == [1, 1, 1]
     assert report["best_db"] >= report["begin_db"]
+
+
+def test_a_resumed_run_takes_its_start_from_the_checkpoint(
+    recipe: DesignRecipe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searching = replace(recipe, starts=Starts(count=6, spread=0.3))
+    whole = finish(searching, DesignOptions(out_dir=tmp_path / "a"))
+    assert whole.searched_s > 0
+    options = DesignOptions(out_dir=tmp_path / "b")
+    finish(searching, options, until=3)
+    monkeypatch.setattr(starts, "improve", pytest.fail)
+    resumed = finish(searching, replace(options, resume=True))
+    assert resumed.searched_s == 0
+    ends = (run.loop.parts.lens.scaled() for run in (whole, resumed))
+    assert torch.equal(*ends)
 
 
 def test_an_earlier_run_is_not_lost_by_mistake(recipe: DesignRecipe, tmp_path: Path) -> None:

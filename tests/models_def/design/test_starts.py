@@ -8,10 +8,17 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import find_lens, parts_of, problem_of
 from camkit.models_def.design.loop import DesignLoop, DesignParts
-from camkit.models_def.design.recipe import DesignRecipe, to_design
-from camkit.models_def.design.starts import Starts, best_judged, best_starts, disturbed
+from camkit.models_def.design.recipe import DesignRecipe, to_design, with_choices
+from camkit.models_def.design.starts import (
+    Starts,
+    best_judged,
+    best_starts,
+    disturbed,
+    traced_lenses,
+)
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.search import improvement
 from camkit.models_def.optics.search.problem import Problem, residuals, valid_share
 from camkit.models_def.optics.search.variables import Variable
 
@@ -76,7 +83,7 @@ def test_starts_from_anywhere_leave_the_neighbourhood_and_keep_their_order(
 ) -> None:
     problem = far_off(recipe, lens, 5)
     begin = problem.free.scaled()
-    near = Starts(count=8, spread=0.02, scout_steps=0, dls_steps=0, judged=2)
+    near = Starts(count=8, spread=0.02, scout_steps=0, dls_steps=0, judged=3)
     assert (best_starts(problem, near) - begin).abs().max() <= 0.02 + 1e-12
     found = best_starts(problem, replace(near, anywhere=0.9, scout_steps=4, judged=3))
     assert found.shape == (4, len(begin))
@@ -94,6 +101,8 @@ def test_the_judge_decides_among_the_best_spots() -> None:
 
 
 def test_a_design_begins_at_the_start_that_is_recovered_best(table: dict[str, Any]) -> None:
+    table["front"] = {"kind": "wiener"}
+    table.pop("network", None)
     table["starts"] = {"count": 8, "spread": 0.3, "scout_steps": 2, "dls_steps": 2}
     by_spots = parts_of(to_design(table))
     table["starts"]["judged"] = 3
@@ -106,6 +115,45 @@ def test_a_design_begins_at_the_start_that_is_recovered_best(table: dict[str, An
     assert marked(judged) >= marked(by_spots)
     among = best_starts(judged.lens.problem, to_design(table).starts)
     assert any(torch.equal(judged.lens.begin, one) for one in among)
+
+
+def test_judged_starts_need_one_window_and_a_front_that_recovers(table: dict[str, Any]) -> None:
+    table["starts"] = {"count": 8, "judged": 3}
+    table["front"] = {"kind": "wiener"}
+    table.pop("network", None)
+    to_design(table)
+    table["front"] = {"kind": "none"}
+    with pytest.raises(ContractError, match="a front that recovers"):
+        to_design(table)
+    table["front"] = {"kind": "wiener"}
+    table["pixels"]["kernel_px"] = 0
+    with pytest.raises(ContractError, match="kernel_px"):
+        to_design(table)
+
+
+@pytest.mark.parametrize("kept", [{"lens_rate": 0.0}, {"search": False}])
+def test_a_lens_that_is_to_stay_is_not_searched_for(
+    table: dict[str, Any], kept: dict[str, Any]
+) -> None:
+    table["starts"] = {"count": 8, "spread": 0.3}
+    lens = parts_of(with_choices(to_design(table), **kept)).lens
+    assert torch.equal(lens.begin, lens.problem.free.scaled())
+
+
+def test_a_search_counts_the_lenses_it_traces(recipe: DesignRecipe, lens: Lens) -> None:
+    problem = far_off(recipe, lens, 6)
+    starts = Starts(count=9, scout_steps=2, dls_steps=3, judged=2)
+    traced = []
+
+    def counted(found: Problem, scaled: torch.Tensor) -> torch.Tensor:
+        traced.append(len(scaled))
+        return residuals(found, scaled)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(improvement, "residuals", counted)
+        best_starts(problem, starts)
+    # a glance at the given lens comes on top of the search, three judgements are the loop's
+    assert sum(traced) - 1 == traced_lenses(starts, len(problem.free.variables)) - 3
 
 
 def test_a_disturbed_lens_is_off_by_no_more_than_asked(lens: Lens) -> None:
@@ -131,6 +179,9 @@ def test_a_disturbed_lens_is_off_by_no_more_than_asked(lens: Lens) -> None:
         ({"anywhere": 1.1}, "anywhere in 0..1"),
         ({"core_um": -1.0}, "core_um"),
         ({"merit": "area"}, "sum_abs"),
+        ({"count": 8, "judged": 4}, "2 to 3 with a count of 8"),
+        ({"count": 8, "judged": 1}, "2 to 3"),
+        ({"judged": 2}, "count of 0"),
     ],
 )
 def test_wrong_starts_are_refused(table: dict[str, Any], entry: dict[str, Any], word: str) -> None:

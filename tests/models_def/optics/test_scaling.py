@@ -4,6 +4,7 @@ from dataclasses import replace
 import pytest
 
 from camkit.errors import ContractError
+from camkit.models_def.design.assembly import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image, with_paraxial_focus
 from camkit.models_def.optics.scaling import scale_lens, scale_to_efl, with_f_number
 from tests.physics.reference_lenses import cooke_triplet, thorlabs_al2550
@@ -34,6 +35,15 @@ def test_a_working_f_number_is_that_of_the_image(distance_mm: float) -> None:
     assert paraxial_data(plain).f_number == pytest.approx(8.0, rel=EXACT)
     same = math.isinf(distance_mm)
     assert (paraxial_image(plain).working_f_number == pytest.approx(8.0, rel=1e-9)) == same
+
+
+def test_an_opened_lens_lets_its_wider_beam_through_the_stop() -> None:
+    lens = find_lens("duet")
+    fast = with_f_number(lens, 2.8)
+    rim_mm = fast.surfaces[fast.stop].semi_diameter_mm
+    assert rim_mm == pytest.approx(paraxial_data(fast).stop_semi_diameter_mm, rel=EXACT)
+    assert rim_mm > lens.surfaces[lens.stop].semi_diameter_mm
+    assert with_f_number(lens, 8.0).surfaces == lens.surfaces
 
 
 def test_a_thick_lens_images_by_newton_s_equation() -> None:

@@ -47,6 +47,8 @@ def test_blur_passes_the_slopes_of_a_convolution() -> None:
     k = random(1, 3, 3, 4, seed=2).double().requires_grad_()
     assert torch.autograd.gradcheck(blur, (planes, k))
     assert torch.autograd.gradcheck(lambda k: blur(planes.detach(), k), (k,))
+    with pytest.raises(ContractError, match="do not match"):
+        blur(random(2, 3, 9, 9), kernels(4, 3, 3, 3))
 
 
 def test_one_kernel_everywhere_makes_scatter_a_blur() -> None:
