@@ -253,8 +253,8 @@ class DesignLoop:
     def judge(self, loss: float = math.nan, seconds: float = 0.0) -> Progress:
         """Recover fixed patches with the present lens and network; the best are kept.
 
-        The best have the largest PSNR; where captures are judged (`edof`), the least loss. What a
-        lens outside its limits pays in the loss counts against it.
+        The best have the largest PSNR; where captures are judged (`edof`) or depths have weights,
+        the least loss. What a lens outside its limits pays in the loss counts against it.
         """
         with torch.no_grad():
             kernels, penalty = self._kernels(moving=False)
@@ -264,7 +264,7 @@ class DesignLoop:
                 for i, batch in enumerate(self._valid)
             ]
         valid_db, valid_loss = (float(np.mean(column)) for column in zip(*found, strict=True))
-        merit = valid_db if self.parts.loss.needs_network else -valid_loss
+        merit = valid_db if self.parts.loss.is_psnr else -valid_loss
         merit -= self.schedule.penalty_weight * float(penalty)
         if merit > self.best_merit:
             self.best_db, self.best_merit, self.best = valid_db, merit, self._weights()

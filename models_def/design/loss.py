@@ -48,6 +48,11 @@ class DesignLoss:
         """Whether recovered pictures are judged, not captures."""
         return self.kind != "edof"
 
+    @property
+    def is_psnr(self) -> bool:
+        """Whether the mean PSNR of recovered pictures says what is wanted."""
+        return self.needs_network and not self.depth_weights
+
 
 def design_loss(loss: DesignLoss, pictures: Tensor, sharp: Tensor) -> Tensor:
     """Give the scalar to minimise.

@@ -1,5 +1,6 @@
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import torch
@@ -7,7 +8,7 @@ import torch
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.loop import DesignLoop
 from camkit.models_def.design.loss import design_loss
-from camkit.models_def.design.recipe import DesignRecipe
+from camkit.models_def.design.recipe import DesignRecipe, to_design
 
 
 def make_loop(recipe: DesignRecipe) -> DesignLoop:
@@ -134,3 +135,18 @@ def test_the_best_lens_is_kept_and_put_in_place(recipe: DesignRecipe) -> None:
     loop.take_best()
     assert loop.best_db == max([begin, *found])
     assert loop.judge().valid_db == loop.best_db
+
+
+def test_with_weights_of_depths_the_least_loss_decides(table: dict[str, Any]) -> None:
+    table["optics"]["object_distances_mm"] = [800.0, 1200.0]
+    table.pop("limits")
+    plain = make_loop(to_design(table))
+    by_psnr = plain.judge()
+    assert plain.best_merit == by_psnr.valid_db
+    merits = []
+    for weights in ([0.0, 1.0], [1.0, 0.0]):
+        table["loss"]["depth_weights"] = weights
+        loop = make_loop(to_design(table))
+        assert loop.judge().valid_db == by_psnr.valid_db
+        merits.append(loop.best_merit)
+    assert -1 < min(merits) < max(merits) < 0
