@@ -1,51 +1,27 @@
 """tools/joint_report.py on a tiny design: budgets, a given joint lens, nothing done twice."""
 
-import importlib
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-RECIPE = """
-name = "tiny"
-prescription = "duet"
+from tests.tiny_design import RECIPE, run_tool
+
+JUDGED = """
 starts = { count = 4, scout_steps = 1, dls_steps = 1, judged = 2 }
-optics = { half_field_deg = 12.0, fields = 2, pupil_rays = 24, efl_mm = 50.0, solved_surface = 4 }
-pixels = { pitch_um = 6.0, kernel_px = 33 }
 front = { kind = "wiener", filter_margin_px = 8 }
 network = { name = "lean_s" }
-loss = { kind = "log_mse" }
-data = { procedural_scenes = 1, scene_px = 160 }
-vary = [
-    { kind = "curvature", surface = 1, low = -0.1, high = 0.1 },
-    { kind = "conic", surface = 4, low = -4.0, high = 4.0 },
-    { kind = "defocus", low = -2.0, high = 2.0 },
-]
-
-[schedule]
-steps = 2
-batch = 1
-patch_px = 24
-epoch_steps = 2
-valid_steps = 2
-valid_patches = 1
 """
-
-
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
-    module = importlib.import_module("tools.joint_report")
-    monkeypatch.setattr("sys.argv", ["joint_report", *map(str, arguments)])
-    module.main()
 
 
 def test_spots_get_their_share_of_lenses_and_nothing_is_done_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
-    recipe.write_text(RECIPE, encoding="utf-8")
+    recipe.write_text(JUDGED + RECIPE, encoding="utf-8")
     size = ("--times", 3, "--network-steps", 1, "--seeds", "5")
-    run(monkeypatch, recipe, "--out-dir", out, *size)
+    run_tool(monkeypatch, "joint_report", recipe, "--out-dir", out, *size)
 
     def made(name: str) -> dict[str, Any]:
         found: dict[str, Any] = json.loads((out / name).read_text(encoding="utf-8"))
@@ -60,7 +36,7 @@ def test_spots_get_their_share_of_lenses_and_nothing_is_done_twice(
     assert (trained[0], trained[-1], len(trained)) == ("start", "joint", 3)
     assert len(made("joint_lens.json")["curve"]) == 2
     files = {path: path.stat().st_mtime_ns for path in out.glob("*_*.json")}
-    run(monkeypatch, recipe, "--out-dir", out, *size)
+    run_tool(monkeypatch, "joint_report", recipe, "--out-dir", out, *size)
     assert {path: path.stat().st_mtime_ns for path in out.glob("*_*.json")} == files
 
 
@@ -68,9 +44,9 @@ def test_a_finished_joint_lens_may_be_given(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
-    recipe.write_text(RECIPE, encoding="utf-8")
+    recipe.write_text(JUDGED + RECIPE, encoding="utf-8")
     alone = ("--times", 1, "--network", "none")
-    run(monkeypatch, recipe, "--out-dir", out, *alone, "--joint", "duet")
+    run_tool(monkeypatch, "joint_report", recipe, "--out-dir", out, *alone, "--joint", "duet")
     lenses = json.loads((out / "joint.json").read_text(encoding="utf-8"))["lenses"]
     assert lenses["joint"]["front_db"] == lenses["start"]["front_db"]
     assert not (out / "joint_lens.json").exists()

@@ -105,7 +105,9 @@ def test_choices_of_a_caller_win_and_change_the_digest(table: dict[str, Any]) ->
     assert recipe_digest(with_choices(recipe)) == recipe_digest(recipe)
 
 
-def test_fields_at_equal_areas_stand_for_equal_parts_of_the_picture(table: dict[str, Any]) -> None:
+def test_fields_at_equal_areas_stand_for_equal_parts_of_the_image_circle(
+    table: dict[str, Any],
+) -> None:
     table["optics"] |= {"fields": 5, "spacing": "area"}
     slopes = problem_of(to_design(table), find_lens("duet")).slopes
     areas = (slopes / slopes[-1]) ** 2
