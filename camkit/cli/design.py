@@ -32,9 +32,11 @@ def design(
         str | None, typer.Option(help="Another start than the recipe's: a name or a lens file.")
     ] = None,
     search: Annotated[
-        bool, typer.Option(help="Try the recipe's [starts]; without, begin at the lens itself.")
+        bool, typer.Option(help="Try the recipe's \\[starts]; without, begin at the lens itself.")
     ] = True,
-    seed: Annotated[int | None, typer.Option(help="Of weights and draws, not of [starts].")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Of weights and draws, not of \\[starts].")
+    ] = None,
     pictures: Annotated[
         int, typer.Option(min=0, help="Draw lens, PSFs and a recovered patch every N steps.")
     ] = 0,

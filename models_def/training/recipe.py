@@ -6,6 +6,7 @@ names the key.
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
@@ -88,6 +89,8 @@ class DataRecipe:
         drift_scale: Largest relative change of the kernels' size, by heat or refocusing.
         drift_turn_deg: Largest turn of the kernels, by a lens turned in its mount.
         target_max: Targets are clipped at this multiple of the white level.
+        depth_shares: How often each of `lens.depths_mm` is drawn, relative to the others; empty
+            for equally often.
     """
 
     picture_share: float = 0.8
@@ -108,6 +111,7 @@ class DataRecipe:
     drift_scale: float = 0.05
     drift_turn_deg: float = 5.0
     target_max: float = 4.0
+    depth_shares: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         _check_share("data.picture_share", self.picture_share)
@@ -123,6 +127,10 @@ class DataRecipe:
             raise ContractError("data.first_samples must lie between 0 and pool_samples")
         if min(self.sample_px, self.scene_px, self.procedural_scenes, self.steps_per_sample) < 1:
             raise ContractError("sizes and counts of data must be positive")
+        if any(not 0 < share < math.inf for share in self.depth_shares):
+            raise ContractError(
+                f"data.depth_shares must be positive and finite; got {self.depth_shares}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,6 +261,11 @@ class Recipe:
     data: DataRecipe
     networks: Mapping[str, NetworkRecipe]
     final: FinalRecipe = field(default_factory=FinalRecipe)
+
+    def __post_init__(self) -> None:
+        shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
+        if shares and shares != depths:
+            raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
 
     def network(self, size: str) -> NetworkRecipe:
         """Give the network of a size, or raise ContractError naming the sizes there are."""

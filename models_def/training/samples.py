@@ -127,12 +127,21 @@ def draw_exposure(rng: Generator, recipe: Recipe, bank: PsfBank) -> Exposure:
         y_mm=float(y_mm),
         block_x_mm=float(x_mm + jitter[0]),
         block_y_mm=float(y_mm + jitter[1]),
-        copy=int(rng.integers(bank.training_copies)),
+        copy=_draw_copy(rng, data.depth_shares, bank),
         iso=float(np.exp(rng.uniform(np.log(data.iso_min), np.log(data.iso_max)))),
         factor=float(2.0**stops),
         borders=(bool(borders[0]), bool(borders[1]), bool(borders[2]), bool(borders[3])),
         drift=_draw_drift(rng, recipe),
     )
+
+
+def _draw_copy(rng: Generator, shares: tuple[float, ...], bank: PsfBank) -> int:
+    """Draw a copy to train on, at one of its depths."""
+    if not shares:
+        return int(rng.integers(bank.training_copies))
+    copy = int(rng.integers(bank.training_copies // bank.depths))
+    odds = np.array(shares) / np.sum(shares)
+    return copy * bank.depths + int(rng.choice(bank.depths, p=odds))
 
 
 def _draw_drift(rng: Generator, recipe: Recipe) -> tuple[float, float]:

@@ -3,12 +3,14 @@
 import json
 import re
 import shlex
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
+from rich.text import Text
 
 import camkit
 from camkit.bundle.manifest import Manifest
@@ -50,6 +52,19 @@ def _inline(text: str) -> list[str]:
 
 def _id(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
+
+
+def _help_texts(command: Any) -> Iterator[str]:
+    yield from (text for text in (command.help, *(p.help for p in command.params)) if text)
+    for part in getattr(command, "commands", {}).values():
+        yield from _help_texts(part)
+
+
+def test_no_word_of_the_help_is_taken_for_markup() -> None:
+    texts = list(_help_texts(typer.main.get_command(app)))
+    assert len(texts) > 100
+    for text in texts:
+        assert Text.from_markup(text).plain == text.replace("\\[", "["), text
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=_id)

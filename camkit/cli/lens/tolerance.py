@@ -18,7 +18,7 @@ def tolerance(
     file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
     errors: Annotated[
         Path | None,
-        typer.Option(help="File with a [tolerance] table; else that of the lens, else defaults."),
+        typer.Option(help="File with a \\[tolerance] table; else that of the lens, else defaults."),
     ] = None,
     samples: Annotated[int, typer.Option(min=1, help="Fabricated copies.")] = 50,
     seed: Annotated[int, typer.Option(min=0, help="Of errors, patches and noise.")] = 1,

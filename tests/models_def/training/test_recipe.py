@@ -114,3 +114,12 @@ def test_depths_decide_the_samples_where_there_are_any(recipe_path):
 def test_depths_that_do_not_increase_are_refused(recipe_path, depths_mm):
     with pytest.raises(ContractError, match=r"lens\.depths_mm"):
         to_recipe(table(recipe_path, lens__depths_mm=depths_mm))
+
+
+@pytest.mark.parametrize(
+    ("shares", "message"),
+    [([1.0], "1 entries"), ([1.0, 0.0], "positive"), ([1.0, float("inf")], "finite")],
+)
+def test_shares_of_depths_must_fit_the_depths(recipe_path, shares, message):
+    with pytest.raises(ContractError, match=message):
+        to_recipe(table(recipe_path, lens__depths_mm=[500.0, 900.0], data__depth_shares=shares))

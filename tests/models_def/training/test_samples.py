@@ -142,6 +142,20 @@ def test_drawn_exposures_stay_in_their_ranges(recipe, bank):
     assert 0.1 < at_border <= data.border_share + 0.05
 
 
+def test_depths_are_drawn_as_often_as_their_shares_say(recipe, bank):
+    rng = np.random.default_rng(0)
+    deep = replace(bank, copies=np.repeat(bank.copies, 3, axis=0), depths=3)
+    uneven = replace(
+        recipe,
+        lens=replace(recipe.lens, depths_mm=(500.0, 700.0, 900.0)),
+        data=replace(recipe.data, depth_shares=(2.0, 1.0, 1.0)),
+    )
+    drawn = np.array([draw_exposure(rng, uneven, deep).copy for _ in range(2000)])
+    shares = np.bincount(drawn % 3, minlength=3) / drawn.size
+    np.testing.assert_allclose(shares, (0.5, 0.25, 0.25), atol=0.04)
+    assert set(drawn.tolist()) == set(range(deep.training_copies))
+
+
 def spot_sample(recipe, bank, **changes):
     """Photograph one point of light in the dark, without noise to speak of."""
     crop = grey(recipe, bank, 0.0)
