@@ -1,17 +1,29 @@
 """Rewrite the glass data of camkit from a copy of the refractiveindex.info database (CC0).
 
     python -m tools.build_glass path/to/database/data-nk
+    python -m tools.build_glass --classic robb1983_data_final.txt
 
 The folder is `data-nk` of the database (github.com/polyanskiy/refractiveindex.info-database, also
 inside the wheel of `optiland`). Writes one JSON file per catalogue into
 `models_def/optics/glass/data/`; `misc.json` is edited by hand and
 stays. Sumita is left out: its printed n_d and V_d disagree with its coefficients.
+
+The second command writes the glasses that Schott made in 1983 and makes no more, from table V of
+Robb and Mercado as the package `opticalglass` holds it (`opticalglass/data`). Numbers of that
+transcription were misread here and there: a glass is taken only if a glass of another table
+(today's equivalent, or another maker's) bears its index and its dispersion out.
 """
 
 import argparse
 import json
 import re
 from pathlib import Path
+
+import torch
+
+from camkit.models_def.optics.glass.catalogue import builtin_catalogues
+from camkit.models_def.optics.glass.dispersion import refractive_index
+from camkit.models_def.optics.glass.material import Glass
 
 DATA = Path(__file__).resolve().parents[1] / "models_def" / "optics" / "glass" / "data"
 MAKERS = {
@@ -54,6 +66,13 @@ LITERATURE = {
     "ZnS-Debenham1984": ("main/ZnS/Debenham", "Debenham 1984, Appl. Opt. 23, 2238"),
     "Ge-Burnett2016": ("main/Ge/Burnett", "Burnett, Kaplan, Stover, Phenis 2016, Proc. SPIE 9974"),
 }
+CLASSIC = "Schott1983"
+CLASSIC_SOURCE = (
+    "Robb, Mercado 1983, Appl. Opt. 22, 1198, table V: Schott catalogue, fit to 1e-4 or better"
+)
+CLASSIC_UM = (0.4, 0.7)
+BASE_UM = 0.574
+BORNE_OUT_INDEX, BORNE_OUT_DISPERSION = 1e-3, 5e-5
 SCHOTT_POWERS = [0.0, 2.0, -2.0, -4.0, -6.0, -8.0]
 
 
@@ -108,10 +127,51 @@ def write(name: str, rows: list[str], source: str, *, literature: bool = False) 
     print(f"{path.name}: {len(rows)} glasses, {len(text) / 1000:.0f} kB")
 
 
+def classic_rows(text: str) -> list[str]:
+    """Give the glasses of the first section that today's catalogue lacks and another bears out."""
+    section = text.split("#---")[0]
+    table = [line.split() for line in section.splitlines() if line and not line.startswith("#")]
+    waves = torch.linspace(0.42, 0.68, 14, dtype=torch.float64)
+    known = [c for c in builtin_catalogues() if not c.literature and c.name != CLASSIC]
+    curves = torch.stack(
+        [
+            refractive_index(glass, waves)
+            for catalogue in known
+            for glass in catalogue.glasses
+            if glass.range_um[0] <= waves[0] and glass.range_um[1] >= waves[-1]
+        ]
+    )
+    rows = []
+    for name, *numbers in table:
+        coefficients = (*map(float, numbers[:3]), BASE_UM)
+        glass = Glass(name=name, formula="buchdahl", coefficients=coefficients, source="table V")
+        apart = curves - refractive_index(glass, waves)
+        shift = apart.mean(1, keepdim=True)
+        alike = (shift[:, 0].abs() <= BORNE_OUT_INDEX) & (
+            (apart - shift).abs().amax(1) <= BORNE_OUT_DISPERSION
+        )
+        if any(c.name == "Schott" and c.with_trade_name(name) for c in known):
+            continue
+        if bool(alike.any()):
+            row = [name, "buchdahl", CLASSIC_UM, None, None, coefficients]
+            rows.append(json.dumps(row, separators=(",", ":")))
+        else:
+            print(f"{name}: not borne out, left out")
+    return sorted(rows)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("database", type=Path)
-    database: Path = parser.parse_args().database
+    parser.add_argument("database", type=Path, nargs="?")
+    parser.add_argument("--classic", type=Path)
+    arguments = parser.parse_args()
+    if arguments.classic:
+        write(CLASSIC, classic_rows(arguments.classic.read_text("utf-8")), CLASSIC_SOURCE)
+    if arguments.database:
+        rewrite(arguments.database)
+
+
+def rewrite(database: Path) -> None:
     for maker, source in MAKERS.items():
         paths = sorted((database / "glass" / maker.lower()).rglob("*.yml"), key=lambda p: p.stem)
         rows = [row for path in paths if (row := entry(path, path.stem))]

@@ -64,7 +64,7 @@ def trade_name_of(glass: Glass) -> str:
 def builtin_catalogues() -> tuple[GlassCatalogue, ...]:
     """Give the catalogues that come with camkit, Schott's first."""
     folder = resources.files("camkit.models_def.optics.glass") / "data"
-    files = ("schott", "ohara", "hoya", "hikari", "cdgm", "misc", "literature")
+    files = ("schott", "schott1983", "ohara", "hoya", "hikari", "cdgm", "misc", "literature")
     return tuple(
         _catalogue(json.loads((folder / f"{name}.json").read_text(encoding="utf-8")))
         for name in files

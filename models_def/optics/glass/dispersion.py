@@ -17,6 +17,7 @@ RANGE_TOLERANCE: Final = 0.05
 """Share of each end of its range by which a glass may be asked beyond it (0.02 um at 0.4 um)."""
 
 _HERZBERGER_UM2: Final = 0.028
+_BUCHDAHL_PER_UM: Final = 2.5
 
 _Coefficients = tuple[float, ...]
 
@@ -121,6 +122,13 @@ def _herzberger(coefficients: _Coefficients, wavelengths_um: Tensor) -> Tensor:
     return a + b * pole + c * pole**2 + d * w2 + e * w2**2 + f * w2**3
 
 
+def _buchdahl(coefficients: _Coefficients, wavelengths_um: Tensor) -> Tensor:
+    base, first, second, base_um = coefficients
+    away = wavelengths_um - base_um
+    chromatic = away / (1 + _BUCHDAHL_PER_UM * away)
+    return base + first * chromatic + second * chromatic**2
+
+
 _FORMULAS: Final[dict[Formula, Callable[[_Coefficients, Tensor], Tensor]]] = {
     "constant": _constant,
     "sellmeier": _sellmeier,
@@ -133,4 +141,5 @@ _FORMULAS: Final[dict[Formula, Callable[[_Coefficients, Tensor], Tensor]]] = {
     "cauchy": _cauchy,
     "conrady": _conrady,
     "herzberger": _herzberger,
+    "buchdahl": _buchdahl,
 }

@@ -19,6 +19,7 @@ Formula = Literal[
     "cauchy",
     "conrady",
     "herzberger",
+    "buchdahl",
 ]
 FORMULAS: Final[tuple[Formula, ...]] = get_args(Formula)
 
@@ -34,6 +35,7 @@ _COUNT_FITS: Final[Mapping[Formula, Callable[[int], bool]]] = {
     "cauchy": lambda count: count > 0,
     "conrady": lambda count: count == 3,
     "herzberger": lambda count: count == 6,
+    "buchdahl": lambda count: count == 4,
 }
 
 
@@ -53,7 +55,8 @@ class Glass:
     - powers: a1, p1, a2, p2, ... of n^2 = sum a w^p;
     - cauchy: n = A + B w^-2 + C w^-4 + ...;
     - conrady: n = A + B / w + C / w^3.5;
-    - herzberger: n = A + B L + C L^2 + D w^2 + E w^4 + F w^6, L = 1 / (w^2 - 0.028).
+    - herzberger: n = A + B L + C L^2 + D w^2 + E w^4 + F w^6, L = 1 / (w^2 - 0.028);
+    - buchdahl: n0, nu1, nu2, w0 of n = n0 + nu1 o + nu2 o^2, o = (w - w0) / (1 + 2.5 (w - w0)).
 
     Attributes:
         name: Strict name, "material-source".

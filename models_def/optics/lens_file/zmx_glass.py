@@ -32,6 +32,8 @@ COMMENT: Final = "glass "
 _SAME: Final = 1e-9
 """Other programs write 13 digits or more."""
 _ALIASES: Final = {"nikon": "hikari", "nikon_hikari": "hikari", "nikon-hikari": "hikari"}
+_OLDER: Final = {"schott1983": "schott"}
+"""Catalogues of glasses that another catalogue no longer has; GCAT knows one name for both."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +52,16 @@ class GlassOrder:
 
 def glass_order(names: Sequence[str], own: Sequence[GlassCatalogue]) -> GlassOrder:
     """Give the order for a GCAT line; catalogues that camkit does not have are passed over."""
-    known = {c.name.casefold(): c for c in builtin_catalogues() if not c.literature}
+    known = [c for c in builtin_catalogues() if not c.literature]
     wanted = [_ALIASES.get(name.casefold(), name.casefold()) for name in names]
-    return GlassOrder(own=tuple(own), listed=tuple(known[n] for n in wanted if n in known))
+    listed = (c for name in wanted for c in known if gcat_name(c) == name.upper())
+    return GlassOrder(own=tuple(own), listed=tuple(dict.fromkeys(listed)))
+
+
+def gcat_name(catalogue: GlassCatalogue) -> str:
+    """Give the name that a GCAT line has for one of camkit's catalogues."""
+    name = catalogue.name.casefold()
+    return _OLDER.get(name, name).upper()
 
 
 def find_zmx_glass(name: str, order: GlassOrder) -> Glass:

@@ -10,6 +10,7 @@ from camkit.models_def.optics.glass.catalogue import AIR, builtin_catalogues
 from camkit.models_def.optics.lens_file.zmx_glass import (
     MODEL_NAME,
     GlassOrder,
+    gcat_name,
     glass_order,
     glass_words,
 )
@@ -57,7 +58,7 @@ def _catalogue_names(lens: Lens) -> list[str]:
     for surface in lens.surfaces:
         if surface.material is not None and "-" in surface.glass:
             names[surface.glass.rpartition("-")[2]] = None
-        names |= {c.name.upper(): None for c in makers if c.get(surface.glass) is not None}
+        names |= {gcat_name(c): None for c in makers if c.get(surface.glass) is not None}
     glasses = {surface.glass: surface.medium for surface in lens.surfaces}.values()
 
     def named(order: list[str]) -> int:

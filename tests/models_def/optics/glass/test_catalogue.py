@@ -73,7 +73,7 @@ def test_trade_name_of_one_catalogue_stands_for_the_strict_one() -> None:
 @pytest.mark.parametrize(
     ("name", "offered"),
     [
-        ("BK7", "N-BK7-Schott"),
+        ("BK7-Schott", "BK7-Schott1983"),
         ("F2", "F2-Schott or F2-Hikari"),
         ("SF10", "SF10-Schott or SF10-Hikari"),
         ("PMMA", "PMMA-Misc or PMMA-Sultanova2009"),
@@ -126,3 +126,36 @@ def test_wavelength_outside_the_range_is_refused_with_the_range() -> None:
     for beyond in (low * 0.94, high * 1.06):
         with pytest.raises(ContractError, match=r"0\.4368\.\.1\.052 um"):
             refractive_index(glass, torch.tensor([0.5, beyond], dtype=torch.float64))
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("BK7", 517642),
+        ("FK5", 487704),
+        ("K5", 522595),
+        ("BAK1", 573575),
+        ("SK2", 607567),
+        ("SK4", 613586),
+        ("PSK3", 552635),
+        ("KF9", 523515),
+        ("LAK9", 691547),
+        ("SSK4", 618551),
+        ("BAF4", 606439),
+        ("LAFN2", 744447),
+        ("SF8", 689312),
+    ],
+)
+def test_glass_of_1983_has_the_index_and_abbe_number_of_its_six_digits(name: str, code: int):
+    glass = find_glass(f"{name}-Schott1983")
+    index = float(refractive_index(glass, torch.tensor(D_LINE_UM, dtype=torch.float64)))
+    assert index == pytest.approx(1 + code // 1000 / 1000, abs=6e-4)
+    assert abbe_number(glass) == pytest.approx(code % 1000 / 10, abs=0.17)
+
+
+def test_glasses_of_1983_are_those_that_are_made_no_more() -> None:
+    assert find_glass("BK7").name == "BK7-Schott1983"
+    today = {c.name: c for c in builtin_catalogues()}["Schott"]
+    old = {c.name: c for c in builtin_catalogues()}["Schott1983"]
+    assert len(old.glasses) > 100
+    assert not any(today.with_trade_name(g.name.rpartition("-")[0]) for g in old.glasses)

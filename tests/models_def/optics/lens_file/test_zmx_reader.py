@@ -218,6 +218,9 @@ def test_wavelengths_without_a_count_lose_the_filling_of_the_table() -> None:
         ("F2 0 0 1.5 40", "SCHOTT", "F2-Schott"),
         ("F2 0 0 1.5 40", "HIKARI SCHOTT", "F2-Hikari"),
         ("SK16 0 0 1.5 40", "SCHOTT", "SK16-Hikari"),
+        ("BK7 0 0 1.5 40", "SCHOTT", "BK7-Schott1983"),
+        ("BAF4 0 0", "SCHOTT HIKARI", "BAF4-Schott1983"),
+        ("BAF4 0 0", "HIKARI SCHOTT", "BAF4-Hikari"),
         ("N-SF6HTULTRA 0 0", "", "N-SF6HTultra-Schott"),
         ("PMMA 0 0 1.5 40", "MISC", "PMMA-Misc"),
         ("PMMA 0 0 1.5 40", "", "PMMA-Misc"),
@@ -239,7 +242,7 @@ def test_glass_is_found_in_the_order_of_gcat(glas: str, gcat: str, name: str) ->
 @pytest.mark.parametrize(
     ("glas", "message"),
     [
-        ("BK7", r"line 32: surface 1: glass must be .*'BK7'.*N-BK7-Schott.*--glass FILE.agf"),
+        ("XN-BK7", r"line 32: surface 1: glass must .*'XN-BK7'.*N-BK7-Schott.*--glass FILE.agf"),
         ("F2", "may be F2-Schott or F2-Hikari"),
         ("___BLANK 1 0 0.5 60", "a model glass needs"),
     ],
