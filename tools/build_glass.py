@@ -129,7 +129,7 @@ def write(name: str, rows: list[str], source: str, *, literature: bool = False) 
 
 def classic_rows(text: str) -> list[str]:
     """Give the glasses of the first section that today's catalogue lacks and another bears out."""
-    section = text.split("#---")[0]
+    section = text.split("#---", maxsplit=1)[0]
     table = [line.split() for line in section.splitlines() if line and not line.startswith("#")]
     waves = torch.linspace(0.42, 0.68, 14, dtype=torch.float64)
     known = [c for c in builtin_catalogues() if not c.literature and c.name != CLASSIC]

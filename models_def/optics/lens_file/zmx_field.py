@@ -37,9 +37,15 @@ def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
         mm_per_unit: Length unit of the file.
 
     Raises:
-        UnsupportedError: If the fields are of a kind that camkit does not convert.
+        UnsupportedError: If the fields are of a kind that camkit does not convert, or chief rays
+            are not to go through the stop.
     """
     record = last(system, "FTYP")
+    if record is not None and record.number(1, 0.0) != 0:
+        raise UnsupportedError(
+            f"line {record.line}: the object space is telecentric; camkit sends chief rays "
+            "through the stop"
+        )
     kind = int(record.number(0, 0.0)) if record else FieldKind.ANGLE
     if kind not in list(FieldKind):
         line = f"line {record.line}: " if record else ""

@@ -19,6 +19,7 @@ from camkit.models_def.optics.prescription import Surface
 EVEN_TERMS: Final = 8
 _TYPES: Final = ("STANDARD", "EVENASPH")
 _FIXED: Final = 1
+_FILLED_IN: Final = (1.5, 40.0)
 _OBSTACLES: Final = ("SQAP", "SQOB", "ELAP", "ELOB", "USAP", "USOB", "OBSC", "SPID")
 
 
@@ -120,7 +121,20 @@ def _glass(records: Records, context: SurfaceContext) -> Glass:
         return find_zmx_glass(name, context.order)
     except ContractError as error:
         where = f"line {found.line}: surface {context.number}"
-        raise ContractError(f"{where}: {error}") from error
+        raise ContractError(f"{where}: {error}{_model_hint(found)}") from error
+
+
+def _model_hint(glass: Record) -> str:
+    """Say what the line itself knows of the glass; programs fill it with 1.5 and 40 if nothing."""
+    words = glass.words[3:5]
+    try:
+        index_d, number = map(float, words)
+    except ValueError:
+        return ""
+    if index_d <= 1 or number <= 0 or (index_d, number) == _FILLED_IN:
+        return ""
+    model = f"GLAS {MODEL_NAME} 1 0 {words[0]} {words[1]}"
+    return f"; or write {model}, the n_d and V_d of the line, for a model of it"
 
 
 def _semi_diameter(records: Records, number: int) -> float:

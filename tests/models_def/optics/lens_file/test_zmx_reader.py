@@ -244,6 +244,8 @@ def test_glass_is_found_in_the_order_of_gcat(glas: str, gcat: str, name: str) ->
     [
         ("XN-BK7", r"line 32: surface 1: glass must .*'XN-BK7'.*N-BK7-Schott.*--glass FILE.agf"),
         ("F2", "may be F2-Schott or F2-Hikari"),
+        ("XN-BK7 0 0 1.6 50.3", "--glass FILE.agf; or write GLAS ___BLANK 1 0 1.6 50.3, the n_d"),
+        ("XN-BK7 0 0 1.5 4.0E+1", "--glass FILE.agf$"),
         ("___BLANK 1 0 0.5 60", "a model glass needs"),
     ],
 )
@@ -270,6 +272,7 @@ def test_unknown_glass_is_refused_with_its_line(glas: str, message: str) -> None
         (("CURV 0.0 0", "CURV 0.1 0"), "object is curved"),
         (("SURF 3\n  TYPE STANDARD\n  CURV 0.0", "SURF 3\n  CURV 0.01"), "image is curved"),
         (("FTYP 0 0 1", "FTYP 4 0 1"), "fields are of kind 4"),
+        (("FTYP 0 0 1", "FTYP 0 1 1"), "object space is telecentric"),
         (("FTYP 0 0 1", "FTYP 1 0 1"), "finite distance"),
         (("ENPD 2.286E+1", "OBNA 5 1"), "NA < 1"),
     ],
