@@ -51,7 +51,10 @@ def bench(
     capture: Annotated[
         Path | None, typer.Option(help="A capture to time; default: a procedural one.")
     ] = None,
-    width: Annotated[int | None, typer.Option(help="Of the procedural capture, px.")] = None,
+    photo: Annotated[
+        Path | None, typer.Option(help="A sharp picture that every camera takes for it.")
+    ] = None,
+    width: Annotated[int | None, typer.Option(help="Of the capture that is made, px.")] = None,
     height: Annotated[int | None, typer.Option(help="Likewise; default: the sensor.")] = None,
     repeat: Annotated[int | None, typer.Option(help="Processes per row; default 3.")] = None,
     quick: Annotated[
@@ -92,6 +95,7 @@ def bench(
         height_px=height,
         small=quick,
         capture=capture,
+        photo=photo,
         data=data,
         images=images,
         work_dir=work_dir,

@@ -137,8 +137,10 @@ def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
         sensor = entrant.bundle.manifest.camera
         width = width or min(QUICK_SIZE_PX[0], sensor.width_px)
         height = height or min(QUICK_SIZE_PX[1], sensor.height_px)
-    path, size = timed_capture(entrant.bundle, width, height, folder)
-    return Camera(entrant=entrant, capture=path, size_px=size, capture_text=SCENE_TEXT)
+    photo = settings.photo
+    path, size = timed_capture(entrant.bundle, width, height, folder, photo)
+    text = photo.name if photo else SCENE_TEXT
+    return Camera(entrant=entrant, capture=path, size_px=size, capture_text=text)
 
 
 def time_cases(

@@ -26,6 +26,7 @@ class Settings:
         height_px: Likewise.
         small: A side that is not given is that of `QUICK_SIZE_PX`, if the sensor is larger.
         capture: A capture to time instead of the procedural one.
+        photo: A sharp picture that every camera photographs for it, likewise.
         data: Folder of sharp pictures to measure accuracy on; None for the golden cases.
         images: Only the first N of them.
         work_dir: Where captures and traced PSFs are kept between runs; None for a folder of this
@@ -41,6 +42,7 @@ class Settings:
     height_px: int | None = None
     small: bool = False
     capture: Path | None = None
+    photo: Path | None = None
     data: Path | None = None
     images: int | None = None
     work_dir: Path | None = None
@@ -55,8 +57,11 @@ class Settings:
         for name, side in (("width", self.width_px), ("height", self.height_px)):
             if side is not None and (side < 64 or side % 2):
                 raise ContractError(f"{name} must be even and at least 64 px; got {side}")
-        if self.capture is not None and not self.capture.is_file():
-            raise ContractError(f"there is no capture {self.capture}")
+        for name, path in (("capture", self.capture), ("photo", self.photo)):
+            if path is not None and not path.is_file():
+                raise ContractError(f"there is no {name} {path}")
+        if self.capture is not None and self.photo is not None:
+            raise ContractError("give a capture or a photo to take one of, not both")
         if self.capture is not None and (self.width_px or self.height_px):
             raise ContractError("a capture has its own size; leave out width and height")
 

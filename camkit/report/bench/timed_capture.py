@@ -1,4 +1,4 @@
-"""The capture that is timed: a procedural scene photographed once by the bundle's camera."""
+"""The capture that is timed: a scene photographed once by the bundle's camera."""
 
 import hashlib
 from pathlib import Path
@@ -7,7 +7,9 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.reader import PSF, Bundle
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.files.picture import read_scene
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.simulate import SimulationOptions, simulate, write_capture
 from camkit.scenes import procedural_scene
@@ -19,24 +21,30 @@ _VERSION: Final = 1
 
 
 def timed_capture(
-    bundle: Bundle, width_px: int | None, height_px: int | None, folder: Path
+    bundle: Bundle,
+    width_px: int | None,
+    height_px: int | None,
+    folder: Path,
+    photo: Path | None = None,
 ) -> tuple[Path, tuple[int, int]]:
     """Give a DNG of the bundle's camera, simulated now or by an earlier call.
 
-    The lights of the scene are cut at white: clipped blocks cost several times what others cost,
-    and how many there are is a matter of the scene.
+    The lights of the procedural scene are cut at white: clipped blocks cost several times what
+    others cost, and how many there are is a matter of the scene.
 
     Args:
         bundle: The camera.
         width_px: Of a centred crop; None for the sensor's.
         height_px: Likewise.
         folder: Where captures are kept.
+        photo: A sharp picture to photograph in place of the procedural scene, its middle if it is
+            larger; exposed as `camkit simulate` does.
 
     Returns:
         The file and its (width, height).
 
     Raises:
-        ContractError: If the size does not fit the sensor.
+        ContractError: If the size does not fit the sensor, or the photo is smaller.
         UnsupportedError: If the camera cannot be simulated.
     """
     camera = bundle.manifest.camera
@@ -48,16 +56,30 @@ def timed_capture(
         )
     lens = bundle.manifest.members[PSF].sha256
     depth_mm = bundle.reference_depth_mm
-    parts = (camera.model_dump_json(), lens, depth_mm, width, height, SCENE_TEXT, _VERSION)
+    shown = hashlib.sha256(photo.read_bytes()).hexdigest() if photo else SCENE_TEXT
+    parts = (camera.model_dump_json(), lens, depth_mm, width, height, shown, _VERSION)
     key = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
     path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}.dng"
     if not path.is_file():
-        scene = np.minimum(procedural_scene(SCENE_SEED, height, width), np.float32(1))
+        if photo is None:
+            scene = np.minimum(procedural_scene(SCENE_SEED, height, width), np.float32(1))
+        else:
+            scene = _middle(read_scene(photo), photo.name, height, width)
         options = SimulationOptions(
-            exposure=EXPOSURE,
+            exposure=EXPOSURE if photo is None else 1.0,
             depth_mm=depth_mm,
             workers=available_threads(None),
         )
         simulation = simulate(scene, camera, bundle.psf, options)
         write_capture(path, simulation, camera, bundle.manifest.name)
     return path, (width, height)
+
+
+def _middle(scene: FloatArray, name: str, height: int, width: int) -> FloatArray:
+    top, left = (scene.shape[1] - height) // 2, (scene.shape[2] - width) // 2
+    if min(top, left) < 0:
+        raise ContractError(
+            f"{name} must have at least {width}x{height} px; it has "
+            f"{scene.shape[2]}x{scene.shape[1]}"
+        )
+    return scene[:, top : top + height, left : left + width]

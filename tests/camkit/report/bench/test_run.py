@@ -71,6 +71,28 @@ def test_the_timed_capture_is_made_once_and_has_no_clipped_lights(tmp_path: Path
         timed_capture(bundle, 322, None, tmp_path)
 
 
+def test_a_photo_is_taken_by_the_camera_in_place_of_the_scene(tmp_path: Path) -> None:
+    from camkit.runtime.raw import read_capture
+
+    bundle = write_wide_bundle(tmp_path)
+    pixels = np.zeros((250, 340, 3), np.uint8)
+    pixels[:, 170:] = 200
+    photo = tmp_path / "photo.png"
+    cv2.imwrite(str(photo), pixels)
+    path, size = timed_capture(bundle, None, None, tmp_path, photo)
+    assert size == (320, 240)
+    samples = read_capture(path).samples
+    assert samples[:, 240:].mean() > 1.5 * samples[:, :80].mean()
+    assert path != timed_capture(bundle, None, None, tmp_path)[0]
+    cv2.imwrite(str(photo), pixels[:200])
+    with pytest.raises(ContractError, match="at least 320x240 px; it has 340x200"):
+        timed_capture(bundle, None, None, tmp_path, photo)
+    with pytest.raises(ContractError, match="not both"):
+        Settings(bundles=("duet",), capture=photo, photo=photo)
+    with pytest.raises(ContractError, match="no photo"):
+        Settings(bundles=("duet",), photo=tmp_path / "none.png")
+
+
 def test_a_reference_must_be_of_one_of_the_cameras(tmp_path: Path) -> None:
     wide = write_wide_bundle(tmp_path)
     tiny = write_tiny_bundle(tmp_path)
