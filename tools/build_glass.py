@@ -21,7 +21,7 @@ from pathlib import Path
 
 import torch
 
-from camkit.models_def.optics.glass.catalogue import builtin_catalogues
+from camkit.models_def.optics.glass.catalogue import builtin_catalogues, trade_name_of
 from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.optics.glass.material import Glass
 
@@ -71,6 +71,8 @@ CLASSIC_SOURCE = (
     "Robb, Mercado 1983, Appl. Opt. 22, 1198, table V: Schott catalogue, fit to 1e-4 or better"
 )
 CLASSIC_UM = (0.4, 0.7)
+WAVES_UM = torch.linspace(0.42, 0.68, 14, dtype=torch.float64)
+THE_SAME = 2e-5
 BASE_UM = 0.574
 BORNE_OUT_INDEX, BORNE_OUT_DISPERSION = 1e-3, 5e-5
 SCHOTT_POWERS = [0.0, 2.0, -2.0, -4.0, -6.0, -8.0]
@@ -128,36 +130,54 @@ def write(name: str, rows: list[str], source: str, *, literature: bool = False) 
 
 
 def classic_rows(text: str) -> list[str]:
-    """Give the glasses of the first section that today's catalogue lacks and another bears out."""
+    """Give glasses of 1983 that today's catalogue lacks, by the best numbers there are for each.
+
+    Today's successor N-X has the very dispersion of X more often than not: then X has its
+    coefficients. That is so if table V, or what another maker sells as X, says so.
+    """
     section = text.split("#---", maxsplit=1)[0]
     table = [line.split() for line in section.splitlines() if line and not line.startswith("#")]
-    waves = torch.linspace(0.42, 0.68, 14, dtype=torch.float64)
-    known = [c for c in builtin_catalogues() if not c.literature and c.name != CLASSIC]
-    curves = torch.stack(
-        [
-            refractive_index(glass, waves)
-            for catalogue in known
-            for glass in catalogue.glasses
-            if glass.range_um[0] <= waves[0] and glass.range_um[1] >= waves[-1]
-        ]
-    )
+    listed = {name: (*map(float, numbers[:3]), BASE_UM) for name, *numbers in table}
+    known = {c.name: c for c in builtin_catalogues() if not c.literature and c.name != CLASSIC}
+    today = known.pop("Schott")
+    seen = [g for c in (today, *known.values()) for g in c.glasses if holds(g)]
+    curves = torch.stack([refractive_index(glass, WAVES_UM) for glass in seen])
+    successors = [trade_name_of(g).removeprefix("N-") for g in today.glasses]
     rows = []
-    for name, *numbers in table:
-        coefficients = (*map(float, numbers[:3]), BASE_UM)
-        glass = Glass(name=name, formula="buchdahl", coefficients=coefficients, source="table V")
-        apart = curves - refractive_index(glass, waves)
-        shift = apart.mean(1, keepdim=True)
-        alike = (shift[:, 0].abs() <= BORNE_OUT_INDEX) & (
-            (apart - shift).abs().amax(1) <= BORNE_OUT_DISPERSION
-        )
-        if any(c.name == "Schott" and c.with_trade_name(name) for c in known):
+    for name in sorted({*listed, *successors}):
+        if today.with_trade_name(name):
             continue
-        if bool(alike.any()):
-            row = [name, "buchdahl", CLASSIC_UM, None, None, coefficients]
-            rows.append(json.dumps(row, separators=(",", ":")))
+        said = []
+        if name in listed:
+            glass = Glass(name=name, formula="buchdahl", coefficients=listed[name], source="V")
+            said.append(refractive_index(glass, WAVES_UM))
+        others = [g for c in known.values() for g in c.with_trade_name(name) if holds(g)]
+        said += [refractive_index(g, WAVES_UM) for g in others]
+        for successor in today.with_trade_name(f"N-{name}"):
+            own = refractive_index(successor, WAVES_UM)
+            if any(float((own - curve).abs().max()) <= THE_SAME for curve in said):
+                facts = [successor.formula, successor.range_um, None, None, successor.coefficients]
+                source = f"{CLASSIC_SOURCE}: as N-{name}, whose coefficients these are"
+                rows.append(json.dumps([name, *facts, source], separators=(",", ":")))
+                break
         else:
-            print(f"{name}: not borne out, left out")
-    return sorted(rows)
+            if name in listed and borne_out(curves - said[0]):
+                row = [name, "buchdahl", CLASSIC_UM, None, None, listed[name]]
+                rows.append(json.dumps(row, separators=(",", ":")))
+            elif name in listed:
+                print(f"{name}: not borne out, left out")
+    return rows
+
+
+def holds(glass: Glass) -> bool:
+    return glass.range_um[0] <= WAVES_UM[0] and glass.range_um[1] >= WAVES_UM[-1]
+
+
+def borne_out(apart: torch.Tensor) -> bool:
+    """Say whether any of the curves has this index and dispersion."""
+    shift = apart.mean(1, keepdim=True)
+    bent = (apart - shift).abs().amax(1)
+    return bool(((shift[:, 0].abs() <= BORNE_OUT_INDEX) & (bent <= BORNE_OUT_DISPERSION)).any())
 
 
 def main() -> None:

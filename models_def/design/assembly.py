@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import torch
 from torch import Tensor, nn
@@ -16,7 +15,11 @@ from camkit.models_def.design.recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.sensor import Recorder
 from camkit.models_def.design.starts import Starts, best_judged, best_starts
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.lens_file.lens_file import (
+    PRESCRIPTIONS,
+    built_in_lenses,
+    read_lens,
+)
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc
@@ -25,8 +28,6 @@ from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.units import to_radians
-
-PRESCRIPTIONS: Final = Path(__file__).resolve().parents[1] / "prescriptions"
 
 
 def find_lens(name: str, folder: Path | None = None) -> Lens:
@@ -39,12 +40,11 @@ def find_lens(name: str, folder: Path | None = None) -> Lens:
     Raises:
         ContractError: If there is neither.
     """
-    built_in = PRESCRIPTIONS / f"{name}.toml"
-    if built_in.is_file():
-        return read_lens(built_in)
+    if name in built_in_lenses():
+        return read_lens(PRESCRIPTIONS / f"{name}.toml")
     path = (folder or Path()) / name
     if not path.is_file():
-        known = ", ".join(sorted(p.stem for p in PRESCRIPTIONS.glob("*.toml")))
+        known = ", ".join(built_in_lenses())
         raise ContractError(f"no lens {name!r}: give a path, or one of {known}")
     return read_lens(path)
 

@@ -1,6 +1,6 @@
 """Where rays land on the sensor: chief rays, field slopes for sensor heights, spots."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import torch
@@ -124,3 +124,15 @@ def rms_radius(spots: Spots) -> Tensor:
     dx = spots.x_mm - (share * spots.x_mm).sum(-1, keepdim=True)
     dy = spots.y_mm - (share * spots.y_mm).sum(-1, keepdim=True)
     return torch.sqrt((share * (dx**2 + dy**2)).sum(-1))
+
+
+def all_waves(spots: Spots) -> Spots:
+    """Give the spots of all wavelengths as one, (field, 1, wavelength * rays), waves alike."""
+    total = spots.weight.sum(-1, keepdim=True).clamp_min(1e-12)
+    return replace(
+        spots,
+        x_mm=spots.x_mm.flatten(1)[:, None],
+        y_mm=spots.y_mm.flatten(1)[:, None],
+        weight=(spots.weight / total).flatten(1)[:, None],
+        fate=spots.fate.flatten(1)[:, None],
+    )

@@ -16,13 +16,13 @@ from camkit.models_def.optics.kernel_bank import (
     colour_kernels,
     focused_copies,
 )
+from camkit.models_def.optics.lens_file.lens_file import PRESCRIPTIONS
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.samples import corner_height_mm
 
-PRESCRIPTIONS: Final = Path(__file__).resolve().parents[1] / "prescriptions"
 WAVELENGTHS: Final = 27
 LEAST_ENERGY: Final = 0.97
 TRACING: Final = 2

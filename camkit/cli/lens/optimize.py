@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
     from camkit.models_def.optics.search.problem import Problem
 
+RINGS = 12
+
 
 def optimize(
     source: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
@@ -46,17 +48,21 @@ def optimize(
     require_torch("camkit lens optimize")
     refuse_existing([out], overwrite=overwrite)
     from camkit.models_def.optics.glass.agf import read_agf
-    from camkit.models_def.optics.lens_file.lens_file import read_lens, write_lens
-    from camkit.models_def.optics.search.finish import finished
+    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens, write_lens
     from camkit.models_def.optics.search.improvement import improve
+    from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims
 
-    lens = read_lens(source, [read_agf(path) for path in glass or ()])
+    lens, read_notes = read_noted_lens(source, [read_agf(path) for path in glass or ()])
     problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
-    found = improve(
-        problem, problem.free.scaled(), starts=starts, spread=spread, steps=steps, seed=seed
-    )
-    better = finished(problem, found.scaled)
+    begin = problem.free.scaled()
+    problem = in_own_frame(problem, begin)
+    found = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
+    better = problem.free.made(found.scaled)
     write_lens(better, out)
+    notes = list(read_notes) + [
+        f"surface {surface}: the beam needs {reach_mm:.3f} mm, the rim of {rim_mm:.3f} mm stays"
+        for surface, reach_mm, rim_mm in too_small_rims(problem, found.scaled)
+    ]
     report = {
         "lens": lens.name,
         "out": str(out),
@@ -67,8 +73,12 @@ def optimize(
         "evaluations": found.evaluations,
         "spot_rms_mm_before": _spots(lens),
         "spot_rms_mm_after": _spots(better),
+        "notes": notes,
     }
     typer.echo(json.dumps(report) if json_ else _text(report))
+    if not json_:
+        for note in notes:
+            typer.echo(note, err=True)
 
 
 def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays: int) -> "Problem":
@@ -106,17 +116,17 @@ def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays
 
 
 def _spots(lens: "Lens") -> list[float]:
-    """Give the RMS spot radius in mm of every field, over all wavelengths alike."""
+    """Give the RMS spot radius in mm of every field, all wavelengths about one centroid."""
     import torch
 
-    from camkit.models_def.optics.pupil import half_disc
-    from camkit.models_def.optics.spot import rms_radius, trace_spots
+    from camkit.models_def.optics.pupil import hexapolar
+    from camkit.models_def.optics.spot import all_waves, rms_radius, trace_spots
 
     slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
     waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
     with torch.no_grad():
-        spots = trace_spots(lens, slopes, waves, half_disc(400), definition="paraxial")
-        found: list[float] = rms_radius(spots).square().mean(1).sqrt().tolist()
+        spots = trace_spots(lens, slopes, waves, hexapolar(RINGS), definition="paraxial")
+        found: list[float] = rms_radius(all_waves(spots))[:, 0].tolist()
     return found
 
 

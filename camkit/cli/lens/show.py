@@ -48,9 +48,7 @@ def show(
     if folder is not None:
         refuse_existing([page_path(folder, file.stem)], overwrite=overwrite)
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
-    for note in notes:
-        typer.echo(f"{file.name}: {note}", err=True)
-    facts = analyse(lens, chosen)
+    facts = analyse(lens, chosen, notes)
     written = [] if folder is None else write_lens_page(facts, folder, file.stem)
     if json_:
         typer.echo(json.dumps(to_json(facts), allow_nan=False))

@@ -1,7 +1,7 @@
 """Everything that is computed about a lens, and its JSON."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -57,7 +57,7 @@ class LensFacts:
         seidel: None if it has none.
         convergence: RMS radii with coarse and fine sampling.
         model: Which PSF the lens needs.
-        notes: What could not be computed and why, for people.
+        notes: What was left out of the file, what could not be computed and why, for people.
     """
 
     lens: Lens
@@ -106,8 +106,13 @@ class LensFacts:
         return {fate.name.lower(): count for fate, count in counts.items()}
 
 
-def analyse(lens: Lens, pupil: Pupil) -> LensFacts:
+def analyse(lens: Lens, pupil: Pupil, notes_of_file: Sequence[str] = ()) -> LensFacts:
     """Compute everything but the curves.
+
+    Args:
+        lens: With a field and a wavelength.
+        pupil: How it is filled.
+        notes_of_file: What the lens does not carry of the file it was read from.
 
     Raises:
         ContractError: If the file has no field or wavelength, the stop no radius (definition
@@ -116,7 +121,7 @@ def analyse(lens: Lens, pupil: Pupil) -> LensFacts:
     if not lens.field_angles_rad or not lens.wavelengths_um:
         raise ContractError("a lens needs a field and a wavelength to be looked at; got none")
     slopes, waves = field_slopes(lens), torch.tensor(lens.wavelengths_um, dtype=torch.float64)
-    notes: list[str] = []
+    notes = list(notes_of_file)
     data = paraxial_data(lens)
     if pupil.definition == "paraxial" and not math.isfinite(data.entrance_pupil_mm):
         raise ContractError("the entrance pupil lies at infinity; use --pupil stop")

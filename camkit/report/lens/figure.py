@@ -3,21 +3,31 @@
 import io
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIELD_COLORS: Final = ("#1f6fb4", "#2e8b57", "#c8452f", "#8855aa", "#b8860b", "#008b8b")
 MARKS: Final = ("o", "+", "x", "s", "^", "d")
 GRID_COLOR: Final = "#dddddd"
+_WAVE_COLORS: Final = (
+    (0.40, (0x5B, 0x2A, 0x9D)),
+    (0.47, (0x2F, 0x5F, 0xD0)),
+    (0.50, (0x00, 0x8B, 0x8B)),
+    (0.545, (0x2E, 0x8B, 0x57)),
+    (0.59, (0xD0, 0x8A, 0x00)),
+    (0.65, (0xC8, 0x2F, 0x2F)),
+    (0.75, (0x6B, 0x1F, 0x1A)),
+)
 
 
 def wave_color(wavelength_um: float) -> str:
-    """Give a colour that tells wavelengths apart: blue, green, red by thirds of the visible."""
-    if wavelength_um < 0.5:
-        return "#2f5fd0"
-    if wavelength_um < 0.58:
-        return "#2e8b57"
-    return "#c8452f" if wavelength_um < 0.7 else "#7a2e1d"
+    """Give a colour that tells wavelengths apart: about that of the light, but darker."""
+    at = [place for place, _ in _WAVE_COLORS]
+    channels = zip(*(color for _, color in _WAVE_COLORS), strict=True)
+    mixed = (round(float(np.interp(wavelength_um, at, channel))) for channel in channels)
+    return "#" + "".join(f"{value:02x}" for value in mixed)
 
 
 def field_color(number: int) -> str:

@@ -1,4 +1,4 @@
-"""Read or write a lens by the suffix of its file: .toml or .zmx."""
+"""Read or write a lens by the suffix of its file, .toml or .zmx; a built-in one by its name."""
 
 import logging
 from collections.abc import Sequence
@@ -12,6 +12,7 @@ from camkit.models_def.optics.lens_file.zmx_writer import write_zmx
 from camkit.models_def.optics.prescription import Lens, read_prescription, write_prescription
 
 SUFFIXES: Final = (".toml", ".zmx")
+PRESCRIPTIONS: Final = Path(__file__).resolve().parents[2] / "prescriptions"
 
 _log = logging.getLogger(__name__)
 
@@ -20,7 +21,7 @@ def read_lens(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> Lens:
     """Read a lens; what of a .zmx file is left out is logged as a warning.
 
     Args:
-        path: .toml or .zmx, in small or capital letters.
+        path: .toml or .zmx, in small or capital letters, or the name of a built-in lens.
         catalogues: Of the user (`read_agf`), beside those that come with camkit.
 
     Raises:
@@ -38,6 +39,7 @@ def read_noted_lens(
     path: Path, catalogues: Sequence[GlassCatalogue] = ()
 ) -> tuple[Lens, tuple[str, ...]]:
     """Read a lens and what of its file it does not carry, one line each; see `read_lens`."""
+    path = _built_in(path)
     if _suffix(path) == ".toml":
         return read_prescription(path, catalogues), ()
     found = read_zmx(path, catalogues)
@@ -52,10 +54,21 @@ def write_lens(lens: Lens, path: Path) -> None:
         write_zmx(lens, path)
 
 
+def built_in_lenses() -> tuple[str, ...]:
+    """Give the names of the lenses that come with camkit."""
+    return tuple(sorted(path.stem for path in PRESCRIPTIONS.glob("*.toml")))
+
+
+def _built_in(path: Path) -> Path:
+    named = not path.exists() and str(path) in built_in_lenses()
+    return PRESCRIPTIONS / f"{path}.toml" if named else path
+
+
 def _suffix(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise UnsupportedError(
-            f"a lens file ends in {' or '.join(SUFFIXES)}; got {path.name}: rename or convert it"
+            f"a lens file ends in {' or '.join(SUFFIXES)}; got {path.name}: rename or convert it, "
+            f"or name one of {', '.join(built_in_lenses())}"
         )
     return suffix

@@ -32,7 +32,8 @@ COMMENT: Final = "glass "
 _SAME: Final = 1e-9
 """Other programs write 13 digits or more."""
 _ALIASES: Final = {"nikon": "hikari", "nikon_hikari": "hikari", "nikon-hikari": "hikari"}
-_OLDER: Final = {"schott1983": "schott"}
+OLD_SCHOTT: Final = "Schott1983"
+_OLDER: Final = {OLD_SCHOTT.casefold(): "schott"}
 """Catalogues of glasses that another catalogue no longer has; GCAT knows one name for both."""
 
 

@@ -10,7 +10,7 @@ from camkit.errors import DecodeError, UnsupportedError
 from camkit.models_def.optics.glass.catalogue import GlassCatalogue
 from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.lens_file.zmx_field import with_fields
-from camkit.models_def.optics.lens_file.zmx_glass import glass_order
+from camkit.models_def.optics.lens_file.zmx_glass import OLD_SCHOTT, GlassOrder, glass_order
 from camkit.models_def.optics.lens_file.zmx_records import (
     Record,
     Records,
@@ -28,6 +28,7 @@ from camkit.models_def.optics.prescription import ApertureKind, Lens, Surface
 
 _MM_PER_UNIT: Final = {"MM": 1.0, "CM": 10.0, "IN": 25.4, "METER": 1000.0, "M": 1000.0}
 _DEFAULT_WAVE: Final = (0.55, 1.0)
+_NORMAL_AIR: Final = (20.0, 1.0)
 _APERTURES: Final = ("ENPD", "FNUM", "FLOA", "OBNA")
 _VIGNETTING: Final = ("VDXN", "VDYN", "VCXN", "VCYN")
 
@@ -94,7 +95,8 @@ def parse_zmx(
         reference_wavelength_um=reference,
     )
     lens = _with_object_aperture(lens, system)
-    return ZmxLens(lens=with_fields(lens, system, scale), notes=_notes(records, surfaces))
+    notes = (*_notes(records, surfaces), *_glass_notes(records, surfaces, order))
+    return ZmxLens(lens=with_fields(lens, system, scale), notes=notes)
 
 
 def _mm_per_unit(record: Record | None) -> float:
@@ -130,7 +132,14 @@ def _check_image(records: ZmxRecords) -> None:
     refuse_unsupported(block, len(records.surfaces) - 1)
     curvature = last(block, "CURV")
     if curvature is not None and curvature.number(0) != 0:
-        raise UnsupportedError(f"line {curvature.line}: the image is curved; a sensor is flat")
+        raise UnsupportedError(
+            f"line {curvature.line}: the last surface is the image, and curved; a sensor is flat "
+            "(or the file is cut off)"
+        )
+    if last(block, "GLAS") is not None:
+        raise DecodeError(
+            f"surface {len(records.surfaces) - 1}, the last, has a glass; is the file cut off?"
+        )
 
 
 def _stop(records: ZmxRecords) -> int:
@@ -171,10 +180,10 @@ def _with_object_aperture(lens: Lens, system: Records) -> Lens:
     if record is None:
         return lens
     sine = record.number(0)
-    if not (sine < 1 and math.isfinite(lens.object_distance_mm)):
-        raise DecodeError(f"line {record.line}: OBNA needs a near object and NA < 1; got {sine}")
     if record.number(1, 0.0) != 0:
         raise UnsupportedError(f"line {record.line}: OBNA given as an angle; give it as NA")
+    if not (sine < 1 and math.isfinite(lens.object_distance_mm)):
+        raise DecodeError(f"line {record.line}: OBNA needs a near object and NA < 1; got {sine}")
     distance_mm = lens.object_distance_mm + paraxial_data(lens).entrance_pupil_mm
     return replace(lens, aperture_value=2 * distance_mm * math.tan(math.asin(sine)))
 
@@ -186,6 +195,8 @@ def _wavelengths(system: Records) -> tuple[tuple[float, ...], float]:
     old = last(system, "WAVL")
     if not listed and old is not None:
         listed = [(value, 1.0) for value in old.numbers()]
+    if not listed:
+        raise DecodeError("the file states no wavelength (WAVM, WAVE or WAVL)")
     kind, primary = last(system, "FTYP"), last(system, "PWAV")
     position = int(primary.number(0)) if primary else 1
     count = int(kind.number(3, 0.0)) if kind else 0
@@ -214,7 +225,33 @@ def _notes(records: ZmxRecords, surfaces: tuple[Surface, ...]) -> tuple[str, ...
     zoom = last(records.system, "MNUM")
     if zoom is not None and zoom.number(0, 1.0) > 1:
         notes.append(f"line {zoom.line}: {zoom.words[0]} configurations: the one shown is read")
+    air = last(records.system, "ENVD")
+    if (
+        air is not None
+        and air.number(2, 0.0) != 0
+        and (air.number(0), air.number(1)) != _NORMAL_AIR
+    ):
+        notes.append(
+            f"line {air.line}: {air.number(0):g} degrees C and {air.number(1):g} atm left out: "
+            "indices are relative to air at 20 degrees C and 1 atm"
+        )
     gaps = [i for i, s in enumerate(surfaces, start=1) if s.thickness_mm < 0]
     if gaps:
         notes.append(f"surfaces {gaps} have negative thickness: kept")
     return tuple(notes)
+
+
+def _glass_notes(
+    records: ZmxRecords, surfaces: tuple[Surface, ...], order: GlassOrder
+) -> tuple[str, ...]:
+    """Say which glasses are not those of a catalogue that GCAT names: once for each."""
+    named = {c.name for c in (*order.own, *order.listed)} - {OLD_SCHOTT}
+    notes: dict[str, str] = {}
+    for block, surface in zip(records.surfaces[1:-1], surfaces, strict=True):
+        glass = last(block, "GLAS")
+        if glass is None or ":" in surface.glass or "-" not in surface.glass:
+            continue
+        name, _, catalogue = surface.glass.rpartition("-")
+        if catalogue not in named and glass.words[0].upper() == name.upper():
+            notes.setdefault(name, f"line {glass.line}: {name} is read as {surface.glass}")
+    return tuple(notes.values())

@@ -18,7 +18,8 @@ from camkit.models_def.optics.prescription import Surface
 
 EVEN_TERMS: Final = 8
 _TYPES: Final = ("STANDARD", "EVENASPH")
-_FIXED: Final = 1
+_FIXED: Final = (1, 2)
+"""Stated, and picked up from another surface; 0 and 3 follow the rays."""
 _FILLED_IN: Final = (1.5, 40.0)
 _OBSTACLES: Final = ("SQAP", "SQOB", "ELAP", "ELOB", "USAP", "USOB", "OBSC", "SPID")
 
@@ -42,9 +43,9 @@ def read_surface(records: Records, context: SurfaceContext) -> Surface:
     """Read a surface between object and image.
 
     An automatic semi-diameter (DIAM flag 0) is what the rays of the file happened to need: it
-    limits nothing. A fixed one (flag 1) vignettes, and so does a circular aperture (CLAP), which
-    takes its place. MEMA, FLAP (a floating aperture: DIAM says it all) and drawing data are
-    passed over.
+    limits nothing. A fixed one (flag 1, or 2 if picked up from another) vignettes, and so does a
+    circular aperture (CLAP), which takes its place. MEMA, FLAP (a floating aperture: DIAM says it
+    all) and drawing data are passed over.
 
     Raises:
         UnsupportedError: If its type, aperture or tilt is none that camkit traces.
@@ -53,7 +54,9 @@ def read_surface(records: Records, context: SurfaceContext) -> Surface:
     refuse_unsupported(records, context.number)
     scale = context.mm_per_unit
     thickness = last(records, "DISZ")
-    if thickness is not None and thickness.words[:1] == ("INFINITY",):
+    if thickness is None:
+        raise DecodeError(f"surface {context.number} has no DISZ; is the file cut off?")
+    if thickness.words[:1] == ("INFINITY",):
         raise UnsupportedError(
             f"line {thickness.line}: surface {context.number} is infinitely thick; "
             "only the object may be"
@@ -61,7 +64,7 @@ def read_surface(records: Records, context: SurfaceContext) -> Surface:
     glass = _glass(records, context)
     return Surface(
         curvature_per_mm=_value(records, "CURV") / scale,
-        thickness_mm=thickness.number(0) * scale if thickness else 0.0,
+        thickness_mm=thickness.number(0) * scale,
         glass=glass.name,
         material=own_glass(glass, context.order.own),
         semi_diameter_mm=_semi_diameter(records, context.number) * scale,
@@ -145,7 +148,7 @@ def _semi_diameter(records: Records, number: int) -> float:
                 f"line {aperture.line}: surface {number} has a central obscuration"
             )
         return _positive(aperture, aperture.number(1))
-    if diameter is None or diameter.number(1, 0.0) != _FIXED or diameter.number(0) == 0:
+    if diameter is None or diameter.number(1, 0.0) not in _FIXED or diameter.number(0) == 0:
         return math.inf
     return _positive(diameter, diameter.number(0))
 

@@ -11,4 +11,5 @@
 - `recipe`: a search within ranges, as TOML
 - `design`: the best of many random starts within the ranges of a recipe
 - `improvement`: a given lens made better
+- `own_frame`: its vignetting, and limits no stricter than it keeps
 """

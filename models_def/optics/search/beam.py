@@ -41,6 +41,7 @@ def launch_beam(
     slopes: Tensor,
     samples: PupilSamples,
     object_distance_mm: float,
+    vignetting: Tensor | None = None,
 ) -> Rays:
     """Start rays at the first vertex plane: (start, field, 1, LEAD + ray).
 
@@ -54,12 +55,19 @@ def launch_beam(
             distant object, from the first vertex for a near one (as `launch`).
         samples: Of the unit disc, (ray,).
         object_distance_mm: From the first vertex; inf allowed.
+        vignetting: (field, 3), what of the pupil a field fills: its middle's y, and its extent
+            along y and x, in radii of the pupil; None for the whole pupil. The chief ray stays.
     """
     place, magnification = entrance_pupil(reference, lens.stop)
     radius = pupil_radius_mm(lens, reference, magnification)
     lead_x = torch.tensor(LEAD_X, dtype=samples.x.dtype)
     lead_y = torch.tensor(LEAD_Y, dtype=samples.x.dtype)
-    px, py = radius * torch.cat([lead_x, samples.x]), radius * torch.cat([lead_y, samples.y])
+    unit_x, unit_y = torch.cat([lead_x, samples.x]), torch.cat([lead_y, samples.y])
+    if vignetting is not None:
+        shift, along_y, along_x = (part[:, None, None] for part in vignetting.unbind(1))
+        unit_y = torch.cat([0 * shift, (shift + along_y * unit_y)[..., 1:]], dim=-1)
+        unit_x = along_x * unit_x
+    px, py = radius * unit_x, radius * unit_y
     slope = slopes[:, None, None]
     if math.isinf(object_distance_mm):
         return launch(px, py - place * slope, slope, object_distance_mm)

@@ -41,6 +41,7 @@ class Problem:
             that is looked at, else from the first one.
         merit_fields: How many fields, from the axis, the merit counts; 0 for all. The others only
             must pass their rays.
+        vignetting: (field, 3), see `launch_beam`; None for whole pupils.
     """
 
     free: FreeLens
@@ -52,6 +53,7 @@ class Problem:
     core_mm: float = 6e-3
     limits: Limits = field(default_factory=Limits)
     merit_fields: int = 0
+    vignetting: Tensor | None = None
 
     def __post_init__(self) -> None:
         if self.merit not in MERITS:
@@ -113,7 +115,14 @@ def trace_batch(
     tensors = free.tensors(scaled, problem.wavelengths_um)
     if change is not None:
         tensors = change(tensors, reference)
-    rays = launch_beam(free.lens, reference, problem.slopes, problem.samples, object_distance_mm)
+    rays = launch_beam(
+        free.lens,
+        reference,
+        problem.slopes,
+        problem.samples,
+        object_distance_mm,
+        problem.vignetting,
+    )
     seen: list[Rays] = []
     landed = trace(tensors, rays, seen=seen)
     return Traced(reference=reference, tensors=tensors, launched=rays, landed=landed, seen=seen)

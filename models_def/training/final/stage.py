@@ -11,13 +11,13 @@ import torch
 from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
 from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.lens_file.lens_file import PRESCRIPTIONS
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.training.checkpoint import read_checkpoint
 from camkit.models_def.training.final.fitter import FinalFitter, FinalParts
 from camkit.models_def.training.final.pairs import PairSamples, read_pairs
 from camkit.models_def.training.final.vgg import file_digest, read_vgg
 from camkit.models_def.training.fitter import Fits
-from camkit.models_def.training.lens_bank import PRESCRIPTIONS
 from camkit.models_def.training.psf_bank import PsfBank
 from camkit.models_def.training.recipe import NetworkRecipe, Recipe
 from camkit.models_def.training.samples import corner_height_mm

@@ -7,6 +7,7 @@ import pytest
 
 from camkit.cli.app import run
 from camkit.cli.exit_code import ExitCode
+from tests.zmx_factory import LA1131
 
 LENS = Path(__file__).resolve().parents[4] / "models_def/prescriptions/cooke-triplet-f5.toml"
 
@@ -38,3 +39,20 @@ def test_wrong_words_are_usage_errors_that_name_the_right_ones(
 ) -> None:
     assert run(["lens", "show", str(LENS), option, value, "--json"]) == ExitCode.USAGE
     assert message in capsys.readouterr().err
+
+
+def test_a_built_in_lens_is_shown_by_its_name(camkit_command) -> None:
+    outcome = camkit_command("lens", "show", "al2550-a", "--json")
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out)["f_number"] == pytest.approx(4.0, rel=1e-6)
+    outcome = camkit_command("lens", "show", "al2551-a", "--json")
+    assert outcome.code == 1
+    assert "name one of" in outcome.err
+    assert "al2550-a" in outcome.err
+
+
+def test_what_was_left_out_of_a_file_stands_in_its_json(camkit_command, tmp_path: Path) -> None:
+    path = tmp_path / "lens.zmx"
+    path.write_text(LA1131.replace("VCYN 0 0", "VCYN 0 0.2"))
+    outcome = camkit_command("lens", "show", path, "--json")
+    assert "VCYN" in json.loads(outcome.out)["notes"][0]

@@ -159,3 +159,9 @@ def test_glasses_of_1983_are_those_that_are_made_no_more() -> None:
     old = {c.name: c for c in builtin_catalogues()}["Schott1983"]
     assert len(old.glasses) > 100
     assert not any(today.with_trade_name(g.name.rpartition("-")[0]) for g in old.glasses)
+
+
+def test_an_old_glass_has_the_coefficients_of_its_successor_only_where_both_are_one() -> None:
+    assert find_glass("BK7").coefficients == find_glass("N-BK7").coefficients
+    assert find_glass("BK7").range_um == find_glass("N-BK7").range_um
+    assert find_glass("LAK9-Schott1983").formula == "buchdahl"

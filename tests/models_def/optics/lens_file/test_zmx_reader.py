@@ -217,7 +217,8 @@ def test_wavelengths_without_a_count_lose_the_filling_of_the_table() -> None:
     [
         ("F2 0 0 1.5 40", "SCHOTT", "F2-Schott"),
         ("F2 0 0 1.5 40", "HIKARI SCHOTT", "F2-Hikari"),
-        ("SK16 0 0 1.5 40", "SCHOTT", "SK16-Hikari"),
+        ("SK16 0 0 1.5 40", "SCHOTT", "SK16-Schott1983"),
+        ("SK18 0 0 1.5 40", "SCHOTT", "SK18-Hikari"),
         ("BK7 0 0 1.5 40", "SCHOTT", "BK7-Schott1983"),
         ("BAF4 0 0", "SCHOTT HIKARI", "BAF4-Schott1983"),
         ("BAF4 0 0", "HIKARI SCHOTT", "BAF4-Hikari"),
@@ -270,11 +271,12 @@ def test_unknown_glass_is_refused_with_its_line(glas: str, message: str) -> None
         (("DISZ INFINITY", "DISZ -20"), "positive distance"),
         (("DISZ INFINITY", "GLAS N-BK7\n  DISZ INFINITY"), "object lies in glass"),
         (("CURV 0.0 0", "CURV 0.1 0"), "object is curved"),
-        (("SURF 3\n  TYPE STANDARD\n  CURV 0.0", "SURF 3\n  CURV 0.01"), "image is curved"),
+        (("SURF 3\n  TYPE STANDARD\n  CURV 0.0", "SURF 3\n  CURV 0.01"), "the image, and curved"),
         (("FTYP 0 0 1", "FTYP 4 0 1"), "fields are of kind 4"),
         (("FTYP 0 0 1", "FTYP 0 1 1"), "object space is telecentric"),
         (("FTYP 0 0 1", "FTYP 1 0 1"), "finite distance"),
-        (("ENPD 2.286E+1", "OBNA 5 1"), "NA < 1"),
+        (("ENPD 2.286E+1", "OBNA 5 0"), "NA < 1"),
+        (("ENPD 2.286E+1", "OBNA 5 1"), "OBNA given as an angle"),
     ],
 )
 def test_what_camkit_does_not_trace_is_refused_by_name(
@@ -288,6 +290,7 @@ def test_what_camkit_does_not_trace_is_refused_by_name(
     ("change", "message"),
     [
         (("DISZ 5.34", "DISZ nan"), "line 31: DISZ needs a finite number"),
+        (("  DISZ 5.34", "  HIDE 5.34"), "surface 1 has no DISZ; is the file cut off"),
         (("DISZ 5.34", "DISZ"), "line 31: DISZ needs 1 values"),
         (("CURV 3.88", "CURV 1e300 3.88"), "line 29: CURV needs a finite"),
         (("ENPD 2.286E+1", ""), "aperture must be one of .* got none"),
@@ -338,3 +341,34 @@ def test_replaced_words_give_a_lens_or_an_expected_error(data: st.DataObject) ->
         parse_zmx("\n".join(lines))
     except CamkitError:
         return
+
+
+@pytest.mark.parametrize(("flag", "limits"), [(0, False), (1, True), (2, True), (3, False)])
+def test_a_semi_diameter_that_is_stated_or_picked_up_vignettes(flag: int, limits: bool) -> None:
+    text = _changed(("DIAM 1.083488179091E+1 0", f"DIAM 1.083488179091E+1 {flag}"))
+    back = parse_zmx(text).lens.surfaces[1]
+    assert back.semi_diameter_mm == (10.83488179091 if limits else math.inf)
+
+
+@pytest.mark.parametrize(
+    ("change", "note"),
+    [
+        (("GLAS N-BK7", "GLAS BK7"), "line 32: BK7 is read as BK7-Schott1983"),
+        (("GLAS N-BK7", "GLAS S-LAH64"), "line 32: S-LAH64 is read as S-LAH64-Ohara"),
+        (("UNIT MM", "ENVD 60 0.5 1\nUNIT MM"), "line 6: 60 degrees C and 0.5 atm left out"),
+    ],
+)
+def test_what_is_read_otherwise_than_the_file_says_is_noted(
+    change: tuple[str, str], note: str
+) -> None:
+    (found,) = parse_zmx(_changed(change)).notes
+    assert found.startswith(note)
+
+
+def test_a_file_cut_off_behind_a_glass_is_refused() -> None:
+    front = FRONT.replace("SURF 1", "SURF 2").replace("  STOP\n", "")
+    text = HEAD + OBJECT + "SURF 1\n  STOP\n  DISZ 1\n" + front
+    with pytest.raises(DecodeError, match="surface 2, the last, has a glass; is the file cut off"):
+        parse_zmx(text.replace("CURV 3.883495145631069700E-002", "CURV 0"))
+    with pytest.raises(UnsupportedError, match="or the file is cut off"):
+        parse_zmx(text)

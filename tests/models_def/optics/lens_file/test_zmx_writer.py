@@ -79,11 +79,13 @@ def test_file_is_utf16_with_mark_and_windows_line_ends(tmp_path: Path) -> None:
 
 def test_makers_glass_is_written_by_its_trade_name_and_a_plastic_as_a_model() -> None:
     lens = read_prescription(PRESCRIPTIONS / "cooke-triplet.toml")
-    text = format_zmx(lens)
-    # in the other order F2 would be Hikari's
+    flint = replace(lens.surfaces[2], glass="SK18-Hikari")
+    text = format_zmx(replace(lens, surfaces=(*lens.surfaces[2:], flint), stop=0))
+    # in the other order F2 would be Hikari's; SK16 is Hikari's, but also a glass of old Schott
     assert "GCAT SCHOTT HIKARI" in text
-    assert "GLAS SK16 0 0 1.6204" in text
+    assert "GLAS SK18 0 0 1.6385" in text
     assert "GLAS F2 0 0 1.6200" in text
+    assert "COMM glass SK16-Hikari" in text
     front = replace(lens.surfaces[0], glass="SF10-Hikari")
     both = (front, replace(front, glass="SF10-Schott"))
     assert "COMM glass SF10-" in format_zmx(replace(lens, surfaces=both, stop=0))
