@@ -192,6 +192,38 @@ def test_cooke_triplet_of_another_melt_has_another_focal_length() -> None:
     )
 
 
+def test_sample_doublet_has_the_focus_and_spot_that_opticstudio_stored_in_its_file() -> None:
+    """EPD 20 mm, old glasses; the sensor stands where a solve of the ray height put it."""
+    curvatures = (1.077039960779e-2, -3.255623054352e-2, -1.2788164132877849e-2)
+    lens = replace(
+        _lens(
+            [1 / c for c in curvatures],
+            (6.0, 3.0, 97.37604742911),
+            ("BK7-Schott1983", "F2-Schott", "air"),
+        ),
+        aperture_value=20.0,
+        reference_wavelength_um=0.589,
+    )
+    assert paraxial_data(lens).bfl_mm == pytest.approx(97.37604742911, abs=6e-11)
+    spots = spot_diagram(lens, _slopes(0.0), _waves(0.486, 0.589, 0.656), Pupil())
+    assert float(max_from_chief(spots).max()) == pytest.approx(8.437369439982e-3, abs=6e-12)
+
+
+def test_sample_cooke_triplet_reaches_as_far_as_opticstudio_stored_in_its_file() -> None:
+    """The image's semi-diameter: the farthest ray of three fields and wavelengths."""
+    curvatures = (0.0454264791, -0.0022948389, -0.045018121)
+    more = (0.0492806889, 0.0125496334, -0.054361615610838313)
+    gaps_mm = (3.25895583, 6.0075511, 0.999974567, 4.75040893, 2.95207564, 42.2077801)
+    glasses = ("SK16-Schott1983", "air", "F2-Schott", "air", "SK16-Schott1983", "air")
+    lens = replace(
+        _lens([1 / c for c in (*curvatures, *more)], gaps_mm, glasses, stop=3),
+        aperture_value=10.0,
+        reference_wavelength_um=0.55,
+    )
+    spots = spot_diagram(lens, _slopes(0, 14, 20), _waves(0.48, 0.55, 0.65), Pupil())
+    assert float(spots.y_mm.max()) == pytest.approx(18.17265834502, abs=6e-9)
+
+
 def test_airy_radius_of_the_cooke_triplet_equals_optiland() -> None:
     """Printed with the rounded zero 1.22 of the Bessel function."""
     found = airy_radius_mm(cooke_triplet()) * 1.22 / AIRY
