@@ -2,11 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+
+if TYPE_CHECKING:
+    from camkit.models_def.optics.prescription import Lens
 
 
 def convert(
@@ -41,6 +44,7 @@ def convert(
         lens = scale_to_efl(lens, efl_mm)
     if f_number is not None:
         lens = with_f_number(lens, f_number)
+        notes = (*notes, *_clipped(lens))
     write_lens(lens, out)
     for note in notes:
         typer.echo(f"{source.name}: {note}", err=True)
@@ -49,3 +53,19 @@ def convert(
         typer.echo(json.dumps({**found, "notes": list(notes)}))
     else:
         typer.echo(f"{out}: {lens.name}, {len(lens.surfaces)} surfaces")
+
+
+def _clipped(lens: "Lens") -> list[str]:
+    """Say whether rims that stayed cut the beam on the axis."""
+    import torch
+
+    from camkit.models_def.optics.analysis.sampling import Pupil
+    from camkit.models_def.optics.analysis.spots import spot_diagram
+    from camkit.models_def.optics.trace import Fate
+
+    waves = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
+    fate = spot_diagram(lens, torch.zeros(1, dtype=torch.float64), waves, Pupil()).fate
+    cut = int((fate == Fate.VIGNETTED).sum())
+    if not cut:
+        return []
+    return [f"rims stay and cut {cut} of {fate.numel()} rays on the axis: open them in the file"]

@@ -32,6 +32,17 @@ def test_a_lens_is_scaled_to_a_focal_length_and_then_stopped(
     assert not (tmp_path / "x.toml").exists()
 
 
+def test_rims_that_cut_the_opened_beam_are_said(camkit_command, tmp_path: Path) -> None:
+    source, out = PRESCRIPTIONS / "cooke-triplet-f5.toml", tmp_path / "x.toml"
+    closed = camkit_command("lens", "convert", source, out, "--f-number", 8, "--json")
+    assert json.loads(closed.out)["notes"] == []
+    narrow = tmp_path / "narrow.toml"
+    text = out.read_text().replace("semi_diameter_mm = ", "semi_diameter_mm = 4.0 # ", 1)
+    narrow.write_text(text)
+    opened = camkit_command("lens", "convert", narrow, tmp_path / "y.toml", "--f-number", 4)
+    assert "rims stay and cut" in opened.err
+
+
 def test_what_is_left_out_is_said_on_stderr(camkit_command, tmp_path: Path) -> None:
     source = tmp_path / "vendor.zmx"
     source.write_text(LA1131.replace("VCYN 0 0", "VCYN 0 0.2"), encoding="latin-1")
