@@ -183,7 +183,7 @@ def borne_out(apart: torch.Tensor) -> bool:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("database", type=Path, nargs="?")
-    parser.add_argument("--classic", type=Path)
+    parser.add_argument("--classic", type=Path, help="table V, in the package opticalglass")
     arguments = parser.parse_args()
     if arguments.classic:
         write(CLASSIC, classic_rows(arguments.classic.read_text("utf-8")), CLASSIC_SOURCE)

@@ -16,16 +16,8 @@ def test_arms_share_their_starts_and_a_finished_run_is_not_done_again(
     recipe, out = tmp_path / "tiny.toml", tmp_path / "out"
     recipe.write_text(RECIPE, encoding="utf-8")
     size = ("--starts", 1, "--steps", 3, "--finalists", 1)
-    run_tool(
-        monkeypatch,
-        "design_stability",
-        recipe,
-        "--out-dir",
-        out,
-        *size,
-        "--arms",
-        "before,curriculum",
-    )
+    command = (recipe, "--out-dir", out, *size, "--arms", "before,curriculum")
+    run_tool(monkeypatch, "design_stability", *command)
     lines = (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()
     trials = [json.loads(line) for line in lines]
     assert [(t["arm"], t["stage"]) for t in trials] == [
@@ -38,16 +30,7 @@ def test_arms_share_their_starts_and_a_finished_run_is_not_done_again(
     assert "| before | ± 5 % |" in capsys.readouterr().out
     off = read_lens(out / "starts" / "00.toml").surfaces[1].radius_mm / -14.2857
     assert 0 < abs(off - 1) < 0.06
-    run_tool(
-        monkeypatch,
-        "design_stability",
-        recipe,
-        "--out-dir",
-        out,
-        *size,
-        "--arms",
-        "before,curriculum",
-    )
+    run_tool(monkeypatch, "design_stability", *command)
     assert (out / "trials.jsonl").read_text(encoding="utf-8").splitlines() == lines
     with pytest.raises(ContractError, match="other settings"):
         run_tool(

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
     from camkit.models_def.optics.search.problem import Problem
 
-RINGS = 12
+RINGS: Final = 12
 
 
 def optimize(
@@ -59,9 +59,12 @@ def optimize(
     found = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
     better = problem.free.made(found.scaled)
     write_lens(better, out)
-    notes = list(read_notes) + [
-        f"surface {surface}: the beam needs {reach_mm:.3f} mm, the rim of {rim_mm:.3f} mm stays"
-        for surface, reach_mm, rim_mm in too_small_rims(problem, found.scaled)
+    notes = [
+        *read_notes,
+        *(
+            f"surface {surface}: the beam needs {reach_mm:.3f} mm, the rim of {rim_mm:.3f} mm stays"
+            for surface, reach_mm, rim_mm in too_small_rims(problem, found.scaled)
+        ),
     ]
     report = {
         "lens": lens.name,
@@ -75,10 +78,9 @@ def optimize(
         "spot_rms_mm_after": _spots(better),
         "notes": notes,
     }
+    for note in notes:
+        typer.echo(f"{source.name}: {note}", err=True)
     typer.echo(json.dumps(report) if json_ else _text(report))
-    if not json_:
-        for note in notes:
-            typer.echo(note, err=True)
 
 
 def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays: int) -> "Problem":

@@ -60,7 +60,7 @@ def built_in_lenses() -> tuple[str, ...]:
 
 
 def _built_in(path: Path) -> Path:
-    named = not path.exists() and str(path) in built_in_lenses()
+    named = not path.is_file() and str(path) in built_in_lenses()
     return PRESCRIPTIONS / f"{path}.toml" if named else path
 
 
