@@ -32,12 +32,18 @@ def deep_psf(depths_mm: tuple[float, ...] = DEPTHS_MM) -> FrozenPsf:
 
 
 def write_deep_bundle(
-    folder: Path, name: str = "deep.camkit", *, depths_mm: tuple[float, ...] = DEPTHS_MM
+    folder: Path,
+    name: str = "deep.camkit",
+    *,
+    depths_mm: tuple[float, ...] = DEPTHS_MM,
+    stress_mm: tuple[float, ...] = (),
 ) -> Bundle:
     """Write and open the tiny bundle with several depths and 320 x 240 pixels."""
     camera = tiny_camera().model_copy(update={"width_px": 320, "height_px": 240})
     changed = {"name": "deep", "camera": camera, "object_distance_mm": FOCUS_MM}
     members = tiny_members() | {"psf.safetensors": psf_to_bytes(deep_psf(depths_mm))}
+    if stress_mm:
+        members |= {"stress_psf.safetensors": psf_to_bytes(deep_psf(stress_mm))}
     path = folder / name
     write_bundle(path, tiny_manifest().model_copy(update=changed), members)
     return open_bundle(path)

@@ -27,11 +27,12 @@ from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
 from camkit.models_def.sensors.psf import wavelength_weights
-from camkit.units import UM_PER_MM
+from camkit.units import MM_PER_M, UM_PER_MM
 
 FloatGrid = NDArray[np.float64]
 
-STRESS_DEPTHS_MM: Final = (5e3, 1e4, 2e4, 5e4, math.inf)
+STRESS_OFFSETS_PER_M: Final = (0.02, 0.05, 0.1, 0.2)
+"""How far off the nearest and the farthest design distance, in 1 / m."""
 STRESS_FIELDS: Final = (0.0, 0.7, 1.0)
 STRESS_WAVELENGTHS: Final = 3
 STRESS_LOSS: Final = 4.0
@@ -162,15 +163,32 @@ def dense_grid(grid: FreezeGrid) -> FreezeGrid:
     return replace(grid, fields=2 * grid.fields - 1, wavelengths=3 * grid.wavelengths - 2)
 
 
+def stress_depths_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
+    """Give the distances to stress a lens at: its own, and some nearer and farther than all.
+
+    Args:
+        depths_mm: Distances it was made for, increasing; infinity is allowed.
+
+    Returns:
+        Increasing, up to infinity where the offsets reach it.
+    """
+    near, far = MM_PER_M / depths_mm[0], MM_PER_M / depths_mm[-1]
+    found = {MM_PER_M / (near + offset) for offset in STRESS_OFFSETS_PER_M}
+    found |= {
+        MM_PER_M / (far - offset) if far > offset else math.inf for offset in STRESS_OFFSETS_PER_M
+    }
+    return tuple(sorted({*found, *depths_mm}))
+
+
 def freeze_stress(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) -> Frozen:
     """Trace kernels off the design point: object distances at three fields.
 
-    The sensor stays where it is, so a distance d is also a focus error of EFL^2 / d.
+    The sensor stays where it is, so an offset in 1 / distance moves the image by EFL^2 times it.
     """
     base = grid or FreezeGrid()
     stress = replace(
         base,
-        depths_mm=STRESS_DEPTHS_MM,
+        depths_mm=stress_depths_mm(base.depths_mm or (lens.object_distance_mm,)),
         wavelengths=STRESS_WAVELENGTHS,
         energy=max(1 - STRESS_LOSS * (1 - base.energy), base.energy / 2),
     )

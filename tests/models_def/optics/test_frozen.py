@@ -17,6 +17,7 @@ from camkit.models_def.optics.frozen import (
     freeze,
     freeze_at,
     freeze_stress,
+    stress_depths_mm,
 )
 from camkit.models_def.optics.kernel_bank import ChannelResponse as ChannelShares
 from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_response
@@ -137,6 +138,15 @@ def test_stress_kernels_spread_as_the_object_comes_near(camera: Camera) -> None:
     away = torch.arange(side) - side // 2
     width = (centre.sum(-1) * away**2).sum(-1)
     assert float(width[0]) > 2 * float(width[-1])
+
+
+def test_stress_distances_lie_around_those_of_the_design() -> None:
+    assert stress_depths_mm((math.inf,)) == (5e3, 1e4, 2e4, 5e4, math.inf)
+    of_one_metre = [round(1000 / depth, 9) for depth in stress_depths_mm((1000.0,))]
+    assert of_one_metre == [1.2, 1.1, 1.05, 1.02, 1.0, 0.98, 0.95, 0.9, 0.8]
+    of_two = stress_depths_mm((500.0, 10000.0))
+    assert [round(1000 / depth, 9) for depth in of_two[:5]] == [2.2, 2.1, 2.05, 2.02, 2.0]
+    assert [round(1000 / depth, 9) for depth in of_two[5:]] == [0.1, 0.08, 0.05, 0.0]
 
 
 def test_between_depths_kernels_follow_one_over_distance_better_than_distance(

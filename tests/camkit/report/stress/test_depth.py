@@ -33,8 +33,6 @@ def test_values_are_the_depths_and_the_focus_is_nominal(deep: Bundle, tmp_path: 
 def test_bundles_of_one_depth_take_no_part(bundle: Bundle, deep: Bundle) -> None:
     assert "no several depths" in (DEPTH.applies(bundle) or "")
     assert DEPTH.applies(deep) is None
-    (defocus,) = choose("defocus")
-    assert defocus.applies(deep) is not None
 
 
 def test_the_input_is_best_at_the_focus_and_chi2_goes_by_the_kernels_of_the_bank(

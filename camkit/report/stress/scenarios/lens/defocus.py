@@ -1,11 +1,12 @@
-"""Nearer than the focus: the kernels of other object distances from the bundle."""
+"""Nearer and farther than the focus: kernels of other object distances from the bundle."""
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, FrozenPsf
 from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
@@ -13,16 +14,37 @@ from camkit.report.stress.twin import Lens, Shot
 from camkit.runtime.bank.psf import color_kernels, kernel_at
 from camkit.units import MM_PER_M, to_mm
 
+FOCUS_WITHIN_PER_M = 0.01
+
 
 def _applies(bundle: Bundle) -> str | None:
     psf = bundle.stress_psf()
     if psf is None:
         return "it holds no stress_psf.safetensors"
-    if bundle.manifest.object_distance_mm is not None:
-        return "it is not focused at infinity"
-    if not np.isinf(psf.depths_mm[-1]):
-        return "its stress PSF does not reach infinity"
+    if psf.depths_mm.size < 2 or _off_focus_per_m(bundle, psf).min() > FOCUS_WITHIN_PER_M:
+        return "its stress PSF does not hold its focus and something beside it"
     return photographs(bundle)
+
+
+def _inverse_per_m(psf: FrozenPsf) -> NDArray[np.float64]:
+    """Give the distances of a PSF as 1 / m, far to near."""
+    inverse: NDArray[np.float64] = np.round(MM_PER_M / psf.depths_mm[::-1], 6)
+    return inverse
+
+
+def _off_focus_per_m(bundle: Bundle, psf: FrozenPsf) -> NDArray[np.float64]:
+    off: NDArray[np.float64] = np.abs(_inverse_per_m(psf) - MM_PER_M / bundle.reference_depth_mm)
+    return off
+
+
+def distances_of(bundle: Bundle) -> Scenario:
+    """Give the scenario with the distances of a bundle's stress PSF; nominal is the focus."""
+    psf = bundle.stress_psf()
+    assert psf is not None
+    values = tuple(float(value) for value in _inverse_per_m(psf))
+    nominal = values[int(_off_focus_per_m(bundle, psf).argmin())]
+    quick = tuple(sorted({values[0], nominal, values[-1]}))
+    return replace(SCENARIO, values=values, nominal=nominal, quick=quick)
 
 
 def _at_known_field(scene: Scene, bundle: Bundle) -> tuple[Scene, float]:
@@ -46,7 +68,8 @@ def _lens_at(bundle: Bundle, inverse_m: float, height_mm: float) -> Lens:
     assert psf is not None
     response = bundle.manifest.camera.channel_response.to_arrays()
     depth_mm = MM_PER_M / inverse_m if inverse_m else np.inf
-    kernels = color_kernels(psf, *response, depth_mm=depth_mm)
+    within_mm = float(np.clip(depth_mm, psf.depths_mm[0], psf.depths_mm[-1]))  # inverse was rounded
+    kernels = color_kernels(psf, *response, depth_mm=within_mm)
 
     def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
         scale = height_mm / max(np.hypot(x_mm, y_mm), 1e-9)
@@ -71,5 +94,7 @@ SCENARIO = Scenario(
     quick=(0.0, 0.2),
     shoot=_shoot,
     applies=_applies,
-    note="0 is infinity, 0.2 is 5 m; at the fields of the bundle's stress PSF, which has few.",
+    fit=distances_of,
+    note="0 is infinity, 0.2 is 5 m; at the fields of the bundle's stress PSF, which has few. The "
+    "methods are not told the distance.",
 )
