@@ -1,4 +1,4 @@
-"""The chart: time against PSNR, one panel per camera.
+"""The chart: time against PSNR, one panel per camera, one below the other.
 
 Marker area follows peak memory, the line is the Pareto front, the dashed line the input.
 """
@@ -59,10 +59,10 @@ def draw_chart(report: dict[str, Any], *, svg: Path, png: Path) -> bool:
     from matplotlib.figure import Figure
 
     width, height = _PANEL_SIZE
-    figure = Figure(figsize=(width * len(cameras), height), dpi=150, layout="constrained")
+    figure = Figure(figsize=(width, height * len(cameras)), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     for number, label in enumerate(cameras, start=1):
-        panel = figure.add_subplot(1, len(cameras), number)
+        panel = figure.add_subplot(len(cameras), 1, number)
         _draw_panel(panel, report, label)
     _save(figure, svg, png)
     return True
