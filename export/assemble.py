@@ -33,7 +33,7 @@ from camkit.bundle.manifest import (
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, PSF, STRESS_PSF, Bundle
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, ParityError
 from camkit.export.card import card_text, preview_png
 from camkit.export.golden_cases import (
@@ -44,8 +44,9 @@ from camkit.export.golden_cases import (
     photograph,
 )
 from camkit.export.network_facts import MeasuredNetwork, measure_network
-from camkit.models_def.optics.lens_file.lens_file import read_lens
-from camkit.models_def.optics.prescription import format_prescription
+from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.lens_file.lens_file import built_in_lenses, find_lens, read_lens
+from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
 from camkit.models_def.training.checkpoint import Checkpoint, load_network, read_checkpoint
 from camkit.models_def.training.recipe import Recipe, differing_camera, to_recipe
 from camkit.runtime.check import check_bundle
@@ -53,12 +54,14 @@ from camkit.runtime.golden_run import develop_case
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.loss import read_loss_model
+from camkit.units import UM_PER_MM
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
 SIZES: Final[tuple[NetworkSize, ...]] = get_args(NetworkSize)
 DEFAULT_SIZE: Final[NetworkSize] = "M"
+SAME_LENS_PX: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +72,7 @@ class Parts:
         checkpoints: One per size, of one camera.
         psf: Frozen PSF of `camkit freeze`.
         stress_psf: Kernels off the design point.
-        prescription: The lens as designed.
+        prescription: The lens as designed; None for that of the checkpoints.
         freeze: Report of `camkit freeze` (JSON), for the manifest.
         plan: Calibration of `tools/plan_report.py` (JSON), for the manifest; measured with an
             earlier export of the same networks.
@@ -92,13 +95,14 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         What was written: sizes of network, bytes, and the lines of the proof.
 
     Raises:
-        ContractError: If the checkpoints are not of one camera, or a size comes twice.
+        ContractError: If the checkpoints are not of one camera, a size comes twice, or the PSF
+            was frozen from another lens.
         ParityError: If torch and ONNX, or the bundle and its own golden cases, disagree.
         BundleError: If the parts contradict each other.
     """
     checkpoints = _read_checkpoints(parts.checkpoints)
     recipe = _recipe(checkpoints)
-    members = _members(parts)
+    members = _members(parts, _lens_of(parts, recipe, checkpoints))
     with tempfile.TemporaryDirectory() as folder:
         bare = write_bundle(
             Path(folder) / "bare.camkit", _manifest(recipe, parts, checkpoints, {}, {}), members
@@ -193,13 +197,45 @@ def _network_inputs(bare: Bundle, cases: Cases, scale: float) -> list[FloatArray
     return windows
 
 
-def _members(parts: Parts) -> dict[str, bytes]:
-    members = {PSF: psf_to_bytes(read_psf(parts.psf))}
+def _lens_of(
+    parts: Parts, recipe: Recipe, checkpoints: dict[NetworkSize, Checkpoint]
+) -> Lens | None:
+    """Give the lens of the camera; None where a checkpoint from before names one by a path."""
+    texts = {c.lens_toml for c in checkpoints.values() if c.lens_toml}
+    if len(texts) > 1:
+        raise ContractError(
+            "the checkpoints were trained with different lenses; train them for one"
+        )
+    if parts.prescription is not None:
+        return read_lens(parts.prescription)
+    if texts:
+        return parse_prescription(texts.pop())
+    name = recipe.lens.prescription
+    return find_lens(name) if name in built_in_lenses() else None
+
+
+def _check_lens(lens: Lens, psf: FrozenPsf, path: Path) -> None:
+    """Refuse a PSF that was frozen from another lens: no two have the same distortion."""
+    own, frozen = trace_distortion(lens, psf.distortion.radius_mm), psf.distortion
+    powers = np.linspace(0.0, 1.0, 33)[:, None] ** np.array([1, 3, 5, 7])
+    off_mm = np.abs(powers @ (own.coefficients - frozen.coefficients).T).max() * frozen.radius_mm
+    off_px = off_mm * UM_PER_MM / psf.pixel_pitch_um
+    if off_px > SAME_LENS_PX:
+        raise ContractError(
+            f"{path} was not frozen from the lens {lens.name}: their distortion differs by "
+            f"{off_px:.2g} px; freeze, train and export the same lens"
+        )
+
+
+def _members(parts: Parts, lens: Lens | None) -> dict[str, bytes]:
+    psf = read_psf(parts.psf)
+    members = {PSF: psf_to_bytes(psf)}
     if parts.stress_psf is not None:
         members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
-    if parts.prescription is not None:
+    if lens is not None:
+        _check_lens(lens, psf, parts.psf)
         # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
-        members[PRESCRIPTION] = format_prescription(read_lens(parts.prescription)).encode()
+        members[PRESCRIPTION] = format_prescription(lens).encode()
     return members
 
 

@@ -11,11 +11,15 @@ from camkit.bundle.manifest import Camera, GoldenCase
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray, FrozenPsf
+from camkit.errors import ContractError
 from camkit.runtime.geometry.warp import undistort_bands
 from camkit.runtime.golden_run import develop_case
 from camkit.runtime.rows import ArrayRows
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
 from camkit.scenes import procedural_scene
+
+SIDE_STEP_PX: Final = 64
+"""Every network takes sides that are multiples of it."""
 
 Cases = dict[str, tuple[GoldenCase, GoldenArrays]]
 
@@ -29,7 +33,8 @@ class CaseRecipe:
         exposure: Factor on the scene.
         iso: ISO speed.
         field: Place on the diagonal, 0 at the axis, 1 in the corner.
-        size_px: Side of the square capture.
+        size_px: Side of the square capture, where the sensor is as large; a multiple of
+            `SIDE_STEP_PX`.
     """
 
     scene_seed: int
@@ -56,8 +61,9 @@ def photograph(
         geometry and colour of the output.
     """
     camera, psf = bundle.manifest.camera, bundle.psf
-    origin = _origin(camera, recipe)
-    scene = procedural_scene(recipe.scene_seed, recipe.size_px, recipe.size_px)
+    side_px = _side_px(camera, recipe)
+    origin = _origin(camera, recipe.field, side_px)
+    scene = procedural_scene(recipe.scene_seed, side_px, side_px)
     options = SimulationOptions(
         iso=recipe.iso,
         seed=recipe.scene_seed,
@@ -103,10 +109,22 @@ def add_outputs(
     }
 
 
-def _origin(camera: Camera, recipe: CaseRecipe) -> tuple[int, int]:
+def _side_px(camera: Camera, recipe: CaseRecipe) -> int:
+    """Give the side of a case: a small sensor makes it smaller."""
+    least = min(camera.width_px, camera.height_px)
+    side_px = min(recipe.size_px, least // SIDE_STEP_PX * SIDE_STEP_PX)
+    if side_px == 0:
+        raise ContractError(
+            f"a sensor needs at least {SIDE_STEP_PX} x {SIDE_STEP_PX} px; got "
+            f"{camera.width_px} x {camera.height_px}"
+        )
+    return side_px
+
+
+def _origin(camera: Camera, field: float, side_px: int) -> tuple[int, int]:
     """Place a case on the diagonal, on a whole CFA cell."""
-    spare = np.array([camera.width_px, camera.height_px]) - recipe.size_px
-    x, y = (spare * (1 + recipe.field) / 2).astype(int) // 2 * 2
+    spare = np.array([camera.width_px, camera.height_px]) - side_px
+    x, y = (spare * (1 + field) / 2).astype(int) // 2 * 2
     return int(x), int(y)
 
 

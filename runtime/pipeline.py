@@ -347,7 +347,9 @@ def _engine(bundle: Bundle, options: Options, threads: int) -> NetworkEngine:
     if size not in networks:
         raise ContractError(
             f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(networks))}; "
-            f"asked for {size}"
+            f"asked for {size}; say --size {min(networks)}"
+            if networks
+            else f"bundle {bundle.manifest.name} holds no network; use method wiener"
         )
     data = bundle.network_bytes(size, fp16=options.dtype == "fp16")
     check_graph(data, networks[size])

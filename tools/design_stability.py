@@ -34,14 +34,14 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import find_lens, parts_of, source_of
+from camkit.models_def.design.assembly import parts_of, source_of
 from camkit.models_def.design.front import Front
 from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.optics import LensModule
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design, recipe_digest
 from camkit.models_def.design.score import score_design
 from camkit.models_def.design.starts import Starts, disturbed
-from camkit.models_def.optics.lens_file.lens_file import write_lens
+from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc

@@ -26,7 +26,7 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import find_lens, network_of, parts_of, problem_of
+from camkit.models_def.design.assembly import network_of, parts_of, problem_of
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.recipe import (
     DesignRecipe,
@@ -36,7 +36,7 @@ from camkit.models_def.design.recipe import (
 )
 from camkit.models_def.design.score import at_lens, score_design
 from camkit.models_def.design.starts import Starts, traced_lenses
-from camkit.models_def.optics.lens_file.lens_file import write_lens
+from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.prescription import Surface
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.search.finish import finished

@@ -23,14 +23,14 @@ import numpy as np
 import torch
 from torch import nn
 
-from camkit.models_def.design.assembly import field_slopes, find_lens, network_of, recorder_of
+from camkit.models_def.design.assembly import field_slopes, network_of, recorder_of
 from camkit.models_def.design.edge import ACROSS
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design
 from camkit.models_def.design.rest import Seen, at_rest, at_work, window_of
 from camkit.models_def.design.score import Captures, edge_contrasts, score_parts
-from camkit.models_def.optics.lens_file.lens_file import write_lens
+from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels

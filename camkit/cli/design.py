@@ -76,6 +76,12 @@ def design(
             overwrite=overwrite,
         ),
     )
+    for variable, own in run.loop.parts.lens.problem.free.outside():
+        typer.echo(
+            f"{variable.kind} of surface {variable.surface}: the given lens has {own:.6g}, outside "
+            f"its bounds {variable.low:g} .. {variable.high:g}: it begins at the bound",
+            err=True,
+        )
     if run.searched_s:
         typer.echo(f"starts tried in {run.searched_s:.0f} s", err=True)
     for moment in run.go():

@@ -35,7 +35,8 @@ def export(
         typer.Option(help=f"Calibration of `adaptive`; default: {PLAN_NAME} there, if any."),
     ] = None,
     prescription: Annotated[
-        Path | None, typer.Option(help="The lens (TOML); default: the one the recipe names.")
+        Path | None,
+        typer.Option(help="The lens (.toml or .zmx); default: the one of the checkpoint."),
     ] = None,
     version: Annotated[str, typer.Option(help="Semantic version of the bundle.")] = "0.1.0",
     overwrite: Overwrite = False,
@@ -61,7 +62,7 @@ def export(
             checkpoints=tuple(checkpoints),
             psf=frozen,
             stress_psf=stress_psf or _beside(folder, STRESS_NAME),
-            prescription=prescription or _named_prescription(checkpoints[0]),
+            prescription=prescription,
             freeze=freeze or _beside(folder, REPORT_NAME),
             plan=plan or _beside(folder, PLAN_NAME),
             version=version,
@@ -74,16 +75,3 @@ def export(
 def _beside(folder: Path, name: str) -> Path | None:
     path = folder / name
     return path if path.is_file() else None
-
-
-def _named_prescription(checkpoint: Path) -> Path | None:
-    """Give the prescription that the checkpoint's recipe names, if it comes with camkit."""
-    import tomllib
-    from importlib import resources
-
-    from camkit.models_def.training.checkpoint import read_checkpoint
-    from camkit.models_def.training.recipe import to_recipe
-
-    recipe = to_recipe(tomllib.loads(read_checkpoint(checkpoint).recipe_toml))
-    folder = Path(str(resources.files("camkit.models_def.prescriptions")))
-    return _beside(folder, f"{recipe.lens.prescription}.toml")

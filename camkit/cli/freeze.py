@@ -56,6 +56,7 @@ def freeze(
         settings=plan.wiener,
         limit_db=limit_db,
         grid=grid,
+        tell=lambda line: typer.echo(line, err=True),
     )
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, Json
+from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def train(
         Path | None, typer.Option(help="With --final: folder of real pairs to fine-tune on.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    overwrite: Overwrite = False,
     threads: Annotated[int, typer.Option(help="Threads of torch.")] = 1,
     workers: Annotated[int, typer.Option(help="Processes that make samples.")] = 1,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
@@ -78,6 +79,7 @@ def train(
             max_minutes=max_minutes,
             start=start,
             resume=resume,
+            overwrite=overwrite,
             threads=threads,
             workers=workers,
             device=device,
@@ -96,5 +98,7 @@ def _final_stage(
 
     if vgg is None:
         typer.echo(f"camkit: {WITHOUT_VGG}", err=True)
-    options = FinalOptions(start=start, vgg=vgg, pairs=pairs, device=device)
+    options = FinalOptions(
+        start=start, vgg=vgg, pairs=pairs, device=device, recipe_folder=recipe.parent
+    )
     return make_stage(read_recipe(recipe), options)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -15,11 +16,7 @@ from camkit.models_def.design.recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.sensor import Recorder
 from camkit.models_def.design.starts import Starts, best_judged, best_starts
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.optics.lens_file.lens_file import (
-    PRESCRIPTIONS,
-    built_in_lenses,
-    read_lens,
-)
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc
@@ -30,25 +27,6 @@ from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.units import to_radians
 
 
-def find_lens(name: str, folder: Path | None = None) -> Lens:
-    """Give a built-in prescription by name, or read a lens file.
-
-    Args:
-        name: Name, or path relative to `folder`.
-        folder: Of the recipe.
-
-    Raises:
-        ContractError: If there is neither.
-    """
-    if name in built_in_lenses():
-        return read_lens(PRESCRIPTIONS / f"{name}.toml")
-    path = (folder or Path()) / name
-    if not path.is_file():
-        known = ", ".join(built_in_lenses())
-        raise ContractError(f"no lens {name!r}: give a path, or one of {known}")
-    return read_lens(path)
-
-
 def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
     """Give the fields, wavelengths and depths of a recipe, and what is free of a lens."""
     optics = recipe.optics
@@ -56,7 +34,12 @@ def problem_of(recipe: DesignRecipe, lens: Lens) -> Problem:
         lens = refocused(lens, optics.focus_distance_mm or optics.object_distances_mm[0])
     if optics.f_number:
         lens = replace(lens, aperture_kind="f_number", aperture_value=optics.f_number)
-    last = optics.solved_surface % len(lens.surfaces)
+    count, solved = len(lens.surfaces), optics.solved_surface
+    if not -count <= solved < count:
+        raise ContractError(
+            f"optics.solved_surface must be 0..{count - 1} (-1 is the last); got {solved}"
+        )
+    last = solved % count
     free = FreeLens(
         lens=lens,
         variables=recipe.variables,
@@ -121,6 +104,12 @@ def network_of(recipe: DesignRecipe) -> nn.Module | None:
         return None
     torch.manual_seed(recipe.schedule.seed)
     network = build_network(choice.name, **choice.config)
+    stride_px: Any = network.stride_px
+    if recipe.schedule.patch_px % stride_px:
+        raise ContractError(
+            f"schedule.patch_px must be a multiple of {stride_px} for {choice.name}; "
+            f"got {recipe.schedule.patch_px}"
+        )
     wanted = recipe.front.channels
     if network.in_channels != wanted:
         raise ContractError(

@@ -1,6 +1,7 @@
 """One design run on disk: checkpoint, log, the lens; resume; several machines by torchrun."""
 
 import json
+import math
 import os
 import pickle
 import time
@@ -135,7 +136,7 @@ class DesignRun:
             "step": moment.step,
             "seconds": round(self._spent_s, 3),
             "cpu_s": round(self._spent_cpu_s, 3),
-            "loss": moment.loss,
+            "loss": moment.loss if math.isfinite(moment.loss) else None,
             "valid_db": moment.valid_db,
             "best_db": moment.best_db,
             "lost_light": moment.lost_light,
@@ -157,7 +158,8 @@ class DesignRun:
             raise ContractError(f"{self.checkpoint} is no design checkpoint of format {FORMAT}")
         if table["digest"] != recipe_digest(self.recipe):
             raise ContractError(
-                f"{self.checkpoint} belongs to another recipe; give --overwrite or --out-dir"
+                f"{self.checkpoint} belongs to another recipe, or to other --steps, "
+                "--lens-rate and the like; say the same again, or give --overwrite or --out-dir"
             )
         self._spent_s, self._spent_cpu_s = table["spent_s"], table["spent_cpu_s"]
         self.loop.parts.lens.load_state_dict(table["lens"])

@@ -8,6 +8,7 @@ loss allows, with the depth known to the filter (interpolated kernels) and unkno
 kernel).
 """
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -49,12 +50,18 @@ __all__ = [
     "freeze_stress",
 ]
 
+Tell = Callable[[str], None]
+
 LOSS_LIMIT_DB: Final = 0.05
 DEPTH_SHARE: Final = 0.75
 BLOCK_TOLERANCE_DB: Final = 0.1
 FIELD_COUNTS: Final = (7, 9, 11, 13, 17, 21, 25)
 WAVELENGTH_COUNTS: Final = (3, 5, 7, 9, 11, 13)
 BLOCKS: Final = ((768, 160), (512, 160), (384, 160), (512, 192), (384, 192))
+
+
+def _silent(_: str) -> None:
+    pass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,6 +120,7 @@ def choose_samples(
     *,
     limit_db: float = LOSS_LIMIT_DB,
     grid: FreezeGrid | None = None,
+    tell: Tell = _silent,
 ) -> tuple[Frozen, Loss]:
     """Freeze with the least wavelengths, then depths, then fields, whose mean loss is allowed.
 
@@ -125,6 +133,7 @@ def choose_samples(
         bench: The lens where it is judged, at the depths that may be kept.
         limit_db: Mean loss allowed.
         grid: Rays, energy and largest side; the rest is chosen here.
+        tell: Takes a line for everything that was tried.
 
     Raises:
         ContractError: If even the densest grid loses more.
@@ -134,7 +143,9 @@ def choose_samples(
     waves = WAVELENGTH_COUNTS[-1]
     for count in WAVELENGTH_COUNTS:
         frozen = freeze(lens, camera, replace(base, fields=fields, wavelengths=count))
-        if frozen_loss(frozen.psf, bench).mean_db <= limit_db / 2:
+        lost_db = frozen_loss(frozen.psf, bench).mean_db
+        tell(f"{count} wavelengths, {fields} fields: {lost_db:.3f} dB")
+        if lost_db <= limit_db / 2:
             waves = count
             break
     kept_mm = choose_depths(frozen.psf, bench, limit_db=DEPTH_SHARE * limit_db)
@@ -143,6 +154,7 @@ def choose_samples(
     for count in FIELD_COUNTS:
         frozen = freeze(lens, camera, replace(base, fields=count, wavelengths=waves))
         loss = frozen_loss(frozen.psf, bench)
+        tell(f"{waves} wavelengths, {count} fields: {loss.mean_db:.3f} dB")
         if loss.mean_db <= limit_db:
             return frozen, loss
     raise ContractError(
@@ -178,19 +190,22 @@ def between_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def choose_blocks(
-    psf: FrozenPsf, bench: Bench, *, limit_db: float = LOSS_LIMIT_DB
+    psf: FrozenPsf, bench: Bench, *, limit_db: float = LOSS_LIMIT_DB, tell: Tell = _silent
 ) -> tuple[Wiener, Loss]:
     """Give the cheapest block grid that loses little.
 
-    Little is the allowed loss, or, where no grid keeps it, `BLOCK_TOLERANCE_DB` more than the
-    best grid loses. The cost of a grid is the area filtered per area answered for.
+    Tried are `BLOCKS` and the grid of the bench's own settings. Little is the allowed loss, or,
+    where no grid keeps it, `BLOCK_TOLERANCE_DB` more than the best grid loses. The cost of a grid
+    is the area filtered per area answered for.
     """
     tried: list[tuple[Wiener, Loss]] = []
-    for block_px, overlap_px in sorted(BLOCKS, key=lambda b: (b[0] / (b[0] - b[1])) ** 2):
+    grids = {*BLOCKS, (bench.settings.block_px, bench.settings.overlap_px)}
+    for block_px, overlap_px in sorted(grids, key=lambda b: ((b[0] / (b[0] - b[1])) ** 2, b)):
         settings = bench.settings.model_copy(
             update={"block_px": block_px, "overlap_px": overlap_px}
         )
         loss = block_loss(psf, bench, settings)
+        tell(f"blocks of {block_px} px, overlap {overlap_px}: {loss.mean_db:.3f} dB")
         tried.append((settings, loss))
         if loss.mean_db <= limit_db:
             break
@@ -207,6 +222,7 @@ def freeze_prescription(
     settings: Wiener | None = None,
     limit_db: float = LOSS_LIMIT_DB,
     grid: FreezeGrid | None = None,
+    tell: Tell = _silent,
 ) -> FreezeReport:
     """Freeze the PSF of a prescription and write it.
 
@@ -218,6 +234,7 @@ def freeze_prescription(
         limit_db: Mean loss allowed for the samples, and for the blocks.
         grid: Rays, energy, largest side and depths; fields, wavelengths and which of the depths
             are kept are chosen here.
+        tell: Takes a line for everything that was tried.
 
     Raises:
         ContractError: If the prescription is wrong or no grid keeps the loss.
@@ -227,9 +244,10 @@ def freeze_prescription(
     lens = read_lens(path)
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     wanted = grid or FreezeGrid()
+    tell(f"tracing {lens.name} and its copies")
     bench = make_bench(lens, camera, chosen, grid=wanted)
-    frozen, loss = choose_samples(lens, camera, bench, limit_db=limit_db, grid=grid)
-    blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db)
+    frozen, loss = choose_samples(lens, camera, bench, limit_db=limit_db, grid=grid, tell=tell)
+    blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db, tell=tell)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
     kept_mm = tuple(frozen.psf.depths_mm.tolist())

@@ -375,7 +375,10 @@ def _parse_surface(
     radius_mm = _number(table["radius_mm"], f"{where}: radius_mm")
     if radius_mm == 0 or math.isnan(radius_mm):
         raise ContractError(f"{where}: radius_mm must not be 0 (a plane is inf)")
-    glass = find_glass(_text(table.get("glass", "air"), f"{where}: glass"), catalogues)
+    try:
+        glass = find_glass(_text(table.get("glass", "air"), "glass"), catalogues)
+    except ContractError as error:
+        raise ContractError(f"{where}: {error}") from error
     return Surface(
         curvature_per_mm=1 / radius_mm,
         thickness_mm=_number(table["thickness_mm"], f"{where}: thickness_mm"),

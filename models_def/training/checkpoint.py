@@ -26,6 +26,7 @@ class Checkpoint:
 
     Attributes:
         recipe_toml: The recipe as text.
+        lens_toml: Its lens as text; empty in checkpoints of before.
         size: Which of its networks.
         network: Name of the network in the catalogue.
         config: What of its config differs from the defaults.
@@ -53,6 +54,7 @@ class Checkpoint:
     weights: State
     average: State
     optimizer: dict[str, Any]
+    lens_toml: str = ""
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
@@ -77,6 +79,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise ContractError(f"{path} is no checkpoint of camkit: {error}") from error
     if not isinstance(table, dict) or table.pop("format", None) != FORMAT:
         raise ContractError(f"{path} is no checkpoint of format {FORMAT}; train again")
+    table.setdefault("lens_toml", "")
     missing = {f.name for f in fields(Checkpoint)} ^ set(table)
     if missing:
         raise ContractError(f"checkpoint {path} has wrong entries: {', '.join(sorted(missing))}")

@@ -16,8 +16,7 @@ from camkit.models_def.optics.kernel_bank import (
     colour_kernels,
     focused_copies,
 )
-from camkit.models_def.optics.lens_file.lens_file import PRESCRIPTIONS
-from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.training.recipe import Recipe
@@ -29,31 +28,30 @@ TRACING: Final = 2
 """Counts how kernels and light have been traced so far: what was kept before is traced again."""
 
 
-def build_lens_bank(recipe: Recipe, cache_folder: Path | None = None) -> PsfBank:
+def build_lens_bank(recipe: Recipe, lens: Lens, cache_folder: Path | None = None) -> PsfBank:
     """Trace the lens of a recipe, or read what an earlier call traced.
 
     Args:
-        recipe: Its `lens` names the prescription and says how many copies and fields.
+        recipe: Its `lens` says how many copies and fields.
+        lens: The lens that it names (`find_lens`).
         cache_folder: Where traced banks are kept; None keeps none.
 
     Raises:
-        ContractError: If the prescription is missing or its light does not fit the kernels.
+        ContractError: If the light of the lens does not fit the kernels.
     """
-    path = PRESCRIPTIONS / f"{recipe.lens.prescription}.toml"
     if cache_folder is None:
-        return _trace(recipe, path)
-    content = [path.read_text(encoding="utf-8"), json.dumps(recipe.lens.to_json())]
+        return _trace(recipe, lens)
+    content = [format_prescription(lens), json.dumps(recipe.lens.to_json())]
     content += [recipe.camera.model_dump_json(), str(TRACING)]
     name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"bank-{name}.npz"
     if not cached.exists():
         cache_folder.mkdir(parents=True, exist_ok=True)
-        write_bank(cached, _trace(recipe, path))
+        write_bank(cached, _trace(recipe, lens))
     return read_bank(cached)
 
 
-def _trace(recipe: Recipe, path: Path) -> PsfBank:
-    lens = read_prescription(path)
+def _trace(recipe: Recipe, lens: Lens) -> PsfBank:
     plan = recipe.lens
     heights = np.linspace(0.0, corner_height_mm(recipe), plan.fields)
     response = _response(recipe)

@@ -1,6 +1,7 @@
 """The process that makes samples: python -m camkit.models_def.training.pool_worker FOLDER 0/1."""
 
 import select
+import signal
 import sys
 import time
 from pathlib import Path
@@ -30,5 +31,7 @@ def _parent_is_gone() -> bool:
 
 
 if __name__ == "__main__":
+    # Ctrl-C reaches the whole group; the trainer ends its workers itself.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     worker, workers = sys.argv[2].split("/")
     work(Path(sys.argv[1]), (int(worker), int(workers)))

@@ -36,7 +36,8 @@ class LensRecipe:
     """The lens and how far its copies vary.
 
     Attributes:
-        prescription: Name of a file in `models_def/prescriptions`, without its ending.
+        prescription: Name of a built-in lens, or path of a file (.toml, .zmx) relative to the
+            recipe.
         copies: Fabricated copies whose PSFs are trained on; one more is kept for validation.
         fields: Field heights of the kernel bank.
         kernel_px: Side of its kernels, odd.

@@ -14,6 +14,9 @@ from typing import Any, Final
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
     State,
@@ -62,6 +65,7 @@ class TrainOptions:
             the first ones; None for random weights.
         stop_at_step: Stop there though the schedule goes on, as an interruption would.
         resume: Go on from the checkpoint in `out_dir`.
+        overwrite: Start anew over a checkpoint that lies there.
         threads: Threads of torch.
         workers: Processes that make samples; 0 makes them in this process.
         device: cpu or cuda.
@@ -78,6 +82,7 @@ class TrainOptions:
     start: Path | None = None
     stop_at_step: int | None = None
     resume: bool = False
+    overwrite: bool = False
     threads: int = 1
     workers: int = 1
     device: str = "cpu"
@@ -91,6 +96,8 @@ class TrainOptions:
             raise ContractError(f"steps must be >= 1; got {self.steps}")
         if self.start is not None and self.resume:
             raise ContractError("a run that is resumed has begun; leave start away")
+        if self.overwrite and self.resume:
+            raise ContractError("resume goes on from the checkpoint, overwrite drops it: say one")
         if self.threads < 1 or self.workers < 0:
             raise ContractError(
                 f"threads must be >= 1, workers >= 0; got {self.threads}, {self.workers}"
@@ -162,19 +169,41 @@ def train(
     """
     torch.set_num_threads(options.threads)
     recipe = read_recipe(recipe_path)
+    entry = recipe.network(options.size)
+    _check_patch(entry, entry.schedule if stage is None else stage.schedule)
+    path = checkpoint_path(recipe, options, stage)
+    if path.exists() and not (options.resume or options.overwrite):
+        raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
     options.out_dir.mkdir(parents=True, exist_ok=True)
-    seed = recipe.network(options.size).schedule.seed
+    seed = entry.schedule.seed
+    lens = find_lens(recipe.lens.prescription, recipe_path.parent)
     if bank is None:
-        bank = build_lens_bank(recipe, options.out_dir)
+        bank = build_lens_bank(recipe, lens, options.out_dir)
     # A pool of its own: another size may be trained beside this one.
     samples = options.out_dir / f"samples_{options.size}"
     pool = open_pool(samples, recipe_path, bank, options.data_folder, seed=seed)
     with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
         pool.start_workers(options.workers)
         cases = make_cases(recipe, bank, options.valid_folder)
-        run = _Run(recipe_path, bank, cases, options, stage)
+        run = _Run(recipe_path, lens, bank, cases, options, stage)
         run.loop(pool, bar)
         return run.result()
+
+
+def checkpoint_path(recipe: Recipe, options: TrainOptions, stage: Stage | None) -> Path:
+    """Give the file that a run writes its checkpoints to."""
+    name = f"{recipe.name}_{options.size}" + ("" if stage is None else f"_{stage.name}")
+    return options.out_dir / f"{name}.pt"
+
+
+def _check_patch(entry: NetworkRecipe, schedule: ScheduleRecipe) -> None:
+    """Refuse patches that the network cannot take, before anything is traced."""
+    stride_px: Any = build_network(entry.network, **entry.config).stride_px
+    if schedule.patch_px < 1 or schedule.patch_px % stride_px:
+        raise ContractError(
+            f"patch_px must be a multiple of {stride_px} for {entry.network}; "
+            f"got {schedule.patch_px}"
+        )
 
 
 def _start(path: Path | None, entry: NetworkRecipe, data: str) -> tuple[State | None, str]:
@@ -198,26 +227,30 @@ class _Run:
     def __init__(
         self,
         recipe_path: Path,
+        lens: Lens,
         bank: PsfBank,
         cases: list[Case],
         options: TrainOptions,
         stage: Stage | None,
     ) -> None:
         self.options, self.cases, self.bank_digest = options, cases, bank.digest()
-        self.toml = recipe_path.read_text(encoding="utf-8")
+        self.toml, self.lens_toml = (
+            recipe_path.read_text(encoding="utf-8"),
+            format_prescription(lens),
+        )
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
-        name, credit = f"{self.recipe.name}_{options.size}", ""
+        credit = ""
         data = describe_data(self.recipe, options.data_folder)
         if stage is None:
             weights, credit = _start(options.start, self.entry, data)
             self.fitter: Fits = Fitter(self.entry, options.device, weights)
         else:
-            name, credit = f"{name}_{stage.name}", stage.credit
+            credit = stage.credit
             self.entry = replace(self.entry, schedule=stage.schedule)
             self.fitter = stage.make_fitter(self.entry, bank)
         self.steps = options.steps or self.entry.schedule.steps
-        self.path = options.out_dir / f"{name}.pt"
+        self.path = checkpoint_path(self.recipe, options, stage)
         self.data = data + credit
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
@@ -306,6 +339,7 @@ class _Run:
     def _save(self, pool: SamplePool) -> None:
         saved = Checkpoint(
             recipe_toml=self.toml,
+            lens_toml=self.lens_toml,
             size=self.options.size,
             network=self.entry.network,
             config=dict(self.entry.config),

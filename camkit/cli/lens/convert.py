@@ -35,9 +35,14 @@ def convert(
     require_torch("camkit lens convert")
     refuse_existing([out], overwrite=overwrite)
     from camkit.models_def.optics.glass.agf import read_agf
-    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens, write_lens
+    from camkit.models_def.optics.lens_file.lens_file import (
+        read_noted_lens,
+        ready_for_lens,
+        write_lens,
+    )
     from camkit.models_def.optics.scaling import scale_to_efl, with_f_number
 
+    ready_for_lens(out)
     catalogues = [read_agf(path) for path in glass or ()]
     lens, notes = read_noted_lens(source, catalogues)
     if efl_mm is not None:
@@ -45,6 +50,8 @@ def convert(
     if f_number is not None:
         lens = with_f_number(lens, f_number)
         notes = (*notes, *_clipped(lens))
+    if out.suffix.lower() == ".zmx" and any(surface.vary for surface in lens.surfaces):
+        notes = (*notes, "what `vary` names stays behind: OUT is all fixed")
     write_lens(lens, out)
     for note in notes:
         typer.echo(f"{source.name}: {note}", err=True)

@@ -48,10 +48,15 @@ def optimize(
     require_torch("camkit lens optimize")
     refuse_existing([out], overwrite=overwrite)
     from camkit.models_def.optics.glass.agf import read_agf
-    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens, write_lens
+    from camkit.models_def.optics.lens_file.lens_file import (
+        read_noted_lens,
+        ready_for_lens,
+        write_lens,
+    )
     from camkit.models_def.optics.search.improvement import improve
     from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims
 
+    ready_for_lens(out)
     lens, read_notes = read_noted_lens(source, [read_agf(path) for path in glass or ()])
     problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
     begin = problem.free.scaled()

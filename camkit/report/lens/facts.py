@@ -167,8 +167,12 @@ def _try(what: str, compute: Callable[[], Found], otherwise: Found, notes: list[
 
 
 def _warnings(lens: Lens, spots: Spots) -> list[str]:
-    """Say which fields lose rays."""
-    found = []
+    """Say which glasses cannot be and which fields lose rays."""
+    found = [
+        f"surface {i}: {surface.glass} is {surface.thickness_mm:g} mm thick, which cannot be made"
+        for i, surface in enumerate(lens.surfaces)
+        if surface.glass != "air" and surface.thickness_mm <= 0
+    ]
     for i, angle_rad in enumerate(lens.field_angles_rad):
         name = f"field {to_degrees(angle_rad):.4g} degrees"
         lost = [

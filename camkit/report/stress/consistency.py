@@ -5,8 +5,9 @@
 The variance is that of the noise that the twin added, plus that of the model: demosaicking and
 regularisation leave residuals at edges that no photon explains, in proportion to the contrast
 around a sample. Its strength is one number per method and scene, the `model error`, found on the
-nominal capture so that chi^2 is 1 there (`calibrate`). What lies above 1 is then unexplained:
-detail that was invented, or light that was lost.
+nominal capture so that chi^2 is 1 there (`calibrate`); where no such number brings it to 1 (kernels
+wider than the contrast around a sample tells of), chi^2 is counted in units of the nominal one.
+What lies above 1 is then unexplained: detail that was invented, or light that was lost.
 """
 
 from dataclasses import dataclass, replace
@@ -133,15 +134,34 @@ def near(mask: NDArray[np.bool_], reach_px: int) -> NDArray[np.bool_]:
     return np.asarray(scipy.ndimage.maximum_filter(mask, 2 * reach_px + 1, mode="constant"))
 
 
-def calibrate(nominal: Residual) -> float:
-    """Give the model error for which chi^2 of a nominal capture is 1; 0 if it is less without."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """How chi^2 of a method is counted on a scene.
+
+    Attributes:
+        model_error: As `Residual.chi2` takes it.
+        unit: Of chi^2: 1, or what stays on the nominal capture with the largest model error.
+    """
+
+    model_error: float = 0.0
+    unit: float = 1.0
+
+    def chi2(self, found: Residual) -> float:
+        """Give chi^2 per sample, 1 (or less) on the nominal capture."""
+        return found.chi2(self.model_error) / self.unit
+
+
+def calibrate(nominal: Residual) -> Scale:
+    """Give the scale on which chi^2 of a nominal capture is 1; less if it is without any."""
     low, high = 0.0, MOST_MODEL_ERROR
     if nominal.chi2(low) <= 1:
-        return 0.0
+        return Scale()
+    if (unit := nominal.chi2(high)) > 1:
+        return Scale(model_error=high, unit=unit)
     for _ in range(30):
         middle = (low + high) / 2
         low, high = (middle, high) if nominal.chi2(middle) > 1 else (low, middle)
-    return high
+    return Scale(model_error=high)
 
 
 def _variance(noise: NoiseModel, signal: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from camkit.contracts import FloatArray
 from camkit.report.stress.consistency import (
     CLIPPED_REACH_PX,
     Residual,
+    Scale,
     calibrate,
     near,
     residual,
@@ -73,7 +74,7 @@ class Judge:
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
-        self._model_errors: dict[tuple[str, str], float] = {}
+        self._scales: dict[tuple[str, str], Scale] = {}
         self._scored: dict[bytes, Verdict] = {}
 
     def score(self, shot: Shot) -> Verdict:
@@ -109,21 +110,20 @@ class Judge:
             outcomes[method] = Outcome(psnr_db=None, fault=fault)
         return outcomes
 
-    def model_error(self, method: str, scene: Scene) -> float:
-        """Give the model error of a method on a scene, from its nominal capture."""
-        if (method, scene.name) not in self._model_errors:
+    def scale(self, method: str, scene: Scene) -> Scale:
+        """Give how chi^2 of a method is counted on a scene, from its nominal capture."""
+        if (method, scene.name) not in self._scales:
             shot = self.rig.shoot(scene)
             for name, planes in self.rig.restore(shot).planes.items():
                 nominal = residual(planes, shot, self.rig.assumed_lens) if name != INPUT else None
-                error = 0.0 if nominal is None else calibrate(nominal)
-                self._model_errors[name, scene.name] = error
-        return self._model_errors.get((method, scene.name), 0.0)
+                self._scales[name, scene.name] = Scale() if nominal is None else calibrate(nominal)
+        return self._scales.get((method, scene.name), Scale())
 
     def _chi2(self, method: str, planes: FloatArray, shot: Shot) -> float | None:
         found: Residual | None = residual(planes, shot, self.rig.assumed_lens)
         if found is None:
             return None
-        return found.chi2(self.model_error(method, shot.light.scene))
+        return self.scale(method, shot.light.scene).chi2(found)
 
 
 def see(rig: Rig, shot: Shot) -> dict[str, float]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from camkit.errors import UnsupportedError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.glass.catalogue import GlassCatalogue
 from camkit.models_def.optics.lens_file.zmx_reader import read_zmx
 from camkit.models_def.optics.lens_file.zmx_writer import write_zmx
@@ -46,6 +46,16 @@ def read_noted_lens(
     return found.lens, found.notes
 
 
+def ready_for_lens(path: Path) -> None:
+    """Refuse a file that no lens can be written to, before any work; make its folder.
+
+    Raises:
+        UnsupportedError: If the suffix is neither .toml nor .zmx.
+    """
+    _suffix(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+
+
 def write_lens(lens: Lens, path: Path) -> None:
     """Write a lens in the format of the suffix; see `write_prescription` and `write_zmx`."""
     if _suffix(path) == ".toml":
@@ -57,6 +67,25 @@ def write_lens(lens: Lens, path: Path) -> None:
 def built_in_lenses() -> tuple[str, ...]:
     """Give the names of the lenses that come with camkit."""
     return tuple(sorted(path.stem for path in PRESCRIPTIONS.glob("*.toml")))
+
+
+def find_lens(name: str, folder: Path | None = None) -> Lens:
+    """Give the lens that a recipe names: a built-in one, or that of a file.
+
+    Args:
+        name: Name of a built-in lens, or path (.toml or .zmx) relative to `folder`.
+        folder: Of the recipe; None for the working directory.
+
+    Raises:
+        ContractError: If there is neither, or the lens is wrong.
+    """
+    if name in built_in_lenses():
+        return read_lens(PRESCRIPTIONS / f"{name}.toml")
+    path = (folder or Path()) / name
+    if not path.is_file():
+        known = ", ".join(built_in_lenses())
+        raise ContractError(f"no lens {name!r}: give a path (.toml or .zmx), or one of {known}")
+    return read_lens(path)
 
 
 def _built_in(path: Path) -> Path:

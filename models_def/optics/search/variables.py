@@ -19,6 +19,7 @@ from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
 
 Kind = Literal["curvature", "conic", "thickness", "even_asphere", "defocus"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+_ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +97,16 @@ class FreeLens:
         flat, _ = self._flat()
         own = torch.stack([flat[self._place(v)] for v in self.variables])
         return ((own - self.low) / span).clamp(0, 1)
+
+    def outside(self) -> tuple[tuple[Variable, float], ...]:
+        """Give the variables whose value in the lens lies outside their bounds, with the value."""
+        flat, _ = self._flat()
+        values = [(v, float(flat[self._place(v)])) for v in self.variables]
+        return tuple(
+            (v, own)
+            for v, own in values
+            if not v.low - _ROUNDING * abs(v.low) <= own <= v.high + _ROUNDING * abs(v.high)
+        )
 
     def tensors(self, scaled: Tensor, wavelengths_um: Tensor) -> SurfaceTensors:
         """Give the lenses as tensors (surface, start, 1, 1, 1), index (surface + 1, wave, 1).

@@ -1,5 +1,6 @@
 """Tolerances from TOML: the table [tolerance] of a lens file, or of a file of its own."""
 
+import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -78,6 +79,8 @@ def _width(key: str, value: object, unit: float, common: Any) -> ErrorWidth:
             f"[{TABLE}]: {key} must be a number or {{ half_width = NUMBER, distribution = NAME }}; "
             f"got {value!r:.80}"
         )
+    if not 0 <= number < math.inf:
+        raise ContractError(f"[{TABLE}]: {key} must be finite and >= 0; got {number!r}")
     return ErrorWidth(half_width=number * unit, distribution=entry.get("distribution", common))
 
 

@@ -11,8 +11,7 @@ import torch
 from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
 from camkit.models_def.optics.distortion import trace_distortion
-from camkit.models_def.optics.lens_file.lens_file import PRESCRIPTIONS
-from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.training.checkpoint import read_checkpoint
 from camkit.models_def.training.final.fitter import FinalFitter, FinalParts
 from camkit.models_def.training.final.pairs import PairSamples, read_pairs
@@ -28,7 +27,7 @@ WITHOUT_VGG: Final = (
     "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
 )
 
-Distort = Callable[[Recipe], RadialDistortion | None]
+Distort = Callable[[Recipe, Path], RadialDistortion | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,17 +39,19 @@ class FinalOptions:
         vgg: Weights of VGG-19; None compares sRGB values instead of features.
         pairs: Folder of real pairs.
         device: cpu or cuda.
+        recipe_folder: For a lens that the recipe names by its path.
     """
 
     start: Path
     vgg: Path | None = None
     pairs: Path | None = None
     device: str = "cpu"
+    recipe_folder: Path = Path()
 
 
-def trace_recipe_distortion(recipe: Recipe) -> RadialDistortion:
-    """Give the distortion of a recipe's lens."""
-    lens = read_prescription(PRESCRIPTIONS / f"{recipe.lens.prescription}.toml")
+def trace_recipe_distortion(recipe: Recipe, folder: Path) -> RadialDistortion:
+    """Give the distortion of a recipe's lens; the recipe lies in `folder`."""
+    lens = find_lens(recipe.lens.prescription, folder)
     return trace_distortion(lens, corner_height_mm(recipe))
 
 
@@ -75,7 +76,11 @@ def make_stage(
         pairs: PairSamples | None = None
         if options.pairs is not None:
             pairs = read_pairs(
-                options.pairs, recipe, bank, distort(recipe), seed=entry.schedule.seed
+                options.pairs,
+                recipe,
+                bank,
+                distort(recipe, options.recipe_folder),
+                seed=entry.schedule.seed,
             )
         parts = FinalParts(
             start=start,

@@ -10,6 +10,7 @@ import torch
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import open_bundle
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
+from camkit.models_def.optics.lens_file.lens_file import write_lens
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.training.recipe import read_recipe
 from tests.models_def.training.conftest import RECIPE
@@ -18,7 +19,7 @@ PRESCRIPTION = Path(__file__).resolve().parents[3] / "models_def" / "prescriptio
 SMALL = {
     "width_px = 600": "width_px = 1600",
     "height_px = 400": "height_px = 1200",
-    'prescription = "duet"': 'prescription = "duet"\ncopies = 1\nfields = 3\nkernel_px = 65\n'
+    'prescription = "duet"': 'prescription = "mine.zmx"\ncopies = 1\nfields = 3\nkernel_px = 65\n'
     "rays = 512",
     "steps = 12": "steps = 4",
 }
@@ -40,15 +41,21 @@ def test_a_recipe_becomes_a_proved_bundle_that_turns_a_capture_into_a_picture(
     for old, new in SMALL.items():
         text = text.replace(old, new)
     (tmp_path / "tiny.toml").write_text(text, encoding="utf-8")
+    lens = read_prescription(PRESCRIPTION)
+    write_lens(lens, tmp_path / "mine.zmx")
     trained = camkit_command("train", "tiny.toml", "--size", "S", "--workers", "0", "--json")
     assert trained.code == 0, trained.err
     assert json.loads(trained.out)["steps"] == 4
 
     grid = FreezeGrid(fields=3, wavelengths=3, rays=512, max_side_px=65, energy=0.97)
-    frozen = freeze(
-        read_prescription(PRESCRIPTION), read_recipe(tmp_path / "tiny.toml").camera, grid
-    )
+    frozen = freeze(lens, read_recipe(tmp_path / "tiny.toml").camera, grid)
     write_psf(tmp_path / "runs" / "psf.safetensors", frozen.psf)
+    again = camkit_command("train", "tiny.toml", "--size", "S", "--workers", "0")
+    assert (again.code, "--resume to go on or --overwrite" in again.err) == (2, True)
+    (tmp_path / "mine.zmx").unlink()  # the checkpoint holds the lens
+    other = ("--prescription", PRESCRIPTION.parent / "duet-joint.toml")
+    refused = camkit_command("export", "runs/tiny_S.pt", "-o", "tiny.camkit", *other)
+    assert (refused.code, "was not frozen from the lens" in refused.err) == (2, True)
     exported = camkit_command("export", "runs/tiny_S.pt", "-o", "tiny.camkit")
     assert exported.code == 0, exported.err
     bundle = open_bundle(tmp_path / "tiny.camkit")

@@ -187,7 +187,7 @@ def test_export_finds_what_lies_beside_the_checkpoint(
     assert (parts.psf, parts.freeze) == (tmp_path / "psf.safetensors", tmp_path / "freeze.json")
     assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
     assert parts.stress_psf is None
-    assert parts.prescription.name == "duet.toml", "the lens that the recipe names"
+    assert parts.prescription is None, "the lens of the checkpoint"
 
 
 def test_files_of_the_final_stage_need_a_checkpoint_to_start_from(camkit_command) -> None:

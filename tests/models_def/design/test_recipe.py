@@ -8,10 +8,11 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import find_lens, parts_of, problem_of
+from camkit.models_def.design.assembly import parts_of, problem_of
 from camkit.models_def.design.loop import DesignLoop
 from camkit.models_def.design.recipe import read_design, recipe_digest, to_design, with_choices
 from camkit.models_def.design.starts import Starts
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 
 RECIPES = Path(__file__).resolve().parents[3] / "models_def" / "recipes"
@@ -84,8 +85,10 @@ def change(key: str, **entries: Any) -> Callable[[dict[str, Any]], None]:
         (change("optics", focus_distance_mm=700.0), "one of object_distances_mm"),
         (change("optics", units="own"), "whitened moves have no units"),
         (change("optics", units="inch"), "one of range, own"),
+        (change("optics", solved_surface=9, efl_mm=50.0), r"solved_surface must be 0\.\.4"),
         (lambda t: t.__setitem__("prescription", "nowhere"), "no lens 'nowhere'"),
         (change("front", kind="wiener"), "takes 3 planes"),
+        (change("schedule", patch_px=26), "multiple of 4 for trimmed_unet; got 26"),
     ],
 )
 def test_wrong_recipes_are_refused_with_a_reason(

@@ -6,10 +6,11 @@ from dataclasses import replace
 import pytest
 import torch
 
-from camkit.models_def.design.assembly import find_lens, parts_of
+from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.recipe import DesignRecipe
 from camkit.models_def.design.rest import at_rest, at_work, window_of
 from camkit.models_def.design.score import at_lens, edge_contrasts, score_parts
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem

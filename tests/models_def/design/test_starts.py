@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import find_lens, parts_of, problem_of
+from camkit.models_def.design.assembly import parts_of, problem_of
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.recipe import DesignRecipe, to_design, with_choices
 from camkit.models_def.design.starts import (
@@ -16,6 +16,7 @@ from camkit.models_def.design.starts import (
     disturbed,
     traced_lenses,
 )
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search import improvement

@@ -91,7 +91,19 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
     out = tmp_path / "psf.safetensors"
-    report = freeze_module.freeze_prescription(DUET, out, camera=camera, limit_db=20.0, grid=SMALL)
+    said: list[str] = []
+    report = freeze_module.freeze_prescription(
+        DUET,
+        out,
+        camera=camera,
+        settings=SETTINGS.model_copy(update={"block_px": 384}),
+        limit_db=20.0,
+        grid=SMALL,
+        tell=said.append,
+    )
+    assert said[1].startswith("3 wavelengths, 9 fields: ")
+    assert said[2].startswith("3 wavelengths, 5 fields: ")
+    assert said[3].startswith("blocks of 384 px, overlap 160: ")
     psf = read_psf(out)
     assert psf.kernels.shape[0] == report.fields == 5
     assert psf.kernels.shape[-1] == report.side_px
@@ -128,7 +140,8 @@ def test_cheapest_block_grid_that_loses_little_is_taken(
         "block_loss",
         lambda _psf, _bench, grid: sampling.Loss(mean_db=known[grid.block_px], worst_db=1.0),
     )
-    settings, loss = freeze_module.choose_blocks(bench.nominal, bench, limit_db=0.05)
+    own = replace(bench, settings=bench.settings.model_copy(update={"block_px": 384}))
+    settings, loss = freeze_module.choose_blocks(bench.nominal, own, limit_db=0.05)
     assert settings.block_px == chosen_px
     assert loss.mean_db == known[chosen_px]
 

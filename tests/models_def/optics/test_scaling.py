@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from camkit.errors import ContractError
-from camkit.models_def.design.assembly import find_lens
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image, with_paraxial_focus
 from camkit.models_def.optics.scaling import scale_lens, scale_to_efl, with_f_number
 from tests.physics.reference_lenses import cooke_triplet, thorlabs_al2550

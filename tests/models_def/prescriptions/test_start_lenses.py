@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from camkit.models_def.design.assembly import find_lens
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc

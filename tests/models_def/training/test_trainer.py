@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -148,6 +149,26 @@ def test_interrupted_write_keeps_the_old_checkpoint(tmp_path, whole, monkeypatch
     with pytest.raises(KeyboardInterrupt):
         write_checkpoint(path, replace(saved, step=99))
     assert read_checkpoint(path).step == 12
+
+
+def test_a_finished_run_is_not_replaced_unasked(tmp_path, recipe_path, bank, whole):
+    there = options(whole.checkpoint.parent, stop_at_step=1)
+    with pytest.raises(ContractError, match="is there already: give --resume"):
+        train(recipe_path, there, bank=bank)
+    assert read_checkpoint(whole.checkpoint).step == 12
+    for _ in range(2):
+        train(recipe_path, options(tmp_path, stop_at_step=1, overwrite=True), bank=bank)
+    with pytest.raises(ContractError, match="say one"):
+        options(tmp_path, resume=True, overwrite=True)
+
+
+def test_patches_that_the_network_cannot_take_are_refused_before_any_tracing(tmp_path, recipe_path):
+    odd = tmp_path / "odd.toml"
+    text = recipe_path.read_text(encoding="utf-8")
+    odd.write_text(re.sub(r"patch_px = \d+", "patch_px = 62", text), encoding="utf-8")
+    with pytest.raises(ContractError, match="multiple of 4 for lean_s; got 62"):
+        train(odd, options(tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("changes", [{"max_minutes": 0.0}, {"threads": 0}, {"workers": -1}])

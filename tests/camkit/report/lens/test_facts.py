@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from camkit.models_def.optics.analysis.sampling import Pupil
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import Lens, Surface
 from camkit.report.lens.facts import analyse, to_json
 from camkit.report.lens.output import write_lens_page
@@ -51,6 +52,15 @@ def _blocked() -> Lens:
     rims = (5.2, math.inf, math.inf, 3.9, math.inf, 5.2)
     surfaces = zip(lens.surfaces, rims, strict=True)
     return replace(lens, surfaces=tuple(replace(s, semi_diameter_mm=rim) for s, rim in surfaces))
+
+
+def test_glass_of_no_thickness_is_noted() -> None:
+    lens = find_lens("duet")
+    i = next(i for i, s in enumerate(lens.surfaces) if s.glass != "air")
+    surfaces = list(lens.surfaces)
+    surfaces[i] = replace(surfaces[i], thickness_mm=-1.0)
+    notes = analyse(replace(lens, surfaces=tuple(surfaces)), Pupil()).notes
+    assert any("-1 mm thick, which cannot be made" in note for note in notes)
 
 
 def test_field_that_loses_all_rays_is_null_in_valid_json_and_the_page_is_made(

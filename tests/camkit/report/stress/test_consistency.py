@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle
-from camkit.report.stress.consistency import calibrate, judged_samples, near, residual
+from camkit.report.stress.consistency import Scale, calibrate, judged_samples, near, residual
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.twin import Setting, photograph
@@ -51,15 +51,27 @@ def test_calibrated_it_is_one_and_never_scaled_up(truth, judge: Judge) -> None:
     shot, planes = truth
     rough = residual(np.roll(planes, 1, axis=2), shot, judge.rig.lens)
     assert rough is not None
-    error = calibrate(rough)
-    assert error > 0
-    assert rough.chi2(error) == pytest.approx(1.0, abs=1e-3)
+    scale = calibrate(rough)
+    assert (scale.model_error > 0, scale.unit) == (True, 1.0)
+    assert scale.chi2(rough) == pytest.approx(1.0, abs=1e-3)
     quiet = type(rough)(
         squared=0.5 * rough.noise_variance,
         noise_variance=rough.noise_variance,
         contrast=rough.contrast,
     )
-    assert calibrate(quiet) == 0.0
+    assert calibrate(quiet) == Scale(model_error=0.0, unit=1.0)
+    assert Scale().chi2(quiet) == pytest.approx(0.5)
+
+
+def test_where_contrast_cannot_explain_the_nominal_it_is_the_unit(truth, judge: Judge) -> None:
+    shot, planes = truth
+    nominal = residual(planes, shot, judge.rig.lens)
+    assert nominal is not None
+    flat = replace(nominal, squared=3 * nominal.noise_variance, contrast=0 * nominal.contrast)
+    scale = calibrate(flat)
+    assert scale.unit == pytest.approx(3.0)
+    assert scale.chi2(flat) == pytest.approx(1.0)
+    assert scale.chi2(replace(flat, squared=2 * flat.squared)) == pytest.approx(2.0)
 
 
 def test_what_clipped_is_not_judged(bundle: Bundle, scene: Scene, judge: Judge) -> None:

@@ -24,6 +24,14 @@ def test_a_lens_made_of_its_own_numbers_is_that_lens(free: FreeLens, lens: Lens)
         assert one.conic == pytest.approx(other.conic, abs=1e-12)
 
 
+def test_numbers_of_the_lens_outside_their_bounds_are_named(lens: Lens) -> None:
+    bounds = {"low": 0.5, "high": 0.6}
+    flat = Variable(kind="curvature", surface=1, **bounds)
+    inside = Variable(kind="conic", surface=1, low=-50.0, high=50.0)
+    free = FreeLens(lens=lens, variables=(flat, inside), rides=False)
+    assert free.outside() == ((flat, lens.surfaces[1].curvature_per_mm),)
+
+
 def test_every_lens_keeps_the_focal_length_and_rides_on_its_image(free: FreeLens) -> None:
     generator = torch.Generator().manual_seed(3)
     for _ in range(4):

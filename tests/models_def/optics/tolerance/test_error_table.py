@@ -48,7 +48,7 @@ def test_file_without_the_table_has_none(tmp_path: Path) -> None:
         ({"index": True}, "index"),
         ({"index": {"half": 1}}, "index"),
         ({"index": {"distribution": "normal"}}, "index"),
-        ({"index": -0.1}, "half-width"),
+        ({"index": -0.1}, "index must be finite and >= 0; got -0.1"),
         ({"index": 1.0, "distribution": "flat"}, "distribution"),
         ({"surface_tilt_deg": 1.0, "surface_tilt_arcmin": 1.0}, "again"),
         ({"compensator": 7}, "compensator"),

@@ -12,7 +12,7 @@ from camkit.models_def.training.trainer import TrainOptions, train
 
 def run(folder, recipe_path, recipe, bank, start, **changes):
     given = {"out_dir": folder, "size": "full", "workers": 0} | changes
-    stage = make_stage(recipe, FinalOptions(start=start), distort=lambda _: None)
+    stage = make_stage(recipe, FinalOptions(start=start), distort=lambda *_: None)
     return train(recipe_path, TrainOptions(**given), bank=bank, stage=stage)
 
 
