@@ -43,6 +43,7 @@ def build_lens_bank(recipe: Recipe, lens: Lens, cache_folder: Path | None = None
         return _trace(recipe, lens)
     content = [format_prescription(lens), json.dumps(recipe.lens.to_json())]
     content += [recipe.camera.model_dump_json(), str(TRACING)]
+    content += ["depths apart"] if recipe.data.known_depth_share else []
     name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"bank-{name}.npz"
     if not cached.exists():
@@ -81,6 +82,7 @@ def _trace(recipe: Recipe, lens: Lens) -> PsfBank:
         frozen_heights_mm=heights,
         relative_illumination=relative_illumination_at(lens, torch.from_numpy(heights)).numpy(),
         depths=depths,
+        frozen_depths=np.stack(kernels[:depths]) if recipe.data.known_depth_share else None,
     )
 
 

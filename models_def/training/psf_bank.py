@@ -32,6 +32,8 @@ class PsfBank:
         frozen_heights_mm: (field,) float64, increasing from 0.
         relative_illumination: (field,) float64 at `frozen_heights_mm`.
         depths: Of every copy.
+        frozen_depths: (depth, field, 3, h, w) float32, what `frozen` is the mean of; None for one
+            depth, or where nobody asks for them.
     """
 
     copies: FloatArray
@@ -40,6 +42,7 @@ class PsfBank:
     frozen_heights_mm: NDArray[np.float64]
     relative_illumination: NDArray[np.float64]
     depths: int = 1
+    frozen_depths: FloatArray | None = None
 
     def __post_init__(self) -> None:
         count = self.copies.shape[0] if self.copies.ndim == 5 else 0
@@ -67,9 +70,23 @@ class PsfBank:
         """Give the (1, 3, h, w) kernels of one copy at a sensor position."""
         return _at(self.copies[copy], self.copy_heights_mm, x_mm, y_mm)
 
-    def frozen_kernels(self, x_mm: float, y_mm: float) -> Tensor:
-        """Give the (1, 3, h, w) frozen kernels at a sensor position."""
-        return _at(self.frozen, self.frozen_heights_mm, x_mm, y_mm)
+    def frozen_kernels(self, x_mm: float, y_mm: float, depth: int | None = None) -> Tensor:
+        """Give the (1, 3, h, w) frozen kernels at a sensor position.
+
+        Args:
+            x_mm: Position.
+            y_mm: Likewise.
+            depth: Number of the depth; None for the mean kernel.
+
+        Raises:
+            ContractError: If the bank does not hold the depths apart.
+        """
+        if depth is not None and self.frozen_depths is None:
+            raise ContractError("this bank does not hold the frozen kernels of its depths apart")
+        frozen = self.frozen
+        if depth is not None and self.frozen_depths is not None:
+            frozen = self.frozen_depths[depth]
+        return _at(frozen, self.frozen_heights_mm, x_mm, y_mm)
 
     def illumination_at(self, height_mm: float) -> float:
         """Give the relative illumination at a field height."""
@@ -80,6 +97,8 @@ class PsfBank:
         total = hashlib.sha256(b"" if self.depths == 1 else str(self.depths).encode())
         for name in _ARRAYS:
             total.update(np.ascontiguousarray(getattr(self, name)).tobytes())
+        if self.frozen_depths is not None:
+            total.update(np.ascontiguousarray(self.frozen_depths).tobytes())
         return total.hexdigest()
 
 
@@ -97,6 +116,8 @@ def write_bank(path: Path, bank: PsfBank) -> None:
     arrays = {name: getattr(bank, name) for name in _ARRAYS}
     if bank.depths > 1:
         arrays["depths"] = np.array(bank.depths)
+    if bank.frozen_depths is not None:
+        arrays["frozen_depths"] = bank.frozen_depths
     np.savez(path, **arrays)
 
 
@@ -104,7 +125,9 @@ def read_bank(path: Path) -> PsfBank:
     """Read what `write_bank` wrote."""
     with np.load(path, allow_pickle=False) as arrays:
         depths = int(arrays["depths"]) if "depths" in arrays else 1
-        return PsfBank(**{name: arrays[name] for name in _ARRAYS}, depths=depths)
+        apart = arrays.get("frozen_depths")
+        kept = {name: arrays[name] for name in _ARRAYS}
+        return PsfBank(**kept, depths=depths, frozen_depths=apart)
 
 
 def gaussian_bank(*, sensor_height_mm: float, axis_px: float, corner_px: float) -> PsfBank:

@@ -92,6 +92,8 @@ class DataRecipe:
         target_max: Targets are clipped at this multiple of the white level.
         depth_shares: How often each of `lens.depths_mm` is drawn, relative to the others; empty
             for equally often.
+        known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
+            `camkit process --depth-m` gives it; the others' has the mean kernel.
     """
 
     picture_share: float = 0.8
@@ -113,8 +115,10 @@ class DataRecipe:
     drift_turn_deg: float = 5.0
     target_max: float = 4.0
     depth_shares: tuple[float, ...] = ()
+    known_depth_share: float = 0.0
 
     def __post_init__(self) -> None:
+        _check_share("data.known_depth_share", self.known_depth_share)
         _check_share("data.picture_share", self.picture_share)
         _check_share("data.border_share", self.border_share)
         _check_share("data.drift_share", self.drift_share)
@@ -267,6 +271,8 @@ class Recipe:
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
         if shares and shares != depths:
             raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
+        if self.data.known_depth_share and depths < 2:
+            raise ContractError("data.known_depth_share needs two or more lens.depths_mm")
 
     def network(self, size: str) -> NetworkRecipe:
         """Give the network of a size, or raise ContractError naming the sizes there are."""

@@ -50,6 +50,7 @@ class Exposure:
         factor: Exposure, 1 for the picture as it is.
         borders: Whether the picture ends at the (top, bottom, left, right) of the sample.
         drift: (size, turn in radians) of the copy's kernels against the traced ones.
+        depth_known: Whether the Wiener filter has the kernel of the copy's depth.
     """
 
     x_mm: float
@@ -61,6 +62,7 @@ class Exposure:
     factor: float = 1.0
     borders: Sides = (False, False, False, False)
     drift: tuple[float, float] = (1.0, 0.0)
+    depth_known: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,6 +134,8 @@ def draw_exposure(rng: Generator, recipe: Recipe, bank: PsfBank) -> Exposure:
         factor=float(2.0**stops),
         borders=(bool(borders[0]), bool(borders[1]), bool(borders[2]), bool(borders[3])),
         drift=_draw_drift(rng, recipe),
+        # drawn last, and only where asked for: other recipes keep their samples
+        depth_known=data.known_depth_share > 0 and rng.random() < data.known_depth_share,
     )
 
 
@@ -197,7 +201,11 @@ def make_sample(
         Circumstances(
             noise=noise,
             gains=gains,
-            frozen=bank.frozen_kernels(exposure.block_x_mm, exposure.block_y_mm),
+            frozen=bank.frozen_kernels(
+                exposure.block_x_mm,
+                exposure.block_y_mm,
+                exposure.copy % bank.depths if exposure.depth_known else None,
+            ),
             illumination=illumination,
         ),
         recipe,

@@ -68,6 +68,10 @@ def test_several_depths_give_every_copy_at_each_and_their_mean_kernel(small, tra
     each.append(build_lens_bank(replace(small, lens=replace(lens, depths_mm=())), DUET).frozen)
     assert np.allclose(deep.frozen, np.mean(each, axis=0), atol=1e-7)
     assert np.abs(each[0] - each[1]).max() > 1e-3
+    assert deep.frozen_depths is None
+    known = replace(small.data, known_depth_share=0.5)
+    apart = build_lens_bank(replace(small, lens=lens, data=known), DUET).frozen_depths
+    assert np.allclose(apart, each, atol=1e-7)
 
 
 def test_banks_without_depths_keep_the_names_of_their_files(small, tmp_path, monkeypatch):

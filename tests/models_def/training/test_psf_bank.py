@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.training.psf_bank import read_bank, write_bank
@@ -33,6 +34,15 @@ def test_depths_survive_the_disk_and_are_seen_by_the_digest(bank, tmp_path):
     deep = replace(bank, depths=bank.copies.shape[0] // 2)
     write_bank(tmp_path / "bank.npz", deep)
     assert read_bank(tmp_path / "bank.npz").depths == deep.depths
+    assert read_bank(tmp_path / "bank.npz").frozen_depths is None
+    with pytest.raises(ContractError, match="does not hold"):
+        deep.frozen_kernels(0.1, 0.2, 1)
+    apart = replace(deep, frozen_depths=np.stack([deep.frozen, deep.frozen[::-1]]))
+    write_bank(tmp_path / "apart.npz", apart)
+    again = read_bank(tmp_path / "apart.npz")
+    assert (again.digest(), again.digest() == deep.digest()) == (apart.digest(), False)
+    assert torch.equal(again.frozen_kernels(0.1, 0.2, 0), deep.frozen_kernels(0.1, 0.2))
+    assert not torch.equal(again.frozen_kernels(0.1, 0.2, 1), deep.frozen_kernels(0.1, 0.2))
     other = replace(bank, copies=np.repeat(bank.copies, 2, axis=0))
     assert replace(other, depths=2).digest() != other.digest()
 

@@ -116,6 +116,13 @@ def test_depths_that_do_not_increase_are_refused(recipe_path, depths_mm):
         to_recipe(table(recipe_path, lens__depths_mm=depths_mm))
 
 
+def test_only_several_depths_can_be_known(recipe_path):
+    with pytest.raises(ContractError, match="needs two or more"):
+        to_recipe(table(recipe_path, data__known_depth_share=0.5))
+    with pytest.raises(ContractError, match=r"must lie in 0\.\.1"):
+        to_recipe(table(recipe_path, data__known_depth_share=1.5))
+
+
 @pytest.mark.parametrize(
     ("shares", "message"),
     [([1.0], "1 entries"), ([1.0, 0.0], "positive"), ([1.0, float("inf")], "finite")],

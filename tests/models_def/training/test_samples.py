@@ -142,6 +142,37 @@ def test_drawn_exposures_stay_in_their_ranges(recipe, bank):
     assert 0.1 < at_border <= data.border_share + 0.05
 
 
+def test_the_filter_knows_the_depth_of_some_samples(recipe, bank):
+    wide = np.roll(bank.frozen, 1, axis=-1) / 2 + np.roll(bank.frozen, -1, axis=-1) / 2
+    apart = np.stack([bank.frozen, wide])
+    deep = replace(bank, copies=np.repeat(bank.copies, 2, axis=0), depths=2, frozen_depths=apart)
+    some = replace(
+        recipe,
+        lens=replace(recipe.lens, depths_mm=(500.0, 900.0)),
+        data=replace(recipe.data, known_depth_share=0.25),
+    )
+    drawn = [draw_exposure(np.random.default_rng(i), some, deep) for i in range(400)]
+    assert 70 < sum(e.depth_known for e in drawn) < 130
+    unaware = [draw_exposure(np.random.default_rng(i), recipe, deep) for i in range(400)]
+    assert [replace(e, depth_known=False) for e in drawn] == unaware, "the rest is drawn as ever"
+    side = scene_side_px(some, deep)
+    crop = np.random.default_rng(1).random((3, side, side), dtype=np.float32)
+    planes = {
+        (depth, known): make_sample(
+            crop,
+            replace(drawn[0], copy=depth, depth_known=known),
+            some,
+            deep,
+            np.random.default_rng(2),
+        ).planes
+        for depth in (0, 1)
+        for known in (False, True)
+    }
+    assert torch.equal(planes[0, True], planes[0, False]), "the mean is that of depth 0 here"
+    assert torch.equal(planes[1, True][:3], planes[1, False][:3]), "one capture"
+    assert not torch.equal(planes[1, True][3:], planes[1, False][3:]), "another filter"
+
+
 def test_depths_are_drawn_as_often_as_their_shares_say(recipe, bank):
     rng = np.random.default_rng(0)
     deep = replace(bank, copies=np.repeat(bank.copies, 3, axis=0), depths=3)
