@@ -4,6 +4,7 @@ The stages are those of `camkit.runtime.job.reconstruction`, joined so that the 
 all methods share, is computed once; a test holds both to the same bits.
 """
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
@@ -137,16 +138,26 @@ class Rig:
             have = [size for size in sizes if size in before.manifest.networks]
             self.networks += tuple(_trained(before, size, f"{size} {BEFORE}") for size in have)
         self._stage = stage
-        self._kernels = color_kernels(
-            bundle.psf, *bundle.manifest.camera.channel_response.to_arrays()
-        )
-        heights_mm = bundle.psf.field_heights_mm
         self.lens = nominal_lens(bundle)
-        self.assumed_lens = replace(
-            self.lens, kernels_at=lambda x, y: kernel_at(self._kernels, heights_mm, x, y)
-        )
+        self.assume(None)
         self._lights: dict[str, Light] = {}
+
+    def assume(self, depth_mm: float | None) -> None:
+        """Give the bank the kernels of a depth, as `--depth-m` does; None for the mean kernel."""
+        response = self.bundle.manifest.camera.channel_response.to_arrays()
+        kernels = color_kernels(self.bundle.psf, *response, depth_mm=depth_mm)
+        heights_mm = self.bundle.psf.field_heights_mm
+        self._kernels = kernels
+        self.assumed_lens = replace(
+            self.lens, kernels_at=lambda x, y: kernel_at(kernels, heights_mm, x, y)
+        )
         self._last: tuple[Capture, Restored] | None = None
+
+    def told(self, depth_mm: float) -> "Rig":
+        """Give a rig like this one whose methods know the depth."""
+        other = copy.copy(self)
+        other.assume(depth_mm)
+        return other
 
     @property
     def methods(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from camkit.report.stress.score import Judge
 from tests.deep_bundle import write_deep_bundle
 
 (DEPTH,) = choose("depth")
+(KNOWN,) = choose("known_depth")
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +51,21 @@ def test_the_input_is_best_at_the_focus_and_chi2_goes_by_the_kernels_of_the_bank
     expected = deep.psf.kernels.mean(axis=1)[0, 0]
     np.testing.assert_allclose(mean[1], expected, atol=0.01)
     assert focused.max() > 1.5 * mean.max()
+
+
+def test_a_bank_that_is_told_the_depth_has_its_kernel_and_the_rig_forgets_it(
+    deep: Bundle, bundle: Bundle, scene: Scene
+) -> None:
+    assert "no several depths" in (KNOWN.applies(bundle) or "")
+    judge = Judge(Rig(deep, ("M",)))
+    blind, known = DEPTH.for_bundle(deep), KNOWN.for_bundle(deep)
+    assert (known.values, known.nominal) == (blind.values, blind.nominal)
+    for value in known.values:
+        told, untold = (s.take(judge, scene, value).outcomes for s in (known, blind))
+        assert told["input"].psnr_db == untold["input"].psnr_db
+        assert told["wiener"].psnr_db != untold["wiener"].psnr_db
+        assert told["M"].chi2 is None
+        if value == known.nominal:  # sharp there: the mean kernel takes a blur away that is none
+            assert (told["wiener"].psnr_db or 0) > (untold["wiener"].psnr_db or 0) + 1
+    again = blind.take(judge, scene, 0.5).outcomes["wiener"].psnr_db
+    assert again == blind.take(Judge(Rig(deep, ("M",))), scene, 0.5).outcomes["wiener"].psnr_db

@@ -1,0 +1,36 @@
+"""As the scenario `depth`, but the methods are told the depth: what `--depth-m` is worth."""
+
+from dataclasses import replace
+
+from camkit.bundle.reader import Bundle
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scenarios.lens import depth
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge, Verdict, see
+from camkit.report.stress.twin import lens_at
+from camkit.units import MM_PER_M
+
+
+def depths_of(bundle: Bundle) -> Scenario:
+    """Give the scenario with the depths of a bundle."""
+    fitted = depth.depths_of(bundle)
+    return replace(SCENARIO, values=fitted.values, nominal=fitted.nominal, quick=fitted.quick)
+
+
+def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:
+    rig, depth_mm = judge.rig, value * MM_PER_M
+    shot = rig.shoot(scene, lens_at(rig.bundle, depth_mm))
+    restored = rig.told(depth_mm).restore(shot)
+    return Verdict(outcomes=judge.judge(shot, restored, with_chi2=False), seen=see(rig, shot))
+
+
+SCENARIO = replace(
+    depth.SCENARIO,
+    name="known_depth",
+    title="Depth of the scene, known",
+    shoot=None,
+    measure=_measure,
+    fit=depths_of,
+    note="The whole scene lies at one depth, and the methods have the kernels of it. chi^2 is not "
+    "judged: it would be calibrated at every depth anew. 1000 m stands for infinity.",
+)
