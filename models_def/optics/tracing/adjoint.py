@@ -12,7 +12,7 @@ Refraction is d' = ratio d + bend N, bend = (T - ratio D) / N.N, with D = N.d an
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import torch
 from torch import Tensor
@@ -51,6 +51,9 @@ class Gradients(NamedTuple):
     thickness: list[Tensor]
     indices: list[Tensor]
 
+
+_WILD: Final = {torch.float32: 1e15, torch.float64: 1e100}
+"""The largest derivative by a place or direction that is still followed."""
 
 Gather = Callable[[Tensor, Tensor], Tensor]
 
@@ -117,6 +120,7 @@ def pull_back(
         push = torch.addcmul(push, bent.z, before.n)
         push = push if path is None else push + path * p.before
         push = push / bent.facing
+        shape, bent, push, g = _tamed(shape, bent, push, g)
         aspheric = plan.aspheric[i]
         _collect(p, wanted, shape, bent, push, total, gather, aspheric=aspheric)
         if wanted.index:
@@ -132,6 +136,47 @@ def pull_back(
         total.even_asphere[::-1],
         total.thickness[::-1],
         total.indices[::-1],
+    )
+
+
+def _tamed(
+    shape: _Shape, bent: _Bent, push: Tensor, g: State
+) -> tuple[_Shape, _Bent, Tensor, State]:
+    """Let rays go whose derivatives leave what their numbers can hold; they point nowhere.
+
+    A lens far from any that forms an image can multiply a derivative by 1e9 at every surface; in
+    single precision it becomes infinite, and infinity minus infinity is no number.
+    """
+    cube = shape.inverse * shape.inverse * shape.inverse
+    size = (push.abs() + (bent.lean * cube).abs()) * (1 + shape.rho)
+    size = size + bent.x.abs() + bent.y.abs() + bent.z.abs() + bent.slope_facing.abs()
+    size = size if bent.ratio is None else size + bent.ratio.abs()
+    calm = size < _WILD[push.dtype]  # false for what is no number
+    if not torch.compiler.is_compiling() and bool(calm.all()):
+        return shape, bent, push, g
+
+    def tame(value: Tensor, instead: float = 0.0) -> Tensor:
+        return torch.where(calm, value, instead)
+
+    return (
+        _Shape(
+            rho=tame(shape.rho),
+            root=tame(shape.root, 1.0),
+            inverse=tame(shape.inverse, 1.0),
+            lean=tame(shape.lean),
+            length2=tame(shape.length2, 1.0),
+        ),
+        _Bent(
+            x=tame(bent.x),
+            y=tame(bent.y),
+            z=tame(bent.z),
+            lean=tame(bent.lean),
+            facing=bent.facing,
+            slope_facing=tame(bent.slope_facing),
+            ratio=None if bent.ratio is None else tame(bent.ratio),
+        ),
+        tame(push),
+        State(*(tame(part) for part in g)),
     )
 
 

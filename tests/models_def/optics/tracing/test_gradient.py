@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
@@ -194,6 +194,7 @@ def test_memory_saved_for_backward_is_as_stated(monkeypatch: pytest.MonkeyPatch)
 
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 10**6), single=st.booleans())
+@example(seed=614438, single=True)  # derivatives beyond what single precision can hold
 def test_no_lens_of_the_box_gives_nan_in_value_or_gradient(seed: int, single: bool) -> None:
     """Curvature +-0.3 / mm, conic +-10, terms to r^12 that move the rim by up to +-3 mm, gaps
     -3..50 mm, index 1..4, rays within 15 mm and slope 1, rims of 12 mm or none."""
