@@ -50,6 +50,7 @@ from camkit.models_def.optics.prescription import Lens, format_prescription, par
 from camkit.models_def.training.checkpoint import Checkpoint, load_network, read_checkpoint
 from camkit.models_def.training.recipe import Recipe, differing_camera, to_recipe
 from camkit.runtime.check import check_bundle
+from camkit.runtime.geometry.distortion import distort_points
 from camkit.runtime.golden_run import develop_case
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -217,8 +218,8 @@ def _lens_of(
 def _check_lens(lens: Lens, psf: FrozenPsf, path: Path) -> None:
     """Refuse a PSF that was frozen from another lens: no two have the same distortion."""
     own, frozen = trace_distortion(lens, psf.distortion.radius_mm), psf.distortion
-    powers = np.linspace(0.0, 1.0, 33)[:, None] ** np.array([1, 3, 5, 7])
-    off_mm = np.abs(powers @ (own.coefficients - frozen.coefficients).T).max() * frozen.radius_mm
+    along = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
+    off_mm = np.abs(distort_points(along, own) - distort_points(along, frozen)).max()
     off_px = off_mm * UM_PER_MM / psf.pixel_pitch_um
     if off_px > SAME_LENS_PX:
         raise ContractError(

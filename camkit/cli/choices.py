@@ -10,7 +10,7 @@ Debug = Annotated[
 ]
 """Read by `camkit.cli.app.run`, which sees all arguments; commands only declare it."""
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUT.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")]
 Quality = Annotated[
     str,
     typer.Option(help="exact (M, skips nothing), best (largest size), adaptive or draft."),

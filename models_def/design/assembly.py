@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -15,7 +14,7 @@ from camkit.models_def.design.optics import WIDEST_PX, LensModule, fitting_windo
 from camkit.models_def.design.recipe import DesignRecipe, OpticsRecipe
 from camkit.models_def.design.sensor import Recorder
 from camkit.models_def.design.starts import Starts, best_judged, best_starts
-from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.catalog import build_network, check_patch
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_image
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
@@ -104,12 +103,7 @@ def network_of(recipe: DesignRecipe) -> nn.Module | None:
         return None
     torch.manual_seed(recipe.schedule.seed)
     network = build_network(choice.name, **choice.config)
-    stride_px: Any = network.stride_px
-    if recipe.schedule.patch_px % stride_px:
-        raise ContractError(
-            f"schedule.patch_px must be a multiple of {stride_px} for {choice.name}; "
-            f"got {recipe.schedule.patch_px}"
-        )
+    check_patch(choice.name, network, recipe.schedule.patch_px)
     wanted = recipe.front.channels
     if network.in_channels != wanted:
         raise ContractError(

@@ -36,6 +36,19 @@ _BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
 NETWORK_NAMES: Final = tuple(_BUILDERS)
 
 
+def check_patch(name: str, network: nn.Module, patch_px: int) -> None:
+    """Refuse the side of a patch that a network cannot take.
+
+    Raises:
+        ContractError: If it is not a multiple of the network's stride.
+    """
+    stride_px: Any = network.stride_px
+    if patch_px < 1 or patch_px % stride_px:
+        raise ContractError(
+            f"schedule.patch_px must be a multiple of {stride_px} for {name}; got {patch_px}"
+        )
+
+
 def build_network(name: str, **config: Any) -> nn.Module:
     """Build an untrained network.
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.catalog import build_network, check_patch
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.training.checkpoint import (
@@ -170,7 +170,9 @@ def train(
     torch.set_num_threads(options.threads)
     recipe = read_recipe(recipe_path)
     entry = recipe.network(options.size)
-    _check_patch(entry, entry.schedule if stage is None else stage.schedule)
+    schedule = entry.schedule if stage is None else stage.schedule
+    # before anything is traced
+    check_patch(entry.network, build_network(entry.network, **entry.config), schedule.patch_px)
     path = checkpoint_path(recipe, options, stage)
     if path.exists() and not (options.resume or options.overwrite):
         raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
@@ -194,16 +196,6 @@ def checkpoint_path(recipe: Recipe, options: TrainOptions, stage: Stage | None) 
     """Give the file that a run writes its checkpoints to."""
     name = f"{recipe.name}_{options.size}" + ("" if stage is None else f"_{stage.name}")
     return options.out_dir / f"{name}.pt"
-
-
-def _check_patch(entry: NetworkRecipe, schedule: ScheduleRecipe) -> None:
-    """Refuse patches that the network cannot take, before anything is traced."""
-    stride_px: Any = build_network(entry.network, **entry.config).stride_px
-    if schedule.patch_px < 1 or schedule.patch_px % stride_px:
-        raise ContractError(
-            f"patch_px must be a multiple of {stride_px} for {entry.network}; "
-            f"got {schedule.patch_px}"
-        )
 
 
 def _start(path: Path | None, entry: NetworkRecipe, data: str) -> tuple[State | None, str]:
@@ -234,10 +226,8 @@ class _Run:
         stage: Stage | None,
     ) -> None:
         self.options, self.cases, self.bank_digest = options, cases, bank.digest()
-        self.toml, self.lens_toml = (
-            recipe_path.read_text(encoding="utf-8"),
-            format_prescription(lens),
-        )
+        self.toml = recipe_path.read_text(encoding="utf-8")
+        self.lens_toml = format_prescription(lens)
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
         credit = ""
