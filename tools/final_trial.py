@@ -94,7 +94,7 @@ def row(name: str, weights: str, folder: Path, steps: int, start: Path) -> str:
     """Run one final stage and give its row."""
     began = time.process_time()
     path, recipe, bank = write_recipe(folder, steps, weights)
-    stage = make_stage(recipe, FinalOptions(start=start))
+    stage = make_stage(recipe, FinalOptions(start=start, size="full"))
     result = train(path, options(folder, "full"), bank=bank, stage=stage)
     last: dict[str, Any] = [e for e in read_log(result.log) if "loss" in e][-1]
     error = colour_error(result.checkpoint, recipe, bank)

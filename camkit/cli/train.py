@@ -34,11 +34,11 @@ def train(
     ),
     start: Annotated[
         Path | None,
-        typer.Option(help="First weights: a checkpoint of the same network, of any camera."),
+        typer.Option(help="First weights: a checkpoint or bundle of any camera, same network."),
     ] = None,
     final: Annotated[
         Path | None,
-        typer.Option(help="Final stage: fine-tune this checkpoint against two discriminators."),
+        typer.Option(help="Final stage: fine-tune a checkpoint or bundle against discriminators."),
     ] = None,
     vgg: Annotated[
         Path | None, typer.Option(help="With --final: VGG-19 weights (.pth or .safetensors).")
@@ -63,11 +63,11 @@ def train(
 
     stage: Stage | None = None
     if final is not None:
-        stage = _final_stage(recipe, final, vgg, pairs, device)
+        stage = _final_stage(recipe, final, size, vgg, pairs, device)
         if start is not None:
-            raise ContractError("--final FROM.pt has its own start; leave --start away")
+            raise ContractError("--final FROM has its own start; leave --start away")
     elif vgg is not None or pairs is not None:
-        raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM.pt too")
+        raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM too")
     result = run(
         recipe,
         TrainOptions(
@@ -91,7 +91,7 @@ def train(
 
 
 def _final_stage(
-    recipe: Path, start: Path, vgg: Path | None, pairs: Path | None, device: str
+    recipe: Path, start: Path, size: str, vgg: Path | None, pairs: Path | None, device: str
 ) -> "Stage":
     from camkit.models_def.training.final.stage import WITHOUT_VGG, FinalOptions, make_stage
     from camkit.models_def.training.recipe import read_recipe
@@ -99,6 +99,11 @@ def _final_stage(
     if vgg is None:
         typer.echo(f"camkit: {WITHOUT_VGG}", err=True)
     options = FinalOptions(
-        start=start, vgg=vgg, pairs=pairs, device=device, recipe_folder=recipe.parent
+        start=start,
+        size=size,
+        vgg=vgg,
+        pairs=pairs,
+        device=device,
+        recipe_folder=recipe.parent,
     )
     return make_stage(read_recipe(recipe), options)

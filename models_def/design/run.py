@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import pickle
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from camkit.models_def.optics.lens_file.lens_file import write_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.finish import finished
 from camkit.models_def.optics.search.problem import valid_share
+from camkit.models_def.training.checkpoint import read_table
 
 FORMAT: Final = 2
 
@@ -148,13 +148,8 @@ class DesignRun:
     def _load(self) -> None:
         if not self.checkpoint.exists():
             return
-        try:
-            table = torch.load(self.checkpoint, map_location="cpu", weights_only=True)
-        except (OSError, pickle.UnpicklingError, RuntimeError, EOFError) as error:
-            raise ContractError(
-                f"{self.checkpoint} is no checkpoint of a design: {error}"
-            ) from error
-        if not isinstance(table, dict) or table.get("format") != FORMAT:
+        table = read_table(self.checkpoint)
+        if table["format"] != FORMAT or "digest" not in table:
             raise ContractError(f"{self.checkpoint} is no design checkpoint of format {FORMAT}")
         if table["digest"] != recipe_digest(self.recipe):
             raise ContractError(

@@ -71,19 +71,39 @@ def read_checkpoint(path: Path) -> Checkpoint:
     Raises:
         ContractError: If it is missing, no checkpoint, or of another format.
     """
+    return to_checkpoint(path, read_table(path))
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """Read what torch saved, tensors and plain values only; no code from it runs.
+
+    Raises:
+        ContractError: If it is missing or something else.
+    """
     try:
         table = torch.load(path, map_location="cpu", weights_only=True)
     except OSError as error:
         raise ContractError(f"cannot read checkpoint {path}: {error.strerror}") from error
     except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
         raise ContractError(f"{path} is no checkpoint of camkit: {error}") from error
-    if not isinstance(table, dict) or table.pop("format", None) != FORMAT:
+    if not isinstance(table, dict) or "format" not in table:
+        raise ContractError(f"{path} is no checkpoint of camkit")
+    return table
+
+
+def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
+    """Make the checkpoint of training from what was read.
+
+    Raises:
+        ContractError: If it is of another format.
+    """
+    entries = {"lens_toml": ""} | table
+    if entries.pop("format", None) != FORMAT:
         raise ContractError(f"{path} is no checkpoint of format {FORMAT}; train again")
-    table.setdefault("lens_toml", "")
-    missing = {f.name for f in fields(Checkpoint)} ^ set(table)
+    missing = {f.name for f in fields(Checkpoint)} ^ set(entries)
     if missing:
         raise ContractError(f"checkpoint {path} has wrong entries: {', '.join(sorted(missing))}")
-    return Checkpoint(**table)
+    return Checkpoint(**entries)
 
 
 def load_network(checkpoint: Checkpoint) -> nn.Module:

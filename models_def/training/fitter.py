@@ -6,12 +6,12 @@ import torch
 from torch import Tensor, nn
 
 from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.training.checkpoint import State
+from camkit.models_def.training.first_weights import FirstWeights, take_first_weights
 from camkit.models_def.training.losses import patch_errors, training_loss
 from camkit.models_def.training.pool import Batch
 from camkit.models_def.training.recipe import NetworkRecipe
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
-
-State = dict[str, Tensor]
 
 
 class Fits(Protocol):
@@ -49,13 +49,15 @@ class Fits(Protocol):
 class Fitter:
     """Fits one network to batches; holds no clock, no file and no random state."""
 
-    def __init__(self, entry: NetworkRecipe, device: str, start: State | None = None) -> None:
-        """Build the network with random weights, or with those of `start`."""
+    def __init__(
+        self, entry: NetworkRecipe, device: str, first: FirstWeights | None = None
+    ) -> None:
+        """Build the network with random weights, or with the first ones given."""
         self.schedule, self.device = entry.schedule, torch.device(device)
         torch.manual_seed(entry.schedule.seed)
         self.network = _to_device(build_network(entry.network, **entry.config), self.device)
-        if start is not None:
-            self.network.load_state_dict(start)
+        if first is not None:
+            take_first_weights(self.network, first)
         self.averaged = _to_device(build_network(entry.network, **entry.config), self.device)
         self.averaged.load_state_dict(self.network.state_dict())
         self._average = [p.detach() for p in self.averaged.parameters()]

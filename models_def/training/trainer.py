@@ -5,7 +5,6 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
 """
 
 import time
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,11 +18,15 @@ from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
-    State,
     read_checkpoint,
     write_checkpoint,
 )
 from camkit.models_def.training.credits import describe_data
+from camkit.models_def.training.first_weights import (
+    FirstWeights,
+    read_first_weights,
+    take_first_weights,
+)
 from camkit.models_def.training.fitter import Fits, Fitter
 from camkit.models_def.training.lens_bank import build_lens_bank
 from camkit.models_def.training.log import RunLog
@@ -35,7 +38,6 @@ from camkit.models_def.training.recipe import (
     Recipe,
     ScheduleRecipe,
     read_recipe,
-    to_recipe,
 )
 from camkit.models_def.training.schedule import progress_of
 from camkit.models_def.training.validation import (
@@ -61,8 +63,8 @@ class TrainOptions:
         valid_folder: Pictures to choose by; None for procedural scenes.
         steps: Steps of the whole schedule; None for the recipe's.
         max_minutes: Wall time after which the schedule, decay included, ends; None for its steps.
-        start: Checkpoint of the same network, of another camera say, whose averaged weights are
-            the first ones; None for random weights.
+        start: Checkpoint or bundle with the same network, of another camera say, whose weights
+            are the first ones; None for random weights.
         stop_at_step: Stop there though the schedule goes on, as an interruption would.
         resume: Go on from the checkpoint in `out_dir`.
         overwrite: Start anew over a checkpoint that lies there.
@@ -139,12 +141,14 @@ class Stage:
         name: Behind the size in the names of its files.
         schedule: Used instead of the network's.
         make_fitter: From the network's entry, with that schedule, and the kernels.
+        first: Weights that the fitter starts from.
         credit: What the stage adds to the training data, for the card.
     """
 
     name: str
     schedule: ScheduleRecipe
     make_fitter: Callable[[NetworkRecipe, PsfBank], Fits]
+    first: FirstWeights | None = None
     credit: str = ""
 
 
@@ -172,7 +176,13 @@ def train(
     entry = recipe.network(options.size)
     schedule = entry.schedule if stage is None else stage.schedule
     # before anything is traced
-    check_patch(entry.network, build_network(entry.network, **entry.config), schedule.patch_px)
+    network = build_network(entry.network, **entry.config)
+    check_patch(entry.network, network, schedule.patch_px)
+    first = None if stage is None else stage.first
+    if options.start is not None:
+        first = read_first_weights(options.start, options.size)
+    if first is not None:
+        take_first_weights(network, first)
     path = checkpoint_path(recipe, options, stage)
     if path.exists() and not (options.resume or options.overwrite):
         raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
@@ -187,7 +197,7 @@ def train(
     with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
         pool.start_workers(options.workers)
         cases = make_cases(recipe, bank, options.valid_folder)
-        run = _Run(recipe_path, lens, bank, cases, options, stage)
+        run = _Run(recipe_path, lens, bank, cases, options, stage, first)
         run.loop(pool, bar)
         return run.result()
 
@@ -196,21 +206,6 @@ def checkpoint_path(recipe: Recipe, options: TrainOptions, stage: Stage | None) 
     """Give the file that a run writes its checkpoints to."""
     name = f"{recipe.name}_{options.size}" + ("" if stage is None else f"_{stage.name}")
     return options.out_dir / f"{name}.pt"
-
-
-def _start(path: Path | None, entry: NetworkRecipe, data: str) -> tuple[State | None, str]:
-    """Give the first weights and what the card says of them beside the data of this run."""
-    if path is None:
-        return None, ""
-    saved = read_checkpoint(path)
-    if (saved.network, saved.config) != (entry.network, dict(entry.config)):
-        raise ContractError(
-            f"{path} holds {saved.network} with {saved.config}; the recipe wants {entry.network} "
-            f"with {dict(entry.config)}"
-        )
-    camera = to_recipe(tomllib.loads(saved.recipe_toml)).name
-    before = "the same" if saved.training_data == data else saved.training_data
-    return saved.average, f"; first weights: {camera} {saved.size}, trained on {before}"
 
 
 class _Run:
@@ -224,24 +219,23 @@ class _Run:
         cases: list[Case],
         options: TrainOptions,
         stage: Stage | None,
+        first: FirstWeights | None,
     ) -> None:
         self.options, self.cases, self.bank_digest = options, cases, bank.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
         self.lens_toml = format_prescription(lens)
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
-        credit = ""
         data = describe_data(self.recipe, options.data_folder)
+        self.data = data + ("" if first is None else first.credit(data))
         if stage is None:
-            weights, credit = _start(options.start, self.entry, data)
-            self.fitter: Fits = Fitter(self.entry, options.device, weights)
+            self.fitter: Fits = Fitter(self.entry, options.device, first)
         else:
-            credit = stage.credit
+            self.data += stage.credit
             self.entry = replace(self.entry, schedule=stage.schedule)
             self.fitter = stage.make_fitter(self.entry, bank)
         self.steps = options.steps or self.entry.schedule.steps
         self.path = checkpoint_path(self.recipe, options, stage)
-        self.data = data + credit
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
         if options.resume:

@@ -5,7 +5,6 @@ batch (+ real pairs) -> generator -> views -+-> discriminators, scores of output
                   weights of the generator <- total loss, eq. (6.14)
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,10 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from camkit.errors import ContractError
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
-from camkit.models_def.networks.full_unet import FullUnet, start_from_trimmed
-from camkit.models_def.training.checkpoint import Checkpoint
+from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.final.adversarial import discriminator_loss, generator_loss
 from camkit.models_def.training.final.content import (
     Views,
@@ -26,7 +23,8 @@ from camkit.models_def.training.final.content import (
 )
 from camkit.models_def.training.final.pairs import PairSamples
 from camkit.models_def.training.final.vgg import VggFeatures
-from camkit.models_def.training.fitter import Fitter, State
+from camkit.models_def.training.first_weights import FirstWeights
+from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.pool import Batch
 from camkit.models_def.training.recipe import FinalRecipe, NetworkRecipe
 from camkit.models_def.training.schedule import learning_rate
@@ -40,14 +38,14 @@ class FinalParts:
     """What the final stage is given besides its recipe.
 
     Attributes:
-        start: Checkpoint whose averaged weights the generator starts from.
+        first: Weights that the generator starts from.
         to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
         features: VGG-19, or None.
         pairs: Samples of real pairs, or None.
         device: cpu or cuda.
     """
 
-    start: Checkpoint
+    first: FirstWeights
     to_rec709: Tensor
     features: VggFeatures | None = None
     pairs: PairSamples | None = None
@@ -59,9 +57,7 @@ class FinalFitter:
 
     def __init__(self, entry: NetworkRecipe, final: FinalRecipe, parts: FinalParts) -> None:
         self.final, self.schedule, self._pairs = final, entry.schedule, parts.pairs
-        self.generator = Fitter(entry, parts.device)
-        start_generator(self.generator.network, entry, parts.start)
-        self.generator.averaged.load_state_dict(self.generator.network.state_dict())
+        self.generator = Fitter(entry, parts.device, parts.first)
         device = self.generator.device
         self._to_rec709 = parts.to_rec709.float().to(device)
         self._features = None if parts.features is None else parts.features.to(device)
@@ -171,33 +167,3 @@ class FinalFitter:
         self.generator.load(weights, average, optimizer["generator"])
         self._optimizer.load_state_dict(optimizer["opponents"])
         self.opponents.load_state_dict(optimizer["opponent_weights"])
-
-
-def start_generator(network: nn.Module, entry: NetworkRecipe, start: Checkpoint) -> tuple[str, ...]:
-    """Give a generator the averaged weights of a checkpoint, in place.
-
-    Args:
-        network: Of the recipe's entry.
-        entry: The recipe's entry.
-        start: The same network, or the trimmed U-Net of which a full one is the extension.
-
-    Returns:
-        Names of the tensors that were copied.
-
-    Raises:
-        ContractError: If the checkpoint is of another network.
-    """
-    if isinstance(network, FullUnet) and start.network == "trimmed_unet":
-        return start_from_trimmed(network, start.average)
-    if start.network != entry.network or not _fits(network.state_dict(), start.average):
-        raise ContractError(
-            f"the final stage of {entry.network} starts from a checkpoint of the same network (or "
-            f"a full_unet from a trimmed_unet); got {start.network} with {dict(start.config)}"
-        )
-    network.load_state_dict(start.average)
-    return tuple(start.average)
-
-
-def _fits(wanted: Mapping[str, Tensor], found: Mapping[str, Tensor]) -> bool:
-    shapes = [{name: t.shape for name, t in state.items()} for state in (wanted, found)]
-    return shapes[0] == shapes[1]

@@ -12,10 +12,10 @@ from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.training.checkpoint import read_checkpoint
 from camkit.models_def.training.final.fitter import FinalFitter, FinalParts
 from camkit.models_def.training.final.pairs import PairSamples, read_pairs
 from camkit.models_def.training.final.vgg import file_digest, read_vgg
+from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.fitter import Fits
 from camkit.models_def.training.psf_bank import PsfBank
 from camkit.models_def.training.recipe import NetworkRecipe, Recipe
@@ -35,7 +35,8 @@ class FinalOptions:
     """What the final stage is given.
 
     Attributes:
-        start: Checkpoint to start from.
+        start: Checkpoint or bundle to start from.
+        size: Which network of the recipe; of a bundle with several, that of the same name.
         vgg: Weights of VGG-19; None compares sRGB values instead of features.
         pairs: Folder of real pairs.
         device: cpu or cuda.
@@ -43,6 +44,7 @@ class FinalOptions:
     """
 
     start: Path
+    size: str
     vgg: Path | None = None
     pairs: Path | None = None
     device: str = "cpu"
@@ -68,7 +70,7 @@ def make_stage(
     Raises:
         ContractError: If a file is not what it should be.
     """
-    start = read_checkpoint(options.start)
+    first = read_first_weights(options.start, options.size)
     features = None if options.vgg is None else read_vgg(options.vgg)
     matrix = rec709_from_camera(np.array(recipe.camera.color_matrix))
 
@@ -83,7 +85,7 @@ def make_stage(
                 seed=entry.schedule.seed,
             )
         parts = FinalParts(
-            start=start,
+            first=first,
             to_rec709=torch.from_numpy(matrix),
             features=features,
             pairs=pairs,
@@ -95,6 +97,7 @@ def make_stage(
         name=STAGE_NAME,
         schedule=recipe.final.schedule,
         make_fitter=make_fitter,
+        first=first,
         credit=_credit(options),
     )
 

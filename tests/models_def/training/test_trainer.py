@@ -105,7 +105,7 @@ def test_weights_of_another_camera_are_the_first_ones_and_the_card_says_so(
 
 
 def test_weights_of_another_network_are_refused(tmp_path, recipe_path, bank, whole):
-    with pytest.raises(ContractError, match="the recipe wants"):
+    with pytest.raises(ContractError, match="holds another network than the recipe's"):
         train(recipe_path, options(tmp_path, start=whole.checkpoint, size="M"), bank=bank)
     with pytest.raises(ContractError, match="has begun"):
         options(tmp_path, start=whole.checkpoint, resume=True)

@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.training.checkpoint import read_checkpoint
 from camkit.models_def.training.final.fitter import FinalFitter, FinalParts
 from camkit.models_def.training.final.pairs import PairSamples
+from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.pool import Batch
 from camkit.models_def.training.recipe import to_recipe
 from tests.models_def.training.conftest import RECIPE
@@ -21,8 +21,8 @@ def make(final_recipe, trimmed_checkpoint):
     def build(pairs=None, **changes):
         final = replace(final_recipe.final, **changes)
         entry = replace(final_recipe.network("full"), schedule=final.schedule)
-        start = read_checkpoint(trimmed_checkpoint)
-        parts = FinalParts(start=start, to_rec709=torch.eye(3), pairs=pairs)
+        first = read_first_weights(trimmed_checkpoint, "full")
+        parts = FinalParts(first=first, to_rec709=torch.eye(3), pairs=pairs)
         return FinalFitter(entry, final, parts)
 
     return build

@@ -12,7 +12,9 @@ from camkit.models_def.training.trainer import TrainOptions, train
 
 def run(folder, recipe_path, recipe, bank, start, **changes):
     given = {"out_dir": folder, "size": "full", "workers": 0} | changes
-    stage = make_stage(recipe, FinalOptions(start=start), distort=lambda *_: None)
+    stage = make_stage(
+        recipe, FinalOptions(start=start, size=given["size"]), distort=lambda *_: None
+    )
     return train(recipe_path, TrainOptions(**given), bank=bank, stage=stage)
 
 
@@ -57,7 +59,7 @@ def test_another_network_is_no_start(
     tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint
 ):
     given = (tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint)
-    with pytest.raises(ContractError, match="starts from a checkpoint of the same network"):
+    with pytest.raises(ContractError, match="holds another network than the recipe's"):
         run(*given, size="S")
 
 
