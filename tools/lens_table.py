@@ -122,6 +122,12 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--network", help="name in the catalogue, in place of the recipe's")
     parser.add_argument("--front", choices=("none", "wiener"), help="in place of the recipe's")
+    parser.add_argument(
+        "--filter-margin-px",
+        type=int,
+        help="recorded around a patch for the filter, in place of the recipe's; half of the "
+        "largest window serves every lens",
+    )
     parser.add_argument("--depths-mm", help="such as 500,700,1000,1500")
     parser.add_argument("--object-mm", type=float, default=1000.0)
     parser.add_argument("--f-number", type=float, default=4.0)
@@ -161,7 +167,11 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
         epoch_steps=max(1, round(schedule.epoch_steps * steps / schedule.steps)),
         valid_steps=max(1, steps // 10),
     )
-    front = replace(recipe.front, kind=arguments.front or recipe.front.kind)
+    front = replace(
+        recipe.front,
+        kind=arguments.front or recipe.front.kind,
+        filter_margin_px=arguments.filter_margin_px or recipe.front.filter_margin_px,
+    )
     config = {**recipe.network.config, "in_channels": front.channels}
     network = replace(recipe.network, config=config)
     if arguments.network:

@@ -164,7 +164,9 @@ class DesignRun:
         """Put the best lens in place, write it, and tell what became of the run."""
         self.loop.take_best()
         lens = self.loop.parts.lens
-        write_lens(finished(lens.problem, lens.scaled().detach()), self.lens_file)
+        found = finished(lens.problem, lens.scaled().detach())
+        note = f"camkit design, recipe {self.recipe.name}, from {found.name}"
+        write_lens(replace(found, name=self.recipe.name, note=note), self.lens_file)
         entries = [json.loads(line) for line in self.log.read_text("utf-8").splitlines()]
         return {
             "name": self.recipe.name,
