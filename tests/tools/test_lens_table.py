@@ -80,3 +80,22 @@ def test_two_lenses_of_one_name_are_refused(
     options = [recipe, "--lens", "a/lens.toml", "b/lens.toml", "--out-dir", tmp_path]
     with pytest.raises(SystemExit, match="two lenses are called lens"):
         _call(monkeypatch, *options)
+
+
+def test_a_wider_margin_gives_the_filter_all_of_a_wide_kernel(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    recipe = tmp_path / "strip.toml"
+    recipe.write_text(RECIPE, encoding="utf-8")
+    pages = {}
+    for margin in (4, 16):
+        out = tmp_path / str(margin)
+        options = [recipe, "--lens", "aca254-050-a", "--seeds", 1, "--out-dir", out]
+        options += ["--front", "wiener", "--filter-margin-px", margin]
+        options += ["--largest-kernel-px", 33, "--patches", 1]
+        assert _call(monkeypatch, *options) == 0
+        report = json.loads((out / "lens_table.json").read_text(encoding="utf-8"))
+        assert report["recovered_px"] == 24 + 2 * margin
+        pages[margin] = (out / "lens_table.md").read_text(encoding="utf-8")
+    assert "which it mars" in pages[4]
+    assert "which it mars" not in pages[16]

@@ -32,7 +32,10 @@ def test_a_stopped_run_goes_on_and_leaves_lens_log_and_checkpoint(
     assert torch.equal(resumed.loop.parts.lens.moves, whole.loop.parts.lens.moves)
     report = resumed.finish()
     lens = read_lens(Path(report["lens"]))
-    assert (lens.name, lens.note) == (recipe.name, f"camkit design, recipe {recipe.name}, from duet")
+    assert (lens.name, lens.note) == (
+        recipe.name,
+        f"camkit design, recipe {recipe.name}, from duet",
+    )
     assert paraxial_data(lens).efl_mm == pytest.approx(50, abs=2)
     entries = [json.loads(line) for line in resumed.log.read_text().splitlines()]
     assert [entry["step"] for entry in entries] == [0, 3, 6]
