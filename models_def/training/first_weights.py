@@ -44,7 +44,9 @@ class FirstWeights:
 
     def credit(self, data: str) -> str:
         """Say for the card where training began; `data` is what it goes on with."""
-        before = "the same" if self.training_data == data else self.training_data
+        before = self.training_data
+        if data and before.startswith(data):
+            before = "the same" + before.removeprefix(data)
         return f"; first weights: {self.whose}, trained on {before}"
 
 

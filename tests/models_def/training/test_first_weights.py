@@ -53,6 +53,8 @@ def test_networks_of_a_built_in_bundle_can_be_trained_further(bundle, size):
     assert equal(state_of_onnx(graph), network.state_dict())
     assert first.credit("other pictures").startswith(f"; first weights: {bundle} {size}, trained ")
     assert first.credit(first.training_data).endswith("trained on the same")
+    pictures = first.training_data.split(";")[0]
+    assert pictures not in first.credit(pictures)
 
 
 def test_bundle_without_the_size_names_those_it_has():
