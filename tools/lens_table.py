@@ -167,11 +167,9 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
         epoch_steps=max(1, round(schedule.epoch_steps * steps / schedule.steps)),
         valid_steps=max(1, steps // 10),
     )
-    front = replace(
-        recipe.front,
-        kind=arguments.front or recipe.front.kind,
-        filter_margin_px=arguments.filter_margin_px or recipe.front.filter_margin_px,
-    )
+    front = replace(recipe.front, kind=arguments.front or recipe.front.kind)
+    if arguments.filter_margin_px is not None:
+        front = replace(front, filter_margin_px=arguments.filter_margin_px)
     config = {**recipe.network.config, "in_channels": front.channels}
     network = replace(recipe.network, config=config)
     if arguments.network:

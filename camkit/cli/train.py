@@ -64,8 +64,6 @@ def train(
     stage: Stage | None = None
     if final is not None:
         stage = _final_stage(recipe, final, size, vgg, pairs, device)
-        if start is not None:
-            raise ContractError("--final FROM has its own start; leave --start away")
     elif vgg is not None or pairs is not None:
         raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM too")
     result = run(

@@ -180,6 +180,8 @@ def train(
     check_patch(entry.network, network, schedule.patch_px)
     first = None if stage is None else stage.first
     if options.start is not None:
+        if stage is not None:
+            raise ContractError(f"the {stage.name} stage has its own start; leave start away")
         first = read_first_weights(options.start, options.size)
     if first is not None:
         take_first_weights(network, first)

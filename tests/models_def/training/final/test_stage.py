@@ -63,5 +63,14 @@ def test_another_network_is_no_start(
         run(*given, size="S")
 
 
+def test_a_stage_takes_no_second_start(
+    tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint
+):
+    stage = make_stage(final_recipe, FinalOptions(start=trimmed_checkpoint, size="full"))
+    options = TrainOptions(out_dir=tmp_path, size="full", start=trimmed_checkpoint)
+    with pytest.raises(ContractError, match="final stage has its own start"):
+        train(final_recipe_path, options, bank=final_bank, stage=stage)
+
+
 def test_log_holds_every_term(whole):
     assert read_log(whole.log)[-1]["valid_db"] == pytest.approx(whole.valid_db)
