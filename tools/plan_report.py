@@ -51,7 +51,7 @@ def main() -> int:
     calibrate.add_argument("--bundle", default="duet", help="name or path")
     calibrate.add_argument("--data", type=Path, help="folder of sharp pictures (train_open)")
     calibrate.add_argument("--pictures", type=int, default=24, help="how many of them")
-    calibrate.add_argument("--procedural", type=int, default=5, help="generated scenes besides")
+    calibrate.add_argument("--procedural", type=int, default=25, help="generated scenes besides")
     calibrate.add_argument("--out", type=Path, help="JSON file for `camkit export --plan`")
     calibrate.add_argument("--write", type=Path, help="bundle to store the plan in")
     report = commands.add_parser("report", help="saving and loss on unseen scenes")
@@ -118,7 +118,8 @@ def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
             height, width = (side // 2 * 2 for side in picture.shape[1:])
             yield paths[index].name, np.ascontiguousarray(picture[:, :height, :width])
     for index in range(options.procedural):
-        kind, generator = list(GENERATORS.items())[index % len(GENERATORS)]
+        # One kind after the other: in turn, a kind would meet the same place in the field always.
+        kind, generator = list(GENERATORS.items())[index * len(GENERATORS) // options.procedural]
         seed = PROCEDURAL_SEED + index
         yield f"{kind}:{seed}", generator(seed, 1024, 1024)
 

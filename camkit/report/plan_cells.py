@@ -48,12 +48,12 @@ class CaptureCells:
 def photograph(
     bundle: Bundle, scene: FloatArray, *, number: int, iso: float, exposure: float = 1.0
 ) -> Simulation:
-    """Photograph a picture at a place of the sensor that its number chooses.
+    """Photograph a picture at a place of the sensor and a distance that its number chooses.
 
     Args:
         bundle: The camera.
         scene: (3, h, w) linear Rec.709.
-        number: Decides field position, quadrant and noise.
+        number: Decides field position, quadrant, distance (of those the PSF knows) and noise.
         iso: Sensitivity.
         exposure: Factor on the scene.
     """
@@ -62,12 +62,13 @@ def photograph(
     sensor = (camera.width_px, camera.height_px)
     share = FIELD_SHARES[number % len(FIELD_SHARES)]
     origin = crop_origin(size, sensor, share, QUADRANTS[number % len(QUADRANTS)])
+    depths_mm = bundle.psf.depths_mm
     options = SimulationOptions(
         iso=iso,
         seed=1000 * number + int(iso),
         origin_px=origin,
         exposure=exposure,
-        depth_mm=bundle.reference_depth_mm,
+        depth_mm=float(depths_mm[number % depths_mm.size]),
     )
     return simulate(scene, camera, bundle.psf, options)
 
