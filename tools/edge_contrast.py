@@ -14,20 +14,23 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.colorimetry import apply_matrix, rec709_from_camera
-from camkit.contracts import FloatArray, depth_name
+from camkit.contracts import depth_name
 from camkit.models_def.design.edge import ACROSS, Across, EdgeContrast, edge_contrast, slanted_edge
 from camkit.report.quality import FIELD_SHARES, crop_origin
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.simulate import SimulationOptions, simulate
+
+Plane = NDArray[np.floating[Any]]
 
 SIDE_PX: Final = 512
 """Of a capture: further than any of our networks sees, and more than a block of the bank."""
@@ -89,13 +92,13 @@ class Row:
         )
 
 
-def main(given: Sequence[str] | None = None) -> None:
+def main() -> None:
     """Measure, write, draw and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("bundle", nargs="+", help="built-in names or files")
     parser.add_argument("--out-dir", type=Path, default=Path("out/contrast"))
     parser.add_argument("--draws", type=int, default=4, help="of the noise, averaged")
-    options = parser.parse_args(given)
+    options = parser.parse_args()
     rows = []
     print(
         "| camera | distance | method | at 0.1 | at 0.25 | at 0.5 | up to | climbs | only falls |"
@@ -133,7 +136,7 @@ def _edges(
     scene = slanted_edge(SIDE_PX, across).float().numpy()
     matrix = rec709_from_camera(np.array(camera.color_matrix, dtype=np.float64))
     truth = scene[1]
-    shown: dict[str, list[FloatArray]] = {method: [] for method in pipelines}
+    shown: dict[str, list[Plane]] = {method: [] for method in pipelines}
     for share in FIELD_SHARES:
         origin = crop_origin((SIDE_PX, SIDE_PX), (camera.width_px, camera.height_px), share, CORNER)
         sums = {method: np.zeros((SIDE_PX, SIDE_PX)) for method in pipelines}
@@ -160,7 +163,7 @@ def _edges(
     }
 
 
-def _middle(plane: FloatArray) -> FloatArray:
+def _middle(plane: Plane) -> Plane:
     cut = (SIDE_PX - SEEN_PX) // 2
     return np.ascontiguousarray(plane[cut:-cut, cut:-cut])
 
