@@ -2,11 +2,11 @@
 
     python -m tools.edge_contrast duet duet-joint trio-edof --out-dir out/contrast
 
-An edge of 4 : 1 along the rows and one along the columns of the sensor are photographed through
-the bundle's PSF at five places between middle and corner and at every distance that the PSF
-knows, and processed as `camkit process` does it, in sensor geometry. Contrast is that of green
-against the sharp edge (ISO 12233, `camkit.models_def.design.edge`). Writes `contrast.json` and
-`contrast.png`, and prints a Markdown table.
+An edge of 4 : 1 (`--levels`) along the rows and one along the columns of the sensor are
+photographed through the bundle's PSF at five places between middle and corner and at every
+distance that the PSF knows, and processed as `camkit process` does it, in sensor geometry.
+Contrast is that of green against the sharp edge (ISO 12233, `camkit.models_def.design.edge`).
+Writes `contrast.json` and `contrast.png`, and prints a Markdown table.
 """
 
 import argparse
@@ -24,7 +24,14 @@ from numpy.typing import NDArray
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import depth_name
-from camkit.models_def.design.edge import ACROSS, Across, EdgeContrast, edge_contrast, slanted_edge
+from camkit.models_def.design.edge import (
+    ACROSS,
+    LEVELS,
+    Across,
+    EdgeContrast,
+    edge_contrast,
+    slanted_edge,
+)
 from camkit.report.quality import FIELD_SHARES, crop_origin
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -41,6 +48,19 @@ CORNER: Final = (1, 1)
 ROUNDING: Final = 4
 LINES: Final[dict[Across, str]] = {"tangential": "-", "sagittal": "--"}
 """Of the chart: the edge along the rows, the edge along the columns."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shots:
+    """What is photographed.
+
+    Attributes:
+        levels: Linear, of the dark and the bright side of an edge.
+        draws: Of the noise; the pictures are averaged.
+    """
+
+    levels: tuple[float, float]
+    draws: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,30 +117,35 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("bundle", nargs="+", help="built-in names or files")
     parser.add_argument("--out-dir", type=Path, default=Path("out/contrast"))
+    parser.add_argument(
+        "--levels", type=float, nargs=2, default=LEVELS, help="linear, of the dark and bright side"
+    )
     parser.add_argument("--draws", type=int, default=4, help="of the noise, averaged")
     options = parser.parse_args()
+    low, high = options.levels
+    shots = Shots(levels=(low, high), draws=options.draws)
     rows = []
     print(
         "| camera | distance | method | at 0.1 | at 0.25 | at 0.5 | up to | climbs | only falls |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for name in options.bundle:
-        for row in measure(open_bundle(find_bundle(name)), options.draws):
+        for row in measure(open_bundle(find_bundle(name)), shots):
             rows.append(row)
             print(row.line(), flush=True)
     options.out_dir.mkdir(parents=True, exist_ok=True)
-    write(rows, options.out_dir / "contrast.json")
+    write(rows, shots, options.out_dir / "contrast.json")
     draw(rows, options.out_dir / "contrast.png")
 
 
-def measure(bundle: Bundle, draws: int) -> list[Row]:
+def measure(bundle: Bundle, shots: Shots) -> list[Row]:
     """Measure every method of a bundle at every distance."""
     pipelines = {"wiener": Pipeline(bundle, Options(method="wiener", undistort=False))}
     for size in bundle.manifest.networks:
         pipelines[size] = Pipeline(bundle, Options(size=size, undistort=False))
     rows = []
     for depth_mm in bundle.psf.depths_mm.tolist():
-        found = {across: _edges(bundle, pipelines, across, depth_mm, draws) for across in ACROSS}
+        found = {across: _edges(bundle, pipelines, across, depth_mm, shots) for across in ACROSS}
         for method in pipelines:
             curves = {across: found[across][method] for across in ACROSS}
             depth = depth_name(depth_mm)
@@ -129,18 +154,18 @@ def measure(bundle: Bundle, draws: int) -> list[Row]:
 
 
 def _edges(
-    bundle: Bundle, pipelines: dict[str, Pipeline], across: Across, depth_mm: float, draws: int
+    bundle: Bundle, pipelines: dict[str, Pipeline], across: Across, depth_mm: float, shots: Shots
 ) -> dict[str, EdgeContrast]:
     """Give the contrast (place, frequency) that each method leaves."""
     camera = bundle.manifest.camera
-    scene = slanted_edge(SIDE_PX, across).float().numpy()
+    scene = slanted_edge(SIDE_PX, across, shots.levels).float().numpy()
     matrix = rec709_from_camera(np.array(camera.color_matrix, dtype=np.float64))
     truth = scene[1]
     shown: dict[str, list[Plane]] = {method: [] for method in pipelines}
     for share in FIELD_SHARES:
         origin = crop_origin((SIDE_PX, SIDE_PX), (camera.width_px, camera.height_px), share, CORNER)
         sums = {method: np.zeros((SIDE_PX, SIDE_PX)) for method in pipelines}
-        for seed in range(draws):
+        for seed in range(shots.draws):
             taken = SimulationOptions(
                 iso=ISO, seed=seed, origin_px=origin, depth_mm=depth_mm, distort=False
             )
@@ -153,7 +178,7 @@ def _edges(
                     white_balance=simulation.white_balance,
                     origin_px=origin,
                 )
-                sums[method] += restored[1] / draws
+                sums[method] += restored[1] / shots.draws
         for method, picture in sums.items():
             shown[method].append(_middle(picture))
     sharp = torch.from_numpy(_middle(truth))
@@ -168,7 +193,7 @@ def _middle(plane: Plane) -> Plane:
     return np.ascontiguousarray(plane[cut:-cut, cut:-cut])
 
 
-def write(rows: Sequence[Row], path: Path) -> None:
+def write(rows: Sequence[Row], shots: Shots, path: Path) -> None:
     """Write all curves as JSON."""
     found = [
         {
@@ -186,7 +211,13 @@ def write(rows: Sequence[Row], path: Path) -> None:
         }
         for row in rows
     ]
-    content = {"field_shares": FIELD_SHARES, "iso": ISO, "rows": found}
+    content = {
+        "field_shares": FIELD_SHARES,
+        "iso": ISO,
+        "levels": shots.levels,
+        "draws": shots.draws,
+        "rows": found,
+    }
     path.write_text(json.dumps(content) + "\n", encoding="utf-8")
 
 

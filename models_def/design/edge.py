@@ -56,18 +56,19 @@ class EdgeContrast:
         return self.rise <= _RISE
 
 
-def slanted_edge(side_px: int, across: Across) -> Tensor:
+def slanted_edge(side_px: int, across: Across, levels: tuple[float, float] = LEVELS) -> Tensor:
     """Give a linear picture (3, side, side) of an edge through its middle, dark to bright.
 
     Args:
         side_px: Of the picture.
         across: `tangential`: the level changes along the rows' direction of counting (y, the
             field's direction); `sagittal`: along x.
+        levels: Linear, of the dark and the bright side.
     """
     fine = (torch.arange(side_px * _FINE, dtype=torch.float64) + 0.5) / _FINE - side_px / 2
     bright = (_distance(fine[:, None], fine[None], across) > 0).to(torch.float64)
     share = bright.reshape(side_px, _FINE, side_px, _FINE).mean((1, 3))
-    low, high = LEVELS
+    low, high = levels
     return (low + (high - low) * share).expand(3, -1, -1).contiguous()
 
 
