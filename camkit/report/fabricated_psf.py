@@ -16,8 +16,12 @@ from camkit.errors import ContractError
 
 PRESCRIPTION: Final = "prescription.toml"
 MAX_SIDE_PX: Final = 161
+LARGER_PX: Final = 50
+"""The window may be as wide as the first, and wider by the second than the bundle's kernels."""
 ENERGY: Final = 0.997
-"""Share of light inside the traced kernels; more than a frozen PSF must hold."""
+LEAST_ENERGY: Final = 0.95
+"""Share of light inside the traced kernels: more than a frozen PSF must hold, and what will do
+where a lens throws its light farther than the widest window."""
 
 
 def fabricated_psf(
@@ -41,13 +45,17 @@ def fabricated_psf(
     text = lens_text(bundle, prescription)
     shape = bundle.psf.kernels.shape
     content = [text, bundle.manifest.camera.model_dump_json(), repr((shape[:3], seed))]
-    content.append(repr((MAX_SIDE_PX, ENERGY, [bundle.reference_depth_mm])))
+    content.append(repr((_max_side_px(bundle.psf), ENERGY, [bundle.reference_depth_mm])))
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"psf-{seed}-{name}.safetensors"
     if not cached.exists():
         cache_folder.mkdir(parents=True, exist_ok=True)
         write_psf(cached, _trace(bundle, text, seed))
     return read_psf(cached)
+
+
+def _max_side_px(psf: FrozenPsf) -> int:
+    return max(MAX_SIDE_PX, int(psf.kernels.shape[-1]) + LARGER_PX)
 
 
 def lens_text(bundle: Bundle, prescription: Path | None) -> str:
@@ -77,7 +85,8 @@ def _trace(bundle: Bundle, text: str, seed: int) -> FrozenPsf:
         wavelengths=psf.wavelengths_um.size,
         depths_mm=(bundle.reference_depth_mm,),
         energy=ENERGY,
-        max_side_px=MAX_SIDE_PX,
+        max_side_px=_max_side_px(psf),
+        least_energy=LEAST_ENERGY,
     )
     _, copy = focused_copies(parse_prescription(text), 2, seed)
     return freeze(copy, bundle.manifest.camera, dense_grid(frozen_grid)).psf

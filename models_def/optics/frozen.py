@@ -54,6 +54,8 @@ class FreezeGrid:
             for that of the lens.
         energy: Least share of the light of every colour that the kernels must hold.
         max_side_px: Largest odd kernel side.
+        least_energy: What kernels of that side must hold where they do not hold `energy`; None:
+            `energy`.
         rays: In half the pupil, per wavelength traced.
     """
 
@@ -62,6 +64,7 @@ class FreezeGrid:
     depths_mm: tuple[float, ...] = ()
     energy: float = 0.995
     max_side_px: int = 151
+    least_energy: float | None = None
     rays: int = 4096
 
     def __post_init__(self) -> None:
@@ -225,6 +228,8 @@ def _smallest_side(traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid) -
         kept = float(_centre(colours, side_px).sum((-2, -1)).min())
         if kept >= grid.energy:
             return side_px, kept
+    if grid.least_energy is not None and kept >= grid.least_energy:
+        return grid.max_side_px, kept
     raise ContractError(
         f"kernels of {grid.max_side_px} px hold {kept:.4f} of the light, wanted {grid.energy}; "
         "raise max_side_px, lower the energy, or use a better lens"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.errors import ContractError
+from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.accuracy import INPUT, Key, Restorers, Scores, measure_accuracy
 from camkit.report.bench.case import BASE_SIZE, Case, Entrant, Ground, Skip
 from camkit.report.bench.crops import MOST_SAMPLES, CropCollector, Patch
@@ -186,7 +186,7 @@ class _Judged:
 def _judge(
     camera: Camera, cases: Sequence[Case], settings: Settings, folder: Path, tell: Tell
 ) -> _Judged:
-    """Measure the accuracy of all methods of one camera."""
+    """Measure the accuracy of all methods of one camera; without it the seconds still stand."""
     bundle, label = camera.entrant.bundle, camera.entrant.label
     own = [case for case in cases if case.camera == label]
     metrics = tuple(metric for metric in registered_metrics() if metric.applies(bundle))
@@ -199,9 +199,12 @@ def _judge(
             tell(f"{label}: judging {sample.caption} ({number}/{count})")
             yield sample
 
-    scores = measure_accuracy(
-        own, told(samples), Restorers(bundle, available_threads(None)), metrics, collector.take
-    )
+    restorers = Restorers(bundle, available_threads(None))
+    try:
+        scores = measure_accuracy(own, told(samples), restorers, metrics, collector.take)
+    except CamkitError as error:
+        tell(f"{label}: {error}")
+        return _Judged(scores={}, patches=[], metrics=metrics, text=f"not measured: {error}")
     return _Judged(scores=scores, patches=collector.patches, metrics=metrics, text=text)
 
 

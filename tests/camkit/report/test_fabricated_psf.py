@@ -9,6 +9,7 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
+from camkit.report import fabricated_psf as fabricated
 from camkit.report.fabricated_psf import fabricated_psf, lens_text
 from tests.bundle_factory import tiny_camera, tiny_manifest, tiny_members, tiny_psf
 
@@ -36,6 +37,18 @@ def test_the_grid_is_twice_and_three_times_as_dense(bundle: Bundle, tmp_path: Pa
     psf = traced(bundle, 1, tmp_path)
     assert psf.field_heights_mm.size == 2 * 2 - 1
     assert psf.wavelengths_um.size == 3 * 3 - 2
+
+
+def test_a_lens_that_throws_light_far_gets_the_widest_window(
+    bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fabricated, "MAX_SIDE_PX", 3)
+    side_px = bundle.psf.kernels.shape[-1] + fabricated.LARGER_PX
+    monkeypatch.setattr(fabricated, "ENERGY", 1.0)
+    assert traced(bundle, 1, tmp_path).kernels.shape[-1] == side_px
+    monkeypatch.setattr(fabricated, "LEAST_ENERGY", 1.0)
+    with pytest.raises(ContractError, match="of the light"):
+        traced(bundle, 3, tmp_path)
 
 
 def test_copies_differ_by_seed_and_from_the_design_and_are_kept(

@@ -8,6 +8,7 @@ import pytest
 
 from camkit.errors import BundleError, ContractError
 from camkit.report.bench.case import Axes
+from camkit.report.bench.output import write_bench
 from camkit.report.bench.run import open_entrants, run_bench
 from camkit.report.bench.settings import Settings
 from camkit.report.bench.timed_capture import timed_capture
@@ -48,6 +49,33 @@ def test_a_bench_measures_seconds_and_accuracy_of_every_row(tmp_path: Path) -> N
     assert len(result.patches["tiny"]) == 4
     assert result.report["machine"]["gemm_gmac_per_s"]["1"] > 0
     assert "tiny: timing M (1/2)" in told
+
+
+def test_seconds_stand_where_the_accuracy_cannot_be_measured(tmp_path: Path) -> None:
+    bundle = write_wide_bundle(tmp_path)
+    sharp = tmp_path / "sharp"
+    sharp.mkdir()
+    cv2.imwrite(str(sharp / "a.png"), np.zeros((20, 20, 3), np.uint8))
+    result = run_bench(
+        Settings(
+            bundles=(str(bundle.path),),
+            axes=Axes(methods=("net",), modes=("exact",), threads=(1,)),
+            repeat=1,
+            data=sharp,
+            work_dir=tmp_path / "work",
+            gemm_s=0.01,
+        )
+    )
+    (row,) = result.report["rows"]
+    assert row["n"] == 1
+    assert row["seconds_median"] > 0
+    assert row["psnr_db"] is None
+    assert row["images"] == 0
+    (camera,) = result.report["cameras"].values()
+    assert camera["accuracy"].startswith("not measured: ")
+    assert "20x20" in camera["accuracy"]
+    write_bench(result, tmp_path / "out")
+    assert "not measured" in (tmp_path / "out" / "bench.html").read_text(encoding="utf-8")
 
 
 def _copy(source: Path, target: Path) -> Path:
