@@ -32,6 +32,7 @@ from camkit.models_def.design.edge import (
     edge_contrast,
     slanted_edge,
 )
+from camkit.report.lens.lens_table import MOST_CONTRAST, worst_of_curves
 from camkit.report.quality import FIELD_SHARES, crop_origin
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -42,12 +43,12 @@ Plane = NDArray[np.floating[Any]]
 SIDE_PX: Final = 512
 """Of a capture: further than any of our networks sees, and more than a block of the bank."""
 SEEN_PX: Final = 128
-MOST: Final = 1.05
 ISO: Final = 100.0
 CORNER: Final = (1, 1)
 ROUNDING: Final = 4
+ALONG: Final[dict[Across, str]] = {"tangential": "rows", "sagittal": "columns"}
+"""Which way the edge runs: places lie on a diagonal, so neither follows the field."""
 LINES: Final[dict[Across, str]] = {"tangential": "-", "sagittal": "--"}
-"""Of the chart: the edge along the rows, the edge along the columns."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,19 +82,9 @@ class Row:
     curves: dict[Across, EdgeContrast]
 
     @property
-    def largest(self) -> float:
-        """Give the largest contrast over places, directions and frequencies."""
-        return max(float(curve.largest.max()) for curve in self.curves.values())
-
-    @property
-    def rise(self) -> float:
-        """Give how far a curve ever climbs again above what it had at a lower frequency."""
-        return max(float(curve.rise.max()) for curve in self.curves.values())
-
-    @property
-    def falling(self) -> float:
-        """Give the share of curves that never climb again by more than 0.02."""
-        return float(torch.cat([c.falls for c in self.curves.values()]).double().mean())
+    def worst(self) -> tuple[float, float, float]:
+        """Give the largest contrast, the largest rise, and the share of curves that only fall."""
+        return worst_of_curves(list(self.curves.values()))
 
     def mean_at(self, cycles_per_px: float) -> float:
         """Give the mean contrast over places and directions, at the nearest frequency."""
@@ -106,9 +97,10 @@ class Row:
     def line(self) -> str:
         """Give the row of the table."""
         means = " | ".join(f"{self.mean_at(cycles):.2f}" for cycles in (0.1, 0.25, 0.5))
+        largest, rise, falls = self.worst
         return (
             f"| {self.bundle} | {self.depth} | {self.method} | {means} "
-            f"| {self.largest:.2f} | {self.rise:.2f} | {self.falling:.0%} |"
+            f"| {largest:.2f} | {rise:.2f} | {falls:.0%} |"
         )
 
 
@@ -200,12 +192,10 @@ def write(rows: Sequence[Row], shots: Shots, path: Path) -> None:
             "bundle": row.bundle,
             "depth": row.depth,
             "method": row.method,
-            "largest": round(row.largest, ROUNDING),
-            "rise": round(row.rise, ROUNDING),
-            "falling": row.falling,
+            **dict(zip(("largest", "rise", "falling"), row.worst, strict=True)),
             "cycles_per_px": next(iter(row.curves.values())).cycles_per_px.tolist(),
             "contrast": {
-                across: np.round(curve.contrast.numpy(), ROUNDING).tolist()
+                ALONG[across]: np.round(curve.contrast.numpy(), ROUNDING).tolist()
                 for across, curve in row.curves.items()
             },
         }
@@ -244,7 +234,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                     label = row.method if across == "tangential" else None
                     style = {"color": f"C{index}", "linestyle": LINES[across], "label": label}
                     panel.plot(curve.cycles_per_px, curve.contrast[place], **style)
-            panel.axhline(MOST, color="0.7", linewidth=0.8)
+            panel.axhline(MOST_CONTRAST, color="0.7", linewidth=0.8)
             panel.set_title(f"{bundle}, {depth}, {FIELD_SHARES[place]:.0%}", fontsize=8)
     panels[0, 0].legend(fontsize=7)
     figure.supxlabel("cycles per pixel")

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camkit.models_def.design.edge import ACROSS
 from camkit.runtime.pipeline import Pipeline
 from tests.plan_factory import write_planned_bundle
 from tests.tiny_design import run_tool
@@ -16,7 +15,7 @@ from tools import edge_contrast
 
 def curves_of(row: dict[str, Any]) -> np.ndarray:
     """Give contrast (direction, place, frequency)."""
-    return np.array([row["contrast"][across] for across in ACROSS])
+    return np.array([row["contrast"][across] for across in ("rows", "columns")])
 
 
 def test_every_method_is_measured_and_a_step_twice_as_high_has_twice_the_contrast(
@@ -40,7 +39,7 @@ def test_every_method_is_measured_and_a_step_twice_as_high_has_twice_the_contras
     # a lens that hardly blurs, on pixels with a mosaic: all of the large, little of the finest
     assert bank[:, :, 0] == pytest.approx(1, abs=0.02)
     assert (bank[:, :, -1] < 0.3).all()
-    assert rows[0]["largest"] == pytest.approx(bank.max())
+    assert rows[0]["largest"] == pytest.approx(bank.max(), abs=1e-4)
     assert f"| {bank.max():.2f} |" in table[2]
 
     honest = Pipeline.process_array

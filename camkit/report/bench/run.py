@@ -75,6 +75,8 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
         DecodeError: If the given capture cannot be read.
     """
     folder = settings.folder()
+    if settings.data is not None:
+        list_set(settings.data, settings.images)  # an error now, not after the timing
     entrants = open_entrants(settings.bundles, settings.references)
     ground = Ground(
         threads=available_threads(None),
@@ -96,6 +98,11 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     machine["gemm_gmac_per_s"] = {str(n): round(peak, 2) for n, peak in sorted(peaks.items())}
     runs = time_cases(cases, cameras, settings.repeat, tell)
     judged = {c.entrant.label: _judge(c, cases, settings, folder, tell) for c in cameras.values()}
+    skips += [
+        Skip(what=f"accuracy of {label}", reason=found.error)
+        for label, found in judged.items()
+        if found.error is not None
+    ]
     return _join(cases, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
 
 
@@ -181,6 +188,7 @@ class _Judged:
     patches: list[Patch]
     metrics: tuple[Metric, ...]
     text: str
+    error: str | None = None
 
 
 def _judge(
@@ -203,8 +211,8 @@ def _judge(
     try:
         scores = measure_accuracy(own, told(samples), restorers, metrics, collector.take)
     except CamkitError as error:
-        tell(f"{label}: {error}")
-        return _Judged(scores={}, patches=[], metrics=metrics, text=f"not measured: {error}")
+        text = f"not measured: {error}"
+        return _Judged(scores={}, patches=[], metrics=metrics, text=text, error=str(error))
     return _Judged(scores=scores, patches=collector.patches, metrics=metrics, text=text)
 
 

@@ -35,6 +35,11 @@ def worst_contrast(entries: Sequence[Entry]) -> tuple[float, float, float]:
         for entry in entries
         for across in ACROSS
     ]
+    return worst_of_curves(curves)
+
+
+def worst_of_curves(curves: Sequence[EdgeContrast]) -> tuple[float, float, float]:
+    """Give the same of curves that are at hand."""
     return (
         max(float(c.largest.max()) for c in curves),
         max(float(c.rise.max()) for c in curves),

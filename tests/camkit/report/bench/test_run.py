@@ -74,8 +74,20 @@ def test_seconds_stand_where_the_accuracy_cannot_be_measured(tmp_path: Path) -> 
     (camera,) = result.report["cameras"].values()
     assert camera["accuracy"].startswith("not measured: ")
     assert "20x20" in camera["accuracy"]
+    (skip,) = (s for s in result.report["skipped"] if s["what"].startswith("accuracy of "))
+    assert "20x20" in skip["reason"]
     write_bench(result, tmp_path / "out")
     assert "not measured" in (tmp_path / "out" / "bench.html").read_text(encoding="utf-8")
+
+
+def test_a_folder_without_pictures_is_an_error_before_the_timing(tmp_path: Path) -> None:
+    told: list[str] = []
+    settings = Settings(
+        bundles=(str(write_tiny_bundle(tmp_path)),), data=tmp_path / "none", work_dir=tmp_path
+    )
+    with pytest.raises(ContractError, match="no folder"):
+        run_bench(settings, told.append)
+    assert told == []
 
 
 def _copy(source: Path, target: Path) -> Path:
