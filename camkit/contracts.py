@@ -18,6 +18,8 @@ from camkit.units import MM_PER_M
 CfaPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 CFA_PATTERNS: Final[tuple[CfaPattern, ...]] = get_args(CfaPattern)
 
+Symmetry = Literal["radial", "uniform", "grid"]
+
 FloatArray = NDArray[np.float32]
 
 PSF_SUM_TOLERANCE: Final = 1e-4
@@ -42,38 +44,37 @@ class NoiseModel:
     """Signal-dependent noise of a linear signal: variance = shot * signal + read_variance.
 
     Attributes:
-        shot: Variance per unit of signal, one per colour (R, G, B).
-        read_variance: Variance at zero signal, one per colour.
+        shot: Variance per unit of signal, one per channel.
+        read_variance: Variance at zero signal, one per channel.
     References: Foi et al. 2008; DNG specification 1.7, NoiseProfile.
     """
 
-    shot: tuple[float, float, float]
-    read_variance: tuple[float, float, float]
+    shot: tuple[float, ...]
+    read_variance: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        values = np.array([self.shot, self.read_variance], dtype=np.float64)
-        if values.shape != (2, 3) or not np.isfinite(values).all() or (values < 0).any():
+        values = np.array([*self.shot, *self.read_variance], dtype=np.float64)
+        same = 0 < len(self.shot) == len(self.read_variance)
+        if not same or not np.isfinite(values).all() or (values < 0).any():
             raise ContractError(
-                f"noise needs 3 finite values >= 0 each; got {self.shot}, {self.read_variance}"
+                "noise needs one finite value >= 0 of each kind for every channel; "
+                f"got {self.shot}, {self.read_variance}"
             )
 
-    def with_gains(self, gains: tuple[float, float, float]) -> "NoiseModel":
-        """Give the noise of the signal after multiplication by one gain per colour."""
-        r, g, b = gains
-        sr, sg, sb = self.shot
-        vr, vg, vb = self.read_variance
+    def with_gains(self, gains: tuple[float, ...]) -> "NoiseModel":
+        """Give the noise of the signal after multiplication by one gain per channel."""
         return NoiseModel(
-            shot=(sr * r, sg * g, sb * b),
-            read_variance=(vr * r * r, vg * g * g, vb * b * b),
+            shot=tuple(s * g for s, g in zip(self.shot, gains, strict=True)),
+            read_variance=tuple(v * g * g for v, g in zip(self.read_variance, gains, strict=True)),
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RadialDistortion:
-    """Radial distortion per colour: r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6).
+    """Radial distortion per channel: r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6).
 
     Attributes:
-        coefficients: (3, 4) float64, rows R, G, B; xi * (1, k1, k2, k3), for radii in units of
+        coefficients: (channel, 4) float64; xi * (1, k1, k2, k3), for radii in units of
             `radius_mm`. r is the ideal (undistorted) radius, r_d the radius on the sensor.
         radius_mm: The unit of r and r_d: half the diagonal of the sensor.
     References: Sun 2021, eq. (6.10) and (6.11).
@@ -83,30 +84,44 @@ class RadialDistortion:
     radius_mm: float
 
     def __post_init__(self) -> None:
-        if self.coefficients.shape != (3, 4) or not np.isfinite(self.coefficients).all():
-            raise ContractError(
-                f"distortion needs finite (3, 4) coefficients; got {self.coefficients.shape}"
-            )
+        shape = self.coefficients.shape
+        if (
+            len(shape) != 2
+            or shape[1] != 4
+            or not shape[0]
+            or not np.isfinite(self.coefficients).all()
+        ):
+            raise ContractError(f"distortion needs finite (channel, 4) coefficients; got {shape}")
         if not (np.isfinite(self.radius_mm) and self.radius_mm > 0):
             raise ContractError(f"distortion radius_mm must be > 0; got {self.radius_mm}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrozenPsf:
-    """The PSF of a camera, frozen on a grid of field heights, depths and wavelengths.
+    """The PSF of a camera, frozen on a grid of field positions, depths and wavelengths.
+
+    Its symmetry says what the fields are and how the kernels of other image points follow:
+
+        radial    a lens of revolution: image points along +y of the sensor; other azimuths by
+                  turning, and kernels are symmetric about their middle column
+        uniform   one field: the same kernel everywhere, turned nowhere
+        grid      image points on a grid over the sensor, row by row; blended between neighbours,
+                  turned nowhere
 
     Attributes:
         kernels: (field, depth, wavelength, h, w) float32, >= 0, each sums to 1. As they fall on
             the sensor (scatter, not flipped), h and w odd, the centre pixel on the chief ray of
-            the reference wavelength (so lateral colour lies in the kernels), for image points
-            along +y of the sensor; other azimuths are obtained by turning.
-        field_heights_mm: (field,) float64, increasing from 0: distance of the chief ray from the
-            axis on the sensor.
+            the reference wavelength (so lateral colour lies in the kernels).
+        field_heights_mm: (field,) float64: distance of the chief ray from the axis on the sensor;
+            increasing from 0, unless the fields are a grid.
         depths_mm: (depth,) float64, object distances, increasing; inf is allowed.
         wavelengths_um: (wavelength,) float64, increasing.
         pixel_pitch_um: Pitch of the kernel samples, equal to that of the sensor.
-        distortion: Radial distortion per colour.
+        distortion: Radial distortion per channel.
         relative_illumination: (field,) float64 > 0, 1 on the axis.
+        symmetry: See above.
+        grid_x_mm: (column,) float64, increasing: positions of a grid, to the right of the axis.
+        grid_y_mm: (row,) float64, increasing: positions of a grid, down the rows.
     """
 
     kernels: FloatArray
@@ -116,10 +131,14 @@ class FrozenPsf:
     pixel_pitch_um: float
     distortion: RadialDistortion
     relative_illumination: NDArray[np.float64]
+    symmetry: Symmetry = "radial"
+    grid_x_mm: NDArray[np.float64] | None = None
+    grid_y_mm: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         self._check_kernels()
         self._check_axes()
+        self._check_fields()
 
     def _check_kernels(self) -> None:
         if self.kernels.ndim != 5 or self.kernels.dtype != np.float32:
@@ -145,11 +164,12 @@ class FrozenPsf:
             raise ContractError(
                 f"axes have {[a.size for a in axes]} samples, kernels {self.kernels.shape[:3]}"
             )
-        if any((np.diff(a) <= 0).any() or np.isnan(a).any() for a in axes):
+        rising = axes if self.symmetry != "grid" else axes[1:]
+        if any((np.diff(a) <= 0).any() or np.isnan(a).any() for a in rising):
             raise ContractError("field heights, depths and wavelengths must increase")
         if self.depths_mm[0] <= 0:
             raise ContractError(f"depths lie in front of the lens, > 0; got {self.depths_mm[0]}")
-        if self.field_heights_mm[0] != 0:
+        if self.symmetry != "grid" and self.field_heights_mm[0] != 0:
             raise ContractError(f"the first field must be 0; got {self.field_heights_mm[0]}")
         light = self.relative_illumination
         if (
@@ -159,6 +179,32 @@ class FrozenPsf:
             raise ContractError("relative illumination needs one finite value > 0 per field")
         if not (np.isfinite(self.pixel_pitch_um) and self.pixel_pitch_um > 0):
             raise ContractError(f"pixel_pitch_um must be > 0; got {self.pixel_pitch_um}")
+
+    def _check_fields(self) -> None:
+        x_mm, y_mm = self.grid_x_mm, self.grid_y_mm
+        fields = self.field_heights_mm.size
+        if self.symmetry not in get_args(Symmetry):
+            known = ", ".join(get_args(Symmetry))
+            raise ContractError(f"symmetry must be one of {known}; got {self.symmetry!r}")
+        if self.symmetry != "grid":
+            if x_mm is not None or y_mm is not None:
+                raise ContractError("only fields of a grid have positions of a grid")
+            if self.symmetry == "uniform" and fields != 1:
+                raise ContractError(f"a uniform PSF has one field; got {fields}")
+            return
+        if x_mm is None or y_mm is None or x_mm.size * y_mm.size != fields:
+            raise ContractError(f"a grid needs a position for each of its {fields} fields")
+        if any((np.diff(a) <= 0).any() or not np.isfinite(a).all() for a in (x_mm, y_mm)):
+            raise ContractError("the positions of a grid must be finite and increase")
+        if not np.allclose(
+            self.field_heights_mm, grid_heights_mm(x_mm, y_mm), rtol=1e-6, atol=1e-9
+        ):
+            raise ContractError("field heights must be the distances of the grid from the axis")
+
+
+def grid_heights_mm(x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the distances (field,) of the positions of a grid from the axis, row by row."""
+    return np.hypot(y_mm[:, None], x_mm).ravel()
 
 
 def depth_weights(depths_mm: NDArray[np.float64], depth_mm: float | None) -> NDArray[np.float64]:

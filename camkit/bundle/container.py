@@ -19,8 +19,9 @@ from typing import Final
 
 from camkit.errors import BundleError
 
-MAX_BUNDLE_BYTES: Final = 64 * 2**20
-"""Cap on the sum of the uncompressed members (and on the file itself)."""
+MAX_BUNDLE_BYTES: Final = 128 * 2**20
+"""Cap on the sum of the uncompressed members (and on the file itself): kernels of 7 fields and 3
+wavelengths, 901 px a side, are 68 MB."""
 MAX_MEMBERS: Final = 64
 MAX_RATIO: Final = 100
 

@@ -4,9 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from camkit.bundle.camera import Entry, NonNegative, Positive
-
-Count = Annotated[int, Field(ge=0)]
+from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Word
 
 
 class HaloError(Entry):
@@ -22,14 +20,32 @@ class HaloError(Entry):
     psnr_db: float | None
 
 
+class Port(Entry):
+    """Some of the channels of a network's input or output, in order.
+
+    Attributes:
+        name: For people and error messages.
+        channels: How many.
+        scale: Samples along a side for one of the network's input; 1 for inputs.
+    """
+
+    name: Word
+    channels: Annotated[int, Field(gt=0, le=1024)]
+    scale: Annotated[int, Field(ge=1, le=16)] = 1
+
+
 class NetworkFacts(Entry):
     """One size of network: its member, and facts measured at export and verified by the check.
+
+    Pixels are those of the network's input.
 
     Attributes:
         member: Name of the fp32 ONNX in the bundle.
         fp16_member: Name of the fp16 ONNX, present only if its range is proven.
-        input_name: Name of the input, (1, input_channels, H, W) float32.
-        output_name: Name of the output, (1, output_channels, H, W) float32.
+        input_name: Name of the tensor (1, channels, H, W) float32 that holds all inputs.
+        inputs: What its channels are: one entry for each plane that the stage takes.
+        output_name: Name of the tensor (1, channels, scale H, scale W) float32 of all outputs.
+        outputs: What its channels are: one entry for each plane that the stage gives.
         receptive_field_radius_px: By the walk through the graph.
         receptive_field_probe_px: By perturbing pixels; the reach is the larger of the two.
         stride_px: H and W must be multiples of it.
@@ -39,8 +55,8 @@ class NetworkFacts(Entry):
         node_activation: The same per node.
         fp16_headroom: Factor by which HDR input may exceed the golden cases.
         fp16_safe: Whether max_activation * fp16_headroom stays below 65504 / 4.
-        mac_per_pixel: Multiplications per output pixel.
-        bytes_per_pixel: Peak of live activations in fp32 per output pixel.
+        mac_per_pixel: Multiplications per pixel.
+        bytes_per_pixel: Peak of live activations in fp32 per pixel.
         parity_max_abs: Largest |torch - ONNX| on golden and random input.
         parameters: Number of weights.
     """
@@ -48,9 +64,9 @@ class NetworkFacts(Entry):
     member: str
     fp16_member: str | None = None
     input_name: str = "input"
-    input_channels: Annotated[int, Field(gt=0, le=1024)] = 6
+    inputs: Annotated[tuple[Port, ...], Field(min_length=1, max_length=64)]
     output_name: str = "output"
-    output_channels: Annotated[int, Field(gt=0, le=1024)] = 3
+    outputs: Annotated[tuple[Port, ...], Field(min_length=1, max_length=64)]
     receptive_field_radius_px: Count
     receptive_field_probe_px: Count
     stride_px: Annotated[int, Field(gt=0, le=4096)]
@@ -69,10 +85,29 @@ class NetworkFacts(Entry):
     def _check(self) -> Self:
         if self.fp16_member is not None and not self.fp16_safe:
             raise ValueError("an fp16 member needs fp16_safe, that is a proven range")
+        if any(port.scale != 1 for port in self.inputs):
+            raise ValueError("the inputs of a network lie on its pixels: scale 1")
+        if len({port.scale for port in self.outputs}) > 1:
+            raise ValueError("the outputs of a network lie on one grid: one scale")
         halos = [entry.halo_px for entry in self.halo_error]
         if halos != sorted(set(halos)):
             raise ValueError(f"halo_error must come by increasing halo; got {halos}")
         return self
+
+    @property
+    def input_channels(self) -> int:
+        """Channels of all inputs."""
+        return sum(port.channels for port in self.inputs)
+
+    @property
+    def output_channels(self) -> int:
+        """Channels of all outputs."""
+        return sum(port.channels for port in self.outputs)
+
+    @property
+    def output_scale(self) -> int:
+        """Samples along a side of the outputs for one pixel."""
+        return self.outputs[0].scale
 
     @property
     def reach_px(self) -> int:

@@ -1,12 +1,13 @@
 """The golden cases of a bundle: what it must compute, packed as safetensors.
 
-Tensors of the case NAME, all but the first two optional:
+Tensors of the case NAME; pictures are float16 where its range holds them, and read as float32:
 
-    NAME.capture                 (h, w) uint16 mosaic in DN, or (3, h, w) float32 linear
-    NAME.reference               (3, h, w) float32, the sharp scene
-    NAME.output.SIZE             (3, h, w) float32, the pipeline's output with that size
-    NAME.network_input           (c, h, w) float32, what the network is given
-    NAME.network_output.SIZE     (c, h, w) float32, what it makes of it
+    NAME.capture                 (h, w) or (c, h, w): uint16 DN, or float32 linear
+    NAME.reference               (c, H, W), the sharp scene as the product `image` shows it
+    NAME.output.PRODUCT.SIZE     (c, H, W), what the pipeline makes of the capture with that size
+
+Bundles of format 1.0 know one product: their NAME.output.SIZE is NAME.output.image.SIZE, and their
+NAME.network_input and NAME.network_output.SIZE are not read.
 """
 
 from collections.abc import Mapping
@@ -21,51 +22,64 @@ from camkit.bundle.psf_file import read_tensors
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 
-MAX_SIDE_PX: Final = 192
-
-_SIZED: Final = ("output", "network_output")
-_SIZES: Final = ("S", "M", "L")
+MAX_SIDE_PX: Final = 1024
+IMAGE: Final = "image"
+_HALF_MAX: Final = 65504.0
+_CAPTURE_TYPES: Final = (np.uint8, np.uint16, np.uint32, np.float32)
+_OF_1_0: Final = ("network_input", "network_output")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoldenArrays:
-    """The arrays of one case; see the head of the module. Sizes are keys of the two mappings."""
+    """The arrays of one case; see the head of the module.
 
-    capture: NDArray[np.uint16] | FloatArray
+    Attributes:
+        capture: As the sensor gives it.
+        reference: (c, H, W) sharp scene.
+        outputs: Product -> size -> (c, H, W).
+    """
+
+    capture: NDArray[Any]
     reference: FloatArray
-    outputs: Mapping[str, FloatArray] = field(default_factory=dict)
-    network_input: FloatArray | None = None
-    network_outputs: Mapping[str, FloatArray] = field(default_factory=dict)
+    outputs: Mapping[str, Mapping[str, FloatArray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         capture = self.capture
-        plane = capture.ndim == 2 or (capture.ndim == 3 and capture.shape[0] == 3)
-        if not plane or capture.dtype not in (np.uint16, np.float32):
+        if capture.ndim not in (2, 3) or capture.dtype not in _CAPTURE_TYPES:
             raise ContractError(
-                "capture must be (h, w) uint16 or (3, h, w) float32; "
+                "capture must be (h, w) or (c, h, w) of uint8, uint16, uint32 or float32; "
                 f"got {capture.dtype} {capture.shape}"
             )
-        if max(capture.shape[-2:]) > MAX_SIDE_PX or min(capture.shape) < 1:
-            raise ContractError(f"a golden capture has 1 to {MAX_SIDE_PX} px a side")
-        for name, array in [("reference", self.reference), *self.outputs.items()]:
-            self._check_planes(name, array, channels=3)
-        if self.network_outputs and self.network_input is None:
-            raise ContractError("network outputs need the network input")
-        if self.network_input is not None:
-            self._check_planes("network_input", self.network_input, channels=None)
-        for name, array in self.network_outputs.items():
-            self._check_planes(name, array, channels=None)
+        _check_sides("capture", capture)
+        pictures = {"reference": self.reference} | {
+            f"{product} of size {size}": array
+            for product, sizes in self.outputs.items()
+            for size, array in sizes.items()
+        }
+        for name, array in pictures.items():
+            if array.dtype != np.float32 or array.ndim != 3 or not np.isfinite(array).all():
+                raise ContractError(
+                    f"{name} must be finite float32 (c, h, w); got {array.dtype} {array.shape}"
+                )
+            _check_sides(name, array)
+        for product, sizes in self.outputs.items():
+            shapes = {array.shape for array in sizes.values()}
+            if product == IMAGE:
+                shapes.add(self.reference.shape)
+            if len(shapes) > 1:
+                raise ContractError(
+                    f"all of {product} must have one shape (that of the reference for {IMAGE}); "
+                    f"got {', '.join(map(str, sorted(shapes)))}"
+                )
 
-    def _check_planes(self, name: str, array: FloatArray, *, channels: int | None) -> None:
-        if array.dtype != np.float32 or array.ndim != 3 or not np.isfinite(array).all():
-            raise ContractError(
-                f"{name} must be finite float32 (c, h, w); got {array.dtype} {array.shape}"
-            )
-        if channels is not None and array.shape != (channels, *self.capture.shape[-2:]):
-            raise ContractError(
-                f"{name} must have 3 planes of the capture's {self.capture.shape[-2:]}; "
-                f"got {array.shape}"
-            )
+    def output(self, product: str, size: str) -> FloatArray | None:
+        """Give what the pipeline makes of the capture, None if it is not stored."""
+        return self.outputs.get(product, {}).get(size)
+
+
+def _check_sides(name: str, array: NDArray[Any]) -> None:
+    if max(array.shape[-2:]) > MAX_SIDE_PX or min(array.shape) < 1:
+        raise ContractError(f"{name}: a golden picture has 1 to {MAX_SIDE_PX} px a side")
 
 
 def golden_to_bytes(cases: Mapping[str, GoldenArrays]) -> bytes:
@@ -73,54 +87,54 @@ def golden_to_bytes(cases: Mapping[str, GoldenArrays]) -> bytes:
     tensors: dict[str, NDArray[Any]] = {}
     for name, case in cases.items():
         tensors[f"{name}.capture"] = case.capture
-        tensors[f"{name}.reference"] = case.reference
-        if case.network_input is not None:
-            tensors[f"{name}.network_input"] = case.network_input
-        tensors |= {f"{name}.output.{size}": array for size, array in case.outputs.items()}
-        tensors |= {
-            f"{name}.network_output.{size}": array for size, array in case.network_outputs.items()
-        }
+        tensors[f"{name}.reference"] = _halved(case.reference)
+        for product, sizes in case.outputs.items():
+            tensors |= {
+                f"{name}.output.{product}.{size}": _halved(array) for size, array in sizes.items()
+            }
     return save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+
+
+def _halved(picture: FloatArray) -> NDArray[Any]:
+    """Give a picture in half precision, unless it leaves its range."""
+    return picture if np.abs(picture).max() > _HALF_MAX else picture.astype(np.float16)
 
 
 def golden_from_bytes(data: bytes) -> dict[str, GoldenArrays]:
     """Decode cases by name.
 
     Raises:
-        BundleError: If the file is damaged, a tensor is of no case or unknown kind, or shapes
-            disagree.
+        BundleError: If the file is damaged, a tensor is of no case or unknown, or shapes disagree.
     """
     tensors = read_tensors(data, what="golden.safetensors")
     parts: dict[str, dict[str, Any]] = {}
     for name, array in tensors.items():
-        case, kind, size = _split(name)
-        known = parts.setdefault(case, {"output": {}, "network_output": {}})
-        if kind in _SIZED:
-            known[kind][size] = array
-        else:
-            known[kind] = array
+        case, *rest = name.split(".")
+        known = parts.setdefault(case, {"outputs": {}})
+        match rest:
+            case ["capture"]:
+                known["capture"] = array
+            case ["reference"]:
+                known["reference"] = _widened(array)
+            case ["output", size]:
+                known["outputs"].setdefault(IMAGE, {})[size] = _widened(array)
+            case ["output", product, size]:
+                known["outputs"].setdefault(product, {})[size] = _widened(array)
+            case [old, *_] if old in _OF_1_0:
+                pass
+            case _:
+                raise BundleError(f"golden.safetensors: tensor {name!r} is of no known kind")
     return {name: _to_case(name, known) for name, known in sorted(parts.items())}
 
 
-def _split(name: str) -> tuple[str, str, str]:
-    case, _, rest = name.partition(".")
-    kind, _, size = rest.partition(".")
-    is_sized = kind in _SIZED and size in _SIZES
-    if not is_sized and (kind not in ("capture", "reference", "network_input") or size):
-        raise BundleError(f"golden.safetensors: tensor {name!r} is of no known kind")
-    return case, kind, size
+def _widened(picture: NDArray[Any]) -> NDArray[Any]:
+    return picture.astype(np.float32) if picture.dtype == np.float16 else picture
 
 
 def _to_case(name: str, known: Mapping[str, Any]) -> GoldenArrays:
     if missing := {"capture", "reference"} - known.keys():
         raise BundleError(f"golden case {name!r} lacks {' and '.join(sorted(missing))}")
     try:
-        return GoldenArrays(
-            capture=known["capture"],
-            reference=known["reference"],
-            outputs=known["output"],
-            network_input=known.get("network_input"),
-            network_outputs=known["network_output"],
-        )
+        return GoldenArrays(**known)
     except ContractError as error:
         raise BundleError(f"golden case {name!r}: {error}") from error

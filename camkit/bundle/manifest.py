@@ -1,91 +1,51 @@
-"""The manifest of a bundle, format 1.0: what `manifest.json` may say, and its JSON schema.
+"""The manifest of a bundle, format 2.0: what `manifest.json` may say, and its JSON schema.
 
     Manifest
-    |-- camera: Camera              sensor, levels, noise, colour (camkit/bundle/camera.py)
-    |-- input_contract, border      what kind of capture it takes; how the picture is continued
-    |-- stages: (Stage, ...)        what the pipeline does, in order (camkit/bundle/stages.py)
-    |-- networks: {size: NetworkFacts}   one per size: its member and the measured facts
-    |-- golden: (GoldenCase, ...)   the cases in golden.safetensors
-    |-- card, freeze                measured accuracy and speed; what freezing the PSF cost
-    |-- envelope, plan              optional: where it helps; thresholds and their cost
-    `-- members: {name: Member}     sha256 and size of every other file in the zip
+    |-- kind                         of camera (camkit/kinds.py)
+    |-- sensor: Sensor               what it gives, size, levels, noise, colour (sensor.py)
+    |-- optics: Optics | None        what the light goes through (optics.py)
+    |-- stages: (Stage, ...)         what the pipeline does, in order (stages/)
+    |-- planes: {name: Plane}        what runs from one stage to the next (plane.py, chain.py)
+    |-- products: {name: plane}      what comes out
+    |-- networks: {role: {size: NetworkFacts}}   members and measured facts (facts.py)
+    |-- golden: (GoldenCase, ...)    the cases in golden.safetensors
+    |-- card, freeze                 measured accuracy and speed; what freezing the PSF cost
+    |-- envelope, plan               optional: where it helps; thresholds and their cost
+    `-- members: {name: Member}      sha256 and size of every other file in the zip
 
-Unknown fields are refused, so a newer minor version is refused too: read `read_manifest`.
+Unknown fields are refused, so a newer minor version is refused too; format 1.0 is brought up to
+date by camkit/bundle/upgrade.py: read `read_manifest`.
 """
 
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, TypeVar
 
-from pydantic import AfterValidator, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-from camkit.bundle.camera import Camera, ChannelResponse, Entry, IsoNoise, NonNegative, Positive
-from camkit.bundle.facts import Card, CardRow, HaloError, NetworkFacts
-from camkit.bundle.stages import (
-    STAGE_ORDER,
-    Color,
-    Demosaic,
-    Illumination,
-    Network,
-    Stage,
-    Undistort,
-    WhiteBalance,
-    Wiener,
-)
+from camkit.bundle.chain import check_use, join_stages
+from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Sorted, Word
+from camkit.bundle.facts import Card, NetworkFacts
+from camkit.bundle.optics import Optics
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import Sensor
+from camkit.bundle.stages import JoinError, Network, Parts, Stage
+from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.errors import BundleError
 
-__all__ = [
-    "FORMAT_VERSION",
-    "Border",
-    "Camera",
-    "Card",
-    "CardRow",
-    "ChannelResponse",
-    "Color",
-    "Demosaic",
-    "GoldenCase",
-    "HaloError",
-    "Illumination",
-    "InputContract",
-    "IsoNoise",
-    "Manifest",
-    "Member",
-    "Network",
-    "NetworkFacts",
-    "NetworkSize",
-    "Range",
-    "Stage",
-    "Threshold",
-    "Undistort",
-    "WhiteBalance",
-    "Wiener",
-    "manifest_schema",
-    "manifest_to_bytes",
-    "read_manifest",
-]
-
-FORMAT_VERSION: Final = (1, 0)
+FORMAT_VERSION: Final = (2, 0)
+_OLDEST: Final = 1
 _S = TypeVar("_S", bound=Entry)
-NetworkSize = Literal["S", "M", "L"]
-"""Sizes of network, from fast to good."""
-InputContract = Literal["raw_bayer_v1", "linear_rgb_v1", "spad_counts_v1", "spad_histogram_v1"]
-"""raw_bayer_v1: (h, w) mosaic in DN; linear_rgb_v1: (3, h, w) linear, 1.0 = white level."""
+NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
+"""Name of a size of network; S, M and L from fast to good."""
 Border = Literal["reflect", "edge", "zero"]
-
-
-def _sorted(mapping: dict[str, Any]) -> dict[str, Any]:
-    return dict(sorted(mapping.items()))
-
-
-# Sorted, so that equal manifests are equal bytes whatever order they were filled in.
-_Sort = AfterValidator(_sorted)
 
 
 class Member(Entry):
     """Hash and uncompressed size of one file in the bundle."""
 
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-    size: Annotated[int, Field(ge=0)]
+    size: Count
 
 
 class GoldenCase(Entry):
@@ -102,7 +62,7 @@ class GoldenCase(Entry):
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_]{1,40}$")]
-    recipe: Annotated[dict[str, int | float | str], _Sort] = Field(default_factory=dict)
+    recipe: Annotated[dict[str, int | float | str], Sorted] = Field(default_factory=dict)
     iso: Positive
     origin_px: tuple[int, int] = (0, 0)
     white_balance: tuple[Positive, Positive, Positive] | None = None
@@ -131,60 +91,105 @@ class Threshold(Entry):
 
 
 class Manifest(Entry):
-    """The manifest of format 1.0.
+    """The manifest of format 2.0.
 
     Attributes:
         format_version: "major.minor" of the format.
+        kind: Kind of camera.
         name: Name of the camera, as `--bundle` takes it.
         version: Semantic version of this bundle.
         licence: Licence of the weights (SPDX where there is one).
         training_data: What the networks were trained on, for people.
-        input_contract: What kind of capture it takes.
+        sensor: What the camera sees with.
+        optics: What it sees through; None where no stage needs to know.
         border: How a picture is continued to a multiple of the network's stride.
-        object_distance_mm: Distance of focus from the first surface; None for infinity.
+        stages: What is done to a capture, in order, and nothing else.
+        planes: What the stages give; follows from the stages and is checked against them.
+        products: Name of a result -> the plane that it is.
+        networks: Role -> size -> facts.
         freeze: What freezing the PSF kept and what it cost (`loss_db` and whatever it measured).
         exported_with: Package -> version.
     """
 
-    format_version: Annotated[str, Field(pattern=r"^[0-9]{1,4}\.[0-9]{1,4}$")] = "1.0"
+    format_version: Annotated[str, Field(pattern=r"^[0-9]{1,4}\.[0-9]{1,4}$")] = "2.0"
+    kind: Word = "bayer"
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
     version: Annotated[str, Field(pattern=r"^[0-9]+\.[0-9]+\.[0-9]+(-[0-9A-Za-z.-]+)?$")]
     licence: str
     training_data: str
-    camera: Camera
-    object_distance_mm: Positive | None = None
-    input_contract: InputContract
+    sensor: Sensor
+    optics: Optics | None = None
     border: Border = "edge"
     stages: tuple[Stage, ...]
-    networks: dict[NetworkSize, NetworkFacts] = Field(default_factory=dict)
+    planes: Annotated[dict[Word, Plane], Sorted]
+    products: Annotated[dict[Word, Word], Sorted]
+    networks: dict[Word, dict[NetworkSize, NetworkFacts]] = Field(default_factory=dict)
     golden: tuple[GoldenCase, ...] = ()
     card: Card = Card()
-    freeze: Annotated[dict[str, int | float | str], _Sort] = Field(default_factory=dict)
-    envelope: Annotated[dict[str, Range], _Sort] | None = None
-    plan: Annotated[dict[str, Threshold], _Sort] | None = None
-    exported_with: Annotated[dict[str, str], _Sort] = Field(default_factory=dict)
-    members: Annotated[dict[str, Member], _Sort] = Field(default_factory=dict)
+    freeze: Annotated[dict[str, int | float | str], Sorted] = Field(default_factory=dict)
+    envelope: Annotated[dict[str, Range], Sorted] | None = None
+    plan: Annotated[dict[str, Threshold], Sorted] | None = None
+    exported_with: Annotated[dict[str, str], Sorted] = Field(default_factory=dict)
+    members: Annotated[dict[str, Member], Sorted] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _check(self) -> "Manifest":
-        order = [STAGE_ORDER.index(stage.type) for stage in self.stages]
-        if order != sorted(set(order)):
-            got = ", ".join(stage.type for stage in self.stages)
-            raise ValueError(
-                f"stages must come once each, in the order {', '.join(STAGE_ORDER)}; got {got}"
-            )
-        if self.stage(Network) is not None and not self.networks:
-            raise ValueError("there is a network stage but no network")
-        if self.input_contract == "raw_bayer_v1" and self.camera.cfa is None:
-            raise ValueError("raw_bayer_v1 needs a cfa")
+        found = join_stages(self.stages, self.parts)
+        for name in found.keys() | self.planes.keys():
+            if name not in found:
+                raise ValueError(f"no stage gives the plane {name!r}")
+            if name not in self.planes:
+                raise ValueError(f"the plane {name!r} is not stated")
+            if found[name] != self.planes[name]:
+                raise ValueError(
+                    f"the plane {name!r} is stated as {self.planes[name].describe()}; its stage "
+                    f"gives {found[name].describe()}"
+                )
+        check_use(self.stages, self.products, self.planes)
+        if idle := self.networks.keys() - {stage.role for stage in self.stages_of(Network)}:
+            raise ValueError(f"no stage uses the networks of the role {', '.join(sorted(idle))}")
         names = [case.name for case in self.golden]
         if len(set(names)) != len(names):
             raise ValueError("two golden cases have one name")
         return self
 
+    @property
+    def parts(self) -> Parts:
+        """Give what stages look at to say what they give."""
+        return Parts(sensor=self.sensor, optics=self.optics, networks=self.networks)
+
     def stage(self, kind: type[_S]) -> _S | None:
-        """Give the stage of one type, or None if this camera does without it."""
-        return next((stage for stage in self.stages if isinstance(stage, kind)), None)
+        """Give the first stage of one type, or None if this camera does without it."""
+        return next(iter(self.stages_of(kind)), None)
+
+    def stages_of(self, kind: type[_S]) -> tuple[_S, ...]:
+        """Give all stages of one type, in order."""
+        return tuple(stage for stage in self.stages if isinstance(stage, kind))
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Name the sizes that every role holds, from the least work to the most."""
+        if not self.networks:
+            return ()
+        first, *others = self.networks.values()
+        common = [size for size in first if all(size in sizes for sizes in others)]
+        return tuple(sorted(common, key=self.mac_per_pixel))
+
+    def mac_per_pixel(self, size: str) -> float:
+        """Give the multiplications per pixel of the networks of one size, all roles together."""
+        return sum(sizes[size].mac_per_pixel for sizes in self.networks.values() if size in sizes)
+
+
+def planes_of(stages: tuple[Stage, ...], parts: Parts) -> dict[str, Plane]:
+    """Give the planes to state in a manifest.
+
+    Raises:
+        BundleError: If the stages do not join.
+    """
+    try:
+        return join_stages(stages, parts)
+    except JoinError as error:
+        raise BundleError(str(error)) from error
 
 
 class _Head(Entry, extra="ignore"):
@@ -195,7 +200,7 @@ class _Head(Entry, extra="ignore"):
 
 
 def read_manifest(data: bytes) -> Manifest:
-    """Decode and check the bytes of manifest.json.
+    """Decode and check the bytes of manifest.json; one of format 1.0 is brought up to date.
 
     Raises:
         BundleError: If it is no JSON, of a newer format than this reader knows (major or
@@ -205,31 +210,37 @@ def read_manifest(data: bytes) -> Manifest:
         head = _Head.model_validate_json(data)
     except ValidationError as error:
         raise BundleError(f"manifest.json cannot be read: {_first(error)}") from error
-    _check_version(head.format_version, head.exported_with)
+    major = _check_version(head.format_version, head.exported_with)
     try:
+        if major < FORMAT_VERSION[0]:
+            return Manifest.model_validate_json(upgrade(data))
         return Manifest.model_validate_json(data)
-    except ValidationError as error:
+    except (ValidationError, UpgradeError) as error:
+        what = _first(error) if isinstance(error, ValidationError) else str(error)
         raise BundleError(
-            f"manifest.json breaks the schema of format {head.format_version}: {_first(error)}"
+            f"manifest.json breaks the schema of format {head.format_version}: {what}"
         ) from error
 
 
-def _check_version(text: str, exported_with: Mapping[str, Any]) -> None:
+def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
+    """Refuse what this reader does not know; give the major version."""
     match = re.fullmatch(r"(\d{1,4})\.(\d{1,4})", text, flags=re.ASCII)
     if match is None:
-        raise BundleError(f"format_version must read like 1.0; got {text[:20]!r}")
+        raise BundleError(f"format_version must read like 2.0; got {text[:20]!r}")
     version = (int(match[1]), int(match[2]))
-    if version > FORMAT_VERSION:
-        ours = ".".join(map(str, FORMAT_VERSION))
+    newest = FORMAT_VERSION if version[0] >= FORMAT_VERSION[0] else (version[0], 0)
+    if version > newest:
+        ours = ".".join(map(str, newest))
         maker = exported_with.get("camkit")
         hint = f" (it was written by camkit {maker})" if isinstance(maker, str) else ""
-        part = "major" if version[0] > FORMAT_VERSION[0] else "minor"
+        part = "major" if version[0] > newest[0] else "minor"
         raise BundleError(
             f"this bundle has format {text}, a newer {part} version than this reader knows "
             f"({ours}); update to a camkit that reads format {text}{hint}"
         )
-    if version[0] < 1:
+    if version[0] < _OLDEST:
         raise BundleError(f"there never was a format {text}; export the bundle again")
+    return version[0]
 
 
 def _first(error: ValidationError) -> str:
@@ -246,5 +257,5 @@ def manifest_to_bytes(manifest: Manifest) -> bytes:
 
 
 def manifest_schema() -> dict[str, Any]:
-    """Give the JSON schema of format 1.0, as `camkit info --schema` prints it."""
+    """Give the JSON schema of format 2.0, as `camkit info --schema` prints it."""
     return Manifest.model_json_schema()

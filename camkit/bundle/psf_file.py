@@ -2,25 +2,30 @@
 
 The file holds seven tensors and no metadata, so that the same PSF always gives the same bytes:
 `kernels` (float32) and, as float64, `field_heights_mm`, `depths_mm`, `wavelengths_um`,
-`pixel_pitch_um` (1,), `distortion_coefficients` (3, 4), `distortion_radius_mm` (1,) and
-`relative_illumination`.
+`pixel_pitch_um` (1,), `distortion_coefficients` (channel, 4), `distortion_radius_mm` (1,) and
+`relative_illumination`. A PSF that is not radial adds `symmetry`, its name in ASCII (uint8), and a
+grid its positions, `grid_x_mm` and `grid_y_mm`.
 """
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.contracts import FrozenPsf, RadialDistortion, Symmetry
 from camkit.errors import BundleError, ContractError
 
 _AXES: Final = ("field_heights_mm", "depths_mm", "wavelengths_um", "relative_illumination")
 _SCALARS: Final = ("pixel_pitch_um", "distortion_radius_mm")
 _TENSORS: Final = frozenset({"kernels", "distortion_coefficients", *_AXES, *_SCALARS})
+_SYMMETRY: Final = "symmetry"
+_GRID: Final = ("grid_x_mm", "grid_y_mm")
+_ADDED: Final = {"radial": (), "uniform": (_SYMMETRY,), "grid": (_SYMMETRY, *_GRID)}
+"""What a PSF of each symmetry holds besides."""
 
 
 def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
@@ -58,6 +63,13 @@ def psf_to_bytes(psf: FrozenPsf) -> bytes:
         "distortion_radius_mm": np.array([psf.distortion.radius_mm], dtype=np.float64),
         "relative_illumination": np.asarray(psf.relative_illumination, dtype=np.float64),
     }
+    if psf.symmetry != "radial":
+        tensors[_SYMMETRY] = np.frombuffer(psf.symmetry.encode("ascii"), dtype=np.uint8)
+    if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
+        tensors |= {
+            name: np.asarray(positions, dtype=np.float64)
+            for name, positions in zip(_GRID, (psf.grid_x_mm, psf.grid_y_mm), strict=True)
+        }
     return save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
 
 
@@ -76,7 +88,8 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
             or the PSF is not one: NaN, negative or unnormalised kernels, axes out of order.
     """
     tensors = read_tensors(data, what=what)
-    _check_tensors(tensors, what)
+    symmetry = _read_symmetry(tensors, what)
+    _check_tensors(tensors, symmetry, what)
     try:
         return FrozenPsf(
             kernels=tensors["kernels"],
@@ -89,17 +102,33 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
                 radius_mm=float(tensors["distortion_radius_mm"][0]),
             ),
             relative_illumination=tensors["relative_illumination"],
+            symmetry=symmetry,
+            grid_x_mm=tensors.get(_GRID[0]),
+            grid_y_mm=tensors.get(_GRID[1]),
         )
     except ContractError as error:
         raise BundleError(f"{what} is refused: {error}") from error
 
 
-def _check_tensors(tensors: Mapping[str, NDArray[Any]], what: str) -> None:
-    if tensors.keys() != _TENSORS:
-        missing = ", ".join(sorted(_TENSORS - tensors.keys())) or "none"
-        extra = ", ".join(sorted(tensors.keys() - _TENSORS)) or "none"
+def _read_symmetry(tensors: Mapping[str, NDArray[Any]], what: str) -> Symmetry:
+    """Give the symmetry that a file names; radial where it names none."""
+    stated = tensors.get(_SYMMETRY)
+    if stated is None:
+        return "radial"
+    for known in get_args(Symmetry):
+        if stated.dtype == np.uint8 and stated.tobytes() == known.encode("ascii"):
+            found: Symmetry = known
+            return found
+    raise BundleError(f"{what}: symmetry must be one of {', '.join(get_args(Symmetry))}")
+
+
+def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what: str) -> None:
+    wanted_names = _TENSORS | set(_ADDED[symmetry])
+    if tensors.keys() - {_SYMMETRY} != wanted_names - {_SYMMETRY}:
+        missing = ", ".join(sorted(wanted_names - tensors.keys())) or "none"
+        extra = ", ".join(sorted(tensors.keys() - wanted_names)) or "none"
         raise BundleError(
-            f"{what} must hold the {len(_TENSORS)} tensors of a frozen PSF; "
+            f"{what} must hold the {len(wanted_names)} tensors of a frozen PSF; "
             f"missing: {missing}; unknown: {extra}. Freeze the PSF again"
         )
     kernels = tensors["kernels"]
@@ -108,8 +137,9 @@ def _check_tensors(tensors: Mapping[str, NDArray[Any]], what: str) -> None:
             f"{what}: kernels must be float32 (field, depth, wavelength, h, w), not empty; "
             f"got {kernels.dtype} {kernels.shape}"
         )
-    shapes = {"distortion_coefficients": (3, 4)} | dict.fromkeys(_SCALARS, (1,))
-    for name in sorted(_TENSORS - {"kernels"}):
+    rows = tensors["distortion_coefficients"].shape[:1]
+    shapes = {"distortion_coefficients": (*rows, 4)} | dict.fromkeys(_SCALARS, (1,))
+    for name in sorted(wanted_names - {"kernels", _SYMMETRY}):
         array = tensors[name]
         wanted = shapes.get(name, (array.size,))
         if array.dtype != np.float64 or array.shape != wanted:

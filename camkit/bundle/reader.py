@@ -21,14 +21,15 @@ from camkit.bundle.container import (
     container_from_bytes,
     read_container,
 )
-from camkit.bundle.manifest import Manifest, NetworkFacts, read_manifest
+from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.manifest import Manifest, read_manifest
+from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_from_bytes
 from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
 
 SUFFIX: Final = ".camkit"
 MANIFEST: Final = "manifest.json"
-PSF: Final = "psf.safetensors"
 STRESS_PSF: Final = "stress_psf.safetensors"
 GOLDEN: Final = "golden.safetensors"
 PRESCRIPTION: Final = "prescription.toml"
@@ -36,7 +37,6 @@ CARD: Final = "card.md"
 PREVIEW: Final = "preview.png"
 
 _MAX_MANIFEST_BYTES: Final = 2**20
-_PSF_STAGES: Final = ("wiener", "illumination", "undistort")
 _PITCH_RTOL: Final = 1e-6
 
 
@@ -73,7 +73,8 @@ class Bundle:
     @property
     def reference_depth_mm(self) -> float:
         """The distance of focus; where the PSF does not reach it, the nearest that it knows."""
-        focus_mm = self.manifest.object_distance_mm or math.inf
+        optics = self.manifest.optics
+        focus_mm = (optics and optics.object_distance_mm) or math.inf
         depths_mm = self.psf.depths_mm
         return float(min(max(focus_mm, depths_mm[0]), depths_mm[-1]))
 
@@ -90,25 +91,27 @@ class Bundle:
         """
         return self._container.read(name)
 
-    def network_facts(self, size: str) -> NetworkFacts:
-        """Give the facts about one size of network ("S", "M" or "L").
+    def network_facts(self, role: str, size: str) -> NetworkFacts:
+        """Give the facts about one size of the network of a role.
 
         Raises:
-            BundleError: If the bundle has no network of that size.
+            BundleError: If the bundle has no such network.
         """
-        for name, facts in self.manifest.networks.items():
-            if name == size:
-                return facts
-        have = ", ".join(self.manifest.networks) or "none"
-        raise BundleError(f"{self.path.name} has no network of size {size!r}; it has: {have}")
+        sizes = self.manifest.networks.get(role, {})
+        if size in sizes:
+            return sizes[size]
+        have = ", ".join(sizes) or "none"
+        raise BundleError(
+            f"{self.path.name} has no network of size {size!r} for {role}; it has: {have}"
+        )
 
-    def network_bytes(self, size: str, *, fp16: bool = False) -> bytes:
-        """Give the ONNX of one size.
+    def network_bytes(self, role: str, size: str, *, fp16: bool = False) -> bytes:
+        """Give the ONNX of one size of the network of a role.
 
         Raises:
-            BundleError: If the bundle has no network of that size, or none in fp16.
+            BundleError: If the bundle has no such network, or none in fp16.
         """
-        facts = self.network_facts(size)
+        facts = self.network_facts(role, size)
         if not fp16:
             return self.member(facts.member)
         if facts.fp16_member is None:
@@ -153,7 +156,7 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
     psf = None
     if PSF in manifest.members:
         psf = psf_from_bytes(container.read(PSF))
-        _check_pitch(psf, manifest)
+        _check_psf(psf, manifest)
     return Bundle(path=path, manifest=manifest, _container=container, _psf=psf)
 
 
@@ -187,13 +190,13 @@ def _check_names(manifest: Manifest, sizes: Mapping[str, int]) -> None:
 
 def _check_references(manifest: Manifest) -> None:
     needed = {}
-    for size, facts in manifest.networks.items():
-        needed[facts.member] = f"network {size}"
-        if facts.fp16_member is not None:
-            needed[facts.fp16_member] = f"network {size} in fp16"
-    for stage in manifest.stages:
-        if stage.type in _PSF_STAGES:
-            needed[PSF] = f"stage {stage.type}"
+    for role, sizes in manifest.networks.items():
+        for size, facts in sizes.items():
+            needed[facts.member] = f"network {size} ({role})"
+            if facts.fp16_member is not None:
+                needed[facts.fp16_member] = f"network {size} ({role}) in fp16"
+    if manifest.optics is not None:
+        needed[manifest.optics.member] = "the optics"
     if manifest.golden:
         needed[GOLDEN] = "the golden cases"
     for name, user in needed.items():
@@ -215,12 +218,24 @@ def _check_member(container: Container, name: str, size: int, sha256: str) -> No
         )
 
 
-def _check_pitch(psf: FrozenPsf, manifest: Manifest) -> None:
-    pitch_um = manifest.camera.pixel_pitch_um
-    if abs(psf.pixel_pitch_um - pitch_um) > _PITCH_RTOL * pitch_um:
+def _check_psf(psf: FrozenPsf, manifest: Manifest) -> None:
+    """Hold the PSF against what the manifest says of it."""
+    optics = manifest.optics
+    if optics is None:
+        raise BundleError(f"the bundle holds {PSF}, and its manifest states no optics")
+    if abs(psf.pixel_pitch_um - optics.pixel_pitch_um) > _PITCH_RTOL * optics.pixel_pitch_um:
         raise BundleError(
-            f"{PSF} is sampled at {psf.pixel_pitch_um} um, the camera has {pitch_um} um pixels; "
-            "freeze the PSF at the pitch of the sensor"
+            f"{PSF} is sampled at {psf.pixel_pitch_um} um, the manifest says "
+            f"{optics.pixel_pitch_um} um; freeze the PSF at the pitch of the sensor"
+        )
+    if psf.symmetry != optics.symmetry:
+        raise BundleError(
+            f"{PSF} is {psf.symmetry}, the manifest says {optics.symmetry}; export again"
+        )
+    rows, channels = psf.distortion.coefficients.shape[0], manifest.sensor.channels
+    if rows != len(channels):
+        raise BundleError(
+            f"{PSF} has the distortion of {rows} channel(s), the sensor {len(channels)}"
         )
 
 

@@ -1,0 +1,115 @@
+"""Do the stages of a manifest join? Each plane followed from the sensor to the products.
+
+    sensor -> capture -> stage -> planes -> stage -> ... -> product
+
+What a plane holds follows from the sensor and the stages alone; the manifest states it as well, so
+that a reader sees it, and a manifest that says otherwise is refused. So is one whose stage takes
+what no earlier stage gives, gives what nobody takes, or cannot take what it is given; the message
+names both ends.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import Sensor, SpadSensor
+from camkit.bundle.stages import JoinError, Parts, Stage
+
+CAPTURE: Final = "capture"
+"""The plane that the sensor gives."""
+
+
+def capture_plane(sensor: Sensor) -> Plane:
+    """Give the plane that a sensor gives: digital numbers, or photons."""
+    if isinstance(sensor, SpadSensor):
+        axes = "t y x" if sensor.time_bins else "y x"
+        return Plane(axes=axes, type="uint32", channels=sensor.captured, domain="counts")
+    return Plane(type="uint16", channels=sensor.captured, domain="dn")
+
+
+def join_stages(stages: Sequence[Stage], parts: Parts) -> dict[str, Plane]:
+    """Follow the planes through the stages.
+
+    Args:
+        stages: In order.
+        parts: Sensor, optics and networks.
+
+    Returns:
+        Every plane by name, without that of the sensor.
+
+    Raises:
+        JoinError: If a stage cannot take what it is given; names both ends.
+    """
+    known = {CAPTURE: capture_plane(parts.sensor)}
+    made_by = {CAPTURE: f"the sensor ({parts.sensor.type})"}
+    for number, stage in enumerate(stages, start=1):
+        name = f"stage {number} ({stage.type})"
+        for taken in stage.takes:
+            if taken not in known:
+                have = ", ".join(known)
+                raise JoinError(f"{name} takes {taken!r}, which nothing before it gives ({have})")
+        try:
+            given = stage.join([known[taken] for taken in stage.takes], parts)
+        except JoinError as error:
+            ends = "; ".join(
+                f"{taken!r} of {made_by[taken]} is {known[taken].describe()}"
+                for taken in stage.takes
+            )
+            raise JoinError(f"{name} does not join: {error}. {ends}") from error
+        if len(given) != len(stage.gives):
+            raise JoinError(f"{name} makes {len(given)} plane(s), it names {len(stage.gives)}")
+        for plane_name, plane in zip(stage.gives, given, strict=True):
+            if plane_name in known:
+                raise JoinError(f"{name} gives {plane_name!r}, as does {made_by[plane_name]}")
+            known[plane_name] = plane
+            made_by[plane_name] = name
+    return {name: plane for name, plane in known.items() if name != CAPTURE}
+
+
+def check_use(
+    stages: Sequence[Stage], products: Mapping[str, str], planes: Mapping[str, Plane]
+) -> None:
+    """Refuse products that no stage gives, and stages whose planes nobody takes.
+
+    Raises:
+        JoinError: Naming the product or the stage.
+    """
+    if not products:
+        raise JoinError("a bundle has at least one product")
+    for product, plane in products.items():
+        if plane not in planes:
+            raise JoinError(f"the product {product!r} is the plane {plane!r}, which no stage gives")
+    used = {taken for stage in stages for taken in stage.takes} | set(products.values())
+    for number, stage in enumerate(stages, start=1):
+        if not used & set(stage.gives):
+            raise JoinError(
+                f"stage {number} ({stage.type}) gives {', '.join(stage.gives)}, which nothing takes"
+            )
+
+
+def rewired(stages: Sequence[Stage], usual: Sequence[Stage]) -> tuple[Stage, ...]:
+    """Wire some of the usual stages of a kind as if the others were not there.
+
+    Args:
+        stages: Some of the usual stages, in their order, with parameters of their own.
+        usual: All of them, wired by their defaults.
+
+    Returns:
+        The same stages; what a missing one would have given is replaced by what it would have
+        taken first.
+    """
+    kept = {(stage.type, getattr(stage, "role", None)) for stage in stages}
+    stand_in = {}
+    for stage in usual:
+        if (stage.type, getattr(stage, "role", None)) not in kept:
+            first = stand_in.get(stage.takes[0], stage.takes[0])
+            stand_in |= dict.fromkeys(stage.gives[:1], first)
+            # a mask that is not passed on is that which was taken, if one was
+            for mask, taken in zip(stage.gives[1:], stage.takes[1:], strict=False):
+                stand_in[mask] = stand_in.get(taken, taken)
+    given = {CAPTURE} | {name for stage in stages for name in stage.gives}
+    made = []
+    for stage in stages:
+        takes = dict.fromkeys(stand_in.get(name, name) for name in stage.takes)
+        made.append(stage.model_copy(update={"takes": tuple(n for n in takes if n in given)}))
+    return tuple(made)

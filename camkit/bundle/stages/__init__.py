@@ -1,0 +1,56 @@
+"""The stages that a bundle may list: one file each, and one line here.
+
+A stage names the planes that it takes and gives, and says by `join` what it makes of them. What it
+does stands in the module of the same name in `camkit.runtime.stages`.
+
+linearise, repair, white_balance, demosaic    the front
+wiener, network                               the restoration
+raise_clipped, illumination, undistort, color what every picture needs behind it
+"""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from camkit.bundle.stages.color import Color
+from camkit.bundle.stages.demosaic import Demosaic
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry
+from camkit.bundle.stages.illumination import Illumination
+from camkit.bundle.stages.linearise import Linearise
+from camkit.bundle.stages.network import Network
+from camkit.bundle.stages.raise_clipped import RaiseClipped
+from camkit.bundle.stages.repair import Repair
+from camkit.bundle.stages.undistort import Undistort
+from camkit.bundle.stages.white_balance import WhiteBalance
+from camkit.bundle.stages.wiener import Wiener
+
+__all__ = [
+    "Color",
+    "Demosaic",
+    "Illumination",
+    "JoinError",
+    "Linearise",
+    "Network",
+    "Parts",
+    "RaiseClipped",
+    "Repair",
+    "Stage",
+    "StageEntry",
+    "Undistort",
+    "WhiteBalance",
+    "Wiener",
+]
+
+Stage = Annotated[
+    Linearise
+    | Repair
+    | WhiteBalance
+    | Demosaic
+    | Wiener
+    | Network
+    | RaiseClipped
+    | Illumination
+    | Undistort
+    | Color,
+    Field(discriminator="type"),
+]

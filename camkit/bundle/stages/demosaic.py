@@ -1,0 +1,27 @@
+"""A mosaic made three linear planes."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from camkit.bundle.entry import Word
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import MOSAIC, RGB
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_count, need_domain
+
+
+class Demosaic(StageEntry):
+    """Mosaic to three linear planes."""
+
+    type: Literal["demosaic"] = "demosaic"
+    takes: tuple[Word, ...] = ("balanced",)
+    gives: tuple[Word, ...] = ("rgb",)
+    method: Literal["fast", "quality"] = "quality"
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Give the three planes."""
+        del parts
+        need_count(taken, 1)
+        need_domain(taken[0], "linear")
+        if taken[0].channels != MOSAIC:
+            raise JoinError("it takes a mosaic")
+        return (taken[0].model_copy(update={"channels": RGB}),)

@@ -1,0 +1,91 @@
+"""What every stage of a bundle has in common: the planes that it takes and gives."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from camkit.bundle.entry import Entry, Word
+from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.optics import Optics
+from camkit.bundle.plane import Domain, Plane
+from camkit.bundle.sensor import Sensor
+
+
+class JoinError(ValueError):
+    """A stage cannot take what it is given; the text says why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """What stages may look at to say what they give.
+
+    Attributes:
+        sensor: Of the camera.
+        optics: None for a camera without any.
+        networks: Role -> size -> facts.
+    """
+
+    sensor: Sensor
+    optics: Optics | None
+    networks: Mapping[str, Mapping[str, NetworkFacts]]
+
+    def need_optics(self, why: str) -> Optics:
+        """Give the optics.
+
+        Raises:
+            JoinError: If there are none.
+        """
+        if self.optics is None:
+            raise JoinError(f"{why}, and the bundle states no optics")
+        return self.optics
+
+
+class StageEntry(Entry):
+    """A stage as the manifest lists it.
+
+    Attributes:
+        takes: Names of the planes it reads.
+        gives: Names of the planes it makes; each has its entry among the manifest's planes.
+    """
+
+    takes: tuple[Word, ...]
+    gives: tuple[Word, ...]
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Say what the stage makes of the planes it takes; one plane for each name in `gives`.
+
+        Raises:
+            JoinError: If it cannot take them.
+        """
+        raise NotImplementedError
+
+
+def need_count(taken: Sequence[Plane], least: int, most: int | None = None) -> None:
+    """Refuse a number of planes; `most` is `least` unless given.
+
+    Raises:
+        JoinError: If there are too few or too many.
+    """
+    most = least if most is None else most
+    if not least <= len(taken) <= most:
+        wanted = f"{least}" if least == most else f"{least} to {most}"
+        raise JoinError(f"it takes {wanted} plane(s), not {len(taken)}")
+
+
+def need_domain(plane: Plane, domain: Domain) -> None:
+    """Refuse a plane of another domain.
+
+    Raises:
+        JoinError: If the plane is of another.
+    """
+    if plane.domain != domain:
+        raise JoinError(f"it takes planes that are {domain}, not {plane.domain}")
+
+
+def need_rows(plane: Plane) -> None:
+    """Refuse a plane that is no picture.
+
+    Raises:
+        JoinError: If it has more axes than rows and columns.
+    """
+    if plane.axes != "y x":
+        raise JoinError(f"it takes pictures (y x), not planes over {plane.axes}")

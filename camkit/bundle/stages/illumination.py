@@ -1,0 +1,33 @@
+"""Division by the relative illumination of the optics."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from camkit.bundle.entry import Word
+from camkit.bundle.plane import Plane
+from camkit.bundle.stages.entry import (
+    JoinError,
+    Parts,
+    StageEntry,
+    need_count,
+    need_domain,
+    need_rows,
+)
+
+
+class Illumination(StageEntry):
+    """Division by the relative illumination of the frozen PSF."""
+
+    type: Literal["illumination"] = "illumination"
+    takes: tuple[Word, ...] = ("neutral",)
+    gives: tuple[Word, ...] = ("even",)
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Give a plane of the kind taken."""
+        need_count(taken, 1)
+        need_domain(taken[0], "linear")
+        need_rows(taken[0])
+        parts.need_optics("it divides by the illumination of optics")
+        if not taken[0].grid.warped:
+            raise JoinError("it works in the geometry of the sensor, before any undistortion")
+        return (taken[0],)

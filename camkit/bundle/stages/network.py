@@ -1,0 +1,90 @@
+"""A network on planes."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from camkit.bundle.entry import Positive, Word
+from camkit.bundle.facts import NetworkFacts, Port
+from camkit.bundle.plane import Plane
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_domain, need_rows
+
+DEFAULT_ROLE = "restore"
+
+
+class Network(StageEntry):
+    """A network, in one of the sizes that the bundle holds for its role.
+
+    Its planes are the inputs of the network, in order, and what it gives are its outputs.
+
+    Attributes:
+        role: Key of `networks` in the manifest.
+        transform: stabilise takes linear planes to equal noise (k-sigma, then square root) before
+            the network and back behind it; none hands them on as they are.
+        scale: Divisor behind the square root; the noise there is 0.5 / scale at any ISO.
+    """
+
+    type: Literal["network"] = "network"
+    takes: tuple[Word, ...] = ("rgb", "restored")
+    gives: tuple[Word, ...] = ("clean",)
+    role: Word = DEFAULT_ROLE
+    transform: Literal["stabilise", "none"] = "stabilise"
+    scale: Positive = 64.0
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Give the outputs of the network, on a finer grid where it says so."""
+        sizes = parts.networks.get(self.role)
+        if not sizes:
+            raise JoinError(f"the bundle holds no network of the role {self.role!r}")
+        if not taken:
+            raise JoinError("it takes at least one plane")
+        first = taken[0]
+        need_rows(first)
+        for plane in taken:
+            if plane.grid != first.grid or plane.axes != first.axes:
+                raise JoinError("its planes must lie on one grid")
+            need_domain(plane, "linear" if self.transform == "stabilise" else first.domain)
+        for size, facts in sizes.items():
+            _check_ports(size, facts.inputs, taken)
+        outputs = _outputs(sizes)
+        last = taken[-1]
+        return tuple(
+            last.model_copy(
+                update={
+                    "channels": _names(port, taken, parts),
+                    "grid": last.grid.finer(port.scale),
+                }
+            )
+            for port in outputs
+        )
+
+
+def _check_ports(size: str, ports: Sequence[Port], taken: Sequence[Plane]) -> None:
+    wanted = [port.channels for port in ports]
+    got = [len(plane.channels) for plane in taken]
+    if wanted != got:
+        raise JoinError(
+            f"its network of size {size} has inputs of {_listed(wanted)} channels "
+            f"({', '.join(port.name for port in ports)}); its planes have {_listed(got)}"
+        )
+
+
+def _outputs(sizes: Mapping[str, NetworkFacts]) -> tuple[Port, ...]:
+    first = next(iter(sizes.values())).outputs
+    for size, facts in sizes.items():
+        if facts.outputs != first:
+            raise JoinError(f"its sizes differ in their outputs; compare {size} with the others")
+    return first
+
+
+def _names(port: Port, taken: Sequence[Plane], parts: Parts) -> tuple[str, ...]:
+    """Name the channels of an output: as those of the last plane of that many, else by number."""
+    for plane in reversed(taken):
+        if len(plane.channels) == port.channels:
+            return plane.channels
+    if len(parts.sensor.channels) == port.channels:
+        return parts.sensor.channels
+    return tuple(f"{port.name}{i}"[-16:] for i in range(port.channels))
+
+
+def _listed(counts: Sequence[int]) -> str:
+    return " + ".join(map(str, counts)) or "no"

@@ -1,0 +1,26 @@
+"""Burnt-out light made neutral."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from camkit.bundle.entry import Word
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import RGB
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_count, need_domain
+
+
+class RaiseClipped(StageEntry):
+    """Clipped channels raised to the others, so that burnt-out light is neutral, never magenta."""
+
+    type: Literal["raise_clipped"] = "raise_clipped"
+    takes: tuple[Word, ...] = ("clean",)
+    gives: tuple[Word, ...] = ("neutral",)
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Give a plane of the kind taken."""
+        del parts
+        need_count(taken, 1)
+        need_domain(taken[0], "linear")
+        if taken[0].channels != RGB:
+            raise JoinError("it takes red, green and blue")
+        return (taken[0],)

@@ -1,0 +1,25 @@
+"""Channels multiplied so that grey is grey."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from camkit.bundle.entry import Word
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import MOSAIC, RGB
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_count, need_domain
+
+
+class WhiteBalance(StageEntry):
+    """Gains of the file or the caller, green = 1."""
+
+    type: Literal["white_balance"] = "white_balance"
+    takes: tuple[Word, ...] = ("sound",)
+    gives: tuple[Word, ...] = ("balanced",)
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Give a plane of the kind taken."""
+        need_count(taken, 1)
+        need_domain(taken[0], "linear")
+        if parts.sensor.channels != RGB or taken[0].channels not in (MOSAIC, RGB):
+            raise JoinError("it balances red, green and blue, which these planes are not")
+        return (taken[0],)

@@ -1,0 +1,74 @@
+"""The Wiener bank."""
+
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, model_validator
+
+from camkit.bundle.entry import NonNegative, Positive, Word
+from camkit.bundle.plane import Plane
+from camkit.bundle.stages.entry import (
+    JoinError,
+    Parts,
+    StageEntry,
+    need_count,
+    need_domain,
+    need_rows,
+)
+
+_PITCH_RTOL: Final = 1e-6
+
+
+class Wiener(StageEntry):
+    """The Wiener bank: overlapping windowed blocks, each with its own PSF.
+
+    Attributes:
+        block_px: Side of a block.
+        overlap_px: Overlap of neighbouring blocks, less than half a block or equal to it.
+        prior_scale: Scale of the power spectrum assumed for a sharp scene.
+        prior_exponent: Its fall with frequency: scale * f^-exponent.
+        clip_iterations: Rounds of re-estimating clipped pixels; 0 for none.
+    """
+
+    type: Literal["wiener"] = "wiener"
+    takes: tuple[Word, ...] = ("rgb", "unknown")
+    gives: tuple[Word, ...] = ("restored",)
+    block_px: Annotated[int, Field(ge=16, le=8192)] = 512
+    overlap_px: Annotated[int, Field(ge=0)] = 160
+    prior_scale: Positive
+    prior_exponent: NonNegative
+    clip_iterations: Annotated[int, Field(ge=0, le=100)] = 0
+
+    @model_validator(mode="after")
+    def _check(self) -> "Wiener":
+        if 2 * self.overlap_px > self.block_px:
+            raise ValueError(
+                f"overlap_px may be half of block_px at most; got {self.overlap_px} of "
+                f"{self.block_px}"
+            )
+        return self
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Give the plane as taken: deconvolved."""
+        need_count(taken, 1, 2)
+        plane = taken[0]
+        need_domain(plane, "linear")
+        need_rows(plane)
+        for mask in taken[1:]:
+            need_domain(mask, "mask")
+        optics = parts.need_optics("it deconvolves with the kernels of optics")
+        if plane.channels != parts.sensor.channels:
+            raise JoinError(
+                f"it takes one plane for each of {', '.join(parts.sensor.channels)}, not "
+                f"{', '.join(plane.channels)}"
+            )
+        if not plane.grid.warped:
+            raise JoinError("it works in the geometry of the sensor, before any undistortion")
+        if parts.sensor.extent is not None:
+            pitch_um = parts.sensor.extent.pixel_pitch_um * plane.grid.pitch_ratio
+            if abs(optics.pixel_pitch_um - pitch_um) > _PITCH_RTOL * pitch_um:
+                raise JoinError(
+                    f"its kernels are sampled at {optics.pixel_pitch_um:g} um, its planes at "
+                    f"{pitch_um:g} um"
+                )
+        return (plane,)

@@ -1,0 +1,101 @@
+"""The kinds of cameras: what every floor of camkit may ask about one, as plain data.
+
+    name -> find_kind -> Kind        its sensor, usual stages and metrics
+                           `-> part  the module of a floor that knows this kind
+
+A kind of camera is one folder on each floor that it needs, and one line in `KINDS` here:
+
+    camkit/runtime/kinds/NAME      readers and twin
+    camkit/models_def/kinds/NAME   samples and judging, for training
+    camkit/report/kinds/NAME       metrics, rows of the bench, scenarios of stress
+
+A package of somebody else brings its own: its entry point in the group `camkit.kinds` names a
+`Kind` whose `home` is the package that holds the folders `runtime`, `models_def` and `report`.
+"""
+
+import importlib
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata, util
+from types import ModuleType
+from typing import Final, Literal
+
+from camkit.errors import ContractError, UnsupportedError
+
+GROUP: Final = "camkit.kinds"
+Floor = Literal["runtime", "models_def", "report"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """A kind of camera.
+
+    Attributes:
+        name: As manifests and recipes name it.
+        title: For people.
+        sensor: Type of its sensor, see `camkit.bundle.sensor`.
+        stages: Types of its usual stages, in order; see `camkit.bundle.stages`.
+        metrics: Names of the metrics by which its results are judged.
+        home: Package with its folders; empty for the kinds that come with camkit.
+    """
+
+    name: str
+    title: str
+    sensor: str
+    stages: tuple[str, ...]
+    metrics: tuple[str, ...]
+    home: str = ""
+
+    def part(self, floor: Floor) -> ModuleType:
+        """Import what one floor knows of this kind.
+
+        Raises:
+            UnsupportedError: If that floor knows nothing of it.
+        """
+        name = f"{self.home}.{floor}" if self.home else f"camkit.{floor}.kinds.{self.name}"
+        if util.find_spec(name) is None:
+            raise UnsupportedError(
+                f"cameras of the kind {self.name!r} have no part in {floor}: add the package {name}"
+            )
+        return importlib.import_module(name)
+
+
+BAYER: Final = Kind(
+    name="bayer",
+    title="a colour photograph behind a mosaic",
+    sensor="bayer",
+    stages=(
+        *("linearise", "repair", "white_balance", "demosaic", "wiener", "network"),
+        *("raise_clipped", "illumination", "undistort", "color"),
+    ),
+    metrics=("picture",),
+)
+
+KINDS: Final = {kind.name: kind for kind in (BAYER,)}
+"""The kinds that come with camkit: one line each."""
+
+
+def find_kind(name: str) -> Kind:
+    """Give the kind of a name: one of camkit's, or of an installed package.
+
+    Raises:
+        UnsupportedError: If there is none; names those there are.
+    """
+    if name in KINDS:
+        return KINDS[name]
+    found = _installed()
+    if name not in found:
+        known = ", ".join(sorted({*KINDS, *found}))
+        raise UnsupportedError(f"there is no kind of camera {name!r}; there are: {known}")
+    kind = found[name].load()
+    if not isinstance(kind, Kind) or kind.name != name or not kind.home:
+        raise ContractError(
+            f"the entry point {found[name].value!r} must be a camkit Kind called {name!r} with a "
+            "home"
+        )
+    return kind
+
+
+@cache
+def _installed() -> dict[str, metadata.EntryPoint]:
+    return {point.name: point for point in metadata.entry_points(group=GROUP)}
