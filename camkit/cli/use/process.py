@@ -64,8 +64,8 @@ def process(
     _debug: Debug = False,
 ) -> None:
     """Turn captures into pictures through the camera's bundle."""
-    from camkit.cli.mosaic import mosaic_options
-    from camkit.cli.progress import TileProgress
+    from camkit.cli.use.mosaic import mosaic_options
+    from camkit.cli.use.progress import TileProgress
     from camkit.runtime.batch import expand
     from camkit.runtime.batch import process as run
     from camkit.runtime.development import WriteOptions
@@ -104,7 +104,7 @@ def process(
         raise typer.Exit(ExitCode.NOTHING_MATCHED)
     headerless = mosaic_options(mosaic, black_level, white_level)
     if dry_run:
-        from camkit.cli.plan_text import print_plans
+        from camkit.cli.use.plan_text import print_plans
 
         done = print_plans(sources, bundle, options, write, headerless, as_json=json_)
     else:

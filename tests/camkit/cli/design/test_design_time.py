@@ -9,7 +9,7 @@ import pytest
 
 from camkit.cli.exit_code import ExitCode
 
-RECIPE = Path(__file__).resolve().parents[3] / "models_def" / "recipes" / "duet.toml"
+RECIPE = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "duet.toml"
 COMMANDS = {
     "freeze": ["lens.toml", "-o", "psf.safetensors"],
     "train": ["recipe.toml"],

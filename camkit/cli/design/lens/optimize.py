@@ -43,7 +43,7 @@ def optimize(
     _debug: Debug = False,
 ) -> None:
     """Improve a lens by damped least squares on its spots (needs torch)."""
-    from camkit.cli.design_time import refuse_existing, require_torch
+    from camkit.cli.design.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens optimize")
     refuse_existing([out], overwrite=overwrite)

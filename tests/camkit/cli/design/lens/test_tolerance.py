@@ -5,7 +5,7 @@ import pytest
 
 from camkit.cli.exit_code import ExitCode
 
-PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
+PRESCRIPTIONS = Path(__file__).resolve().parents[5] / "models_def" / "prescriptions"
 DUET = PRESCRIPTIONS / "duet.toml"
 QUICK = ("--samples", "2", "--rays", "32")
 

@@ -44,7 +44,7 @@ def export(
     _debug: Debug = False,
 ) -> None:
     """Pack checkpoints, PSF and prescription, and prove the result (needs torch)."""
-    from camkit.cli.design_time import print_report, refuse_existing, require_torch
+    from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
     from camkit.errors import ContractError
 
     require_torch("camkit export")

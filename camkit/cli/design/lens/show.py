@@ -34,7 +34,7 @@ def show(
 
     Without -o and --json the page is written beside where you are, as NAME.html.
     """
-    from camkit.cli.design_time import refuse_existing, require_torch
+    from camkit.cli.design.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens show")
     from camkit.models_def.optics.analysis.sampling import Pupil

@@ -47,7 +47,7 @@ def design(
     _debug: Debug = False,
 ) -> None:
     """Design a lens together with the network that undoes its blur (needs torch)."""
-    from camkit.cli.design_time import require_torch
+    from camkit.cli.design.design_time import require_torch
 
     require_torch("camkit design")
     from camkit.models_def.design.recipe import read_design, with_choices

@@ -43,7 +43,7 @@ def tolerance(
 
     Without -o and --json the chart is written where you are.
     """
-    from camkit.cli.design_time import refuse_existing, require_torch
+    from camkit.cli.design.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens tolerance")
     import torch

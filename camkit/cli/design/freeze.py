@@ -37,7 +37,7 @@ def freeze(
     _debug: Debug = False,
 ) -> None:
     """Trace the lens and keep as few PSF samples as the stated loss allows (needs torch)."""
-    from camkit.cli.design_time import print_report, refuse_existing, require_torch
+    from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     require_torch("camkit freeze")
     refuse_existing([out, stress_out, report], overwrite=overwrite)

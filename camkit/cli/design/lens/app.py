@@ -2,10 +2,10 @@
 
 import typer
 
-from camkit.cli.lens.convert import convert
-from camkit.cli.lens.optimize import optimize
-from camkit.cli.lens.show import show
-from camkit.cli.lens.tolerance import tolerance
+from camkit.cli.design.lens.convert import convert
+from camkit.cli.design.lens.optimize import optimize
+from camkit.cli.design.lens.show import show
+from camkit.cli.design.lens.tolerance import tolerance
 
 lens_app = typer.Typer(
     name="lens", help="One lens: look at it, improve it, convert it.", no_args_is_help=True

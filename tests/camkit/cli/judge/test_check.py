@@ -8,7 +8,7 @@ import pytest
 from camkit.cli.exit_code import ExitCode
 from camkit.runtime.check import LAYERS
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "data" / "example-1.0.camkit"
+EXAMPLE = Path(__file__).resolve().parents[3] / "data" / "example-1.0.camkit"
 
 
 def test_the_example_of_format_1_0_passes_every_layer(camkit_command) -> None:

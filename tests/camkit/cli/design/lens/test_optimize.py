@@ -6,7 +6,7 @@ import pytest
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 
-PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
+PRESCRIPTIONS = Path(__file__).resolve().parents[5] / "models_def" / "prescriptions"
 QUICK = ("--starts", "2", "--steps", "20", "--rays", "8")
 
 

@@ -36,7 +36,7 @@ def info(
         return
     if file is None:
         raise ContractError("give a bundle or a capture, or --schema")
-    from camkit.cli.mosaic import mosaic_options
+    from camkit.cli.use.mosaic import mosaic_options
 
     options = mosaic_options(mosaic, black_level, white_level)
     facts = _describe(file, options)

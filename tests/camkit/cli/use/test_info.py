@@ -13,7 +13,7 @@ from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import open_bundle
 from camkit.cli.exit_code import ExitCode
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "data" / "example-1.0.camkit"
+EXAMPLE = Path(__file__).resolve().parents[3] / "data" / "example-1.0.camkit"
 KINDS: dict[str, Any] = {
     "object": dict,
     "array": list,

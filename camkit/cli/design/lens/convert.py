@@ -30,7 +30,7 @@ def convert(
 
     A finite object distance is scaled with the lens.
     """
-    from camkit.cli.design_time import refuse_existing, require_torch
+    from camkit.cli.design.design_time import refuse_existing, require_torch
 
     require_torch("camkit lens convert")
     refuse_existing([out], overwrite=overwrite)

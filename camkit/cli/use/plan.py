@@ -3,7 +3,7 @@
 import inspect
 from typing import Any
 
-from camkit.cli.process import process
+from camkit.cli.use.process import process
 
 NOT_PLANNED = frozenset({"dry_run", "jobs", "resume", "overwrite"})
 """Options of `process` that say nothing about a plan."""

@@ -9,7 +9,7 @@ from camkit.cli.app import run
 from camkit.cli.exit_code import ExitCode
 from tests.zmx_factory import LA1131
 
-LENS = Path(__file__).resolve().parents[4] / "models_def/prescriptions/cooke-triplet-f5.toml"
+LENS = Path(__file__).resolve().parents[5] / "models_def/prescriptions/cooke-triplet-f5.toml"
 
 
 def test_json_is_one_object_on_stdout_and_nothing_is_written(

@@ -55,7 +55,7 @@ def train(
     _debug: Debug = False,
 ) -> None:
     """Train one network of a recipe behind the Wiener bank of its lens (needs torch)."""
-    from camkit.cli.design_time import print_report, require_torch
+    from camkit.cli.design.design_time import print_report, require_torch
 
     require_torch("camkit train")
     from camkit.models_def.training.trainer import TrainOptions

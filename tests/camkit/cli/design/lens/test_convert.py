@@ -6,7 +6,7 @@ import pytest
 from camkit.cli.exit_code import ExitCode
 from tests.zmx_factory import LA1131
 
-PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
+PRESCRIPTIONS = Path(__file__).resolve().parents[5] / "models_def" / "prescriptions"
 
 
 def test_lens_goes_to_zmx_and_back_unchanged(camkit_command, tmp_path: Path) -> None:
