@@ -68,12 +68,12 @@ def bench(
 ) -> None:
     """Chart the speed of a bundle against its accuracy, beside classical methods."""
     from camkit.bundle.reader import built_in_bundles
-    from camkit.report.bench.case import Axes
     from camkit.report.bench.settings import (
         DEFAULT_REPEAT,
         QUICK_METHODS,
         Settings,
     )
+    from camkit.report.bench.trial import Axes
 
     chosen = [*(bundles or ()), *(built_in_bundles() if all_ else ())]
     axes = Axes(

@@ -1,4 +1,4 @@
-"""Cases: one way to do the work each, and the axes along which they vary."""
+"""Trials: one way to do the work each, and the axes along which they vary."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,14 +13,14 @@ BASE_SIZE: Final = "M"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
+class Trial:
     """One row of the bench before it is measured.
 
     Attributes:
         camera: Label of the bundle whose camera takes the captures.
         bundle: Label of the bundle that does the work.
         path: That bundle; None only develops.
-        kind: network, classical, develop or what else registers.
+        maker: Name of the row maker: network, classical, develop or what else registers.
         method: As `camkit process --method` takes it, or develop.
         size: S, M or L; None without a network.
         mode: exact, fast or whole; None without a network.
@@ -30,13 +30,13 @@ class Case:
         tile_px: Forced side of the tiles; None for the planned one.
         max_mem_bytes: Memory cap; None for the default.
         base_threads: Threads that need no mention.
-        extra: Further fields of `Options` by name, for kinds of rows to come.
+        extra: Further fields of `Options` by name, for row makers to come.
     """
 
     camera: str
     bundle: str
     path: Path | None
-    kind: str
+    maker: str
     method: str
     size: str | None = None
     mode: str | None = None
@@ -61,7 +61,7 @@ class Case:
 
     @property
     def label(self) -> str:
-        """Name the case for people, without its camera."""
+        """Name the trial for people, without its camera."""
         name = self.size or self.method
         names = [name] if self.bundle == self.camera else [self.bundle, name]
         return " ".join([*names, *self._particulars()])
@@ -99,7 +99,7 @@ class Axes:
     """The values that a caller asked for; None leaves an axis to the bench.
 
     Axes that were asked for are multiplied with each other; the others are varied one at a time
-    around the base case, so that the default stays short.
+    around the base trial, so that the default stays short.
 
     Attributes:
         sizes: S, M, L; None for all that the bundle holds.
@@ -190,15 +190,15 @@ class Skip(NamedTuple):
 
 
 class Vary(NamedTuple):
-    """One axis: field of `Case`, values, and whether the caller asked for them."""
+    """One axis: field of `Trial`, values, and whether the caller asked for them."""
 
     field: str
     values: tuple[Any, ...]
     asked: bool
 
 
-def spread_out(base: Case, axes: Sequence[Vary], *, vary: bool) -> Iterator[Case]:
-    """Give a case for every product of the axes asked for, then those varied one at a time.
+def spread_out(base: Trial, axes: Sequence[Vary], *, vary: bool) -> Iterator[Trial]:
+    """Give a trial for every product of the axes asked for, then those varied one at a time.
 
     Args:
         base: Gives the fields that no axis sets.

@@ -1,4 +1,4 @@
-"""Kinds of rows and metrics register by lying in a folder; which cases a bundle gives."""
+"""Row makers and metrics register by lying in a folder; which trials a bundle gives."""
 
 import sys
 from dataclasses import replace
@@ -9,10 +9,10 @@ import pytest
 from camkit.bundle.facts import HaloError
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, UnsupportedError
-from camkit.report.bench.case import Axes, Entrant, Ground
 from camkit.report.bench.discovery import discover
 from camkit.report.bench.metric import registered_metrics
-from camkit.report.bench.row_kind import make_cases, row_kinds
+from camkit.report.bench.row_maker import make_trials, row_makers
+from camkit.report.bench.trial import Axes, Entrant, Ground
 from tests.wide_bundle import write_wide_bundle
 
 GROUND = Ground(threads=2, providers=("cpu",), free_bytes=10**10)
@@ -24,28 +24,28 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 
 def labels(bundle: Bundle, axes: Axes, ground: Ground = GROUND) -> tuple[list[str], list[str]]:
-    cases, skips = make_cases([Entrant(label="tiny", bundle=bundle, camera="tiny")], axes, ground)
-    return [case.label for case in cases], [f"{s.what}: {s.reason}" for s in skips]
+    trials, skips = make_trials([Entrant(label="tiny", bundle=bundle, camera="tiny")], axes, ground)
+    return [trial.label for trial in trials], [f"{s.what}: {s.reason}" for s in skips]
 
 
-def test_the_kinds_that_come_with_camkit_are_found() -> None:
-    assert [kind.name for kind in row_kinds()] == ["classical", "develop", "network"]
+def test_the_row_makers_that_come_with_camkit_are_found() -> None:
+    assert [maker.name for maker in row_makers()] == ["classical", "develop", "network"]
     assert [c.name for m in registered_metrics() for c in m.columns] == ["psnr_db", "ssim"]
 
 
 def test_a_new_module_registers_without_any_edit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = tmp_path / "more_kinds"
+    package = tmp_path / "more_rows"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    (package / "spad.py").write_text("KIND = 'a new kind'")
+    (package / "spad.py").write_text("ROWS = 'a new maker'")
     monkeypatch.syspath_prepend(tmp_path)
-    assert discover("more_kinds", "KIND", str) == ("a new kind",)
-    (package / "wrong.py").write_text("KIND = 3")
-    with pytest.raises(UnsupportedError, match=r"more_kinds\.wrong must define KIND as a str"):
-        discover("more_kinds", "KIND", str)
-    for name in ("more_kinds", "more_kinds.spad", "more_kinds.wrong"):
+    assert discover("more_rows", "ROWS", str) == ("a new maker",)
+    (package / "wrong.py").write_text("ROWS = 3")
+    with pytest.raises(UnsupportedError, match=r"more_rows\.wrong must define ROWS as a str"):
+        discover("more_rows", "ROWS", str)
+    for name in ("more_rows", "more_rows.spad", "more_rows.wrong"):
         sys.modules.pop(name, None)
 
 
@@ -85,15 +85,15 @@ def test_a_measured_halo_and_a_second_provider_make_their_rows(bundle: Bundle) -
 
 def test_one_window_may_take_most_of_the_free_memory_and_only_that(bundle: Bundle) -> None:
     entrant = Entrant(label="tiny", bundle=bundle, camera="tiny")
-    cases, _ = make_cases([entrant], Axes(modes=("exact", "whole"), methods=("net",)), GROUND)
-    caps = {case.mode: case.max_mem_bytes for case in cases}
+    trials, _ = make_trials([entrant], Axes(modes=("exact", "whole"), methods=("net",)), GROUND)
+    caps = {trial.mode: trial.max_mem_bytes for trial in trials}
     assert caps == {"exact": None, "whole": 7 * 10**9}
 
 
 def test_a_reference_gives_its_networks_only(bundle: Bundle) -> None:
     entrant = Entrant(label="rival", bundle=bundle, camera="tiny")
-    cases, skips = make_cases([entrant], Axes(sizes=("S",)), GROUND)
-    assert [case.label for case in cases] == ["rival M"]
+    trials, skips = make_trials([entrant], Axes(sizes=("S",)), GROUND)
+    assert [trial.label for trial in trials] == ["rival M"]
     assert not skips
 
 

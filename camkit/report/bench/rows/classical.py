@@ -1,13 +1,13 @@
 """Classical methods on the blocks and PSFs of a bundle, tuned and padded by the runtime."""
 
 from camkit.bundle.manifest import Wiener
-from camkit.report.bench.case import Axes, Case, Entrant, Ground, Skip
-from camkit.report.bench.row_kind import RowKind
+from camkit.report.bench.row_maker import RowMaker
+from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 
 METHODS = ("wiener", "rl", "admm-tv")
 
 
-def make_cases(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Case], list[Skip]]:
+def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Trial], list[Skip]]:
     """Give every method once, on the first number of threads asked for."""
     if entrant.is_reference:
         return [], []
@@ -16,11 +16,11 @@ def make_cases(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Case]
         return [], [Skip(f"{entrant.label} {m}", "the bundle has no Wiener bank") for m in wanted]
     threads = ground.base_threads(axes)
     return [
-        Case(
+        Trial(
             camera=entrant.camera,
             bundle=entrant.label,
             path=entrant.bundle.path,
-            kind=KIND.name,
+            maker=ROWS.name,
             method=method,
             threads=threads,
             base_threads=threads,
@@ -29,4 +29,4 @@ def make_cases(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Case]
     ], []
 
 
-KIND = RowKind(name="classical", methods=METHODS, cases=make_cases)
+ROWS = RowMaker(name="classical", methods=METHODS, trials=make_trials)

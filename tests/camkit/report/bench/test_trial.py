@@ -1,13 +1,13 @@
-"""Cases: what they are called, what they ask of the pipeline, and how axes are spread out."""
+"""Trials: what they are called, what they ask of the pipeline, and how axes are spread out."""
 
 from typing import Any
 
 import pytest
 
 from camkit.errors import ContractError
-from camkit.report.bench.case import Axes, Vary, spread_out
+from camkit.report.bench.trial import Axes, Vary, spread_out
 from camkit.runtime.options import Options
-from tests.bench_factory import make_case
+from tests.bench_factory import make_trial
 
 
 @pytest.mark.parametrize(
@@ -24,25 +24,25 @@ from tests.bench_factory import make_case
     ],
 )
 def test_labels_name_what_is_not_plain(changes: dict[str, Any], label: str) -> None:
-    case = make_case(**changes)
-    assert case.label == label
-    assert case.is_variant is (len(label.removeprefix("trimmed ").split()) > 1)
+    trial = make_trial(**changes)
+    assert trial.label == label
+    assert trial.is_variant is (len(label.removeprefix("trimmed ").split()) > 1)
 
 
-def test_options_of_a_case_are_options_of_the_pipeline() -> None:
-    given = make_case(mode="whole", max_mem_bytes=10**9, tile_px=64).options()
+def test_options_of_a_trial_are_options_of_the_pipeline() -> None:
+    given = make_trial(mode="whole", max_mem_bytes=10**9, tile_px=64).options()
     chosen = Options(**given)
     assert (chosen.size, chosen.mode, chosen.method, chosen.tile_px) == ("M", "whole", "net", 64)
     assert chosen.max_mem_bytes == 10**9
-    develop = make_case(path=None, size=None, mode=None, dtype=None, provider=None)
+    develop = make_trial(path=None, size=None, mode=None, dtype=None, provider=None)
     assert develop.options() == {"threads": 2}
 
 
 def test_threads_and_tiles_do_not_decide_accuracy_and_the_rest_does() -> None:
-    key = make_case().accuracy_key
-    assert make_case(threads=1, tile_px=64).accuracy_key == key
+    key = make_trial().accuracy_key
+    assert make_trial(threads=1, tile_px=64).accuracy_key == key
     for change in ({"mode": "fast"}, {"dtype": "fp16"}, {"size": "S"}, {"bundle": "other"}):
-        assert make_case(**change).accuracy_key != key
+        assert make_trial(**change).accuracy_key != key
 
 
 def test_axes_asked_for_are_multiplied_and_others_varied_one_at_a_time() -> None:
@@ -51,9 +51,9 @@ def test_axes_asked_for_are_multiplied_and_others_varied_one_at_a_time() -> None
         Vary("threads", (2, 1), asked=True),
         Vary("dtype", ("fp32", "fp16"), asked=False),
     ]
-    labels = [case.label for case in spread_out(make_case(), axes, vary=True)]
+    labels = [trial.label for trial in spread_out(make_trial(), axes, vary=True)]
     assert labels == ["M", "M 1 thread", "M fast", "M fast 1 thread", "M fp16"]
-    assert len(list(spread_out(make_case(), axes, vary=False))) == 4
+    assert len(list(spread_out(make_trial(), axes, vary=False))) == 4
 
 
 @pytest.mark.parametrize(

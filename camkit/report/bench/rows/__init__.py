@@ -1,4 +1,4 @@
-"""Kinds of rows: every module here defines `KIND`, a `camkit.report.bench.row_kind.RowKind`.
+"""Row makers: every module here defines `ROWS`, a `camkit.report.bench.row_maker.RowMaker`.
 
 classical   the classical methods on the bundle's blocks
 develop     no reconstruction at all
