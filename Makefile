@@ -4,7 +4,7 @@ VENV := .venv
 DEV := .venv-dev
 RUNTIME_STAMP := $(VENV)/.runtime-installed
 DEV_STAMP := $(DEV)/.dev-installed
-SOURCES := camkit runtime export models_def tests tools
+SOURCES := camkit runtime export models_def tests tools setup.py
 
 .PHONY: demo test test-slow check format docs clean
 

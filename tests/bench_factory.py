@@ -1,21 +1,21 @@
-"""Cases, runs, scores and facts of a bench, made by hand."""
+"""Trials, runs, scores and facts of a bench, made by hand."""
 
 from pathlib import Path
 from typing import Any
 
 from camkit.report.bench.accuracy import INPUT, Scores
-from camkit.report.bench.case import Case
 from camkit.report.bench.metric import registered_metrics
 from camkit.report.bench.process_run import Run
 from camkit.report.bench.row import Facts
+from camkit.report.bench.trial import Trial
 
 
-def make_case(**changes: Any) -> Case:
+def make_trial(**changes: Any) -> Trial:
     fields: dict[str, Any] = {
         "camera": "duet",
         "bundle": "duet",
         "path": Path("duet.camkit"),
-        "kind": "network",
+        "maker": "network",
         "method": "net",
         "size": "M",
         "mode": "exact",
@@ -24,7 +24,7 @@ def make_case(**changes: Any) -> Case:
         "threads": 2,
         "base_threads": 2,
     }
-    return Case(**(fields | changes))
+    return Trial(**(fields | changes))
 
 
 def make_scores(values: dict[str, float], psf: str = "fresh") -> Scores:
@@ -51,11 +51,11 @@ def make_facts(**changes: Any) -> Facts:
         "gemm_gmac_per_s": 100.0,
         "scores": {
             INPUT: make_scores({"a": 20.0, "b": 22.0}),
-            make_case().accuracy_key: make_scores({"a": 25.0, "b": 29.0}),
+            make_trial().accuracy_key: make_scores({"a": 25.0, "b": 29.0}),
         },
         "metrics": registered_metrics(),
         "base": [make_run(4.0), make_run(6.0)],
         "base_label": "M",
-        "base_key": make_case().accuracy_key,
+        "base_key": make_trial().accuracy_key,
     }
     return Facts(**(fields | changes))

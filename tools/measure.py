@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from camkit.bundle.reader import built_in_bundles, find_bundle, open_bundle
-from camkit.cli.doctor import examine
+from camkit.cli.judge.doctor import examine
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
 from camkit.runtime.rows import ArrayRows

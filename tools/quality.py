@@ -5,7 +5,7 @@
 
 writes the JSON (every measurement, all means) and the page beside it (docs/quality.md). What was
 measured lies in a journal in the work directory; `--resume` measures only what is missing there
-or what has changed, so rows, captures and kinds of PSF may be measured in several runs.
+or what has changed, so rows, captures and sources of PSFs may be measured in several runs.
 """
 
 import argparse
@@ -251,7 +251,7 @@ def isos_of(arguments: argparse.Namespace) -> list[float]:
 
 def list_shots(arguments: argparse.Namespace) -> list[Shot]:
     """Give all captures, those of the first picture of every set first: a part is a fair part."""
-    kinds: Sequence[Any] = ("fresh", "bundle") if arguments.psf == "both" else (arguments.psf,)
+    sources: Sequence[Any] = ("fresh", "bundle") if arguments.psf == "both" else (arguments.psf,)
     shots = [
         Shot(
             set_name=name,
@@ -259,13 +259,13 @@ def list_shots(arguments: argparse.Namespace) -> list[Shot]:
             number=number,
             position=position,
             iso=iso,
-            psf=kind,
+            psf=source,
         )
         for name in arguments.sets.split(",")
         for number, picture in enumerate(list_set(arguments.data / name, arguments.per_set))
         for position in range(len(FIELD_SHARES))
         for iso in isos_of(arguments)
-        for kind in kinds
+        for source in sources
     ]
     return sorted(shots, key=lambda shot: (shot.number, shot.position))
 

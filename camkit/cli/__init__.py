@@ -1,14 +1,12 @@
-"""The command line: one file per command, in the order of daily use.
+"""The command line: one file per command, grouped by task.
 
-    process   captures in, pictures out          simulate   the digital twin: a scene to a DNG
-    info      what a bundle or a capture is       check      prove a bundle
-    bench     speed against accuracy              doctor     what this machine has
-    stress    where the networks stop helping
-    freeze, train, export   design time (torch)
+    use       captures in, pictures out: process, plan, simulate, info
+    judge     what a camera and this machine are worth: check, stress, bench, doctor
+    design    a camera made at design time (torch): design, freeze, train, export, lens ...
 
-`app` joins the commands and turns errors into one line and an exit code (`exit_code`). Shared by
-commands: `choices` (options), `mosaic` (headerless mosaics), `progress` (bars and results),
-`design_time` (asking for torch, keeping files).
+`app` joins the commands and turns errors into one line and an exit code (`exit_code`). `choices`
+are options that several commands share. A new command is a file in the folder of its task and a
+line in `app`.
 """
 
 from camkit.cli.app import main

@@ -9,20 +9,20 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.bench import bench
-from camkit.cli.check import check
-from camkit.cli.design import design
-from camkit.cli.doctor import doctor
+from camkit.cli.design.design import design
+from camkit.cli.design.export import export
+from camkit.cli.design.freeze import freeze
+from camkit.cli.design.lens.app import lens_app
+from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
-from camkit.cli.export import export
-from camkit.cli.freeze import freeze
-from camkit.cli.info import info
-from camkit.cli.lens.app import lens_app
-from camkit.cli.plan import plan
-from camkit.cli.process import process
-from camkit.cli.simulate import simulate
-from camkit.cli.stress import stress
-from camkit.cli.train import train
+from camkit.cli.judge.bench import bench
+from camkit.cli.judge.check import check
+from camkit.cli.judge.doctor import doctor
+from camkit.cli.judge.stress import stress
+from camkit.cli.use.info import info
+from camkit.cli.use.plan import plan
+from camkit.cli.use.process import process
+from camkit.cli.use.simulate import simulate
 from camkit.errors import CamkitError
 
 DEBUG_FLAG = "--debug"

@@ -11,7 +11,7 @@ from typing import Final
 
 from camkit.contracts import FloatArray
 from camkit.report.journal import append_journal, read_journal
-from camkit.report.quality import Exposed, PsfKind, Restorer, Shot, judge
+from camkit.report.quality import Exposed, PsfSource, Restorer, Shot, judge
 
 COLUMNS: Final = (
     "psf",
@@ -50,7 +50,7 @@ class Measurement:
         identity: Hash of all that decides the value besides the capture.
     """
 
-    psf: PsfKind
+    psf: PsfSource
     set_name: str
     picture: str
     position: int

@@ -44,7 +44,7 @@ BORDER_PX: Final = 32
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 FloatGrid = NDArray[np.float64]
-PsfKind = Literal["fresh", "bundle"]
+PsfSource = Literal["fresh", "bundle"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ class Shot:
     number: int
     position: int
     iso: float
-    psf: PsfKind
+    psf: PsfSource
 
     @property
     def fabrication_seed(self) -> int:

@@ -10,9 +10,9 @@ from camkit.bundle.manifest import Network, Wiener
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError
-from camkit.report.bench.case import Case
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.samples import Sample
+from camkit.report.bench.trial import Trial
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 
@@ -49,20 +49,20 @@ class Restorers:
         self._threads = threads
         self._made: dict[tuple[Key, bool], Pipeline] = {}
 
-    def restore(self, case: Case | None, sample: Sample) -> FloatArray:
+    def restore(self, trial: Trial | None, sample: Sample) -> FloatArray:
         """Give linear Rec.709, (3, h, w), in the geometry of the sample's truth.
 
         Args:
-            case: The method; None or a case without a bundle develops only.
+            trial: The method; None or a trial without a bundle develops only.
             sample: The capture.
 
         Raises:
             CamkitError: If the method cannot do it.
         """
-        key = INPUT if case is None or case.path is None else case.accuracy_key
+        key = INPUT if trial is None or trial.path is None else trial.accuracy_key
         place = key, sample.undistort
         if place not in self._made:
-            self._made[place] = self._make(case, undistort=sample.undistort)
+            self._made[place] = self._make(trial, undistort=sample.undistort)
         return self._made[place].process_array(
             sample.capture,
             iso=sample.iso,
@@ -70,12 +70,12 @@ class Restorers:
             origin_px=sample.origin_px,
         )
 
-    def _make(self, case: Case | None, *, undistort: bool) -> Pipeline:
-        if case is None or case.path is None:
+    def _make(self, trial: Trial | None, *, undistort: bool) -> Pipeline:
+        if trial is None or trial.path is None:
             plain = Options(method="wiener", undistort=undistort, threads=self._threads)
             return Pipeline(without_restoration(self._bundle), plain)
-        chosen: dict[str, Any] = case.options() | {"threads": self._threads, "tile_px": None}
-        return Pipeline(open_bundle(case.path), Options(**chosen, undistort=undistort))
+        chosen: dict[str, Any] = trial.options() | {"threads": self._threads, "tile_px": None}
+        return Pipeline(open_bundle(trial.path), Options(**chosen, undistort=undistort))
 
 
 def without_restoration(bundle: Bundle) -> Bundle:
@@ -85,7 +85,7 @@ def without_restoration(bundle: Bundle) -> Bundle:
 
 
 def measure_accuracy(
-    cases: Iterable[Case],
+    trials: Iterable[Trial],
     samples: Iterable[Sample],
     restorers: Restorers,
     metrics: Sequence[Metric],
@@ -94,24 +94,24 @@ def measure_accuracy(
     """Restore every sample by every method that differs in its pixels.
 
     Args:
-        cases: Of one camera.
+        trials: Of one camera.
         samples: Captures; each is made once and not kept.
         restorers: Of that camera.
         metrics: What to measure.
         on_result: Called with every result, `INPUT` first.
 
     Returns:
-        Scores by `Case.accuracy_key`, and those of `INPUT`.
+        Scores by `Trial.accuracy_key`, and those of `INPUT`.
     """
-    methods: dict[Key, Case | None] = {INPUT: None}
-    methods |= {c.accuracy_key: c for c in cases if c.path is not None}
+    methods: dict[Key, Trial | None] = {INPUT: None}
+    methods |= {t.accuracy_key: t for t in trials if t.path is not None}
     found = {key: Scores() for key in methods}
     for sample in samples:
-        for key, case in methods.items():
+        for key, trial in methods.items():
             if found[key].error is not None:
                 continue
             try:
-                restored = restorers.restore(case, sample)
+                restored = restorers.restore(trial, sample)
             except CamkitError as error:
                 found[key] = Scores(error=str(error))
                 continue

@@ -9,14 +9,14 @@ from camkit.errors import UnsupportedError
 _T = TypeVar("_T")
 
 
-def discover(package: str, name: str, kind: type[_T]) -> tuple[_T, ...]:
+def discover(package: str, name: str, expected: type[_T]) -> tuple[_T, ...]:
     """Give one object of every module of a package, by the modules' names.
 
     Args:
         package: The folder, by its import name: its modules import the type that it is searched
             for, so that a plain import of it would be a cycle.
         name: Global that every module in it defines.
-        kind: Type of that global.
+        expected: Type of that global.
 
     Raises:
         UnsupportedError: If a module defines none of that type.
@@ -26,7 +26,7 @@ def discover(package: str, name: str, kind: type[_T]) -> tuple[_T, ...]:
     for module in sorted(pkgutil.iter_modules(places), key=lambda m: m.name):
         full = f"{package}.{module.name}"
         entry = getattr(importlib.import_module(full), name, None)
-        if not isinstance(entry, kind):
-            raise UnsupportedError(f"{full} must define {name} as a {kind.__name__}")
+        if not isinstance(entry, expected):
+            raise UnsupportedError(f"{full} must define {name} as a {expected.__name__}")
         found.append(entry)
     return tuple(found)

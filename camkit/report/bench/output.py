@@ -21,14 +21,16 @@ def write_bench(result: Result, folder: Path) -> list[Path]:
         The files; without matplotlib or without PSNR there is no chart.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    paths = {kind: folder / f"{NAME}.{kind}" for kind in ("json", "csv", "svg", "png", "html")}
+    paths = {
+        suffix: folder / f"{NAME}.{suffix}" for suffix in ("json", "csv", "svg", "png", "html")
+    }
     text = json.dumps(result.report, indent=1, allow_nan=False)
     paths["json"].write_text(text + "\n", encoding="utf-8")
     write_csv(paths["csv"], result.report["rows"])
     drawn = draw_chart(result.report, svg=paths["svg"], png=paths["png"])
     if not drawn:
-        for kind in ("svg", "png"):
-            paths.pop(kind).unlink(missing_ok=True)
+        for suffix in ("svg", "png"):
+            paths.pop(suffix).unlink(missing_ok=True)
     chart = base64.b64encode(paths["svg"].read_bytes()).decode("ascii") if drawn else None
     paths["html"].write_text(to_html(result, chart), encoding="utf-8")
     return list(paths.values())

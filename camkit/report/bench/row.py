@@ -1,4 +1,4 @@
-"""All that is known about a case as one flat record; unknown values are None."""
+"""All that is known about a trial as one flat record; unknown values are None."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from camkit.report.bench.accuracy import (
     mean_gain,
     standard_error_of_gain,
 )
-from camkit.report.bench.case import Case
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.process_run import Run
 from camkit.report.bench.timing import Spread, is_noisy, paired_ratio, quantile, spread_of
+from camkit.report.bench.trial import Trial
 
 Row = dict[str, Any]
 MP_OF_REFERENCE: Final = 24.0
@@ -27,11 +27,11 @@ class Facts:
 
     Attributes:
         size_px: (width, height) of the capture that is timed.
-        mac_per_px: Of the case's network.
-        gemm_gmac_per_s: Peak of the machine at the case's threads.
-        scores: Of all methods of the case's camera.
+        mac_per_px: Of the trial's network.
+        gemm_gmac_per_s: Peak of the machine at the trial's threads.
+        scores: Of all methods of the trial's camera.
         metrics: Of that camera.
-        base: Runs of the case that others are compared with.
+        base: Runs of the trial that others are compared with.
         base_label: Its label.
         base_key: Key of its scores.
     """
@@ -46,36 +46,36 @@ class Facts:
     base_key: Key
 
 
-def make_row(case: Case, runs: Sequence[Run], facts: Facts) -> Row:
-    """Join what is known about a case.
+def make_row(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
+    """Join what is known about a trial.
 
     Args:
-        case: The case.
+        trial: The trial.
         runs: Its processes, in the order of the rounds.
         facts: What is known from elsewhere.
     """
     width, height = facts.size_px
     row: Row = {
-        "bundle": case.bundle,
-        "camera": case.camera,
-        "label": case.label,
-        "kind": case.kind,
-        "variant": case.is_variant,
-        "method": case.method,
-        "size": case.size,
-        "mode": case.mode,
-        "dtype": case.dtype,
-        "provider": case.provider,
-        "threads": case.threads,
-        "tile_px": case.tile_px,
+        "bundle": trial.bundle,
+        "camera": trial.camera,
+        "label": trial.label,
+        "kind": trial.maker,
+        "variant": trial.is_variant,
+        "method": trial.method,
+        "size": trial.size,
+        "mode": trial.mode,
+        "dtype": trial.dtype,
+        "provider": trial.provider,
+        "threads": trial.threads,
+        "tile_px": trial.tile_px,
         "width": width,
         "height": height,
         **_seconds(runs, facts, width * height / 1e6),
-        **_network_share(case, runs, facts),
-        **_accuracy(case, facts),
+        **_network_share(trial, runs, facts),
+        **_accuracy(trial, facts),
     }
     failed = next((run.error for run in runs if run.error is not None), None)
-    scores = facts.scores.get(_key(case))
+    scores = facts.scores.get(_key(trial))
     row["error"] = failed or (None if scores is None else scores.error)
     return row
 
@@ -113,12 +113,12 @@ def _spread_columns(name: str, spread: Spread | None) -> Row:
     }
 
 
-def _network_share(case: Case, runs: Sequence[Run], facts: Facts) -> Row:
+def _network_share(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
     """Give the network's useful multiply-adds per second over the machine's peak (CPU only)."""
     seconds = _stage_medians(runs).get("network")
     share = None
     known = facts.mac_per_px is not None and facts.gemm_gmac_per_s is not None
-    if known and seconds and case.provider == "cpu":
+    if known and seconds and trial.provider == "cpu":
         width, height = facts.size_px
         assert facts.mac_per_px is not None
         assert facts.gemm_gmac_per_s is not None
@@ -128,8 +128,8 @@ def _network_share(case: Case, runs: Sequence[Run], facts: Facts) -> Row:
     return {"mac_per_px": facts.mac_per_px, "share_of_gemm_peak": share}
 
 
-def _accuracy(case: Case, facts: Facts) -> Row:
-    scores, of_input = facts.scores.get(_key(case)), facts.scores.get(INPUT)
+def _accuracy(trial: Trial, facts: Facts) -> Row:
+    scores, of_input = facts.scores.get(_key(trial)), facts.scores.get(INPUT)
     of_base = facts.scores.get(facts.base_key)
     lenses = set() if scores is None else scores.psf
     row: Row = {
@@ -159,8 +159,8 @@ def _gain(
     return mean_gain(scores, other, column), standard_error_of_gain(scores, other, column)
 
 
-def _key(case: Case) -> Key:
-    return INPUT if case.path is None else case.accuracy_key
+def _key(trial: Trial) -> Key:
+    return INPUT if trial.path is None else trial.accuracy_key
 
 
 def _means(scores: Scores | None, column: str) -> tuple[float | None, float | None]:

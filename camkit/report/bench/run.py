@@ -1,4 +1,4 @@
-"""The whole bench: cases made, timed in interleaved rounds, judged, and joined in rows."""
+"""The whole bench: trials made, timed in interleaved rounds, judged, and joined in rows."""
 
 import shutil
 import tempfile
@@ -10,18 +10,18 @@ from typing import Any, Final
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.accuracy import INPUT, Key, Restorers, Scores, measure_accuracy
-from camkit.report.bench.case import BASE_SIZE, Case, Entrant, Ground, Skip
 from camkit.report.bench.crops import MOST_SAMPLES, CropCollector, Patch
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric, registered_metrics
 from camkit.report.bench.process_run import Job, Run, run_job
 from camkit.report.bench.row import Facts, Row, make_row
-from camkit.report.bench.row_kind import make_cases
+from camkit.report.bench.row_maker import make_trials
 from camkit.report.bench.samples import ISOS, Sample, golden_samples, picture_samples
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
 from camkit.report.bench.timed_capture import SCENE_TEXT, timed_capture
 from camkit.report.bench.timing import interleaved
+from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
 from camkit.report.quality import FIELD_SHARES, list_set
 from camkit.runtime.network.engine import available_threads, usable_providers
 from camkit.runtime.raw import read_capture
@@ -53,8 +53,8 @@ class Result:
 
     Attributes:
         report: Plain JSON values: machine, settings, cameras, rows, skipped.
-        patches: Camera -> the same patches of every method, by `Case.accuracy_key`.
-        names: `Case.accuracy_key` -> label.
+        patches: Camera -> the same patches of every method, by `Trial.accuracy_key`.
+        names: `Trial.accuracy_key` -> label.
     """
 
     report: dict[str, Any]
@@ -83,8 +83,8 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
         providers=usable_providers(),
         free_bytes=free_memory_bytes(),
     )
-    cases, skips = make_cases(entrants, settings.axes, ground)
-    if not cases:
+    trials, skips = make_trials(entrants, settings.axes, ground)
+    if not trials:
         raise ContractError(
             f"nothing to measure: {'; '.join(f'{s.what}: {s.reason}' for s in skips)}"
         )
@@ -94,16 +94,16 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
             tell(f"{entrant.label}: preparing the capture")
             cameras[entrant.label] = _camera(entrant, settings, folder)
     machine = describe_machine()
-    peaks = {n: gemm_peak_gmac_per_s(n, settings.gemm_s) for n in {c.threads for c in cases}}
+    peaks = {n: gemm_peak_gmac_per_s(n, settings.gemm_s) for n in {t.threads for t in trials}}
     machine["gemm_gmac_per_s"] = {str(n): round(peak, 2) for n, peak in sorted(peaks.items())}
-    runs = time_cases(cases, cameras, settings.repeat, tell)
-    judged = {c.entrant.label: _judge(c, cases, settings, folder, tell) for c in cameras.values()}
+    runs = time_trials(trials, cameras, settings.repeat, tell)
+    judged = {c.entrant.label: _judge(c, trials, settings, folder, tell) for c in cameras.values()}
     skips += [
         Skip(what=f"accuracy of {label}", reason=found.error)
         for label, found in judged.items()
         if found.error is not None
     ]
-    return _join(cases, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
+    return _join(trials, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
 
 
 def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Entrant]:
@@ -150,26 +150,26 @@ def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
     return Camera(entrant=entrant, capture=path, size_px=size, capture_text=text)
 
 
-def time_cases(
-    cases: Sequence[Case], cameras: dict[str, Camera], repeat: int, tell: Tell
-) -> dict[Case, list[Run]]:
-    """Run every case in fresh processes, all cases once per round; a case that fails drops out."""
-    runs: dict[Case, list[Run]] = {case: [] for case in cases}
+def time_trials(
+    trials: Sequence[Trial], cameras: dict[str, Camera], repeat: int, tell: Tell
+) -> dict[Trial, list[Run]]:
+    """Run every trial in fresh processes, all once per round; a trial that fails drops out."""
+    runs: dict[Trial, list[Run]] = {trial: [] for trial in trials}
     with tempfile.TemporaryDirectory(prefix="camkit-bench-") as name:
         folder = Path(name)
         twins = {label: _twins(camera.capture, folder / label) for label, camera in cameras.items()}
-        for number, case in enumerate(interleaved(cases, repeat)):
-            if any(run.error is not None for run in runs[case]):
+        for number, trial in enumerate(interleaved(trials, repeat)):
+            if any(run.error is not None for run in runs[trial]):
                 continue
-            step = f"{number + 1}/{repeat * len(cases)}"
-            tell(f"{case.camera}: timing {case.label} ({step})")
+            step = f"{number + 1}/{repeat * len(trials)}"
+            tell(f"{trial.camera}: timing {trial.label} ({step})")
             job = Job(
-                files=twins[case.camera],
-                bundle="none" if case.path is None else str(case.path.resolve()),
+                files=twins[trial.camera],
+                bundle="none" if trial.path is None else str(trial.path.resolve()),
                 out_dir=folder / "out",
-                options=case.options(),
+                options=trial.options(),
             )
-            runs[case].append(run_job(job))
+            runs[trial].append(run_job(job))
     return runs
 
 
@@ -192,14 +192,14 @@ class _Judged:
 
 
 def _judge(
-    camera: Camera, cases: Sequence[Case], settings: Settings, folder: Path, tell: Tell
+    camera: Camera, trials: Sequence[Trial], settings: Settings, folder: Path, tell: Tell
 ) -> _Judged:
     """Measure the accuracy of all methods of one camera; without it the seconds still stand."""
     bundle, label = camera.entrant.bundle, camera.entrant.label
-    own = [case for case in cases if case.camera == label]
+    own = [trial for trial in trials if trial.camera == label]
     metrics = tuple(metric for metric in registered_metrics() if metric.applies(bundle))
     samples, count, text = _samples(bundle, settings, folder)
-    plain = [case.accuracy_key for case in own if not case.is_variant]
+    plain = [trial.accuracy_key for trial in own if not trial.is_variant]
     collector = CropCollector(plain, every=max(1, count // MOST_SAMPLES))
 
     def told(found: Iterable[Sample]) -> Iterable[Sample]:
@@ -240,30 +240,30 @@ class _Found:
 
 
 def _join(
-    cases: Sequence[Case],
-    runs: dict[Case, list[Run]],
+    trials: Sequence[Trial],
+    runs: dict[Trial, list[Run]],
     cameras: dict[str, Camera],
     judged: dict[str, _Judged],
     found: _Found,
 ) -> Result:
     bundles = {entrant.label: entrant.bundle for entrant in found.entrants}
     rows: list[Row] = []
-    for case in cases:
-        base = _base_of(case, cases)
+    for trial in trials:
+        base = _base_of(trial, trials)
         mac = None
-        if case.size is not None:
-            mac = bundles[case.bundle].network_facts(case.size).mac_per_pixel
+        if trial.size is not None:
+            mac = bundles[trial.bundle].network_facts(trial.size).mac_per_pixel
         facts = Facts(
-            size_px=cameras[case.camera].size_px,
+            size_px=cameras[trial.camera].size_px,
             mac_per_px=mac,
-            gemm_gmac_per_s=found.peaks[case.threads],
-            scores=judged[case.camera].scores,
-            metrics=judged[case.camera].metrics,
+            gemm_gmac_per_s=found.peaks[trial.threads],
+            scores=judged[trial.camera].scores,
+            metrics=judged[trial.camera].metrics,
             base=runs[base],
             base_label=base.label,
             base_key=INPUT if base.path is None else base.accuracy_key,
         )
-        rows.append(make_row(case, runs[case], facts))
+        rows.append(make_row(trial, runs[trial], facts))
     report = {
         "report_version": REPORT_VERSION,
         "machine": found.machine,
@@ -284,11 +284,11 @@ def _join(
     return Result(
         report=report,
         patches={label: judged[label].patches for label in cameras},
-        names={case.accuracy_key: case.label for case in reversed(cases)},
+        names={trial.accuracy_key: trial.label for trial in reversed(trials)},
     )
 
 
-def _base_of(case: Case, cases: Sequence[Case]) -> Case:
-    """Give the case that the others of its camera are compared with: size M, or the first."""
-    own = [other for other in cases if other.camera == case.camera]
+def _base_of(trial: Trial, trials: Sequence[Trial]) -> Trial:
+    """Give the trial that the others of its camera are compared with: size M, or the first."""
+    own = [other for other in trials if other.camera == trial.camera]
     return next((o for o in own if o.size == BASE_SIZE and o.bundle == o.camera), own[0])

@@ -23,7 +23,7 @@ from camkit.errors import ContractError
 from camkit.report.fabricated_psf import fabricated_psf
 from camkit.report.quality import (
     FIELD_SHARES,
-    PsfKind,
+    PsfSource,
     Shot,
     expose,
     list_set,
@@ -55,7 +55,7 @@ class Sample:
 
     picture: str
     caption: str
-    psf: PsfKind
+    psf: PsfSource
     capture: NDArray[Any]
     iso: float
     white_balance: tuple[float, float, float] | None
@@ -101,7 +101,7 @@ def picture_samples(
     """
     camera = bundle.manifest.camera
     most_px = min(MOST_PX, camera.width_px, camera.height_px)
-    psf = psf_kind(bundle)
+    psf = psf_source(bundle)
 
     @lru_cache(maxsize=4)
     def lens(seed: int) -> FrozenPsf:
@@ -128,7 +128,7 @@ def picture_samples(
                 yield _photograph(shot, scene, bundle, kernels, share)
 
 
-def psf_kind(bundle: Bundle) -> PsfKind:
+def psf_source(bundle: Bundle) -> PsfSource:
     """Tell through which lens pictures are photographed: fresh, if it can be traced here."""
     traceable = PRESCRIPTION in bundle.names and util.find_spec("torch") is not None
     return "fresh" if traceable else "bundle"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from camkit.errors import ContractError
-from camkit.report.bench.case import Axes
+from camkit.report.bench.trial import Axes
 
 DEFAULT_REPEAT = 3
 QUICK_SIZE_PX = (512, 384)

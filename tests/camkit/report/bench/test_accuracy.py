@@ -1,4 +1,4 @@
-"""Accuracy: samples of both kinds, scores by the protocol, the input by the same pipeline."""
+"""Accuracy: samples of both sorts, scores by the protocol, the input by the same pipeline."""
 
 import math
 from itertools import islice
@@ -22,9 +22,9 @@ from camkit.report.bench.accuracy import (
     measure_accuracy,
     standard_error_of_gain,
 )
-from camkit.report.bench.case import Case
 from camkit.report.bench.metric import registered_metrics
-from camkit.report.bench.samples import golden_samples, picture_samples, psf_kind
+from camkit.report.bench.samples import golden_samples, picture_samples, psf_source
+from camkit.report.bench.trial import Trial
 from camkit.report.quality import Shot, bundle_restorer, expose, finish_planes, judge
 from tests.bundle_factory import tiny_manifest, tiny_members
 from tests.psf_factory import texture
@@ -45,12 +45,12 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def make_case(bundle: Bundle, method: str, size: str | None = None) -> Case:
-    return Case(
+def make_trial(bundle: Bundle, method: str, size: str | None = None) -> Trial:
+    return Trial(
         camera="wide",
         bundle="wide",
         path=bundle.path,
-        kind="k",
+        maker="k",
         method=method,
         size=size,
         threads=1,
@@ -59,9 +59,9 @@ def make_case(bundle: Bundle, method: str, size: str | None = None) -> Case:
 
 
 def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_path: Path) -> None:
-    cases = [make_case(bundle, "wiener"), make_case(bundle, "net", "M")]
+    trials = [make_trial(bundle, "wiener"), make_trial(bundle, "net", "M")]
     scores = measure_accuracy(
-        cases,
+        trials,
         picture_samples(bundle, pictures, 1, tmp_path),
         Restorers(bundle, threads=1),
         registered_metrics(),
@@ -78,8 +78,8 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
     exposed = expose(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.psf)
     wanted = {
         INPUT: finish_planes(exposed.local.planes, exposed, bundle),
-        cases[0].accuracy_key: bundle_restorer(bundle, method="wiener")(exposed),
-        cases[1].accuracy_key: bundle_restorer(bundle, size="M")(exposed),
+        trials[0].accuracy_key: bundle_restorer(bundle, method="wiener")(exposed),
+        trials[1].accuracy_key: bundle_restorer(bundle, size="M")(exposed),
     }
     for key, restored in wanted.items():
         found = scores[key].by_picture["a.png"]
@@ -91,21 +91,21 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
 
 
 def test_without_a_prescription_the_lens_is_the_bundle_s_own(bundle: Bundle) -> None:
-    assert psf_kind(bundle) == "bundle"
+    assert psf_source(bundle) == "bundle"
 
 
 def test_a_method_that_fails_says_why_and_the_others_go_on(
     bundle: Bundle, pictures: Path, tmp_path: Path
 ) -> None:
-    cases = [make_case(bundle, "net", "L"), make_case(bundle, "wiener")]
+    trials = [make_trial(bundle, "net", "L"), make_trial(bundle, "wiener")]
     scores = measure_accuracy(
-        cases,
+        trials,
         islice(picture_samples(bundle, pictures, 1, tmp_path), 2),
         Restorers(bundle, threads=1),
         registered_metrics(),
     )
-    assert "holds size" in str(scores[cases[0].accuracy_key].error)
-    assert scores[cases[1].accuracy_key].error is None
+    assert "holds size" in str(scores[trials[0].accuracy_key].error)
+    assert scores[trials[1].accuracy_key].error is None
 
 
 def test_golden_cases_are_judged_against_their_stored_truth(tmp_path: Path) -> None:

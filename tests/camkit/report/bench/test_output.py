@@ -19,36 +19,36 @@ from camkit.report.bench.output import write_bench
 from camkit.report.bench.page import to_html
 from camkit.report.bench.row import make_row
 from camkit.report.bench.run import Result
-from tests.bench_factory import make_case, make_facts, make_run, make_scores
+from tests.bench_factory import make_facts, make_run, make_scores, make_trial
 
 NAMES = ("S", "M <b>", "wiener")
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    cases = [
-        make_case(size="S"),
-        make_case(size="M <b>"),
-        make_case(size="S", threads=1),
-        make_case(
-            size=None, mode=None, dtype=None, provider=None, kind="classical", method="wiener"
+    trials = [
+        make_trial(size="S"),
+        make_trial(size="M <b>"),
+        make_trial(size="S", threads=1),
+        make_trial(
+            size=None, mode=None, dtype=None, provider=None, maker="classical", method="wiener"
         ),
     ]
     gains = [5.0, 6.0, 5.0, 3.0]
     scores = {
-        case.accuracy_key: make_scores({"a": 19.0 + gain, "b": 21.0 + gain})
-        for case, gain in zip(cases, gains, strict=True)
+        trial.accuracy_key: make_scores({"a": 19.0 + gain, "b": 21.0 + gain})
+        for trial, gain in zip(trials, gains, strict=True)
     }
     scores[INPUT] = make_scores({"a": 19.0, "b": 20.0})
     rows = [
-        make_row(case, [make_run(2.0 + i), make_run(2.1 + i)], make_facts(scores=scores))
-        for i, case in enumerate(cases)
+        make_row(trial, [make_run(2.0 + i), make_run(2.1 + i)], make_facts(scores=scores))
+        for i, trial in enumerate(trials)
     ]
     pixel = base64.b64encode(b"png").decode()
     patch = Patch(
         caption="golden & case",
-        pictures={SHARP: pixel, INPUT: pixel, cases[0].accuracy_key: pixel},
-        psnr_db={INPUT: 20.0, cases[0].accuracy_key: 25.5},
+        pictures={SHARP: pixel, INPUT: pixel, trials[0].accuracy_key: pixel},
+        psnr_db={INPUT: 20.0, trials[0].accuracy_key: 25.5},
     )
     report: dict[str, Any] = {
         "report_version": 1,
@@ -74,7 +74,7 @@ def result() -> Result:
     return Result(
         report=report,
         patches={"duet": [patch]},
-        names={case.accuracy_key: case.label for case in reversed(cases)},
+        names={trial.accuracy_key: trial.label for trial in reversed(trials)},
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from camkit.report.bench.process_run import Run
 from camkit.report.bench.row import make_row
-from tests.bench_factory import make_case, make_facts, make_run
+from tests.bench_factory import make_facts, make_run, make_trial
 
 PROMISED = {
     *("bundle", "method", "size", "mode", "dtype", "provider", "threads", "width", "height"),
@@ -18,7 +18,7 @@ PROMISED = {
 
 
 def test_a_row_joins_seconds_memory_and_accuracy() -> None:
-    row = make_row(make_case(), [make_run(8.0), make_run(12.0)], make_facts())
+    row = make_row(make_trial(), [make_run(8.0), make_run(12.0)], make_facts())
     assert set(row) >= PROMISED
     assert (row["n"], row["seconds_first"], row["seconds_min"]) == (2, 8, 8)
     assert row["seconds_median"] == 10
@@ -44,7 +44,7 @@ def test_a_row_joins_seconds_memory_and_accuracy() -> None:
 
 def test_a_failed_row_holds_its_reason_and_nothing_made_up() -> None:
     facts = make_facts(scores={}, base=[])
-    row = make_row(make_case(), [Run(error="no memory")], facts)
+    row = make_row(make_trial(), [Run(error="no memory")], facts)
     assert set(row) >= PROMISED
     assert row["error"] == "no memory"
     assert row["n"] == row["images"] == 0
@@ -54,23 +54,23 @@ def test_a_failed_row_holds_its_reason_and_nothing_made_up() -> None:
 
 
 def test_the_developed_row_has_the_accuracy_of_the_input() -> None:
-    case = make_case(path=None, kind="develop", method="develop", size=None, provider=None)
-    row = make_row(case, [make_run(1.0)], make_facts(mac_per_px=None))
+    trial = make_trial(path=None, maker="develop", method="develop", size=None, provider=None)
+    row = make_row(trial, [make_run(1.0)], make_facts(mac_per_px=None))
     assert row["psnr_db"] == row["input_psnr_db"] == 21
     assert row["gain_se_psnr_db"] is None
     assert row["share_of_gemm_peak"] is None
 
 
 def test_a_share_above_one_is_unknown() -> None:
-    row = make_row(make_case(), [make_run(1.0)], make_facts(gemm_gmac_per_s=1.0))
+    row = make_row(make_trial(), [make_run(1.0)], make_facts(gemm_gmac_per_s=1.0))
     assert row["share_of_gemm_peak"] is None
 
 
 def test_speed_on_another_provider_is_not_held_against_the_cpu() -> None:
-    row = make_row(make_case(provider="cuda"), [make_run(1.0)], make_facts())
+    row = make_row(make_trial(provider="cuda"), [make_run(1.0)], make_facts())
     assert row["share_of_gemm_peak"] is None
 
 
-def test_cases_carry_no_paths_into_rows() -> None:
-    row = make_row(make_case(path=Path("/secret/duet.camkit")), [make_run(1.0)], make_facts())
+def test_trials_carry_no_paths_into_rows() -> None:
+    row = make_row(make_trial(path=Path("/secret/duet.camkit")), [make_run(1.0)], make_facts())
     assert "secret" not in json.dumps(row)

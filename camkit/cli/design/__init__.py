@@ -1,0 +1,10 @@
+"""Commands of design time; they need torch.
+
+    lens      one lens file: look at it, improve it, convert it
+    design    a lens and its network designed together
+    freeze    a lens to a frozen PSF
+    train     a recipe to a checkpoint
+    export    checkpoints and PSF to one proved bundle
+
+`design_time` is what they share: asking for torch, keeping files, printing a report.
+"""

@@ -1,0 +1,115 @@
+"""`camkit design`: a lens and its network designed together."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.models_def.design.loop import Progress
+    from camkit.models_def.design.run import DesignRun
+
+MUCH_LOST = 0.02
+
+
+def design(
+    recipe: Annotated[Path, typer.Argument(help="Design recipe (.toml).", metavar="RECIPE")],
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of sharp pictures; none: procedural scenes.")
+    ] = None,
+    out_dir: Annotated[
+        Path | None, typer.Option(help="For lens, checkpoint, log and pictures; runs/NAME.")
+    ] = None,
+    steps: Annotated[int | None, typer.Option(min=1, help="Steps instead of the recipe's.")] = None,
+    lens_rate: Annotated[
+        float | None, typer.Option(min=0, help="Learning rate of the lens; 0 trains the network.")
+    ] = None,
+    prescription: Annotated[
+        str | None, typer.Option(help="Another start than the recipe's: a name or a lens file.")
+    ] = None,
+    search: Annotated[
+        bool, typer.Option(help="Try the recipe's \\[starts]; without, begin at the lens itself.")
+    ] = True,
+    seed: Annotated[
+        int | None, typer.Option(help="Of weights and draws, not of \\[starts].")
+    ] = None,
+    pictures: Annotated[
+        int, typer.Option(min=0, help="Draw lens, PSFs and a recovered patch every N steps.")
+    ] = 0,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of torch.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where a run stopped.")] = False,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Design a lens together with the network that undoes its blur (needs torch)."""
+    from camkit.cli.design.design_time import require_torch
+
+    require_torch("camkit design")
+    from camkit.models_def.design.recipe import read_design, with_choices
+    from camkit.models_def.design.run import DesignOptions, DesignRun
+
+    if resume and overwrite:
+        raise ContractError("--resume goes on, --overwrite starts anew: give one of them")
+    chosen = with_choices(
+        read_design(recipe),
+        steps=steps,
+        lens_rate=lens_rate,
+        prescription=prescription,
+        seed=seed,
+        search=search,
+    )
+    if chosen.starts.count and chosen.schedule.lens_rate and not resume:
+        typer.echo(f"trying {chosen.starts.count} starts", err=True)
+    run = DesignRun(
+        chosen,
+        DesignOptions(
+            out_dir=out_dir or Path("runs") / chosen.name,
+            recipe_folder=recipe.parent,
+            pictures=data,
+            threads=threads,
+            resume=resume,
+            overwrite=overwrite,
+        ),
+    )
+    for variable, own in run.loop.parts.lens.problem.free.outside():
+        typer.echo(
+            f"{variable.kind} of surface {variable.surface}: the given lens has {own:.6g}, outside "
+            f"its bounds {variable.low:g} .. {variable.high:g}: it begins at the bound",
+            err=True,
+        )
+    if run.searched_s:
+        typer.echo(f"starts tried in {run.searched_s:.0f} s", err=True)
+    for moment in run.go():
+        typer.echo(_line(moment), err=True)
+        if pictures and run.leads and moment.step % pictures == 0:
+            _draw(run, moment)
+    if run.leads:
+        report = run.finish()
+        typer.echo(json.dumps(report) if json_ else _text(report))
+
+
+def _line(moment: "Progress") -> str:
+    lost = f", {moment.lost_light:.0%} of the light beyond kernel_px at the worst field"
+    return (
+        f"step {moment.step}: loss {moment.loss:.4f}, validation {moment.valid_db:.3f} dB "
+        f"(best {moment.best_db:.3f}), {moment.seconds:.0f} s"
+        + (lost if moment.lost_light > MUCH_LOST else "")
+    )
+
+
+def _draw(run: "DesignRun", moment: "Progress") -> None:
+    from camkit.report.lens.design_picture import draw_design
+
+    draw_design(run.view(), run.options.out_dir / f"{run.recipe.name}_{moment.step:06}.png")
+
+
+def _text(report: dict[str, Any]) -> str:
+    return (
+        f"{report['name']}: validation {report['begin_db']:.3f} -> {report['best_db']:.3f} dB "
+        f"after {report['steps']} steps\nlens: {report['lens']}\nlog: {report['log']}"
+    )

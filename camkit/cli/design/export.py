@@ -1,0 +1,77 @@
+"""`camkit export`: checkpoints, frozen PSF and prescription to one proved bundle."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+
+PSF_NAME = "psf.safetensors"
+STRESS_NAME = "stress_psf.safetensors"
+REPORT_NAME = "freeze.json"
+PLAN_NAME = "plan.json"
+
+
+def export(
+    checkpoints: Annotated[
+        list[Path], typer.Argument(help="One checkpoint per size.", metavar="CHECKPOINT...")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The bundle (.camkit).")],
+    psf: Annotated[
+        Path | None,
+        typer.Option(help=f"The frozen PSF; default: {PSF_NAME} beside the first checkpoint."),
+    ] = None,
+    stress_psf: Annotated[
+        Path | None,
+        typer.Option(help=f"Kernels off the design point; default: {STRESS_NAME} there, if any."),
+    ] = None,
+    freeze: Annotated[
+        Path | None,
+        typer.Option(help=f"Report of `camkit freeze`; default: {REPORT_NAME} there, if any."),
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(help=f"Calibration of `adaptive`; default: {PLAN_NAME} there, if any."),
+    ] = None,
+    prescription: Annotated[
+        Path | None,
+        typer.Option(help="The lens (.toml or .zmx); default: the one of the checkpoint."),
+    ] = None,
+    version: Annotated[str, typer.Option(help="Semantic version of the bundle.")] = "0.1.0",
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Pack checkpoints, PSF and prescription, and prove the result (needs torch)."""
+    from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
+    from camkit.errors import ContractError
+
+    require_torch("camkit export")
+    refuse_existing([out], overwrite=overwrite)
+    folder = checkpoints[0].parent
+    frozen = psf or _beside(folder, PSF_NAME)
+    if frozen is None:
+        raise ContractError(
+            f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or say --psf"
+        )
+    from camkit.export.assemble import Parts, export_bundle
+
+    report = export_bundle(
+        Parts(
+            checkpoints=tuple(checkpoints),
+            psf=frozen,
+            stress_psf=stress_psf or _beside(folder, STRESS_NAME),
+            prescription=prescription,
+            freeze=freeze or _beside(folder, REPORT_NAME),
+            plan=plan or _beside(folder, PLAN_NAME),
+            version=version,
+        ),
+        out,
+    )
+    print_report(report, json_)
+
+
+def _beside(folder: Path, name: str) -> Path | None:
+    path = folder / name
+    return path if path.is_file() else None

@@ -1,0 +1,149 @@
+"""`camkit lens optimize`: a lens made better on spots."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.models_def.optics.prescription import Lens
+    from camkit.models_def.optics.search.problem import Problem
+
+RINGS: Final = 12
+
+
+def optimize(
+    source: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The better lens (.toml or .zmx).")],
+    vary: Annotated[
+        str | None,
+        typer.Option(
+            help="What is free of every refracting surface: curvature,conic,thickness,"
+            "even_asphere; default: what `vary` of each surface names."
+        ),
+    ] = None,
+    merit: Annotated[str, typer.Option(help="rms, sum_abs or energy.")] = "sum_abs",
+    core_um: Annotated[
+        float, typer.Option(min=0.01, help="Radius below which a spot counts as sharp.")
+    ] = 6.0,
+    starts: Annotated[int, typer.Option(min=1, help="Starts near the lens.")] = 8,
+    spread: Annotated[
+        float, typer.Option(min=0, max=1, help="How far, as a share of the ranges.")
+    ] = 0.05,
+    steps: Annotated[int, typer.Option(min=1, help="Steps of the best starts.")] = 60,
+    rays: Annotated[int, typer.Option(min=4, help="Rays in half the pupil.")] = 24,
+    seed: Annotated[int, typer.Option(help="Of the starts.")] = 1,
+    glass: GlassFiles = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Improve a lens by damped least squares on its spots (needs torch)."""
+    from camkit.cli.design.design_time import refuse_existing, require_torch
+
+    require_torch("camkit lens optimize")
+    refuse_existing([out], overwrite=overwrite)
+    from camkit.models_def.optics.glass.agf import read_agf
+    from camkit.models_def.optics.lens_file.lens_file import (
+        read_noted_lens,
+        ready_for_lens,
+        write_lens,
+    )
+    from camkit.models_def.optics.search.improvement import improve
+    from camkit.models_def.optics.search.own_frame import in_own_frame, too_small_rims
+
+    ready_for_lens(out)
+    lens, read_notes = read_noted_lens(source, [read_agf(path) for path in glass or ()])
+    problem = _problem(lens, vary, merit=merit, core_mm=core_um / 1000, rays=rays)
+    begin = problem.free.scaled()
+    problem = in_own_frame(problem, begin)
+    found = improve(problem, begin, starts=starts, spread=spread, steps=steps, seed=seed)
+    better = problem.free.made(found.scaled)
+    write_lens(better, out)
+    notes = [
+        *read_notes,
+        *(
+            f"surface {surface}: the beam needs {reach_mm:.3f} mm, the rim of {rim_mm:.3f} mm stays"
+            for surface, reach_mm, rim_mm in too_small_rims(problem, found.scaled)
+        ),
+    ]
+    report = {
+        "lens": lens.name,
+        "out": str(out),
+        "merit": merit,
+        "merit_before": found.merit_before,
+        "merit_after": found.merit,
+        "variables": len(problem.free.variables),
+        "evaluations": found.evaluations,
+        "spot_rms_mm_before": _spots(lens),
+        "spot_rms_mm_after": _spots(better),
+        "notes": notes,
+    }
+    for note in notes:
+        typer.echo(f"{source.name}: {note}", err=True)
+    typer.echo(json.dumps(report) if json_ else _text(report))
+
+
+def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays: int) -> "Problem":
+    import torch
+
+    from camkit.models_def.optics.prescription import VARY
+    from camkit.models_def.optics.pupil import half_disc
+    from camkit.models_def.optics.search.improvement import free_lens, refracting_surfaces
+    from camkit.models_def.optics.search.limits import Limits
+    from camkit.models_def.optics.search.merit import MERITS
+    from camkit.models_def.optics.search.problem import Problem
+
+    if merit not in MERITS:
+        raise ContractError(f"--merit is one of {', '.join(MERITS)}; got {merit!r}")
+    free: list[Any] = [surface.vary for surface in lens.surfaces]
+    if vary is not None:
+        names = tuple(name.strip() for name in vary.split(",") if name.strip())
+        if not set(names) <= set(VARY):
+            raise ContractError(f"--vary names some of {', '.join(VARY)}; got {vary!r}")
+        refracting = refracting_surfaces(lens)
+        free = [names if i in refracting else () for i in range(len(lens.surfaces))]
+    waves = lens.wavelengths_um
+    if len(waves) % 2 == 0:
+        waves = tuple(sorted((*waves, lens.reference_wavelength_um)))
+    angles = torch.tensor(sorted({0.0, *lens.field_angles_rad}), dtype=torch.float64)
+    return Problem(
+        free=free_lens(lens, free),
+        slopes=torch.tan(angles),
+        wavelengths_um=torch.tensor(waves, dtype=torch.float64),
+        samples=half_disc(rays),
+        merit=merit,
+        core_mm=core_mm,
+        limits=Limits(min_bfl_mm=1.0, max_curvature_per_mm=1.0),
+    )
+
+
+def _spots(lens: "Lens") -> list[float]:
+    """Give the RMS spot radius in mm of every field, all wavelengths about one centroid."""
+    import torch
+
+    from camkit.models_def.optics.pupil import hexapolar
+    from camkit.models_def.optics.spot import all_waves, rms_radius, trace_spots
+
+    slopes = torch.tan(torch.tensor(lens.field_angles_rad, dtype=torch.float64))
+    waves = torch.tensor(lens.wavelengths_um, dtype=torch.float64)
+    with torch.no_grad():
+        spots = trace_spots(lens, slopes, waves, hexapolar(RINGS), definition="paraxial")
+        found: list[float] = rms_radius(all_waves(spots))[:, 0].tolist()
+    return found
+
+
+def _text(report: dict[str, Any]) -> str:
+    before, after = report["spot_rms_mm_before"], report["spot_rms_mm_after"]
+    fields = ", ".join(
+        f"{1000 * a:.1f} -> {1000 * b:.1f}" for a, b in zip(before, after, strict=True)
+    )
+    return (
+        f"{report['lens']}: merit {report['merit_before']:.4g} -> {report['merit_after']:.4g} "
+        f"({report['merit']}, {report['variables']} variables, {report['evaluations']} lenses "
+        f"traced)\nRMS spots of the fields in um: {fields}\n{report['out']}"
+    )

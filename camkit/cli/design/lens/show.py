@@ -1,0 +1,59 @@
+"""`camkit lens show`: a lens on one page."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+
+
+def show(
+    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    pupil: Annotated[
+        str, typer.Option(help="Definition of the pupil: paraxial, chief or stop.")
+    ] = "paraxial",
+    sampling: Annotated[
+        str,
+        typer.Option(
+            help="Of the pupil: hexapolar:RINGS, gauss:RINGSxARMS, radau:RINGSxARMS, grid:SIDE "
+            "or fibonacci:RAYS."
+        ),
+    ] = "hexapolar:6",
+    out_dir: Annotated[
+        Path | None,
+        typer.Option("-o", "--out-dir", help="Folder for NAME.html and its pictures (PNG, SVG)."),
+    ] = None,
+    glass: GlassFiles = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Draw and measure a lens: layout, spots, MTF, curves, Seidel sums (needs torch).
+
+    Without -o and --json the page is written beside where you are, as NAME.html.
+    """
+    from camkit.cli.design.design_time import refuse_existing, require_torch
+
+    require_torch("camkit lens show")
+    from camkit.models_def.optics.analysis.sampling import Pupil
+    from camkit.models_def.optics.glass.agf import read_agf
+    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
+    from camkit.report.lens.facts import analyse, to_json
+    from camkit.report.lens.output import page_path, write_lens_page
+
+    chosen = Pupil(definition=pupil, sampling=sampling)  # type: ignore[arg-type]
+    folder = out_dir if out_dir is not None or json_ else Path()
+    if folder is not None:
+        refuse_existing([page_path(folder, file.stem)], overwrite=overwrite)
+    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    facts = analyse(lens, chosen, notes)
+    written = [] if folder is None else write_lens_page(facts, folder, file.stem)
+    if json_:
+        typer.echo(json.dumps(to_json(facts), allow_nan=False))
+        return
+    for note in facts.notes:
+        typer.echo(f"{file.name}: {note}", err=True)
+    for path in written:
+        typer.echo(str(path))

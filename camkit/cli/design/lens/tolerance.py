@@ -1,0 +1,93 @@
+"""`camkit lens tolerance`: what fabrication costs, and what to tighten first."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.models_def.optics.tolerance.errors import Tolerances
+
+
+def tolerance(
+    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    errors: Annotated[
+        Path | None,
+        typer.Option(help="File with a \\[tolerance] table; else that of the lens, else defaults."),
+    ] = None,
+    samples: Annotated[int, typer.Option(min=1, help="Fabricated copies.")] = 50,
+    seed: Annotated[int, typer.Option(min=0, help="Of errors, patches and noise.")] = 1,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of sharp pictures; none: procedural scenes.")
+    ] = None,
+    pitch_um: Annotated[float, typer.Option(min=0.1, help="Of the pixels.")] = 6.0,
+    noise: Annotated[
+        float, typer.Option(min=0, help="Standard deviation, 1.0 = white level.")
+    ] = 0.01,
+    rays: Annotated[int, typer.Option(min=2, help="Of the pupil.")] = 512,
+    out_dir: Annotated[
+        Path | None,
+        typer.Option("-o", "--out-dir", help="Folder for NAME-tolerance.png, .svg and .json."),
+    ] = None,
+    glass: GlassFiles = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Draw fabricated copies of a lens: yield after recovery, sensitivities (needs torch).
+
+    Without -o and --json the chart is written where you are.
+    """
+    from camkit.cli.design.design_time import refuse_existing, require_torch
+
+    require_torch("camkit lens tolerance")
+    import torch
+
+    # the arrays are small: more threads mostly wait for each other
+    torch.set_num_threads(1)
+    from camkit.models_def.design.tolerance import ToleranceRun, run_tolerance
+    from camkit.models_def.optics.glass.agf import read_agf
+    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
+    from camkit.report.lens.yield_chart import chart_paths, to_json, to_text, write_tolerance
+
+    folder = out_dir if out_dir is not None or json_ else Path()
+    if folder is not None:
+        refuse_existing(chart_paths(folder, file.stem), overwrite=overwrite)
+    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    for note in notes:
+        typer.echo(f"{file.name}: {note}", err=True)
+    run = ToleranceRun(
+        samples=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
+    )
+    result = run_tolerance(lens, _tolerances(file, errors), run, _progress)
+    written = () if folder is None else write_tolerance(result, folder, file.stem)
+    if json_:
+        typer.echo(json.dumps(to_json(result), allow_nan=False))
+        return
+    typer.echo(to_text(result))
+    for path in written:
+        typer.echo(str(path))
+
+
+def _tolerances(file: Path, errors: Path | None) -> "Tolerances":
+    from camkit.models_def.optics.tolerance.error_table import read_tolerances
+    from camkit.models_def.optics.tolerance.errors import Tolerances
+
+    if errors is not None:
+        found = read_tolerances(errors)
+        if found is None:
+            raise ContractError(f"{errors} has no [tolerance] table; see docs/tolerance.md")
+        return found
+    own = read_tolerances(file) if file.suffix.lower() == ".toml" else None
+    return own or Tolerances()
+
+
+def _progress(done: int, total: int) -> None:
+    if sys.stderr.isatty():
+        end = "\n" if done == total else ""
+        typer.echo(f"\r{done} of {total} copies{end}", nl=False, err=True)

@@ -1,0 +1,107 @@
+"""`camkit train`: a recipe to a checkpoint."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.models_def.training.trainer import Stage
+
+
+def train(
+    recipe: Annotated[Path, typer.Argument(help="The recipe (TOML).")],
+    size: Annotated[str, typer.Option(help="Which of the recipe's networks: S, M, ...")] = "M",
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of pictures; without it procedural scenes only.")
+    ] = None,
+    valid: Annotated[
+        Path | None, typer.Option(help="Folder of pictures to validate on; default: procedural.")
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Steps of the whole schedule; default: the recipe's.")
+    ] = None,
+    max_minutes: Annotated[
+        float | None,
+        typer.Option(help="Wall time, decay included; default: until the steps are done."),
+    ] = None,
+    out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint, log and samples.")] = Path(
+        "runs"
+    ),
+    start: Annotated[
+        Path | None,
+        typer.Option(help="First weights: a checkpoint or bundle of any camera, same network."),
+    ] = None,
+    final: Annotated[
+        Path | None,
+        typer.Option(help="Final stage: fine-tune a checkpoint or bundle against discriminators."),
+    ] = None,
+    vgg: Annotated[
+        Path | None, typer.Option(help="With --final: VGG-19 weights (.pth or .safetensors).")
+    ] = None,
+    pairs: Annotated[
+        Path | None, typer.Option(help="With --final: folder of real pairs to fine-tune on.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
+    overwrite: Overwrite = False,
+    threads: Annotated[int, typer.Option(help="Threads of torch.")] = 1,
+    workers: Annotated[int, typer.Option(help="Processes that make samples.")] = 1,
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Train one network of a recipe behind the Wiener bank of its lens (needs torch)."""
+    from camkit.cli.design.design_time import print_report, require_torch
+
+    require_torch("camkit train")
+    from camkit.models_def.training.trainer import TrainOptions
+    from camkit.models_def.training.trainer import train as run
+
+    stage: Stage | None = None
+    if final is not None:
+        stage = _final_stage(recipe, final, size, vgg, pairs, device)
+    elif vgg is not None or pairs is not None:
+        raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM too")
+    result = run(
+        recipe,
+        TrainOptions(
+            out_dir=out_dir,
+            size=size,
+            data_folder=data,
+            valid_folder=valid,
+            steps=steps,
+            max_minutes=max_minutes,
+            start=start,
+            resume=resume,
+            overwrite=overwrite,
+            threads=threads,
+            workers=workers,
+            device=device,
+        ),
+        stage=stage,
+    )
+    plain = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(result).items()}
+    print_report(plain, json_)
+
+
+def _final_stage(
+    recipe: Path, start: Path, size: str, vgg: Path | None, pairs: Path | None, device: str
+) -> "Stage":
+    from camkit.models_def.training.final.stage import WITHOUT_VGG, FinalOptions, make_stage
+    from camkit.models_def.training.recipe import read_recipe
+
+    if vgg is None:
+        typer.echo(f"camkit: {WITHOUT_VGG}", err=True)
+    options = FinalOptions(
+        start=start,
+        size=size,
+        vgg=vgg,
+        pairs=pairs,
+        device=device,
+        recipe_folder=recipe.parent,
+    )
+    return make_stage(read_recipe(recipe), options)

@@ -1,0 +1,7 @@
+"""Commands that judge a camera and the machine it runs on.
+
+check     prove a bundle
+stress    where the networks stop helping
+bench     speed against accuracy
+doctor    what this machine has
+"""

@@ -1,0 +1,165 @@
+"""`camkit bench`: speed against accuracy, as a table, a chart and a page."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from camkit.report.bench.row import Row
+    from camkit.report.bench.settings import Settings
+
+
+def bench(
+    bundles: Annotated[
+        list[str] | None, typer.Argument(help="Bundle NAMEs or PATHs.", metavar="[BUNDLE]...")
+    ] = None,
+    all_: Annotated[bool, typer.Option("--all", help="All built-in bundles.")] = False,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of sharp pictures; default: the golden cases.")
+    ] = None,
+    images: Annotated[int | None, typer.Option(help="Only the first N of them.")] = None,
+    out_dir: Annotated[Path, typer.Option(help="Folder of table, chart and page.")] = Path("bench"),
+    sizes: Annotated[str | None, typer.Option(help="S,M,L; default: all.")] = None,
+    methods: Annotated[
+        str | None, typer.Option(help="net,wiener,rl,admm-tv,develop; default: all.")
+    ] = None,
+    modes: Annotated[
+        str | None, typer.Option(help="exact,fast,whole; default: all three for size M.")
+    ] = None,
+    dtypes: Annotated[str | None, typer.Option(help="fp32,fp16; default: both for size M.")] = None,
+    providers: Annotated[
+        str | None, typer.Option(help="cpu,cuda,tensorrt,openvino; default: those there.")
+    ] = None,
+    threads: Annotated[
+        str | None, typer.Option(help="1,2,...; default: all, and 1 for size M.")
+    ] = None,
+    tile: Annotated[
+        str | None, typer.Option(help="Sides of tiles in px; default: the planned one.")
+    ] = None,
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(help="Another bundle of the same camera to stand beside; may be repeated."),
+    ] = None,
+    capture: Annotated[
+        Path | None, typer.Option(help="A capture to time; default: a procedural one.")
+    ] = None,
+    photo: Annotated[
+        Path | None, typer.Option(help="A sharp picture that every camera takes for it.")
+    ] = None,
+    width: Annotated[int | None, typer.Option(help="Of the capture that is made, px.")] = None,
+    height: Annotated[int | None, typer.Option(help="Likewise; default: the sensor.")] = None,
+    repeat: Annotated[int | None, typer.Option(help="Processes per row; default 3.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A small capture, few rows, two processes each.")
+    ] = False,
+    work_dir: Annotated[
+        Path | None, typer.Option(help="Keeps captures and traced PSFs between runs.")
+    ] = None,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Chart the speed of a bundle against its accuracy, beside classical methods."""
+    from camkit.bundle.reader import built_in_bundles
+    from camkit.report.bench.settings import (
+        DEFAULT_REPEAT,
+        QUICK_METHODS,
+        Settings,
+    )
+    from camkit.report.bench.trial import Axes
+
+    chosen = [*(bundles or ()), *(built_in_bundles() if all_ else ())]
+    axes = Axes(
+        sizes=_words(sizes),
+        methods=_words(methods) or (QUICK_METHODS if quick else None),
+        modes=_words(modes),
+        dtypes=_words(dtypes),
+        providers=_words(providers),
+        threads=_numbers(threads, "--threads"),
+        tiles_px=_numbers(tile, "--tile"),
+        vary=not quick,
+    )
+    settings = Settings(
+        bundles=tuple(dict.fromkeys(chosen)),
+        references=tuple(reference or ()),
+        axes=axes,
+        repeat=(2 if quick else DEFAULT_REPEAT) if repeat is None else repeat,
+        width_px=width,
+        height_px=height,
+        small=quick,
+        capture=capture,
+        photo=photo,
+        data=data,
+        images=images,
+        work_dir=work_dir,
+        gemm_s=0.2 if quick else 1.0,
+    )
+    _run(settings, out_dir, as_json=json_)
+
+
+def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
+    from camkit.report.bench.output import write_bench
+    from camkit.report.bench.run import run_bench
+
+    tell = _teller()
+    result = run_bench(settings, tell)
+    tell("")
+    files = write_bench(result, out_dir)
+    if as_json:
+        typer.echo(json.dumps(result.report, allow_nan=False))
+        return
+    for line in _lines(result.report["rows"]):
+        typer.echo(line)
+    for skip in result.report["skipped"]:
+        typer.echo(f"camkit: not measured: {skip['what']}: {skip['reason']}", err=True)
+    typer.echo(f"written: {', '.join(str(file) for file in files)}")
+
+
+def _teller() -> "Callable[[str], None]":
+    """Give what shows progress: one line on a terminal's stderr, nothing elsewhere."""
+    if not sys.stderr.isatty():
+        return lambda _text: None
+    return lambda text: typer.echo(f"\r\033[K{text[:100]}", err=True, nl=False)
+
+
+def _lines(rows: "list[Row]") -> list[str]:
+    heads = ("bundle", "method", "PSNR dB", "SSIM", "s", "p90", "steady s", "peak MB", "noisy")
+    keys = ("psnr_db", "ssim", "seconds_median", "seconds_p90", "steady_seconds_median")
+    forms = (".2f", ".3f", ".2f", ".2f", ".2f")
+    table: list[tuple[str, ...]] = [heads]
+    for row in rows:
+        numbers = [
+            "-" if row[key] is None else format(row[key], form)
+            for key, form in zip(keys, forms, strict=True)
+        ]
+        peak = "-" if row["peak_rss_mb"] is None else f"{row['peak_rss_mb']:.0f}"
+        noisy = {True: "yes", False: "no", None: "-"}[row["noisy"]]
+        table.append((row["bundle"], row["label"], *numbers, peak, noisy))
+        if row["error"]:
+            table[-1] = (*table[-1][:2], f"failed: {row['error']}")
+    widths = [
+        max(len(line[i]) for line in table if len(line) == len(heads)) for i in range(len(heads))
+    ]
+    return ["  ".join(w.ljust(n) for w, n in zip(line, widths, strict=False)) for line in table]
+
+
+def _words(text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    return tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip())) or None
+
+
+def _numbers(text: str | None, option: str) -> tuple[int, ...] | None:
+    words = _words(text)
+    if words is None:
+        return None
+    if not all(word.isdigit() for word in words):
+        raise ContractError(f"{option} takes whole numbers with commas; got {text!r}")
+    return tuple(int(word) for word in words)

@@ -1,0 +1,9 @@
+"""Commands of daily use.
+
+    process   captures in, pictures out (`progress`: bars and results)
+    plan      what `process` would do, why, and what it would take (`plan_text`)
+    simulate  the digital twin: a scene to a DNG
+    info      what a bundle or a capture is
+
+`mosaic` holds the options of headerless mosaics, for `process` and `info`.
+"""

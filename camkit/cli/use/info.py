@@ -1,0 +1,135 @@
+"""`camkit info`: what a bundle or a capture is, or the schema of the manifest."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from camkit.cli.choices import Debug, Json
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.bundle.reader import Bundle
+
+
+def info(
+    file: Annotated[
+        str | None, typer.Argument(help="Bundle NAME or PATH, or a capture.", metavar="FILE")
+    ] = None,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of the manifest.")
+    ] = False,
+    mosaic: Annotated[
+        str | None, typer.Option(help="Headerless mosaic: RGGB, BGGR, GRBG or GBRG.")
+    ] = None,
+    black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
+    white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Say what a bundle or a capture is."""
+    if schema:
+        from camkit.bundle.manifest import manifest_schema
+
+        typer.echo(json.dumps(manifest_schema(), indent=2))
+        return
+    if file is None:
+        raise ContractError("give a bundle or a capture, or --schema")
+    from camkit.cli.use.mosaic import mosaic_options
+
+    options = mosaic_options(mosaic, black_level, white_level)
+    facts = _describe(file, options)
+    if json_:
+        typer.echo(json.dumps(facts))
+        return
+    for line in _lines(facts, ""):
+        typer.echo(line)
+
+
+def _describe(file: str, mosaic: Any) -> dict[str, Any]:
+    from camkit.bundle.reader import SUFFIX, built_in_bundles
+
+    path = Path(file)
+    if path.suffix == SUFFIX or (not path.exists() and file in built_in_bundles()):
+        return _describe_bundle(file)
+    if not (path.exists() or path.suffix):
+        from camkit.bundle.reader import find_bundle
+
+        find_bundle(file)  # says which bundles there are
+    return _describe_capture(path, mosaic)
+
+
+def _describe_bundle(file: str) -> dict[str, Any]:
+    from camkit.bundle.reader import find_bundle, open_bundle
+
+    bundle = open_bundle(find_bundle(file))
+    manifest = bundle.manifest.model_dump(mode="json", exclude={"members"}, exclude_none=True)
+    for facts in manifest["networks"].values():
+        facts.pop("node_activation", None)
+    return {
+        "bundle": str(bundle.path),
+        "sha256": bundle.sha256,
+        "psf": _describe_psf(bundle),
+        **manifest,
+    }
+
+
+def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
+    from camkit.bundle.reader import PSF
+    from camkit.contracts import depth_name
+
+    if PSF not in bundle.names:
+        return None
+    psf = bundle.psf
+    return {
+        "kernels": list(psf.kernels.shape),
+        "field_heights_mm": [round(float(v), 3) for v in psf.field_heights_mm],
+        "depths": [depth_name(v) for v in psf.depths_mm],
+        "wavelengths_um": [round(float(v), 4) for v in psf.wavelengths_um],
+    }
+
+
+def _describe_capture(path: Path, mosaic: Any) -> dict[str, Any]:
+    from camkit.runtime.raw import read_capture
+
+    capture = read_capture(path, mosaic=mosaic)
+    matrix = capture.color_matrix
+    noise = capture.noise
+    return {
+        "capture": str(path),
+        "sha256": capture.sha256,
+        "contract": capture.contract,
+        "camera": capture.camera,
+        "width": capture.width,
+        "height": capture.height,
+        "cfa": capture.cfa,
+        "black_level": capture.black_level.ravel().tolist(),
+        "white_level": capture.white_level,
+        "white_balance": capture.white_balance,
+        "color_matrix": None if matrix is None else matrix.round(4).tolist(),
+        "orientation": capture.orientation,
+        "iso": capture.iso,
+        "exposure_time_s": capture.exposure_time_s,
+        "noise": None if noise is None else [noise.shot, noise.read_variance],
+        "origin_px": capture.origin_px,
+        "sensor_size_px": capture.sensor_size_px,
+        "pixel_pitch_um": capture.pixel_pitch_um,
+        "bundle_named": capture.bundle_name,
+        "notes": capture.notes,
+    }
+
+
+def _lines(value: Any, indent: str) -> list[str]:
+    lines = []
+    for key, item in value.items():
+        if isinstance(item, dict) and item:
+            lines += [f"{indent}{key}:", *_lines(item, indent + "  ")]
+        elif isinstance(item, list) and item and isinstance(item[0], dict):
+            lines.append(f"{indent}{key}:")
+            lines += [
+                f"{indent}  - " + ", ".join(f"{k} {v}" for k, v in part.items()) for part in item
+            ]
+        elif item is not None:
+            lines.append(f"{indent}{key}: {item}")
+    return lines

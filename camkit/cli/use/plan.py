@@ -1,0 +1,26 @@
+"""`camkit plan`: what would be done to captures, why, and what it would take."""
+
+import inspect
+from typing import Any
+
+from camkit.cli.use.process import process
+
+NOT_PLANNED = frozenset({"dry_run", "jobs", "resume", "overwrite"})
+"""Options of `process` that say nothing about a plan."""
+
+
+def plan(**choices: Any) -> None:
+    """Print what `process` would do with the same options, why, and what it would take."""
+    process(**choices, dry_run=True, overwrite=True)
+
+
+def _as_process() -> inspect.Signature:
+    """Give the signature of `process` without the options that say nothing about a plan."""
+    whole = inspect.signature(process)
+    kept = [p for name, p in whole.parameters.items() if name not in NOT_PLANNED]
+    return whole.replace(parameters=kept)
+
+
+# typer reads a command's options from here; so the two commands can never differ.
+plan.__signature__ = _as_process()  # type: ignore[attr-defined]
+plan.__annotations__ = dict(process.__annotations__)

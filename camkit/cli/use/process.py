@@ -1,0 +1,136 @@
+"""`camkit process`: captures in, pictures and sidecars out."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality
+from camkit.cli.exit_code import ExitCode
+from camkit.errors import ContractError
+
+Files = Annotated[list[str], typer.Argument(help="Captures, folders or globs.", metavar="FILES...")]
+
+
+def process(
+    files: Files,
+    bundle: Annotated[
+        str | None,
+        typer.Option(help="Bundle NAME or PATH; 'none' only develops. Default: the file's own."),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Size of the network: S, M or L. Default: the quality's.")
+    ] = None,
+    quality: Quality = "exact",
+    max_seconds: MaxSeconds = None,
+    max_error_db: MaxErrorDb = None,
+    out_dir: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path(),
+    format_: Annotated[str, typer.Option("--format", help="exr, tiff, png or dng.")] = "exr",
+    color: Annotated[
+        str, typer.Option(help="rec709, acescg or camera; a DNG is camera.")
+    ] = "rec709",
+    wb: Annotated[str, typer.Option(help="'camera' or gains R,G,B.")] = "camera",
+    exposure: Annotated[float, typer.Option(help="Exposure in EV.")] = 0.0,
+    demosaic: Annotated[
+        str | None, typer.Option(help="fast or quality; default: the bundle's.")
+    ] = None,
+    linear: Annotated[bool, typer.Option("--linear", help="TIFF and PNG without curve.")] = False,
+    vignetting: Annotated[bool, typer.Option(help="Divide by relative illumination.")] = True,
+    undistort: Annotated[bool, typer.Option(help="Undo the lens's distortion.")] = True,
+    mosaic: Annotated[
+        str | None, typer.Option(help="Headerless mosaic: RGGB, BGGR, GRBG or GBRG.")
+    ] = None,
+    black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
+    white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
+    depth_m: DepthM = None,
+    method: Annotated[str, typer.Option(help="net, wiener, rl or admm-tv.")] = "net",
+    mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",
+    assume: Annotated[
+        str | None, typer.Option(help="centre or scale, for a picture that is no full frame.")
+    ] = None,
+    on_unsafe: Annotated[
+        str,
+        typer.Option(help="Outside the bundle's measured range: warn, fallback (Wiener) or fail."),
+    ] = "warn",
+    max_mem: Annotated[str | None, typer.Option(help="Memory cap, such as 2G or 900M.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Threads in all.")] = None,
+    jobs: Annotated[int, typer.Option(help="Captures at once.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Skip what is proved done.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace pictures that exist.")
+    ] = False,
+    json_: Annotated[bool, typer.Option("--json", help="One JSON object per file.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the plan, do nothing.")] = False,
+    _debug: Debug = False,
+) -> None:
+    """Turn captures into pictures through the camera's bundle."""
+    from camkit.cli.use.mosaic import mosaic_options
+    from camkit.cli.use.progress import TileProgress
+    from camkit.runtime.batch import expand
+    from camkit.runtime.batch import process as run
+    from camkit.runtime.development import WriteOptions
+    from camkit.runtime.options import Options, parse_memory
+
+    options = Options(
+        size=size,
+        quality=quality,  # type: ignore[arg-type]
+        max_seconds=max_seconds,
+        max_error_db=max_error_db,
+        depth_m=depth_m,
+        method=method,  # type: ignore[arg-type]  # checked by Options
+        mode=mode,  # type: ignore[arg-type]
+        demosaic=demosaic,  # type: ignore[arg-type]
+        color=color,  # type: ignore[arg-type]
+        white_balance=_gains(wb),
+        exposure_ev=exposure,
+        vignetting=vignetting,
+        undistort=undistort,
+        assume=assume,  # type: ignore[arg-type]
+        on_unsafe=on_unsafe,  # type: ignore[arg-type]
+        max_mem_bytes=None if max_mem is None else parse_memory(max_mem),
+        threads=threads,
+    )
+    write = WriteOptions(
+        out_dir=out_dir,
+        format=format_,  # type: ignore[arg-type]
+        linear=linear,
+        resume=resume,
+        overwrite=overwrite,
+        jobs=jobs,
+    )
+    sources = expand(files)
+    if not sources:
+        typer.echo(f"camkit: no capture matches {', '.join(files)}", err=True)
+        raise typer.Exit(ExitCode.NOTHING_MATCHED)
+    headerless = mosaic_options(mosaic, black_level, white_level)
+    if dry_run:
+        from camkit.cli.use.plan_text import print_plans
+
+        done = print_plans(sources, bundle, options, write, headerless, as_json=json_)
+    else:
+        with TileProgress() as progress:
+            results = run(
+                sources,
+                bundle=bundle,
+                options=options,
+                write=write,
+                mosaic=headerless,
+                progress=progress.tile,
+                on_result=lambda result: progress.result(result, as_json=json_),
+            )
+        done = all(result.status != "failed" for result in results)
+    if not done:
+        raise typer.Exit(ExitCode.INPUT_FAILED)
+
+
+def _gains(text: str) -> tuple[float, float, float] | None:
+    """Read --wb: None for the camera's own gains, else (R, G, B) with G = 1."""
+    if text == "camera":
+        return None
+    try:
+        r, g, b = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ContractError(f"--wb takes 'camera' or three gains R,G,B; got {text!r}") from None
+    if not g > 0:
+        raise ContractError(f"--wb gains must be > 0; got {text!r}")
+    return r / g, 1.0, b / g

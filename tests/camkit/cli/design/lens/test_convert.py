@@ -1,0 +1,77 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from camkit.cli.exit_code import ExitCode
+from tests.zmx_factory import LA1131
+
+PRESCRIPTIONS = Path(__file__).resolve().parents[5] / "models_def" / "prescriptions"
+
+
+def test_lens_goes_to_zmx_and_back_unchanged(camkit_command, tmp_path: Path) -> None:
+    there, back = tmp_path / "duet.zmx", tmp_path / "duet.toml"
+    assert camkit_command("lens", "convert", PRESCRIPTIONS / "duet.toml", there).code == 0
+    outcome = camkit_command("lens", "convert", there, back, "--json")
+    assert json.loads(outcome.out)["surfaces"] == 5
+    assert back.read_text() == (PRESCRIPTIONS / "duet.toml").read_text()
+
+
+def test_a_lens_is_scaled_to_a_focal_length_and_then_stopped(
+    camkit_command, tmp_path: Path
+) -> None:
+    out = tmp_path / "long.zmx"
+    asked = ("--efl-mm", 85, "--f-number", 5.6)
+    assert camkit_command("lens", "convert", PRESCRIPTIONS / "duet.toml", out, *asked).code == 0
+    shown = json.loads(camkit_command("lens", "show", out, "--json").out)
+    assert shown["efl_mm"] == pytest.approx(85, rel=1e-9)
+    assert shown["f_number"] == pytest.approx(5.6, rel=1e-9)
+    wrong = camkit_command("lens", "convert", out, tmp_path / "x.toml", "--efl-mm", -85)
+    assert wrong.code == ExitCode.USAGE
+    assert "focal length" in wrong.err
+    assert not (tmp_path / "x.toml").exists()
+
+
+def test_rims_that_cut_the_opened_beam_are_said(camkit_command, tmp_path: Path) -> None:
+    source, out = PRESCRIPTIONS / "cooke-triplet-f5.toml", tmp_path / "x.toml"
+    closed = camkit_command("lens", "convert", source, out, "--f-number", 8, "--json")
+    assert json.loads(closed.out)["notes"] == []
+    narrow = tmp_path / "narrow.toml"
+    text = out.read_text().replace("semi_diameter_mm = ", "semi_diameter_mm = 4.0 # ", 1)
+    narrow.write_text(text)
+    opened = camkit_command("lens", "convert", narrow, tmp_path / "y.toml", "--f-number", 4)
+    assert "rims stay and cut" in opened.err
+
+
+def test_what_is_left_out_is_said_on_stderr(camkit_command, tmp_path: Path) -> None:
+    source = tmp_path / "vendor.zmx"
+    source.write_text(LA1131.replace("VCYN 0 0", "VCYN 0 0.2"), encoding="latin-1")
+    outcome = camkit_command("lens", "convert", source, tmp_path / "x.toml")
+    assert outcome.code == 0
+    assert "vendor.zmx: line 12: vignetting factors VCYN left out" in outcome.err
+
+
+def test_own_glass_is_taken_from_a_catalogue_and_into_the_toml(
+    camkit_command, tmp_path: Path
+) -> None:
+    source, glass, out = tmp_path / "my.zmx", tmp_path / "my.agf", tmp_path / "my.toml"
+    source.write_text(LA1131.replace("GLAS N-BK7", "GLAS FOO"), encoding="latin-1")
+    glass.write_text("NM FOO 2 0 1.6 50\nCD 1.4 0.01\nLD 0.3 2\n")
+    failed = camkit_command("lens", "convert", source, out)
+    assert failed.code == ExitCode.USAGE
+    assert "--glass FILE.agf" in failed.err
+    assert camkit_command("lens", "convert", source, out, "--glass", glass).code == 0
+    glass.unlink()
+    assert camkit_command("lens", "convert", out, tmp_path / "again.toml").code == 0
+    assert (tmp_path / "again.toml").read_text() == out.read_text()
+
+
+@pytest.mark.parametrize("name", ["x.toml", "x.seq"])
+def test_existing_and_unknown_files_are_refused(camkit_command, tmp_path: Path, name: str) -> None:
+    out = tmp_path / name
+    if name == "x.toml":
+        out.write_text("kept")
+    outcome = camkit_command("lens", "convert", PRESCRIPTIONS / "duet.toml", out)
+    assert outcome.code != 0
+    assert "--overwrite" in outcome.err or "lens file ends in" in outcome.err
+    assert not out.exists() or out.read_text() == "kept"

@@ -1,0 +1,203 @@
+"""The commands that need torch: they say so, and otherwise hand their options on."""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import pytest
+
+from camkit.cli.exit_code import ExitCode
+
+RECIPE = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "duet.toml"
+COMMANDS = {
+    "freeze": ["lens.toml", "-o", "psf.safetensors"],
+    "train": ["recipe.toml"],
+    "export": ["one.pt", "-o", "one.camkit"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_without_torch_a_design_command_says_how_to_get_it(
+    command: str, camkit_command, monkeypatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    outcome = camkit_command(command, *COMMANDS[command])
+    assert outcome.code == ExitCode.INPUT_FAILED
+    assert f"camkit {command} needs torch" in outcome.err
+    assert "pip install camkit[train]" in outcome.err
+
+
+@pytest.mark.parametrize("command", ["freeze", "export"])
+def test_an_existing_output_is_refused_before_any_work(
+    command: str, camkit_command, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / COMMANDS[command][-1]).write_bytes(b"precious")
+    outcome = camkit_command(command, *COMMANDS[command])
+    assert outcome.code == ExitCode.USAGE
+    assert "--overwrite" in outcome.err
+
+
+def test_export_without_a_frozen_psf_says_where_it_looked(
+    camkit_command, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = camkit_command("export", "runs/one.pt", "-o", "one.camkit")
+    assert outcome.code == ExitCode.USAGE
+    assert "runs/psf.safetensors" in outcome.err
+    assert "camkit freeze" in outcome.err
+
+
+def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> None:
+    from camkit.models_def.training import trainer
+
+    seen = []
+
+    def fake(
+        recipe: Path, options: trainer.TrainOptions, *, stage: trainer.Stage | None
+    ) -> trainer.TrainResult:
+        assert stage is None
+        seen.append((recipe, options))
+        return trainer.TrainResult(
+            checkpoint=options.out_dir / "x.pt",
+            log=options.out_dir / "x.jsonl",
+            steps=3,
+            elapsed_s=1.0,
+            cpu_s=1.0,
+            capture_db=20.0,
+            wiener_db=22.0,
+            valid_db=24.0,
+        )
+
+    monkeypatch.setattr(trainer, "train", fake)
+    outcome = camkit_command(
+        *("train", RECIPE, "--size", "S", "--data", "pictures", "--valid", "few", "--resume"),
+        *("--max-minutes", "2.5", "--out-dir", tmp_path, "--threads", "2", "--workers", "0"),
+        "--json",
+    )
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out)["valid_db"] == 24.0
+    assert seen == [
+        (
+            RECIPE,
+            trainer.TrainOptions(
+                out_dir=tmp_path,
+                size="S",
+                data_folder=Path("pictures"),
+                valid_folder=Path("few"),
+                max_minutes=2.5,
+                resume=True,
+                threads=2,
+                workers=0,
+            ),
+        )
+    ]
+
+
+def test_a_missing_recipe_is_a_usage_error(camkit_command, tmp_path) -> None:
+    outcome = camkit_command("train", tmp_path / "absent.toml", "--out-dir", tmp_path)
+    assert outcome.code == ExitCode.USAGE
+    assert "absent.toml" in outcome.err
+
+
+def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monkeypatch) -> None:
+    from camkit.models_def.optics import freeze as module
+    from camkit.models_def.optics.lens_file import lens_file
+    from tests.bundle_factory import tiny_psf
+
+    report = module.FreezeReport(
+        fields=9,
+        wavelengths=5,
+        side_px=97,
+        energy_kept=0.995,
+        loss_db=0.04,
+        worst_loss_db=0.1,
+        loss_limit_db=0.05,
+        block_px=512,
+        overlap_px=160,
+        block_loss_db=0.03,
+        efl_mm=50.0,
+        corner_illumination=0.83,
+    )
+    seen = {}
+
+    def fake(path: Path, out: Path, **options: object) -> module.FreezeReport:
+        seen.update(options)
+        out.write_bytes(b"psf")
+        return report
+
+    monkeypatch.setattr(module, "freeze_prescription", fake)
+    monkeypatch.setattr(
+        module, "freeze_stress", lambda *_: module.Frozen(psf=tiny_psf(), energy_kept=1.0)
+    )
+    monkeypatch.setattr(lens_file, "read_lens", lambda path: path)
+    folder = tmp_path / "new"
+    outcome = camkit_command(
+        *("freeze", "lens.toml", "-o", folder / "psf.safetensors"),
+        *("--stress-out", folder / "stress.safetensors", "--report", folder / "freeze.json"),
+        *("--depths-mm", "500,1e3,inf", "--max-side-px", 201, "--limit-db", 0.1, "--json"),
+    )
+    assert outcome.code == 0, outcome.err
+    assert seen["grid"].depths_mm == (500.0, 1000.0, math.inf)
+    assert (seen["grid"].max_side_px, seen["limit_db"]) == (201, 0.1)
+    assert json.loads(outcome.out) == json.loads((folder / "freeze.json").read_text())
+    assert json.loads(outcome.out)["block_px"] == 512
+    assert (folder / "stress.safetensors").stat().st_size > 100
+    assert seen["camera"].width_px == 6000, "the camera of the default recipe"
+    assert seen["settings"].clip_iterations == 6, "its Wiener bank measures the loss"
+
+
+def test_export_finds_what_lies_beside_the_checkpoint(
+    camkit_command, tmp_path, monkeypatch
+) -> None:
+    from camkit.export import assemble
+    from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
+
+    checkpoint = Checkpoint(
+        recipe_toml=RECIPE.read_text(encoding="utf-8"),
+        size="M",
+        network="lean_m",
+        config={},
+        bank_digest="",
+        training_data="",
+        step=0,
+        elapsed_s=0.0,
+        cpu_s=0.0,
+        valid_db=None,
+        weights={},
+        average={},
+        optimizer={},
+    )
+    write_checkpoint(tmp_path / "one.pt", checkpoint)
+    for name in ("psf.safetensors", "freeze.json", "plan.json"):
+        (tmp_path / name).write_bytes(b"{}")
+    seen = []
+
+    def fake(parts: assemble.Parts, out: Path) -> dict[str, str]:
+        seen.append(parts)
+        return {"bundle": str(out)}
+
+    monkeypatch.setattr(assemble, "export_bundle", fake)
+    call = ("export", tmp_path / "one.pt", "-o", tmp_path / "one.camkit")
+    for chosen in ((), ("--plan", tmp_path / "other.json")):
+        outcome = camkit_command(*call, *chosen)
+        assert outcome.code == 0, outcome.err
+    parts, other = seen
+    assert (parts.psf, parts.freeze) == (tmp_path / "psf.safetensors", tmp_path / "freeze.json")
+    assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
+    assert parts.stress_psf is None
+    assert parts.prescription is None, "the lens of the checkpoint"
+
+
+def test_files_of_the_final_stage_need_a_checkpoint_to_start_from(camkit_command) -> None:
+    outcome = camkit_command("train", RECIPE, "--vgg", "vgg19.pth")
+    assert outcome.code == ExitCode.USAGE
+    assert "say --final FROM too" in outcome.err
+
+
+def test_depths_that_are_no_numbers_are_a_usage_error(camkit_command, tmp_path) -> None:
+    out = tmp_path / "psf.safetensors"
+    outcome = camkit_command("freeze", "lens.toml", "-o", out, "--depths-mm", "near,far")
+    assert outcome.code == ExitCode.USAGE
+    assert "--depths-mm takes distances" in outcome.err

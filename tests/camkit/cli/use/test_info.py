@@ -1,0 +1,114 @@
+"""`camkit info`: bundles, captures and the schema, for people and for programs."""
+
+import json
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import cv2
+import numpy as np
+import pytest
+
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.reader import open_bundle
+from camkit.cli.exit_code import ExitCode
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "data" / "example-1.0.camkit"
+KINDS: dict[str, Any] = {
+    "object": dict,
+    "array": list,
+    "string": str,
+    "number": (int, float),
+    "integer": int,
+    "boolean": bool,
+    "null": type(None),
+}
+
+
+def test_a_bundle_is_described_without_its_list_of_hashes(captures, camkit_command) -> None:
+    facts = json.loads(camkit_command("info", "tiny.camkit", "--json").out)
+    assert facts["name"] == "tiny"
+    assert facts["sha256"] == open_bundle(captures / "tiny.camkit").sha256
+    assert facts["psf"]["kernels"] == [2, 1, 3, 5, 5]
+    assert facts["psf"]["depths"] == ["infinity"]
+    assert "members" not in facts
+    text = camkit_command("info", "tiny.camkit").out
+    assert "name: tiny" in text
+    assert "  pixel_pitch_um: 6.0" in text
+
+
+def test_a_capture_is_described_with_its_place_on_the_sensor(captures, camkit_command) -> None:
+    facts = json.loads(camkit_command("info", "a.dng", "--json").out)
+    assert (facts["width"], facts["height"], facts["cfa"]) == (96, 64, "RGGB")
+    assert facts["bundle_named"] == "tiny"
+    assert facts["origin_px"] == [0, 0]
+    assert facts["iso"] == 100
+
+
+def test_a_headerless_mosaic_is_described_with_its_options(captures, camkit_command) -> None:
+    cv2.imwrite(str(captures / "bare.png"), np.full((8, 10), 100, np.uint16))
+    options = ("--mosaic", "GRBG", "--black-level", "25", "--white-level", "1023")
+    facts = json.loads(camkit_command("info", "bare.png", *options, "--json").out)
+    assert (facts["contract"], facts["cfa"]) == ("raw_bayer_v1", "GRBG")
+
+
+def _faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[str]:
+    """Hold a value against the part of JSON schema that pydantic writes."""
+    if "$ref" in schema:
+        return _faults(value, root["$defs"][schema["$ref"].removeprefix("#/$defs/")], root)
+    choices = schema.get("anyOf", schema.get("oneOf"))
+    if choices is not None:
+        fits = any(_faults(value, one, root) == [] for one in choices)
+        return [] if fits else [f"{value!r} fits none"]
+    if value not in schema.get("enum", [schema.get("const", value)]):
+        return [f"{value!r} is not one of the allowed"]
+    if "type" in schema and not isinstance(value, KINDS[schema["type"]]):
+        return [f"{value!r} is no {schema['type']}"]
+    if isinstance(value, dict):
+        return _object_faults(value, schema, root)
+    if isinstance(value, list):
+        prefix = schema.get("prefixItems", [])
+        kinds = [*prefix, *[schema.get("items", {})] * (len(value) - len(prefix))]
+        pairs = zip(value, kinds, strict=True)
+        return [fault for item, kind in pairs for fault in _faults(item, kind, root)]
+    return []
+
+
+def _object_faults(
+    value: dict[str, Any], schema: dict[str, Any], root: dict[str, Any]
+) -> list[str]:
+    known, rest = schema.get("properties", {}), schema.get("additionalProperties", True)
+    found = [f"lacks {name}" for name in schema.get("required", []) if name not in value]
+    for name, item in value.items():
+        if name not in known and rest is False:
+            found.append(f"{name} is unknown")
+        kind = known.get(name, rest if isinstance(rest, dict) else {})
+        found += _faults(item, kind, root)
+    return found
+
+
+def test_the_schema_describes_the_example_of_format_1_0_and_nothing_more(camkit_command) -> None:
+    schema = json.loads(camkit_command("info", "--schema").out)
+    assert set(schema["properties"]) == set(Manifest.model_fields)
+    with ZipFile(EXAMPLE) as archive:
+        manifest = json.loads(archive.read("manifest.json"))
+    assert _faults(manifest, schema, schema) == []
+    assert _faults(manifest | {"surprise": 1}, schema, schema)
+    assert _faults(manifest | {"camera": {}}, schema, schema)
+    assert _faults(manifest | {"networks": {"XL": {}}}, schema, schema)
+
+
+@pytest.mark.parametrize(
+    ("file", "code"),
+    [("absent.dng", ExitCode.INPUT_FAILED), ("absent", 3), ("absent.camkit", 3)],
+)
+def test_what_is_not_there_ends_with_its_code(
+    captures, camkit_command, file: str, code: int
+) -> None:
+    outcome = camkit_command("info", file)
+    assert outcome.code == code
+    assert file in outcome.err
+
+
+def test_no_file_and_no_schema_is_a_usage_error(camkit_command) -> None:
+    assert camkit_command("info").code == ExitCode.USAGE
