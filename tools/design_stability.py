@@ -14,7 +14,7 @@ spots       focal length solved, sensor riding on the image, limits, whitened mo
             eight lenses near the start by damped least squares, spots judging
 after       the same with the recipe's own search: more lenses, from further off, judged by what
             is recovered
-curriculum  as after, opened from part of the aperture and field to the whole in stages
+curriculum  as after, opened from part of the aperture and field to the whole step by step
 
 The best three of each arm run to the recipe's end. Every lens is judged by the Wiener front on
 fresh pictures. What is finished is kept in `trials.jsonl` and not done again.
@@ -53,7 +53,7 @@ from camkit.report.lens.stability_chart import Rules, Trial, best_trials, to_tex
 
 LEVELS: Final = (0.05, 0.1, 0.2, 0.5)
 FOCUS_MM: Final = 2.0
-STAGES: Final = {
+OPENINGS: Final = {
     "before": (1.0,),
     "spots": (1.0,),
     "after": (1.0,),
@@ -125,7 +125,7 @@ class Found:
 
     arm: str
     number: int
-    stage: str
+    run: str
     cpu_s: float
 
 
@@ -142,7 +142,7 @@ def main() -> None:
         within_mm=arguments.within_mm,
     )
     done = read_journal(bench.out_dir / "trials.jsonl", to_trial, "trial of a stability run")
-    known = {(t.arm, t.number, t.stage) for t in done}
+    known = {(t.arm, t.number, t.run) for t in done}
     for number in range(arguments.starts):
         for arm in arms:
             if (arm, number, "box") not in known:
@@ -159,7 +159,7 @@ def main() -> None:
 def kept(bench: Bench, trial: Trial) -> Trial:
     append_journal(bench.out_dir / "trials.jsonl", [asdict(trial)])
     print(
-        f"{trial.number:2} {trial.arm:10} {100 * trial.level:.0f} % {trial.stage}: "
+        f"{trial.number:2} {trial.arm:10} {100 * trial.level:.0f} % {trial.run}: "
         f"{trial.front_db:.2f} dB, rays {trial.valid_rays:.3f}, EFL {trial.efl_mm:.2f} mm, "
         f"limits {trial.limits_cost:.3g}, {trial.cpu_s:.0f} CPU-s",
         file=sys.stderr,
@@ -176,7 +176,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--out-dir", type=Path, default=Path("out/stability"))
     parser.add_argument("--data", type=Path, help="pictures to design on")
     parser.add_argument("--fresh", type=Path, help="pictures to judge on")
-    parser.add_argument("--arms", default="before,after", help=", ".join(STAGES))
+    parser.add_argument("--arms", default="before,after", help=", ".join(OPENINGS))
     parser.add_argument("--starts", type=int, default=32, help="in all, spread over the levels")
     parser.add_argument("--minutes", type=float, default=3.0, help="CPU time of a start")
     parser.add_argument("--steps", type=int, default=0, help="of a start, instead of --minutes")
@@ -186,9 +186,9 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--within-mm", type=float, default=0.5, help="of the focal length")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    unknown = set(arguments.arms.split(",")) - set(STAGES)
+    unknown = set(arguments.arms.split(",")) - set(OPENINGS)
     if unknown:
-        parser.error(f"--arms takes {', '.join(STAGES)}; got {', '.join(sorted(unknown))}")
+        parser.error(f"--arms takes {', '.join(OPENINGS)}; got {', '.join(sorted(unknown))}")
     return arguments
 
 
@@ -304,16 +304,16 @@ def to_trial(entry: Mapping[str, Any]) -> Trial:
 
 
 def from_start(bench: Bench, arm: str, number: int, steps: int) -> Trial:
-    """Design from one disturbed lens for so many steps, in stages of aperture and field."""
+    """Design from one disturbed lens for so many steps, aperture and field opened in turn."""
     begin = time.process_time()
-    parts, recipe, shares = bench.parts(arm, number), bench.of_arm(arm), STAGES[arm]
+    parts, recipe, shares = bench.parts(arm, number), bench.of_arm(arm), OPENINGS[arm]
     plan = short(recipe.schedule, max(1, steps // len(shares)))
     whole, scaled = parts.lens.problem, parts.lens.scaled().detach()
     for share in shares:
         samples = replace(whole.samples, x=whole.samples.x * share, y=whole.samples.y * share)
         part = replace(whole, slopes=whole.slopes * share, samples=samples)
         scaled = descended(parts, part, scaled, plan, whiten=recipe.optics.whiten)
-    found = Found(arm=arm, number=number, stage="box", cpu_s=time.process_time() - begin)
+    found = Found(arm=arm, number=number, run="box", cpu_s=time.process_time() - begin)
     return judged(bench, parts, scaled, found)
 
 
@@ -326,7 +326,7 @@ def to_the_end(bench: Bench, trial: Trial) -> Trial:
     plan = short(recipe.schedule, recipe.schedule.steps)
     scaled = descended(parts, parts.lens.problem, given, plan, whiten=recipe.optics.whiten)
     cpu_s = time.process_time() - begin
-    found = Found(arm=trial.arm, number=trial.number, stage="end", cpu_s=cpu_s)
+    found = Found(arm=trial.arm, number=trial.number, run="end", cpu_s=cpu_s)
     return judged(bench, parts, scaled, found)
 
 
@@ -356,7 +356,7 @@ def judged(bench: Bench, parts: DesignParts, scaled: Tensor, found: Found) -> Tr
         arm=found.arm,
         number=found.number,
         level=level_of(found.number),
-        stage=found.stage,
+        run=found.run,
         scaled=tuple(scaled.tolist()),
         front_db=score.psnr_db,
         valid_rays=float(valid_share(problem, scaled[None])),

@@ -4,7 +4,7 @@
                             -> trimmed_unet   the thesis's trimmed U-Net, a reference
                             -> full_unet      its generator: the trimmed one with its deep scales
                                catalog        their names, for recipes and checkpoints
-    restored and true picture -> discriminator   opponents in the final stage, never exported
+    restored and true picture -> discriminator   opponents in fine-tuning, never exported
 
 Every network of the catalogue takes (batch, 6 or 3, h, w) float32 stabilised planes, h and w
 multiples of its total stride, and gives (batch, 3, h, w). The last three input planes are the ones

@@ -1,4 +1,4 @@
-"""Discriminators of the final stage; they are trained against, never exported.
+"""Discriminators of fine-tuning; they are trained against, never exported.
 
     picture -- 4x4 /2 -- [4x4 /2, norm] x (layers - 1) -- 4x4, norm -- 4x4 -- map of scores
 

@@ -1,4 +1,4 @@
-"""The generator of the thesis's final stage: the trimmed U-Net with its deep scales put back.
+"""The generator of the thesis's fine-tuning: the trimmed U-Net with its deep scales put back.
 
     /1   encode ------------------------------------------- merge -- output
     /2     encode ------------------------------------- merge          the trimmed U-Net

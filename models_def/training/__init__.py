@@ -8,7 +8,7 @@
     validation                     what a run is chosen by
     trainer, progress, log         the run, its bar and its log
     checkpoint, credits            what is kept, and what it was trained on
-    final/                         the last stage: discriminators, features, real pairs
+    fine_tuning/                   afterwards: discriminators, features, real pairs
 
 A run that is interrupted goes on with the same bits.
 """

@@ -200,17 +200,17 @@ class NetworkRecipe:
     schedule: ScheduleRecipe = field(default_factory=ScheduleRecipe)
 
 
-FINAL_SCHEDULE: Final = ScheduleRecipe(
+FINE_TUNING_SCHEDULE: Final = ScheduleRecipe(
     steps=20_000, batch=4, patch_px=256, learning_rate=1e-4, final_rate=0.0, precision="float32"
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FinalRecipe:
-    """The final stage: a trained network against two discriminators (Sun 2021, section 6.2.2).
+class FineTuningRecipe:
+    """Fine-tuning: a trained network against two discriminators (Sun 2021, section 6.2.2).
 
     Attributes:
-        schedule: Of this stage.
+        schedule: Of the fine-tuning.
         perceptual_weight: nu1 of eq. (6.12), on the features.
         pixel_weight: nu2, on the pixels. The thesis prints 0.5 and 0.006 for the two; these
             defaults are the order of the source it cites (Kupyn et al. 2019).
@@ -224,7 +224,7 @@ class FinalRecipe:
         pair_samples: Samples cut from each real pair.
     """
 
-    schedule: ScheduleRecipe = FINAL_SCHEDULE
+    schedule: ScheduleRecipe = FINE_TUNING_SCHEDULE
     perceptual_weight: float = 0.006
     pixel_weight: float = 0.5
     global_weight: float = 0.01
@@ -239,11 +239,15 @@ class FinalRecipe:
     def __post_init__(self) -> None:
         weights = self.perceptual_weight, self.pixel_weight, self.global_weight, self.local_weight
         if min(weights) < 0 or self.pixel_weight + self.perceptual_weight == 0:
-            raise ContractError("final needs weights >= 0, and one of perceptual and pixel > 0")
+            raise ContractError(
+                "fine_tuning needs weights >= 0, and one of perceptual and pixel > 0"
+            )
         counts = self.global_layers, self.local_layers, self.discriminator_width, self.pair_samples
         if min(counts) < 1 or self.discriminator_rate <= 0:
-            raise ContractError("final needs layers, width, pair_samples, discriminator_rate > 0")
-        _check_share("final.pair_share", self.pair_share)
+            raise ContractError(
+                "fine_tuning needs layers, width, pair_samples, discriminator_rate > 0"
+            )
+        _check_share("fine_tuning.pair_share", self.pair_share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -265,7 +269,7 @@ class Recipe:
     lens: LensRecipe
     data: DataRecipe
     networks: Mapping[str, NetworkRecipe]
-    final: FinalRecipe = field(default_factory=FinalRecipe)
+    fine_tuning: FineTuningRecipe = field(default_factory=FineTuningRecipe)
 
     def __post_init__(self) -> None:
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
@@ -294,8 +298,9 @@ def read_recipe(path: Path) -> Recipe:
 
 def to_recipe(table: Mapping[str, Any]) -> Recipe:
     """Turn a parsed TOML table into a recipe; raises ContractError as `read_recipe` does."""
+    table = _renamed(table)
     known = {"name", "object_distance_mm", "scale", "camera", "wiener", "lens"}
-    check_keys("recipe", table, known | {"data", "schedule", "networks", "final"})
+    check_keys("recipe", table, known | {"data", "schedule", "networks", "fine_tuning"})
     schedule = section("schedule", ScheduleRecipe, table.get("schedule", {}))
     networks = table.get("networks")
     if not isinstance(networks, Mapping) or not networks:
@@ -309,8 +314,21 @@ def to_recipe(table: Mapping[str, Any]) -> Recipe:
         lens=section("lens", LensRecipe, table.get("lens", {})),
         data=section("data", DataRecipe, table.get("data", {})),
         networks={size: _network(size, entry, schedule) for size, entry in networks.items()},
-        final=_final(table.get("final", {})),
+        fine_tuning=_fine_tuning(table.get("fine_tuning", {})),
     )
+
+
+def _renamed(table: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Give the table of today's names: what is `fine_tuning` was `final` in older recipes.
+
+    Checkpoints carry their recipe as text, so the older name is read for ever.
+    """
+    if "final" not in table:
+        return table
+    if "fine_tuning" in table:
+        raise ContractError("final is the older name of fine_tuning; a recipe holds one of them")
+    others = {key: value for key, value in table.items() if key != "final"}
+    return others | {"fine_tuning": table["final"]}
 
 
 def _network(size: str, entry: Mapping[str, Any], schedule: ScheduleRecipe) -> NetworkRecipe:
@@ -324,12 +342,12 @@ def _network(size: str, entry: Mapping[str, Any], schedule: ScheduleRecipe) -> N
     )
 
 
-def _final(table: Any) -> FinalRecipe:
+def _fine_tuning(table: Any) -> FineTuningRecipe:
     if not isinstance(table, Mapping):
-        raise ContractError(f"final must be a table; got {table!r}")
-    changed = asdict(FINAL_SCHEDULE) | dict(table.get("schedule", {}))
-    schedule = section("final.schedule", ScheduleRecipe, changed)
-    return section("final", FinalRecipe, {**table, "schedule": schedule})
+        raise ContractError(f"fine_tuning must be a table; got {table!r}")
+    changed = asdict(FINE_TUNING_SCHEDULE) | dict(table.get("schedule", {}))
+    schedule = section("fine_tuning.schedule", ScheduleRecipe, changed)
+    return section("fine_tuning", FineTuningRecipe, {**table, "schedule": schedule})
 
 
 def differing_camera(one: Recipe, other: Recipe) -> str | None:

@@ -134,15 +134,15 @@ class TrainResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stage:
-    """A later stage of training, with its own files, schedule and fitter.
+class Refinement:
+    """Later training of a trained network, with its own files, schedule and fitter.
 
     Attributes:
         name: Behind the size in the names of its files.
         schedule: Used instead of the network's.
         make_fitter: From the network's entry, with that schedule, and the kernels.
         first: Weights that the fitter starts from.
-        credit: What the stage adds to the training data, for the card.
+        credit: What it adds to the training data, for the card.
     """
 
     name: str
@@ -157,7 +157,7 @@ def train(
     options: TrainOptions,
     *,
     bank: PsfBank | None = None,
-    stage: Stage | None = None,
+    refinement: Refinement | None = None,
 ) -> TrainResult:
     """Train one network of a recipe.
 
@@ -166,7 +166,7 @@ def train(
         options: Where, how long and with what.
         bank: Kernels to train with; None traces the recipe's lens (about a minute, kept in
             `out_dir`).
-        stage: A later stage; None fits a new network to the recipe's loss.
+        refinement: Later training; None fits a new network to the recipe's loss.
 
     Raises:
         ContractError: If recipe, options or the checkpoint to resume do not fit.
@@ -174,18 +174,18 @@ def train(
     torch.set_num_threads(options.threads)
     recipe = read_recipe(recipe_path)
     entry = recipe.network(options.size)
-    schedule = entry.schedule if stage is None else stage.schedule
+    schedule = entry.schedule if refinement is None else refinement.schedule
     # before anything is traced
     network = build_network(entry.network, **entry.config)
     check_patch(entry.network, network, schedule.patch_px)
-    first = None if stage is None else stage.first
+    first = None if refinement is None else refinement.first
     if options.start is not None:
-        if stage is not None:
-            raise ContractError(f"the {stage.name} stage has its own start; leave start away")
+        if refinement is not None:
+            raise ContractError("a refinement has its own start; leave start away")
         first = read_first_weights(options.start, options.size)
     if first is not None:
         take_first_weights(network, first)
-    path = checkpoint_path(recipe, options, stage)
+    path = checkpoint_path(recipe, options, refinement)
     if path.exists() and not (options.resume or options.overwrite):
         raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
     options.out_dir.mkdir(parents=True, exist_ok=True)
@@ -199,14 +199,14 @@ def train(
     with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
         pool.start_workers(options.workers)
         cases = make_cases(recipe, bank, options.valid_folder)
-        run = _Run(recipe_path, lens, bank, cases, options, stage, first)
+        run = _Run(recipe_path, lens, bank, cases, options, refinement, first)
         run.loop(pool, bar)
         return run.result()
 
 
-def checkpoint_path(recipe: Recipe, options: TrainOptions, stage: Stage | None) -> Path:
+def checkpoint_path(recipe: Recipe, options: TrainOptions, refinement: Refinement | None) -> Path:
     """Give the file that a run writes its checkpoints to."""
-    name = f"{recipe.name}_{options.size}" + ("" if stage is None else f"_{stage.name}")
+    name = f"{recipe.name}_{options.size}" + ("" if refinement is None else f"_{refinement.name}")
     return options.out_dir / f"{name}.pt"
 
 
@@ -220,7 +220,7 @@ class _Run:
         bank: PsfBank,
         cases: list[Case],
         options: TrainOptions,
-        stage: Stage | None,
+        refinement: Refinement | None,
         first: FirstWeights | None,
     ) -> None:
         self.options, self.cases, self.bank_digest = options, cases, bank.digest()
@@ -230,14 +230,14 @@ class _Run:
         self.entry = self.recipe.network(options.size)
         data = describe_data(self.recipe, options.data_folder)
         self.data = data + ("" if first is None else first.credit(data))
-        if stage is None:
+        if refinement is None:
             self.fitter: Fits = Fitter(self.entry, options.device, first)
         else:
-            self.data += stage.credit
-            self.entry = replace(self.entry, schedule=stage.schedule)
-            self.fitter = stage.make_fitter(self.entry, bank)
+            self.data += refinement.credit
+            self.entry = replace(self.entry, schedule=refinement.schedule)
+            self.fitter = refinement.make_fitter(self.entry, bank)
         self.steps = options.steps or self.entry.schedule.steps
-        self.path = checkpoint_path(self.recipe, options, stage)
+        self.path = checkpoint_path(self.recipe, options, refinement)
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
         if options.resume:

@@ -1,4 +1,4 @@
-"""The generator of the final stage: torch = onnxruntime, tiled = whole, as far as it reaches."""
+"""The generator of fine-tuning: torch = onnxruntime, tiled = whole, as far as it reaches."""
 
 import numpy as np
 import pytest

@@ -20,7 +20,7 @@ def test_arms_share_their_starts_and_a_finished_run_is_not_done_again(
     run_tool(monkeypatch, "design_stability", *command)
     lines = (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()
     trials = [json.loads(line) for line in lines]
-    assert [(t["arm"], t["stage"]) for t in trials] == [
+    assert [(t["arm"], t["run"]) for t in trials] == [
         *(("before", "box"), ("curriculum", "box")),
         *(("before", "end"), ("curriculum", "end")),
     ]

@@ -10,7 +10,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.models_def.training.trainer import Stage
+    from camkit.models_def.training.trainer import Refinement
 
 
 def train(
@@ -36,15 +36,15 @@ def train(
         Path | None,
         typer.Option(help="First weights: a checkpoint or bundle of any camera, same network."),
     ] = None,
-    final: Annotated[
+    fine_tune: Annotated[
         Path | None,
-        typer.Option(help="Final stage: fine-tune a checkpoint or bundle against discriminators."),
+        typer.Option(help="Fine-tune this checkpoint or bundle against discriminators."),
     ] = None,
     vgg: Annotated[
-        Path | None, typer.Option(help="With --final: VGG-19 weights (.pth or .safetensors).")
+        Path | None, typer.Option(help="With --fine-tune: VGG-19 weights (.pth or .safetensors).")
     ] = None,
     pairs: Annotated[
-        Path | None, typer.Option(help="With --final: folder of real pairs to fine-tune on.")
+        Path | None, typer.Option(help="With --fine-tune: folder of real pairs to fine-tune on.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
     overwrite: Overwrite = False,
@@ -61,11 +61,11 @@ def train(
     from camkit.models_def.training.trainer import TrainOptions
     from camkit.models_def.training.trainer import train as run
 
-    stage: Stage | None = None
-    if final is not None:
-        stage = _final_stage(recipe, final, size, vgg, pairs, device)
+    refinement: Refinement | None = None
+    if fine_tune is not None:
+        refinement = _fine_tuning(recipe, fine_tune, size, vgg, pairs, device)
     elif vgg is not None or pairs is not None:
-        raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM too")
+        raise ContractError("--vgg and --pairs belong to fine-tuning; say --fine-tune FROM too")
     result = run(
         recipe,
         TrainOptions(
@@ -82,21 +82,25 @@ def train(
             workers=workers,
             device=device,
         ),
-        stage=stage,
+        refinement=refinement,
     )
     plain = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(result).items()}
     print_report(plain, json_)
 
 
-def _final_stage(
+def _fine_tuning(
     recipe: Path, start: Path, size: str, vgg: Path | None, pairs: Path | None, device: str
-) -> "Stage":
-    from camkit.models_def.training.final.stage import WITHOUT_VGG, FinalOptions, make_stage
+) -> "Refinement":
+    from camkit.models_def.training.fine_tuning.refinement import (
+        WITHOUT_VGG,
+        FineTuningOptions,
+        make_refinement,
+    )
     from camkit.models_def.training.recipe import read_recipe
 
     if vgg is None:
         typer.echo(f"camkit: {WITHOUT_VGG}", err=True)
-    options = FinalOptions(
+    options = FineTuningOptions(
         start=start,
         size=size,
         vgg=vgg,
@@ -104,4 +108,4 @@ def _final_stage(
         device=device,
         recipe_folder=recipe.parent,
     )
-    return make_stage(read_recipe(recipe), options)
+    return make_refinement(read_recipe(recipe), options)

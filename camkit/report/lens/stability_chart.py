@@ -27,7 +27,7 @@ class Trial:
         arm: How it was designed.
         number: Of the start.
         level: How far off it was: share of the curvatures.
-        stage: `box` for the short run of every start, `end` for those that went on.
+        run: `box` for the short run of every start, `end` for those that went on.
         scaled: The lens.
         front_db: PSNR of the Wiener front on fresh pictures; NaN for a lens without image.
         valid_rays: Share of rays that reach the sensor.
@@ -39,7 +39,7 @@ class Trial:
     arm: str
     number: int
     level: float
-    stage: str
+    run: str
     scaled: tuple[float, ...]
     front_db: float
     valid_rays: float
@@ -110,13 +110,13 @@ def wilson_interval(hits: int, trials: int) -> tuple[float, float]:
 
 def best_trials(trials: Sequence[Trial], rules: Rules, arm: str, count: int) -> list[Trial]:
     """Give the best short runs of an arm; those that are no sound lens come last."""
-    own = [t for t in trials if t.arm == arm and t.stage == "box" and math.isfinite(t.front_db)]
+    own = [t for t in trials if t.arm == arm and t.run == "box" and math.isfinite(t.front_db)]
     return sorted(own, key=lambda t: (not rules.sound(t), -t.front_db))[:count]
 
 
 def cells(trials: Sequence[Trial], rules: Rules) -> list[Cell]:
     """Sum up short runs by arm and level."""
-    short = [t for t in trials if t.stage == "box"]
+    short = [t for t in trials if t.run == "box"]
     best_db = max((t.front_db for t in short if rules.sound(t)), default=math.inf)
     made = []
     for arm in dict.fromkeys(t.arm for t in short):
@@ -155,7 +155,7 @@ def write_stability(
 
 
 def _ends(trials: Sequence[Trial]) -> list[Trial]:
-    return [t for t in trials if t.stage == "end"]
+    return [t for t in trials if t.run == "end"]
 
 
 def _row(cell: Cell) -> dict[str, Any]:

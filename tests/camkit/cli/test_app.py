@@ -28,7 +28,7 @@ OPTIONS = {
     "--debug",
     "stress": "--scenarios --quick --data --sizes --scenes --compare --out-dir --write --list "
     "--json --debug",
-    "train": "--size --data --steps --max-minutes --resume --final --vgg --pairs --debug",
+    "train": "--size --data --steps --max-minutes --resume --fine-tune --vgg --pairs --debug",
     "design": "--data --out-dir --steps --lens-rate --prescription --seed --pictures --threads "
     "--resume --overwrite --json --debug",
     "export": "-o --psf --stress-psf --prescription --debug",

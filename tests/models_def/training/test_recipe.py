@@ -71,6 +71,20 @@ def test_wrong_recipes_are_refused_by_naming_the_key(recipe_path, change, value,
         to_recipe(table(recipe_path, **{change: value}))
 
 
+def test_recipes_of_old_checkpoints_have_fine_tuning_under_its_older_name(recipe_path):
+    text = recipe_path.read_text(encoding="utf-8")
+    settings = "\npixel_weight = 0.006\nschedule = { steps = 7 }\n"
+    older = to_recipe(tomllib.loads(text + "[final]" + settings))
+    today = to_recipe(tomllib.loads(text + "[fine_tuning]" + settings))
+    assert older == today
+    assert (older.fine_tuning.pixel_weight, older.fine_tuning.schedule.steps) == (0.006, 7)
+
+
+def test_fine_tuning_under_both_names_is_refused(recipe_path):
+    with pytest.raises(ContractError, match="final is the older name of fine_tuning"):
+        to_recipe(table(recipe_path, final={}, fine_tuning={}))
+
+
 def test_unknown_size_is_refused_with_those_there_are(recipe):
     with pytest.raises(ContractError, match="S, M; got 'XL'"):
         recipe.network("XL")

@@ -55,9 +55,9 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
     seen = []
 
     def fake(
-        recipe: Path, options: trainer.TrainOptions, *, stage: trainer.Stage | None
+        recipe: Path, options: trainer.TrainOptions, *, refinement: trainer.Refinement | None
     ) -> trainer.TrainResult:
-        assert stage is None
+        assert refinement is None
         seen.append((recipe, options))
         return trainer.TrainResult(
             checkpoint=options.out_dir / "x.pt",
@@ -190,10 +190,10 @@ def test_export_finds_what_lies_beside_the_checkpoint(
     assert parts.prescription is None, "the lens of the checkpoint"
 
 
-def test_files_of_the_final_stage_need_a_checkpoint_to_start_from(camkit_command) -> None:
+def test_files_of_fine_tuning_need_a_checkpoint_to_start_from(camkit_command) -> None:
     outcome = camkit_command("train", RECIPE, "--vgg", "vgg19.pth")
     assert outcome.code == ExitCode.USAGE
-    assert "say --final FROM too" in outcome.err
+    assert "say --fine-tune FROM too" in outcome.err
 
 
 def test_depths_that_are_no_numbers_are_a_usage_error(camkit_command, tmp_path) -> None:

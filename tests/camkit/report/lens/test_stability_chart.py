@@ -19,7 +19,7 @@ GOOD = Trial(
     arm="after",
     number=0,
     level=0.1,
-    stage="box",
+    run="box",
     scaled=(0.5,),
     front_db=25.0,
     valid_rays=1.0,
@@ -37,7 +37,7 @@ TRIALS = [
     replace(GOOD, number=5, front_db=math.nan),  # no image
     replace(GOOD, number=6, limits_cost=1.0),  # a success that cannot be built
     replace(GOOD, number=0, arm="before", front_db=20.0),
-    replace(GOOD, number=0, stage="end", front_db=26.0),  # does not count
+    replace(GOOD, number=0, run="end", front_db=26.0),  # does not count
 ]
 
 

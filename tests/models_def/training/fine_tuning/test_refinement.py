@@ -1,33 +1,33 @@
-"""The final stage as a run: it goes on exactly, says what it learned from, and can be exported."""
+"""Fine-tuning as a run: it goes on exactly, says what it learned from, and can be exported."""
 
 import pytest
 import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
-from camkit.models_def.training.final.stage import FinalOptions, make_stage
+from camkit.models_def.training.fine_tuning.refinement import FineTuningOptions, make_refinement
 from camkit.models_def.training.log import read_log
 from camkit.models_def.training.trainer import TrainOptions, train
 
 
 def run(folder, recipe_path, recipe, bank, start, **changes):
     given = {"out_dir": folder, "size": "full", "workers": 0} | changes
-    stage = make_stage(
-        recipe, FinalOptions(start=start, size=given["size"]), distort=lambda *_: None
+    refinement = make_refinement(
+        recipe, FineTuningOptions(start=start, size=given["size"]), distort=lambda *_: None
     )
-    return train(recipe_path, TrainOptions(**given), bank=bank, stage=stage)
+    return train(recipe_path, TrainOptions(**given), bank=bank, refinement=refinement)
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint):
-    folder = tmp_path_factory.mktemp("final")
-    return run(folder, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint)
+def whole(tmp_path_factory, recipe_path, recipe, bank, trimmed_checkpoint):
+    folder = tmp_path_factory.mktemp("fine_tuning")
+    return run(folder, recipe_path, recipe, bank, trimmed_checkpoint)
 
 
 def test_resumed_run_equals_an_uninterrupted_one_to_the_last_bit(
-    tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint, whole
+    tmp_path, recipe_path, recipe, bank, trimmed_checkpoint, whole
 ):
-    given = (tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint)
+    given = (tmp_path, recipe_path, recipe, bank, trimmed_checkpoint)
     run(*given, stop_at_step=3)
     resumed = run(*given, resume=True)
     one, two = read_checkpoint(whole.checkpoint), read_checkpoint(resumed.checkpoint)
@@ -41,7 +41,7 @@ def test_resumed_run_equals_an_uninterrupted_one_to_the_last_bit(
 
 
 def test_checkpoint_has_a_name_of_its_own_and_loads_like_any_network(whole):
-    assert whole.checkpoint.name == "tiny_full_final.pt"
+    assert whole.checkpoint.name == "tiny_full_fine_tuned.pt"
     saved = read_checkpoint(whole.checkpoint)
     assert (saved.network, saved.size) == ("full_unet", "full")
     network = load_network(saved)
@@ -52,24 +52,22 @@ def test_checkpoint_has_a_name_of_its_own_and_loads_like_any_network(whole):
 
 def test_card_says_that_no_vgg_was_used(whole):
     told = read_checkpoint(whole.checkpoint).training_data
-    assert told.endswith("final stage against two discriminators, without VGG-19")
+    assert told.endswith("fine-tuned against two discriminators, without VGG-19")
 
 
-def test_another_network_is_no_start(
-    tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint
-):
-    given = (tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint)
+def test_another_network_is_no_start(tmp_path, recipe_path, recipe, bank, trimmed_checkpoint):
+    given = (tmp_path, recipe_path, recipe, bank, trimmed_checkpoint)
     with pytest.raises(ContractError, match="holds another network than the recipe's"):
         run(*given, size="S")
 
 
-def test_a_stage_takes_no_second_start(
-    tmp_path, final_recipe_path, final_recipe, final_bank, trimmed_checkpoint
+def test_a_refinement_takes_no_second_start(
+    tmp_path, recipe_path, recipe, bank, trimmed_checkpoint
 ):
-    stage = make_stage(final_recipe, FinalOptions(start=trimmed_checkpoint, size="full"))
+    refinement = make_refinement(recipe, FineTuningOptions(start=trimmed_checkpoint, size="full"))
     options = TrainOptions(out_dir=tmp_path, size="full", start=trimmed_checkpoint)
-    with pytest.raises(ContractError, match="final stage has its own start"):
-        train(final_recipe_path, options, bank=final_bank, stage=stage)
+    with pytest.raises(ContractError, match="refinement has its own start"):
+        train(recipe_path, options, bank=bank, refinement=refinement)
 
 
 def test_log_holds_every_term(whole):

@@ -1,4 +1,4 @@
-"""One step of the final stage: both discriminators learn, then the generator.
+"""One step of fine-tuning: both discriminators learn, then the generator.
 
 batch (+ real pairs) -> generator -> views -+-> discriminators, scores of output and truth
                                             +-> content loss       |
@@ -14,19 +14,19 @@ from torch import Tensor, nn
 
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
 from camkit.models_def.training.checkpoint import State
-from camkit.models_def.training.final.adversarial import discriminator_loss, generator_loss
-from camkit.models_def.training.final.content import (
+from camkit.models_def.training.fine_tuning.adversarial import discriminator_loss, generator_loss
+from camkit.models_def.training.fine_tuning.content import (
     Views,
     make_views,
     perceptual_loss,
     pixel_loss,
 )
-from camkit.models_def.training.final.pairs import PairSamples
-from camkit.models_def.training.final.vgg import VggFeatures
+from camkit.models_def.training.fine_tuning.pairs import PairSamples
+from camkit.models_def.training.fine_tuning.vgg import VggFeatures
 from camkit.models_def.training.first_weights import FirstWeights
 from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.pool import Batch
-from camkit.models_def.training.recipe import FinalRecipe, NetworkRecipe
+from camkit.models_def.training.recipe import FineTuningRecipe, NetworkRecipe
 from camkit.models_def.training.schedule import learning_rate
 
 OPPONENT_SEED: Final = 2
@@ -34,8 +34,8 @@ BETAS: Final = (0.9, 0.999)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FinalParts:
-    """What the final stage is given besides its recipe.
+class FineTuningParts:
+    """What fine-tuning is given besides its recipe.
 
     Attributes:
         first: Weights that the generator starts from.
@@ -52,11 +52,13 @@ class FinalParts:
     device: str = "cpu"
 
 
-class FinalFitter:
+class FineTuningFitter:
     """Fits a generator against a global and a local discriminator. References: eq. (6.14)."""
 
-    def __init__(self, entry: NetworkRecipe, final: FinalRecipe, parts: FinalParts) -> None:
-        self.final, self.schedule, self._pairs = final, entry.schedule, parts.pairs
+    def __init__(
+        self, entry: NetworkRecipe, recipe: FineTuningRecipe, parts: FineTuningParts
+    ) -> None:
+        self.recipe, self.schedule, self._pairs = recipe, entry.schedule, parts.pairs
         self.generator = Fitter(entry, parts.device, parts.first)
         device = self.generator.device
         self._to_rec709 = parts.to_rec709.float().to(device)
@@ -65,14 +67,17 @@ class FinalFitter:
         self.opponents = nn.ModuleDict(
             {
                 name: Discriminator(
-                    DiscriminatorConfig(layers=layers, width=final.discriminator_width)
+                    DiscriminatorConfig(layers=layers, width=recipe.discriminator_width)
                 )
-                for name, layers in (("global", final.global_layers), ("local", final.local_layers))
+                for name, layers in (
+                    ("global", recipe.global_layers),
+                    ("local", recipe.local_layers),
+                )
             }
         ).to(device)
-        self._shares = {"global": final.global_weight, "local": final.local_weight}
+        self._shares = {"global": recipe.global_weight, "local": recipe.local_weight}
         self._optimizer = torch.optim.Adam(
-            self.opponents.parameters(), lr=final.discriminator_rate, betas=BETAS
+            self.opponents.parameters(), lr=recipe.discriminator_rate, betas=BETAS
         )
         self._notes: dict[str, list[float]] = {}
 
@@ -93,7 +98,7 @@ class FinalFitter:
     def _mixed(self, batch: Batch, pairs: PairSamples, step: int) -> Batch:
         """Replace the first patches of a batch by patches of real pairs."""
         count, _, patch_px, _ = batch.planes.shape
-        real = round(self.final.pair_share * count)
+        real = round(self.recipe.pair_share * count)
         if real == 0:
             return batch
         # Drawn by the step alone, so that a resumed run draws the same.
@@ -109,7 +114,7 @@ class FinalFitter:
     def _teach_opponents(self, views: Views, step: int, progress: float) -> None:
         decay = learning_rate(self.schedule, step, progress) / self.schedule.learning_rate
         for group in self._optimizer.param_groups:
-            group["lr"] = self.final.discriminator_rate * decay
+            group["lr"] = self.recipe.discriminator_rate * decay
         self.opponents.requires_grad_(requires_grad=True)
         losses = {
             name: discriminator_loss(judge(views.real), judge(views.seen.detach()))
@@ -126,7 +131,7 @@ class FinalFitter:
         pixel, perceptual = pixel_loss(views), perceptual_loss(views, self._features)
         self._note("pixel", pixel)
         self._note("perceptual", perceptual)
-        total = self.final.perceptual_weight * perceptual + self.final.pixel_weight * pixel
+        total = self.recipe.perceptual_weight * perceptual + self.recipe.pixel_weight * pixel
         for name, judge in self.opponents.items():
             adversarial = generator_loss(judge(views.real), judge(views.seen))
             self._note(f"adversarial_{name}", adversarial)

@@ -1,4 +1,4 @@
-"""One step of the final stage moves each player by its own loss, and draws pairs by the step."""
+"""One step of fine-tuning moves each player by its own loss, and draws pairs by the step."""
 
 import tomllib
 from dataclasses import replace
@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.training.final.fitter import FinalFitter, FinalParts
-from camkit.models_def.training.final.pairs import PairSamples
+from camkit.models_def.training.fine_tuning.fitter import FineTuningFitter, FineTuningParts
+from camkit.models_def.training.fine_tuning.pairs import PairSamples
 from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.pool import Batch
 from camkit.models_def.training.recipe import to_recipe
@@ -17,13 +17,13 @@ from tests.models_def.training.conftest import RECIPE
 
 
 @pytest.fixture
-def make(final_recipe, trimmed_checkpoint):
+def make(recipe, trimmed_checkpoint):
     def build(pairs=None, **changes):
-        final = replace(final_recipe.final, **changes)
-        entry = replace(final_recipe.network("full"), schedule=final.schedule)
+        tuning = replace(recipe.fine_tuning, **changes)
+        entry = replace(recipe.network("full"), schedule=tuning.schedule)
         first = read_first_weights(trimmed_checkpoint, "full")
-        parts = FinalParts(first=first, to_rec709=torch.eye(3), pairs=pairs)
-        return FinalFitter(entry, final, parts)
+        parts = FineTuningParts(first=first, to_rec709=torch.eye(3), pairs=pairs)
+        return FineTuningFitter(entry, tuning, parts)
 
     return build
 
@@ -69,11 +69,11 @@ def test_real_pairs_replace_their_share_of_a_batch_by_the_step_alone(make):
 
 def test_recipe_table_is_checked():
     minimal = tomllib.loads(RECIPE)
-    with pytest.raises(ContractError, match="final must be a table"):
-        to_recipe({"final": 3, **minimal})
-    with pytest.raises(ContractError, match="final: unknown key 'sigma'"):
-        to_recipe({"final": {"sigma": 1.0}, **minimal})
+    with pytest.raises(ContractError, match="fine_tuning must be a table"):
+        to_recipe({"fine_tuning": 3, **minimal})
+    with pytest.raises(ContractError, match="fine_tuning: unknown key 'sigma'"):
+        to_recipe({"fine_tuning": {"sigma": 1.0}, **minimal})
     with pytest.raises(ContractError, match="weights >= 0"):
-        to_recipe({"final": {"pixel_weight": -1.0}, **minimal})
+        to_recipe({"fine_tuning": {"pixel_weight": -1.0}, **minimal})
     with pytest.raises(ContractError, match="layers, width"):
-        to_recipe({"final": {"global_layers": 0}, **minimal})
+        to_recipe({"fine_tuning": {"global_layers": 0}, **minimal})

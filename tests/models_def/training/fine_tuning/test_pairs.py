@@ -8,8 +8,8 @@ import torch
 from camkit.colorimetry import camera_from_rec709, encode_srgb
 from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError, DecodeError
-from camkit.models_def.training.final.homography import map_points
-from camkit.models_def.training.final.pairs import read_capture, read_pairs
+from camkit.models_def.training.fine_tuning.homography import map_points
+from camkit.models_def.training.fine_tuning.pairs import read_capture, read_pairs
 from camkit.models_def.training.samples import corner_height_mm
 from camkit.scenes import procedural_scene
 
@@ -19,10 +19,8 @@ EXPOSURE = 0.6
 
 
 @pytest.fixture(scope="module")
-def distortion(final_recipe):
-    return RadialDistortion(
-        coefficients=np.tile(ROW, (3, 1)), radius_mm=corner_height_mm(final_recipe)
-    )
+def distortion(recipe):
+    return RadialDistortion(coefficients=np.tile(ROW, (3, 1)), radius_mm=corner_height_mm(recipe))
 
 
 def ideal_positions(recipe, x, y):
@@ -39,14 +37,14 @@ def ideal_positions(recipe, x, y):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, final_recipe, final_bank):
+def folder(tmp_path_factory, recipe, bank):
     """One pair: a picture, and what a lens that distorts and vignettes makes of it."""
     home = tmp_path_factory.mktemp("pairs")
-    camera = final_recipe.camera
+    camera = recipe.camera
     shown = np.clip(procedural_scene(11, 440, 620), 0, 1)
     srgb = np.rint(255 * encode_srgb(shown)).astype(np.uint8)
     y, x = np.mgrid[0 : camera.height_px, 0 : camera.width_px].astype(np.float64)
-    at = map_points(np.linalg.inv(TRUE), ideal_positions(final_recipe, x, y).reshape(-1, 2))
+    at = map_points(np.linalg.inv(TRUE), ideal_positions(recipe, x, y).reshape(-1, 2))
     at = at.reshape(*x.shape, 2).astype(np.float32)
     planes = [
         cv2.remap(p, at[..., 0], at[..., 1], cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_CONSTANT)
@@ -55,7 +53,7 @@ def folder(tmp_path_factory, final_recipe, final_bank):
     matrix, _ = camera_from_rec709(np.array(camera.color_matrix))
     light = EXPOSURE * np.tensordot(matrix, np.stack(planes), 1)
     heights = np.hypot(x - x.mean(), y - y.mean()) * camera.pixel_pitch_um / 1000
-    light *= np.interp(heights, final_bank.frozen_heights_mm, final_bank.relative_illumination)
+    light *= np.interp(heights, bank.frozen_heights_mm, bank.relative_illumination)
     capture = np.clip([cv2.GaussianBlur(p, (0, 0), 1.0) for p in light], 0, 1)
     for name in ("capture", "reference"):
         (home / name).mkdir()
@@ -67,8 +65,8 @@ def folder(tmp_path_factory, final_recipe, final_bank):
 
 
 @pytest.fixture(scope="module")
-def samples(folder, final_recipe, final_bank, distortion):
-    return read_pairs(folder, final_recipe, final_bank, distortion, seed=1)
+def samples(folder, recipe, bank, distortion):
+    return read_pairs(folder, recipe, bank, distortion, seed=1)
 
 
 def test_homography_behind_the_distortion_is_found_to_a_tenth_of_a_pixel(samples):
@@ -110,30 +108,28 @@ def test_drawn_patches_depend_on_the_generator_alone(samples):
     assert one.weight.shape == (3, 3)
 
 
-def test_another_reference_is_an_error_that_names_the_pair(
-    tmp_path, folder, final_recipe, final_bank
-):
+def test_another_reference_is_an_error_that_names_the_pair(tmp_path, folder, recipe, bank):
     for name in ("capture", "reference"):
         (tmp_path / name).mkdir()
     (tmp_path / "capture" / "b.tiff").write_bytes((folder / "capture" / "one.tiff").read_bytes())
     (tmp_path / "pairs.toml").write_text("iso = 100\n", encoding="utf-8")
     with pytest.raises(ContractError, match=r"pair b: .*holds no picture"):
-        read_pairs(tmp_path, final_recipe, final_bank, None, seed=1)
+        read_pairs(tmp_path, recipe, bank, None, seed=1)
     cv2.imwrite(str(tmp_path / "reference" / "b.png"), np.full((200, 300, 3), 90, np.uint8))
     with pytest.raises(ContractError, match=r"pair b: .*too few features"):
-        read_pairs(tmp_path, final_recipe, final_bank, None, seed=1)
+        read_pairs(tmp_path, recipe, bank, None, seed=1)
 
 
 @pytest.mark.parametrize(
     "text", ["", "iso = -1.0", 'iso = "x"', "iso = 100\nblack = 3", "iso = 1\nwhite_balance = [1]"]
 )
-def test_wrong_settings_are_refused(tmp_path, final_recipe, final_bank, text):
+def test_wrong_settings_are_refused(tmp_path, recipe, bank, text):
     (tmp_path / "pairs.toml").write_text(text, encoding="utf-8")
     with pytest.raises(ContractError, match="must hold iso > 0"):
-        read_pairs(tmp_path, final_recipe, final_bank, None, seed=1)
+        read_pairs(tmp_path, recipe, bank, None, seed=1)
 
 
-def test_captures_of_another_kind_are_refused(tmp_path, folder, final_recipe, final_bank):
+def test_captures_of_another_kind_are_refused(tmp_path, folder, recipe, bank):
     path = tmp_path / "x.png"
     cv2.imwrite(str(path), np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(ContractError, match="16-bit RGB, linear; got uint8"):

@@ -8,7 +8,12 @@ from safetensors.torch import save_file
 from torch.nn import functional
 
 from camkit.errors import ContractError
-from camkit.models_def.training.final.vgg import CONVOLUTIONS, VggFeatures, file_digest, read_vgg
+from camkit.models_def.training.fine_tuning.vgg import (
+    CONVOLUTIONS,
+    VggFeatures,
+    file_digest,
+    read_vgg,
+)
 
 
 @pytest.fixture(scope="module")

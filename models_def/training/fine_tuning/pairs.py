@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, NoiseModel, RadialDistortion
 from camkit.errors import ContractError, DecodeError
-from camkit.models_def.training.final.alignment import CLIPPED_ABOVE, AlignedPair, Aligner
-from camkit.models_def.training.final.homography import Homography, warp_to
+from camkit.models_def.training.fine_tuning.alignment import CLIPPED_ABOVE, AlignedPair, Aligner
+from camkit.models_def.training.fine_tuning.homography import Homography, warp_to
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import Batch, cut_patch
 from camkit.models_def.training.psf_bank import PsfBank
@@ -72,7 +72,7 @@ class PairSettings:
 def read_pairs(
     folder: Path, recipe: Recipe, bank: PsfBank, distortion: RadialDistortion | None, *, seed: int
 ) -> PairSamples:
-    """Align every pair of a folder and cut `final.pair_samples` samples from each.
+    """Align every pair of a folder and cut `fine_tuning.pair_samples` samples from each.
 
     Args:
         folder: See the head of the module.
@@ -93,7 +93,7 @@ def read_pairs(
         rng = np.random.default_rng((seed, 2, number))
         try:
             pair = aligner.align(read_capture(path), to_linear(read_picture(_partner(path))))
-            for _ in range(recipe.final.pair_samples):
+            for _ in range(recipe.fine_tuning.pair_samples):
                 place = _draw_place(rng, pair, recipe)
                 samples.append(_cut(rng, pair, place, (aligner, bank, noise, settings), recipe))
         except ContractError as error:

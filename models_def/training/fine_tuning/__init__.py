@@ -1,4 +1,4 @@
-"""The final stage: a trained network, fine-tuned against two discriminators and on real pairs.
+"""Fine-tuning: a trained network against two discriminators and on real pairs.
 
     homography    from a reference picture to a capture of it
     alignment     a pair with distortion, homography and colours told apart
@@ -7,7 +7,7 @@
     content       output and truth as seen on a display; eq. (6.12)
     adversarial   RaGAN-LS, eq. (6.13) with its signs
     fitter        one step: discriminators, then generator, eq. (6.14)
-    stage         all of it as a stage of the ordinary trainer
+    refinement    all of it as the ordinary trainer runs it
 
 References: Sun 2021, sections 6.2.2 and 6.3.1.
 """

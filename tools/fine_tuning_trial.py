@@ -1,6 +1,6 @@
-"""A small trial of the final stage on procedural scenes: does it behave, and which weights to use?
+"""A small trial of fine-tuning on procedural scenes: does it behave, and which weights to use?
 
-    python -m tools.final_trial FOLDER --steps 300
+    python -m tools.fine_tuning_trial FOLDER --steps 300
 
 A narrow trimmed U-Net is trained, then a narrow generator is started from it and fine-tuned with
 the loss weights of eq. (6.12) in both orders, and once without discriminators. Prints one Markdown
@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
-from camkit.models_def.training.final.stage import FinalOptions, make_stage
+from camkit.models_def.training.fine_tuning.refinement import FineTuningOptions, make_refinement
 from camkit.models_def.training.log import read_log
 from camkit.models_def.training.psf_bank import PsfBank, gaussian_bank
 from camkit.models_def.training.recipe import Recipe, read_recipe
@@ -40,7 +40,7 @@ schedule = { steps = STEPS, batch = 4, patch_px = 64, precision = "float32" }
 network = "full_unet"
 config = { widths = [8, 16, 32, 32, 32, 32, 32] }
 
-[final]
+[fine_tuning]
 discriminator_width = 16
 WEIGHTS
 schedule = { steps = STEPS, batch = 2, patch_px = 128, warmup_steps = 20 }
@@ -86,16 +86,18 @@ def write_recipe(folder: Path, steps: int, weights: str) -> tuple[Path, Recipe, 
 
 
 def options(folder: Path, size: str) -> TrainOptions:
-    """Give the options of a run that makes its own samples."""
-    return TrainOptions(out_dir=folder, size=size, workers=0, validate_s=1e9, checkpoint_s=1e9)
+    """Give the options of a run that makes its own samples and replaces the run before it."""
+    return TrainOptions(
+        out_dir=folder, size=size, overwrite=True, workers=0, validate_s=1e9, checkpoint_s=1e9
+    )
 
 
 def row(name: str, weights: str, folder: Path, steps: int, start: Path) -> str:
-    """Run one final stage and give its row."""
+    """Run one fine-tuning and give its row."""
     began = time.process_time()
     path, recipe, bank = write_recipe(folder, steps, weights)
-    stage = make_stage(recipe, FinalOptions(start=start, size="full"))
-    result = train(path, options(folder, "full"), bank=bank, stage=stage)
+    refinement = make_refinement(recipe, FineTuningOptions(start=start, size="full"))
+    result = train(path, options(folder, "full"), bank=bank, refinement=refinement)
     last: dict[str, Any] = [e for e in read_log(result.log) if "loss" in e][-1]
     error = colour_error(result.checkpoint, recipe, bank)
     scores = [f"{last[f'discriminator_{d}']:.3f}" for d in ("global", "local")]

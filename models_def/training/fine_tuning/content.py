@@ -1,4 +1,4 @@
-"""What the final stage compares: output and truth as a display shows them, and eq. (6.12).
+"""What fine-tuning compares: output and truth as a display shows them, and eq. (6.12).
 
 The network works on stabilised planes. Features and discriminators were made for, or judge,
 pictures that people look at; so planes become linear light, Rec.709 and sRGB first. The pixel term

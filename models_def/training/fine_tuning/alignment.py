@@ -18,7 +18,7 @@ from camkit.bundle.camera import Camera
 from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError
-from camkit.models_def.training.final.homography import (
+from camkit.models_def.training.fine_tuning.homography import (
     WORK_SIDE_PX,
     Homography,
     find_homography,

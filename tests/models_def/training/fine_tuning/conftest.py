@@ -1,4 +1,4 @@
-"""The tiny camera of the training tests with tables for the final stage."""
+"""The tiny camera of the training tests with tables for fine-tuning."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from camkit.models_def.training.samples import corner_height_mm
 from camkit.models_def.training.trainer import TrainOptions, train
 from tests.models_def.training.conftest import RECIPE, one_thread  # noqa: F401
 
-FINAL = """
+FINE_TUNING = """
 [networks.trimmed]
 network = "trimmed_unet"
 config = { widths = [4, 4, 8] }
@@ -19,7 +19,7 @@ schedule = { steps = 4, precision = "float32" }
 network = "full_unet"
 config = { widths = [4, 4, 8, 8, 8, 8, 8] }
 
-[final]
+[fine_tuning]
 discriminator_width = 4
 pair_samples = 4
 schedule = { steps = 6, batch = 2, patch_px = 64, warmup_steps = 2 }
@@ -35,27 +35,27 @@ def one_picture_to_validate_on():
 
 
 @pytest.fixture(scope="session")
-def final_recipe_path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("final_recipe") / "tiny.toml"
-    path.write_text(RECIPE + FINAL, encoding="utf-8")
+def recipe_path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recipe") / "tiny.toml"
+    path.write_text(RECIPE + FINE_TUNING, encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="session")
-def final_recipe(final_recipe_path):
-    return read_recipe(final_recipe_path)
+def recipe(recipe_path):
+    return read_recipe(recipe_path)
 
 
 @pytest.fixture(scope="session")
-def final_bank(final_recipe):
-    height = corner_height_mm(final_recipe)
+def bank(recipe):
+    height = corner_height_mm(recipe)
     return gaussian_bank(sensor_height_mm=height, axis_px=0.9, corner_px=1.8)
 
 
 @pytest.fixture(scope="session")
-def trimmed_checkpoint(tmp_path_factory, final_recipe_path, final_bank):
+def trimmed_checkpoint(tmp_path_factory, recipe_path, bank):
     """Four steps of the trimmed U-Net."""
     options = TrainOptions(
         out_dir=tmp_path_factory.mktemp("trimmed"), size="trimmed", workers=0, threads=1
     )
-    return train(final_recipe_path, options, bank=final_bank).checkpoint
+    return train(recipe_path, options, bank=bank).checkpoint

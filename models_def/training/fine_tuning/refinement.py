@@ -1,4 +1,4 @@
-"""The final stage as the ordinary trainer runs it: files read, credits written, fitter made."""
+"""Fine-tuning as the ordinary trainer runs it: files read, credits written, fitter made."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.training.final.fitter import FinalFitter, FinalParts
-from camkit.models_def.training.final.pairs import PairSamples, read_pairs
-from camkit.models_def.training.final.vgg import file_digest, read_vgg
+from camkit.models_def.training.fine_tuning.fitter import FineTuningFitter, FineTuningParts
+from camkit.models_def.training.fine_tuning.pairs import PairSamples, read_pairs
+from camkit.models_def.training.fine_tuning.vgg import file_digest, read_vgg
 from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.fitter import Fits
 from camkit.models_def.training.psf_bank import PsfBank
 from camkit.models_def.training.recipe import NetworkRecipe, Recipe
 from camkit.models_def.training.samples import corner_height_mm
-from camkit.models_def.training.trainer import Stage
+from camkit.models_def.training.trainer import Refinement
 
-STAGE_NAME: Final = "final"
+NAME: Final = "fine_tuned"
 WITHOUT_VGG: Final = (
     "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
 )
@@ -31,8 +31,8 @@ Distort = Callable[[Recipe, Path], RadialDistortion | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FinalOptions:
-    """What the final stage is given.
+class FineTuningOptions:
+    """What fine-tuning is given.
 
     Attributes:
         start: Checkpoint or bundle to start from.
@@ -57,13 +57,13 @@ def trace_recipe_distortion(recipe: Recipe, folder: Path) -> RadialDistortion:
     return trace_distortion(lens, corner_height_mm(recipe))
 
 
-def make_stage(
-    recipe: Recipe, options: FinalOptions, *, distort: Distort = trace_recipe_distortion
-) -> Stage:
-    """Prepare the final stage of a recipe.
+def make_refinement(
+    recipe: Recipe, options: FineTuningOptions, *, distort: Distort = trace_recipe_distortion
+) -> Refinement:
+    """Prepare the fine-tuning of a recipe.
 
     Args:
-        recipe: Its table `final`.
+        recipe: Its table `fine_tuning`.
         options: Files.
         distort: Gives the distortion that real pairs are aligned through; None for none.
 
@@ -84,29 +84,29 @@ def make_stage(
                 distort(recipe, options.recipe_folder),
                 seed=entry.schedule.seed,
             )
-        parts = FinalParts(
+        parts = FineTuningParts(
             first=first,
             to_rec709=torch.from_numpy(matrix),
             features=features,
             pairs=pairs,
             device=options.device,
         )
-        return FinalFitter(entry, recipe.final, parts)
+        return FineTuningFitter(entry, recipe.fine_tuning, parts)
 
-    return Stage(
-        name=STAGE_NAME,
-        schedule=recipe.final.schedule,
+    return Refinement(
+        name=NAME,
+        schedule=recipe.fine_tuning.schedule,
         make_fitter=make_fitter,
         first=first,
         credit=_credit(options),
     )
 
 
-def _credit(options: FinalOptions) -> str:
+def _credit(options: FineTuningOptions) -> str:
     """Say what else the weights learned from, for the card."""
     features = "without VGG-19"
     if options.vgg is not None:
         digest = file_digest(options.vgg)[:16]
         features = f"with VGG-19 features of {options.vgg.name} (sha256 {digest}...)"
     pairs = "" if options.pairs is None else f" and real pairs of {options.pairs.name}"
-    return f"; final stage against two discriminators, {features}{pairs}"
+    return f"; fine-tuned against two discriminators, {features}{pairs}"
