@@ -17,8 +17,6 @@ Matrix = NDArray[np.float64]
 Chromaticity = tuple[float, float]
 
 D65: Final[Chromaticity] = (0.3127, 0.3290)
-D50: Final[Chromaticity] = (0.3457, 0.3585)
-STANDARD_LIGHT_A: Final[Chromaticity] = (0.44757, 0.40745)
 ACES_WHITE: Final[Chromaticity] = (0.32168, 0.33767)
 REC709_PRIMARIES: Final = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060))
 ACESCG_PRIMARIES: Final = ((0.713, 0.293), (0.165, 0.830), (0.128, 0.044))

@@ -39,15 +39,6 @@ class DiscriminatorConfig:
             )
 
 
-def reach_px(layers: int) -> int:
-    """Give the side of the square of pixels that one score sees."""
-    # The last two layers do not stride: 7 of their inputs; a layer /2 of kernel 4 sees 2 n + 2.
-    side = 7
-    for _ in range(layers):
-        side = 2 * side + 2
-    return side
-
-
 class Discriminator(nn.Module):
     """Scores of how real parts of a picture look."""
 

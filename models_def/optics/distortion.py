@@ -61,9 +61,3 @@ def trace_distortion(lens: Lens, radius_mm: float) -> RadialDistortion:
     ideal_mm = ideal_heights(lens, heights_mm)
     row = fit_distortion(ideal_mm / radius_mm, heights_mm / radius_mm)
     return RadialDistortion(coefficients=np.tile(row, (3, 1)), radius_mm=radius_mm)
-
-
-def distortion_share(lens: Lens, heights_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the distortion h / (EFL tan(field angle)) - 1 at sensor heights > 0."""
-    share: NDArray[np.float64] = heights_mm / ideal_heights(lens, heights_mm) - 1
-    return share

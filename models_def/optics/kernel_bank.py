@@ -68,25 +68,6 @@ def wavelength_grid(count: int, low_um: float = 0.42, high_um: float = 0.68) -> 
     return np.linspace(low_um, high_um, count)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KernelBank:
-    """Kernels of several copies of a lens.
-
-    Attributes:
-        kernels: (copy, field, 3, h, w) float32, each sums to 1; copy 0 is the nominal lens. As
-            they fall on the sensor for points along +y, centred on the copy's own chief ray of
-            the reference wavelength.
-        field_heights_mm: (field,).
-        pixel_pitch_um: Of the kernel samples.
-        energy_kept: Least share of light inside the window, over everything.
-    """
-
-    kernels: FloatArray
-    field_heights_mm: NDArray[np.float64]
-    pixel_pitch_um: float
-    energy_kept: float
-
-
 def fabricated_copies(
     lens: Lens, count: int, seed: int, errors: FabricationErrors | None = None
 ) -> tuple[Lens, ...]:
@@ -144,38 +125,3 @@ def colour_kernels(
         kept = share.sum(-1)
         kernels = torch.einsum("fcw,fwij->fcij", share / kept[..., None], traced.kernels)
     return kernels.to(torch.float32).numpy(), float(kept.min())
-
-
-def kernel_bank(
-    lens: Lens,
-    response: ChannelResponse,
-    *,
-    copies: int,
-    seed: int,
-    heights_mm: NDArray[np.float64],
-    size_px: int,
-    pitch_um: float,
-    rays: int = 4096,
-) -> KernelBank:
-    """Trace the nominal lens and focused copies of it at the same sensor heights.
-
-    Args:
-        lens: Nominal.
-        response: Colours over a (dense) wavelength grid.
-        copies: Lenses in all, the nominal one included.
-        seed: Of the fabrication errors.
-        heights_mm: (field,) from 0 to the corner of the sensor.
-        size_px: Odd kernel side.
-        pitch_um: Sensor pitch.
-        rays: In half the pupil.
-    """
-    built = [
-        colour_kernels(copy, response, heights_mm, size_px=size_px, pitch_um=pitch_um, rays=rays)
-        for copy in focused_copies(lens, copies, seed)
-    ]
-    return KernelBank(
-        kernels=np.stack([kernels for kernels, _ in built]),
-        field_heights_mm=heights_mm,
-        pixel_pitch_um=pitch_um,
-        energy_kept=min(kept for _, kept in built),
-    )

@@ -88,30 +88,7 @@ def trace_psf(
     *,
     rays: int = DEFAULT_RAYS,
 ) -> TracedPsf:
-    """Trace kernels as `trace_kernels` does and say how much light they hold."""
-    samples = half_disc(rays)
-    slopes = slopes_for_heights(lens, heights_mm)
-    fields = max(1, _CHUNK_RAYS // (rays * len(wavelengths_um)))
-    parts = [
-        splat(trace_spots(lens, some, wavelengths_um, samples), size_px, pitch_um)
-        for some in torch.split(slopes, fields)
-    ]
-    return TracedPsf(
-        kernels=torch.cat([p.kernels for p in parts]),
-        energy_kept=torch.cat([p.energy_kept for p in parts]),
-    )
-
-
-def trace_kernels(
-    lens: Lens,
-    heights_mm: Tensor,
-    wavelengths_um: Tensor,
-    size_px: int,
-    pitch_um: float,
-    *,
-    rays: int = DEFAULT_RAYS,
-) -> Tensor:
-    """Trace the PSF at sensor heights and wavelengths.
+    """Trace the PSF at sensor heights and wavelengths, and say how much light it holds.
 
     Args:
         lens: The prescription.
@@ -123,11 +100,20 @@ def trace_kernels(
         rays: In half the pupil; the other half is its mirror image.
 
     Returns:
-        (field, wavelength, size_px, size_px) float64, each sums to 1, as it falls on the
-        sensor, the centre pixel on the chief ray of the reference wavelength, rows increasing
-        away from the axis (a point at +y).
+        float64 kernels as they fall on the sensor, the centre pixel on the chief ray of the
+        reference wavelength, rows increasing away from the axis (a point at +y).
     """
-    return trace_psf(lens, heights_mm, wavelengths_um, size_px, pitch_um, rays=rays).kernels
+    samples = half_disc(rays)
+    slopes = slopes_for_heights(lens, heights_mm)
+    fields = max(1, _CHUNK_RAYS // (rays * len(wavelengths_um)))
+    parts = [
+        splat(trace_spots(lens, some, wavelengths_um, samples), size_px, pitch_um)
+        for some in torch.split(slopes, fields)
+    ]
+    return TracedPsf(
+        kernels=torch.cat([p.kernels for p in parts]),
+        energy_kept=torch.cat([p.energy_kept for p in parts]),
+    )
 
 
 def with_object_distance(lens: Lens, distance_mm: float) -> Lens:

@@ -32,26 +32,6 @@ def reverse(tensors: SurfaceTensors) -> SurfaceTensors:
     )
 
 
-def launch_from_sensor(x_mm: Tensor, y_mm: Tensor, target: tuple[Tensor, Tensor, float]) -> Rays:
-    """Start rays on the sensor towards points of a plane, the exit pupil as a rule.
-
-    Args:
-        x_mm: Sensor points; broadcasts with the rest.
-        y_mm: The same.
-        target: x, y and distance in mm of the points from the sensor, the distance positive
-            towards the scene. A negative one is a pupil behind the sensor: rays leave its
-            points behind.
-
-    Raises:
-        ContractError: If the plane is the sensor's.
-    """
-    target_x, target_y, distance_mm = target
-    if not (math.isfinite(distance_mm) and distance_mm != 0):
-        raise ContractError(f"the target distance must be finite and not 0; got {distance_mm} mm")
-    slopes = (target_x - x_mm) / distance_mm, (target_y - y_mm) / distance_mm
-    return launch_with_slopes(x_mm, y_mm, *slopes)
-
-
 def launch_with_slopes(x_mm: Tensor, y_mm: Tensor, slope_x: Tensor, slope_y: Tensor) -> Rays:
     """Start rays on the sensor (z = 0) with slopes towards the scene; all broadcast."""
     n = torch.rsqrt(1 + slope_x**2 + slope_y**2)

@@ -1,6 +1,6 @@
 """The sensor and the front end in torch; each has a twin in the runtime (tests/parity).
 
-    forward     blur, mosaic, noise, clipping, with gradients
+    forward     blur by one kernel, or by one a block
     demosaic    mosaic to planes
     psf         the kernel of an image point
     wiener      the Wiener filter of a patch

@@ -1,13 +1,8 @@
-"""The camera in torch, with gradients: blur, illumination, CFA, noise, clipping, quantisation.
+"""Light on its way to the sensor, in torch with gradients: blurred by one kernel or block by block.
 
-    planes -> blur (one kernel) or scatter (blocks) -> times illumination -> expose -> mosaic
-
-Twin of `camkit.runtime.simulate` and `scatter`; `tests/parity` holds the two together. Noise is
-reparametrised: the caller hands in standard normal numbers, so the mosaic is differentiable in
-scene, kernels and gains. Clipping and rounding let gradients through unchanged.
+`scatter` is the twin of `camkit.runtime.geometry.scatter`; `tests/parity` holds the two together.
 """
 
-from dataclasses import dataclass
 from math import cos, pi
 from typing import Any, Final
 
@@ -18,36 +13,11 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 from torch.nn.functional import pad
 
-from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError
-from camkit.models_def.sensors.demosaic import mosaic
 
 BLOCK_STEP_PX: Final = 128
-# Keeps the slope of the square root finite where a camera without read noise sees no light.
-LEAST_VARIANCE: Final = 1e-12
 
 Span = tuple[int, int, Tensor]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sensor:
-    """What the pixels do.
-
-    Attributes:
-        cfa: Mosaic.
-        gains: White balance gains in the planes; the raw signal is the planes over the gains.
-        noise: Noise of the raw signal at the ISO.
-        full_well: Signal at which the pixel is full (1.0 = white level).
-        black_level: DN at no light.
-        white_level: DN at which the converter clips.
-    """
-
-    cfa: CfaPattern
-    gains: tuple[float, float, float]
-    noise: NoiseModel
-    full_well: float
-    black_level: float
-    white_level: float
 
 
 def blur(planes: Tensor, kernels: Tensor) -> Tensor:
@@ -167,31 +137,6 @@ def block_centres_px(length: int, margin_px: int, *, step_px: int = BLOCK_STEP_P
     return torch.tensor(
         [(first + last - 1) / 2 - margin_px for first, last, _ in spans], dtype=torch.float64
     )
-
-
-def expose(planes: Tensor, sensor: Sensor, normal: Tensor | None = None) -> Tensor:
-    """Record white-balanced planes as a raw mosaic.
-
-    Args:
-        planes: (b, 3, h, w) linear, white-balanced, 1.0 = white level of green.
-        sensor: Mosaic, gains, noise and levels.
-        normal: (b, h, w) standard normal numbers, or None for no noise. Photon noise is Gaussian
-            here, which departs from Poisson below some ten electrons.
-
-    Returns:
-        (b, h, w) linear raw signal, 1.0 = white level, in steps of one DN, clipped.
-
-    References: Foi et al. 2008.
-    """
-    signal = mosaic(planes / planes.new_tensor(sensor.gains)[:, None, None], sensor.cfa)
-    if normal is not None:
-        shot, read = sensor.noise.shot[1], sensor.noise.read_variance[1]
-        variance = (shot * signal + read).clamp(min=LEAST_VARIANCE)
-        signal = signal + variance.sqrt() * normal
-    span = sensor.white_level - sensor.black_level
-    levels = sensor.black_level + signal.clamp(max=sensor.full_well) * span
-    recorded = (levels.round().clamp(0, sensor.white_level) - sensor.black_level) / span
-    return signal + (recorded - signal).detach()
 
 
 def _spectrum(planes: Tensor, size: tuple[int, int]) -> Tensor:

@@ -4,7 +4,7 @@ They exist to be compared with. Neither clips a highlight; both treat clipped sa
 this bright", and both follow the noise.
 """
 
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 import scipy.fft
@@ -17,8 +17,6 @@ from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
 from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, inverse, transform
 from camkit.runtime.bank.wiener import wiener_filter
-
-Method = Literal["wiener", "rl", "admm-tv"]
 
 # Tuned on development pictures behind the first camera, never on test pictures.
 RL_ROUNDS_PER_SNR: Final = 0.7

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray, NoiseModel
-from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
+from camkit.runtime.bank.blocks import Block, BlockFilter
 from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
 
@@ -28,26 +28,6 @@ LEAST_POWER: Final = 1e-12
 KERNEL_ERROR: Final = 1e-2
 """Least NSR where the OTF is far from 1: the real lens differs from the frozen PSF, and what the
 frozen OTF calls almost nothing must not be raised without end."""
-
-
-def wiener_bank(
-    psf: LocalPsf, settings: Wiener, noise: NoiseModel, *, threads: int = 1
-) -> BlockBank:
-    """Make the front end of a capture.
-
-    Args:
-        psf: Kernels and place of the capture.
-        settings: The manifest's Wiener stage.
-        noise: Noise of the capture after white balance.
-        threads: Blocks restored at a time; no influence on the bits.
-    """
-    return BlockBank(
-        psf,
-        wiener_filter(settings, noise),
-        block_px=settings.block_px,
-        overlap_px=settings.overlap_px,
-        threads=threads,
-    )
 
 
 def wiener_filter(settings: Wiener, noise: NoiseModel) -> BlockFilter:

@@ -1,4 +1,4 @@
-"""Radial distortion of points: the model, its inverse, its range, its fit.
+"""Radial distortion of points: the model, its inverse, its range.
 
 r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6), r ideal and r_d on the sensor, both in units of
 `RadialDistortion.radius_mm` (Sun 2021, eq. 6.10). Pictures are warped in `warp.py`.
@@ -66,43 +66,6 @@ def undistort_points(
         ideal, radius, out=np.full_like(radius, 1 / coefficients[0]), where=radius > 0
     )
     return np.asarray(points_mm * scale)
-
-
-def fit_distortion(
-    r_mm: FloatGrid, r_distorted_mm: FloatGrid, radius_mm: float
-) -> RadialDistortion:
-    """Fit the radial model to pairs of radii by linear least squares.
-
-    Args:
-        r_mm: (n,) ideal radii, or (3, n) for one fit per colour; n >= 4.
-        r_distorted_mm: Radii on the sensor, of the same shape.
-        radius_mm: Half the diagonal of the sensor.
-
-    Raises:
-        ContractError: If the shapes disagree or fewer than four different radii are given.
-
-    References: Sun 2021, eq. (6.11).
-    """
-    is_pair = r_mm.shape == r_distorted_mm.shape
-    if not is_pair or r_mm.shape[:-1] not in {(), (3,)} or r_mm.ndim == 0:
-        raise ContractError(
-            f"radii must be (n,) or (3, n) pairs; got {r_mm.shape} and {r_distorted_mm.shape}"
-        )
-    pairs = (
-        np.broadcast_to(
-            np.stack([r_mm, r_distorted_mm]).reshape(2, -1, r_mm.shape[-1]), (2, 3, r_mm.shape[-1])
-        )
-        / radius_mm
-    )
-    rows = [_fit_radii(r, r_d) for r, r_d in zip(pairs[0], pairs[1], strict=True)]
-    return RadialDistortion(coefficients=np.stack(rows), radius_mm=radius_mm)
-
-
-def _fit_radii(r: FloatGrid, r_distorted: FloatGrid) -> FloatGrid:
-    if np.unique(r[r > 0]).size < 4:
-        raise ContractError("the fit needs at least four different radii > 0; give more points")
-    powers = np.stack([r, r**3, r**5, r**7], axis=1)
-    return np.asarray(np.linalg.lstsq(powers, r_distorted, rcond=None)[0])
 
 
 def check_distortion(distortion: RadialDistortion, corner_radius_mm: float) -> None:

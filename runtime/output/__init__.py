@@ -7,7 +7,6 @@ Map:
     exr: OpenEXR, half, or float where half would overflow.
     tiff, png: 16 bits with an ICC profile.
     linear_dng, dng: LinearRaw in camera space; Bayer DNG for simulated captures.
-    preview: a small 8-bit picture on the way.
     icc: ICC profiles from primaries, white and tone.
     part_file: files that appear complete or not at all.
     sidecar: what was done, and proof that it is whole.

@@ -11,11 +11,6 @@ def part_path(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
-def remove_stale_part(path: Path) -> None:
-    """Remove what an interrupted run left of an output."""
-    part_path(path).unlink(missing_ok=True)
-
-
 @contextmanager
 def atomic_output(path: Path) -> Iterator[Path]:
     """Give the path to write to; the file takes its real name when the block ends well.

@@ -28,7 +28,6 @@ import numpy as np
 
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, cfa_channels
 from camkit.errors import ContractError
-from camkit.runtime.capture import Capture
 from camkit.runtime.signal.directional import DIRECTIONAL_MARGIN_PX, demosaic_directional
 
 DemosaicMethod = Literal["fast", "quality"]
@@ -84,41 +83,18 @@ def demosaic(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod = "fast
         raise ContractError(f"mosaic must be (h, w) float32; got {mosaic.dtype} {mosaic.shape}")
     if cfa not in CFA_PATTERNS:
         raise ContractError(f"CFA must be one of {', '.join(CFA_PATTERNS)}; got {cfa!r}")
-    return _demosaic_range(mosaic, cfa, method, (0, mosaic.shape[0]))
-
-
-def demosaic_rows(
-    capture: Capture,
-    gains: tuple[float, float, float],
-    top: int,
-    bottom: int,
-    method: DemosaicMethod = "fast",
-) -> FloatArray:
-    """Linearise, white-balance and demosaic rows top..bottom of a capture.
-
-    Args:
-        capture: A mosaic, or planes, which are only white-balanced.
-        gains: White balance (R, G, B).
-        top: First row.
-        bottom: Row after the last.
-        method: "fast" or "quality".
-
-    Returns:
-        (3, bottom - top, w) float32, equal to the same rows of the whole picture bit for bit.
-
-    Raises:
-        ContractError: If the rows lie outside the picture.
-    """
-    if capture.cfa is None:
-        rows = capture.linear_rows(top, bottom)
-        rows *= np.array(gains, dtype=np.float32)[:, None, None]
-        return rows
-    margin = _margin(method)
-    first, last = max(top - margin, 0), min(bottom + margin, capture.height)
-    mosaic = capture.linear_rows(first, last)
-    cfa = shift_rows(capture.cfa, first)
-    apply_gains(mosaic, cfa, gains)
-    return _demosaic_range(mosaic, cfa, method, (top - first, bottom - first))
+    if method not in DEMOSAIC_MARGIN_PX:
+        raise ContractError(f"demosaic must be fast or quality; got {method!r}")
+    height, width = mosaic.shape
+    margin, step = DEMOSAIC_MARGIN_PX[method], BAND_ROWS[method]
+    planes = np.empty((3, height, width), dtype=np.float32)
+    # bands fit into the cache
+    for top in range(0, height, step):
+        bottom = min(top + step, height)
+        first, last = max(top - margin, 0), min(bottom + margin, height)
+        band = _demosaic_band(mosaic[first:last], shift_rows(cfa, first), method)
+        planes[:, top:bottom] = band[:, top - first : bottom - first]
+    return planes
 
 
 def apply_gains(mosaic: FloatArray, cfa: CfaPattern, gains: tuple[float, float, float]) -> None:
@@ -135,27 +111,6 @@ def shift_rows(cfa: CfaPattern, rows: int) -> CfaPattern:
         return cfa
     swapped = cfa[2:] + cfa[:2]
     return next(pattern for pattern in CFA_PATTERNS if pattern == swapped)
-
-
-def _margin(method: DemosaicMethod) -> int:
-    if method not in DEMOSAIC_MARGIN_PX:
-        raise ContractError(f"demosaic must be fast or quality; got {method!r}")
-    return DEMOSAIC_MARGIN_PX[method]
-
-
-def _demosaic_range(
-    mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod, rows: tuple[int, int]
-) -> FloatArray:
-    """Demosaic the given rows in bands that fit into the cache."""
-    height, width = mosaic.shape
-    margin, step = _margin(method), BAND_ROWS[method]
-    planes = np.empty((3, rows[1] - rows[0], width), dtype=np.float32)
-    for top in range(*rows, step):
-        bottom = min(top + step, rows[1])
-        first, last = max(top - margin, 0), min(bottom + margin, height)
-        band = _demosaic_band(mosaic[first:last], shift_rows(cfa, first), method)
-        planes[:, top - rows[0] : bottom - rows[0]] = band[:, top - first : bottom - first]
-    return planes
 
 
 def _demosaic_band(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod) -> FloatArray:

@@ -17,7 +17,7 @@ from camkit.models_def.optics.kernel_bank import (
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_image, with_paraxial_focus
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.psf import trace_kernels, with_object_distance
+from camkit.models_def.optics.psf import trace_psf, with_object_distance
 from camkit.models_def.optics.render.alignment import averaged, fit_alignment
 from camkit.models_def.optics.render.monte_carlo import Sampling, render
 from camkit.models_def.optics.render.optics import Optics, lens_optics
@@ -160,7 +160,7 @@ def test_a_point_of_light_is_rendered_as_the_traced_psf(duet: Lens) -> None:
     side = pixels * fine - 1
     heights = torch.tensor([height], dtype=torch.float64)
     green = torch.tensor([0.54], dtype=torch.float64)
-    kernel = trace_kernels(duet, heights, green, side, 12.0 / fine, rays=8000)
+    kernel = trace_psf(duet, heights, green, side, 12.0 / fine, rays=8000).kernels
     spread = _blurred(
         torch.nn.functional.pad(kernel[0], (0, 1, 0, 1)), [*range(1, 9), *range(7, 0, -1)]
     )

@@ -63,13 +63,6 @@ def _one(wavefront: Wavefront, i: int, j: int, x_mm: Tensor, y_mm: Tensor) -> Te
     return (field.real**2 + field.imag**2) / energy
 
 
-def strehl_ratio(wavefront: Wavefront) -> Tensor:
-    """Give |mean amplitude|^2 (field, wavelength) at the centre, 1 without aberration."""
-    turn = 2 * math.pi / wavefront.wavelengths_um[:, None]
-    waves = torch.polar(wavefront.amplitude, -turn * wavefront.opd_um).sum(-1)
-    return torch.abs(waves / wavefront.amplitude.sum(-1)) ** 2
-
-
 def pupil_for_reach(reach_mm: float, wavelength_um: float, aperture: float) -> PupilSamples:
     """Give a pupil sampling fine enough for light up to a distance from the centre.
 

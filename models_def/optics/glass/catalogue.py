@@ -93,11 +93,6 @@ def _glass(row: Sequence[Any], suffix: str, source: str) -> Glass:
     )
 
 
-def glass_names(catalogues: Iterable[GlassCatalogue] = ()) -> tuple[str, ...]:
-    """Give every strict name that a prescription may use."""
-    return (AIR.name, *(glass.name for glass in _all(catalogues)))
-
-
 def _all(catalogues: Iterable[GlassCatalogue]) -> Iterator[Glass]:
     for catalogue in (*catalogues, *builtin_catalogues()):
         yield from catalogue.glasses

@@ -1,4 +1,3 @@
-import math
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,6 @@ from hypothesis import strategies as st
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.distortion import (
-    distortion_share,
     fit_distortion,
     ideal_heights,
     trace_distortion,
@@ -44,6 +42,6 @@ def test_fitted_polynomial_follows_the_chief_rays_of_duet() -> None:
 
 
 def test_duet_s_distortion_stays_within_six_per_cent() -> None:
-    share = distortion_share(read_prescription(DUET), np.linspace(1, HALF_DIAGONAL_MM, 20))
+    heights = np.linspace(1, HALF_DIAGONAL_MM, 20)
+    share = heights / ideal_heights(read_prescription(DUET), heights) - 1
     assert float(np.abs(share).max()) < 0.06
-    assert math.isfinite(share[0])

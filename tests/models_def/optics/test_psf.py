@@ -7,7 +7,7 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens, Surface, read_prescription, with_focus_shift
-from camkit.models_def.optics.psf import energy_diameter, splat, trace_kernels, trace_psf
+from camkit.models_def.optics.psf import energy_diameter, splat, trace_psf
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.optics.spot import (
     Spots,
@@ -89,7 +89,7 @@ def test_kernel_without_light_is_refused() -> None:
 
 def test_kernels_sum_to_one_and_are_mirror_symmetric() -> None:
     lens = read_prescription(DUET)
-    kernels = trace_kernels(lens, _f64(0, 10, 21), _f64(0.45, 0.54), 129, PITCH_UM, rays=1000)
+    kernels = trace_psf(lens, _f64(0, 10, 21), _f64(0.45, 0.54), 129, PITCH_UM, rays=1000).kernels
     assert kernels.shape == (3, 2, 129, 129)
     assert torch.allclose(kernels.sum((-2, -1)), torch.ones(3, 2, dtype=torch.float64))
     assert torch.equal(kernels, kernels.flip(-1))
@@ -97,8 +97,8 @@ def test_kernels_sum_to_one_and_are_mirror_symmetric() -> None:
 
 
 def test_perfect_lens_puts_all_light_on_the_middle_pixel() -> None:
-    kernel = trace_kernels(_perfect_lens(), _f64(0), _f64(0.5875618), 5, PITCH_UM, rays=200)[0, 0]
-    assert float(kernel[2, 2]) == pytest.approx(1, abs=1e-3)
+    traced = trace_psf(_perfect_lens(), _f64(0), _f64(0.5875618), 5, PITCH_UM, rays=200)
+    assert float(traced.kernels[0, 0, 2, 2]) == pytest.approx(1, abs=1e-3)
 
 
 def test_defocus_disc_has_the_size_of_the_cone() -> None:
@@ -113,7 +113,7 @@ def test_kernel_s_first_moment_is_the_offset_of_the_centroid_from_the_chief_ray(
     """Rows grow outward: blue, refracted differently, lands where the rays say."""
     lens = read_prescription(DUET)
     heights, waves = _f64(18.0), _f64(0.46, 0.54, 0.6)
-    kernels = trace_kernels(lens, heights, waves, 129, PITCH_UM, rays=2000)[0]
+    kernels = trace_psf(lens, heights, waves, 129, PITCH_UM, rays=2000).kernels[0]
     row = torch.arange(129, dtype=torch.float64) - 64
     found = (kernels.sum(-1) * row).sum(-1)
     spots = trace_spots(lens, slopes_for_heights(lens, heights), waves, half_disc(2000))

@@ -11,7 +11,6 @@ from camkit.runtime.bank.baselines import (
     richardson_lucy_filter,
 )
 from camkit.runtime.bank.blocks import Block, to_otf
-from camkit.runtime.bank.wiener import wiener_bank
 from tests.psf_factory import (
     ISO_100,
     blur_periodic,
@@ -161,15 +160,6 @@ def test_banks_of_every_method_take_any_size(method, size):
     restored = bank.restore_array(planes)
     assert restored.shape == planes.shape
     assert np.isfinite(restored).all()
-
-
-def test_the_wiener_method_is_the_wiener_bank():
-    planes = texture(80, 90)
-    psf = local_psf(*coma_kernels(radius_px=7), (90, 80))
-    np.testing.assert_array_equal(
-        restoration_bank(psf, SETTINGS, ISO_100).restore_array(planes),
-        wiener_bank(psf, SETTINGS, ISO_100).restore_array(planes),
-    )
 
 
 def test_an_unknown_method_is_refused():

@@ -6,10 +6,11 @@ from hypothesis import strategies as st
 
 from camkit.bundle.stages import Wiener
 from camkit.contracts import NoiseModel
+from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import Block, BlockBank, plan_spans, taper_edges, to_otf
 from camkit.runtime.bank.psf import kernel_at
 from camkit.runtime.bank.richardson_lucy import apply_transfer
-from camkit.runtime.bank.wiener import CORNER_FREQUENCY, KERNEL_ERROR, wiener_bank, wiener_filter
+from camkit.runtime.bank.wiener import CORNER_FREQUENCY, KERNEL_ERROR, wiener_filter
 from tests.psf_factory import (
     ISO_100,
     QUIET,
@@ -29,7 +30,7 @@ DELTA = gaussian_kernel(0.01, 2)
 
 def test_delta_psf_leaves_image_unchanged():
     planes = texture(150, 170)
-    bank = wiener_bank(local_psf(DELTA, np.zeros(1), (170, 150)), SMALL, QUIET)
+    bank = restoration_bank(local_psf(DELTA, np.zeros(1), (170, 150)), SMALL, QUIET)
     np.testing.assert_allclose(bank.restore_array(planes), planes, atol=2e-5)
 
 
@@ -97,7 +98,7 @@ def test_bank_equals_a_slow_obvious_twin(size):
     w, h = size
     planes = with_noise(texture(h, w), ISO_100, np.random.default_rng(1))
     psf = local_psf(*coma_kernels(radius_px=7), (w, h))
-    restored = wiener_bank(psf, SMALL, ISO_100).restore_array(planes)
+    restored = restoration_bank(psf, SMALL, ISO_100).restore_array(planes)
     np.testing.assert_allclose(restored, reference(planes, psf, ISO_100), atol=2e-5)
 
 
@@ -124,9 +125,9 @@ def test_a_varying_blur_is_undone_by_turned_kernels_only():
     blurred = blur_by_scattering(scene, psf)
     planes = with_noise(blurred, ISO_100, np.random.default_rng(0))
     tight = SMALL.model_copy(update={"block_px": 48, "overlap_px": 24})
-    restored = wiener_bank(psf, tight, ISO_100).restore_array(planes)
+    restored = restoration_bank(psf, tight, ISO_100).restore_array(planes)
     averaged = local_psf(kernels.mean(axis=0), np.zeros(1), (size, size))
-    wrong = wiener_bank(averaged, tight, ISO_100).restore_array(planes)
+    wrong = restoration_bank(averaged, tight, ISO_100).restore_array(planes)
     assert psnr_db(restored, scene, 10) > psnr_db(planes, scene, 10) + 1.5
     assert psnr_db(restored, scene, 10) > psnr_db(wrong, scene, 10) + 1.5
 
@@ -200,8 +201,8 @@ def test_blocks_without_clipped_samples_ignore_the_clip_iterations():
     aware = SMALL.model_copy(update={"clip_iterations": 6})
     none = np.zeros((100, 100), dtype=bool)
     np.testing.assert_array_equal(
-        wiener_bank(psf, aware, ISO_100).restore_array(planes, none),
-        wiener_bank(psf, SMALL, ISO_100).restore_array(planes),
+        restoration_bank(psf, aware, ISO_100).restore_array(planes, none),
+        restoration_bank(psf, SMALL, ISO_100).restore_array(planes),
     )
 
 
@@ -213,7 +214,8 @@ def test_any_size_gives_the_same_bits_on_one_and_two_threads(h, w):
     saturated = planes > 0.7
     aware = SMALL.model_copy(update={"clip_iterations": 2})
     one, two = (
-        wiener_bank(psf, aware, ISO_100, threads=n).restore_array(planes, saturated) for n in (1, 2)
+        restoration_bank(psf, aware, ISO_100, threads=n).restore_array(planes, saturated)
+        for n in (1, 2)
     )
     assert one.shape == planes.shape
     assert np.isfinite(one).all()

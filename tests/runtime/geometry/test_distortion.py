@@ -8,7 +8,6 @@ from camkit.errors import ContractError
 from camkit.runtime.geometry.distortion import (
     check_distortion,
     distort_points,
-    fit_distortion,
     undistort_points,
 )
 
@@ -83,42 +82,3 @@ def test_model_that_folds_on_the_sensor_is_refused() -> None:
 def test_model_with_negative_scale_is_refused() -> None:
     with pytest.raises(ContractError, match="folds"):
         check_distortion(model((-1, 0, 0, 0)), RADIUS_MM)
-
-
-def test_fit_recovers_the_coefficients_of_every_colour() -> None:
-    truth = model((1.0, -0.05, 0.01, -0.002), (1.01, -0.04, 0, 0), (0.99, 0.03, 0.002, 0))
-    radii = np.linspace(0.5, RADIUS_MM, 12)
-    distorted = np.stack(
-        [distort_points(on_axis_x(radii), truth, channel=c)[:, 0] for c in range(3)]
-    )
-    found = fit_distortion(np.tile(radii, (3, 1)), distorted, RADIUS_MM)
-    np.testing.assert_allclose(found.coefficients, truth.coefficients, atol=1e-10)
-
-
-def test_one_set_of_pairs_serves_all_colours() -> None:
-    radii = np.linspace(0.5, RADIUS_MM, 12)
-    found = fit_distortion(radii, radii * 1.02, RADIUS_MM)
-    np.testing.assert_allclose(found.coefficients, np.tile([1.02, 0, 0, 0], (3, 1)), atol=1e-10)
-
-
-def test_fit_is_the_least_squares_solution() -> None:
-    rng = np.random.default_rng(2)
-    radii = np.linspace(0.5, RADIUS_MM, 40)
-    noisy = radii * (1 - 0.03 * (radii / RADIUS_MM) ** 2) + rng.normal(0, 0.01, 40)
-    found = fit_distortion(radii, noisy, RADIUS_MM).coefficients[0]
-
-    def cost(c: np.ndarray) -> float:
-        r = radii / RADIUS_MM
-        return float(((np.stack([r, r**3, r**5, r**7], 1) @ c - noisy / RADIUS_MM) ** 2).sum())
-
-    steps = np.concatenate([np.eye(4), -np.eye(4)]) * 1e-4
-    assert all(cost(found + step) > cost(found) for step in steps)
-
-
-def test_fit_with_too_few_radii_or_other_shapes_is_refused() -> None:
-    with pytest.raises(ContractError, match="four different"):
-        fit_distortion(np.array([1.0, 2, 2, 2, 1]), np.array([1.0, 2, 2, 2, 1]), RADIUS_MM)
-    with pytest.raises(ContractError, match="pairs"):
-        fit_distortion(np.ones(4), np.ones(5), RADIUS_MM)
-    with pytest.raises(ContractError, match="pairs"):
-        fit_distortion(np.ones((2, 5)), np.ones((2, 5)), RADIUS_MM)

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from camkit.runtime.output.part_file import atomic_output, part_path, remove_stale_part
+from camkit.runtime.output.part_file import atomic_output, part_path
 
 
 def test_file_appears_under_its_name_only_when_complete(tmp_path: Path) -> None:
@@ -38,14 +38,6 @@ def test_stale_part_is_removed_before_writing(tmp_path: Path) -> None:
         assert not part.exists()
         part.write_bytes(b"new")
     assert target.read_bytes() == b"new"
-
-
-def test_stale_part_can_be_removed_alone(tmp_path: Path) -> None:
-    target = tmp_path / "a.exr"
-    remove_stale_part(target)
-    part_path(target).write_bytes(b"stale")
-    remove_stale_part(target)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_block_that_writes_nothing_is_an_error(tmp_path: Path) -> None:

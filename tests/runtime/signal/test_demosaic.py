@@ -1,17 +1,12 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from camkit.contracts import CFA_PATTERNS, cfa_channels
 from camkit.errors import ContractError
-from camkit.runtime.capture import Capture
 from camkit.runtime.signal.demosaic import (
     DEMOSAIC_MARGIN_PX,
     MALVAR_KERNELS,
-    apply_gains,
     demosaic,
-    demosaic_rows,
     shift_rows,
 )
 from tests.data_folder import data_path
@@ -85,43 +80,6 @@ def test_highlights_and_negatives_are_not_clipped(method):
     assert result.max() >= mosaic.max()
     doubled = demosaic(2 * mosaic, "RGGB", method)
     assert np.array_equal(doubled, 2 * result)
-
-
-@pytest.mark.parametrize("method", METHODS)
-@settings(max_examples=12, deadline=None)
-@given(
-    height=st.integers(1, 150),
-    width=st.integers(1, 40),
-    cut=st.tuples(st.floats(0, 1), st.floats(0, 1)),
-    cfa=st.sampled_from(CFA_PATTERNS),
-)
-def test_rows_with_margin_equal_the_whole_bit_for_bit(method, height, width, cut, cfa):
-    rng = np.random.default_rng(height * 1000 + width)
-    samples = rng.integers(0, 1100, (height, width)).astype(np.uint16)
-    capture = Capture(
-        samples=samples,
-        cfa=cfa,
-        black_level=np.array([[10, 11], [12, 13]], dtype=np.float32),
-        white_level=1000.0,
-    )
-    gains = (2.0, 1.0, 1.5)
-    whole_mosaic = capture.linear_rows(0, height)
-    apply_gains(whole_mosaic, cfa, gains)
-    whole = demosaic(whole_mosaic, cfa, method)
-    top, bottom = sorted(round(share * height) for share in cut)
-    if top < bottom:
-        rows = demosaic_rows(capture, gains, top, bottom, method)
-        assert np.array_equal(rows, whole[:, top:bottom])
-
-
-def test_planes_are_only_white_balanced():
-    samples = np.full((3, 4, 5), 0.5, dtype=np.float32)
-    capture = Capture(
-        samples=samples, cfa=None, black_level=np.zeros(3, dtype=np.float32), white_level=1.0
-    )
-    rows = demosaic_rows(capture, (2.0, 1.0, 3.0), 1, 3)
-    assert rows.shape == (3, 2, 5)
-    assert rows[:, 0, 0].tolist() == [1.0, 0.5, 1.5]
 
 
 def test_one_row_down_swaps_the_rows_of_the_cell():

@@ -1,10 +1,15 @@
 """The front as rows: bands on any number of threads are parts of the whole, counts included."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from camkit.contracts import CFA_PATTERNS, CfaPattern
 from camkit.runtime.capture import Capture
-from camkit.runtime.signal.demosaic import demosaic_rows
+from camkit.runtime.signal.demosaic import DemosaicMethod, apply_gains, demosaic
 from camkit.runtime.signal.front_rows import FrontRows
 
 GAINS = (2.0, 1.0, 1.5)
@@ -46,14 +51,39 @@ def test_bands_on_any_number_of_threads_are_the_whole(
     assert shared.clipped_fraction == whole.clipped_fraction
 
 
-def test_without_repair_the_front_is_balance_and_demosaic() -> None:
-    capture = bayer_capture()
-    front = FrontRows(capture, GAINS, method="fast", repair=False, threads=2)
-    np.testing.assert_array_equal(
-        front.read(5, 60), demosaic_rows(capture, GAINS, 5, 60, method="fast")
+@pytest.mark.parametrize("method", ["fast", "quality"])
+@settings(max_examples=12, deadline=None)
+@given(
+    height=st.integers(1, 150),
+    width=st.integers(1, 40),
+    cut=st.tuples(st.floats(0, 1), st.floats(0, 1)),
+    cfa=st.sampled_from(CFA_PATTERNS),
+)
+def test_without_repair_rows_are_balance_and_demosaic_of_the_whole_bit_for_bit(
+    method: DemosaicMethod, height: int, width: int, cut: tuple[float, float], cfa: CfaPattern
+) -> None:
+    samples = np.random.default_rng(height * 1000 + width).integers(0, 1100, (height, width))
+    capture = Capture(
+        samples=samples.astype(np.uint16),
+        cfa=cfa,
+        black_level=np.array([[10, 11], [12, 13]], dtype=np.float32),
+        white_level=1000.0,
     )
-    assert front.repaired == 0
-    assert front.clipped > 0
+    mosaic = capture.linear_rows(0, height)
+    apply_gains(mosaic, cfa, GAINS)
+    whole = demosaic(mosaic, cfa, method)
+    top, bottom = sorted(round(share * height) for share in cut)
+    if top < bottom:
+        front = FrontRows(capture, GAINS, method=method, repair=False, threads=2)
+        np.testing.assert_array_equal(front.read(top, bottom), whole[:, top:bottom])
+        assert front.repaired == 0
+
+
+def test_planes_are_only_white_balanced() -> None:
+    capture = replace(planes_capture(), samples=np.full((3, 4, 5), 0.5, dtype=np.float32))
+    rows = FrontRows(capture, GAINS, method="fast", repair=False).read(1, 3)
+    assert rows.shape == (3, 2, 5)
+    assert rows[:, 0, 0].tolist() == [1.0, 0.5, 0.75]
 
 
 @pytest.mark.parametrize(("threads", "step"), [(1, 70), (2, 33)])
