@@ -108,7 +108,7 @@ class FileResult:
             output=target,
             status="skipped",
             bundle=_bundle_name(pipeline),
-            size=_size(pipeline),
+            size=pipeline.size,
             seconds={},
             peak_rss_mb=peak_rss_mb(),
         )
@@ -165,12 +165,12 @@ def develop_file(
     )
     if estimate is not None:
         total_s = sum(seconds.values())
-        work.plan["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
+        work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
     record = {
         **result.to_json(),
         **_identity(capture.sha256, pipeline, write, mosaic),
         "output_sha256": output_sha256,
-        "plan": work.plan,
+        "plan": work.record,
         "clipped_fraction": work.clipped_fraction,
         "orientation": capture.orientation,
         "camera": capture.camera,
@@ -224,9 +224,10 @@ def _identity(
 
 def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> float:
     """Stream the bands into the file; return the seconds for which the writer was waited for."""
+    _, height, width = work.shape
     picture = PictureFormat(
-        width=work.capture.width,
-        height=work.capture.height,
+        width=width,
+        height=height,
         color=work.color,
         orientation=1 if write.format == "dng" else work.capture.orientation,
         tone="linear" if write.linear else "srgb",
@@ -251,7 +252,3 @@ def _open(
 
 def _bundle_name(pipeline: Pipeline) -> str | None:
     return None if pipeline.bundle is None else pipeline.bundle.manifest.name
-
-
-def _size(pipeline: Pipeline) -> str | None:
-    return None if pipeline.engine is None else pipeline.size

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from camkit.contracts import FloatArray, FrozenPsf
-from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.geometry.sensor_window import FloatGrid, SensorWindow
 
 TABLE_SAMPLES: Final = 4096
 GAIN_SAMPLES: Final = 1 << 21
@@ -29,6 +29,8 @@ def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: in
     """
     width, _ = window.size_px
     x_mm, y_mm = window.to_mm(np.arange(width), np.arange(top, bottom))
+    if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
+        return _on_grid(psf, x_mm, y_mm)
     # A table over the squared height makes the lookup two multiplications per pixel.
     end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
     squares = np.linspace(0.0, end, TABLE_SAMPLES)
@@ -42,19 +44,29 @@ def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: in
     return np.asarray(low + at * (table32[index + 1] - low), dtype=np.float32)
 
 
+def _on_grid(psf: FrozenPsf, x_mm: FloatGrid, y_mm: FloatGrid) -> FloatArray:
+    """Give the illumination (row, column) between the positions of a grid; its rim holds beyond."""
+    assert psf.grid_x_mm is not None
+    assert psf.grid_y_mm is not None
+    known = psf.relative_illumination.reshape(psf.grid_y_mm.size, psf.grid_x_mm.size)
+    across = np.stack([np.interp(x_mm, psf.grid_x_mm, row) for row in known])
+    hats = np.stack([np.interp(y_mm, psf.grid_y_mm, unit) for unit in np.eye(psf.grid_y_mm.size)])
+    return np.asarray(hats.T @ across, dtype=np.float32)
+
+
 def divide_illumination(
     band: FloatArray, top: int, psf: FrozenPsf, window: SensorWindow
 ) -> FloatArray:
     """Undo vignetting on a band of a picture in sensor geometry; see `IlluminationGain`.
 
     Args:
-        band: (3, rows, w) float32, linear.
+        band: (c, rows, w) float32, linear.
         top: First row of the band in the picture.
         psf: Frozen PSF.
         window: Where the picture lies on the sensor.
 
     Returns:
-        (3, rows, w) float32, a new array.
+        (c, rows, w) float32, a new array.
     """
     return IlluminationGain(psf, window).divide(band, top)
 
@@ -70,10 +82,14 @@ class IlluminationGain:
             window: Where the picture lies on the sensor.
         """
         width, height = window.size_px
+        self._grid = psf if psf.symmetry == "grid" else None
+        self._window = window
         x_mm, y_mm = window.to_mm(np.arange(width), np.arange(height))
         end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
         squares = np.linspace(0.0, end, TABLE_SAMPLES)
-        coarse = np.interp(squares, psf.field_heights_mm**2, psf.relative_illumination)
+        heights = psf.field_heights_mm if self._grid is None else np.zeros(1)
+        light = psf.relative_illumination if self._grid is None else np.ones(1)
+        coarse = np.interp(squares, heights**2, light)
         # Rounded one by one, the two indices of a pixel may sum to one more than the last.
         fine = np.linspace(0.0, end, GAIN_SAMPLES + 1)
         self._table = (1 / np.interp(fine, squares, coarse)).astype(np.float32)
@@ -82,10 +98,13 @@ class IlluminationGain:
         self._rows = np.rint(y_mm**2 * scale).astype(np.intp)
 
     def divide(self, band: FloatArray, top: int, out: FloatArray | None = None) -> FloatArray:
-        """Undo vignetting on a (3, rows, w) band that starts at row `top`.
+        """Undo vignetting on a (c, rows, w) band that starts at row `top`.
 
         Fills `out`, which may be the band, or a new array.
         """
+        if self._grid is not None:
+            light = illumination_band(self._grid, self._window, top, top + band.shape[1])
+            return np.asarray(np.divide(band, light, out=out))
         rows = self._rows[top : top + band.shape[1], None]
         gain = self._table.take(rows + self._columns, mode="clip")
         return np.asarray(np.multiply(band, gain, out=out))

@@ -13,13 +13,15 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
 from camkit.runtime.options import Options
-from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.decision import DEVELOP, NET, Case, Decision, Work
 from camkit.runtime.plan.estimate import estimate_seconds, tier_work_of
 from camkit.runtime.plan.loss import LossModel, read_loss_model
 from camkit.runtime.plan.rule import apply_rules
 from camkit.runtime.plan.rules.size import REFERENCE, size_cost_db
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import work_shares
+from camkit.runtime.plan.ways import ways_of
+from camkit.runtime.stage_finder import methods_of, stage_module
 
 LADDER: Final = (0.0, 1.0, 3.0, 10.0, 30.0)
 """Losses tried for --max-seconds, in units of that of `adaptive`."""
@@ -50,7 +52,7 @@ class Plan:
         """Name the networks whose speed the savings need."""
         works = [self.work, *(w for before, _, after in self.steps for w in (before, after))]
         named = {size for work in works for size in (work.size, work.small)}
-        return [s for s in sizes_by_work(self.case.bundle) if s in named | {REFERENCE}]
+        return [s for s in self.case.bundle.manifest.sizes if s in named | {REFERENCE}]
 
     def decisions(self, speed: Speed | None = None) -> list[Decision]:
         """Give the decisions; with a speed, with the seconds they save."""
@@ -64,7 +66,7 @@ class Plan:
     def _saving_s(self, before: Work, after: Work, speed: Speed) -> float:
         """Give the seconds between two works; the size is compared with the reference."""
         chosen = before is after is self.steps[0][2] and after.size != REFERENCE
-        if chosen and REFERENCE in speed.network_s_per_mp:
+        if chosen and any(size == REFERENCE for _, size in speed.network_s_per_mp):
             before = replace(before, size=REFERENCE)
         if before is after:
             return 0.0
@@ -77,19 +79,21 @@ def default_size(bundle: Bundle, options: Options) -> str:
     """Give the size that a pipeline gets ready: --size, or that of the quality."""
     if options.size is not None:
         return options.size
-    sizes = sizes_by_work(bundle)
+    sizes = bundle.manifest.sizes
     if not sizes:
         return REFERENCE
     if options.quality == "best":
         return sizes[-1]
-    return sizes[0] if options.quality == "draft" else REFERENCE
+    if options.quality == "draft":
+        return sizes[0]
+    return REFERENCE if REFERENCE in sizes or len(sizes) > 1 else sizes[0]
 
 
-def sizes_by_work(bundle: Bundle) -> list[str]:
-    """Give the sizes of a bundle from the cheapest on."""
-    return sorted(
-        bundle.manifest.networks, key=lambda size: bundle.network_facts(size).mac_per_pixel
-    )
+def usual_method(bundle: Bundle, options: Options) -> str:
+    """Give the method: the caller's, else the best that the stages of a bundle have."""
+    if options.method is not None:
+        return options.method
+    return (*methods_of(bundle.manifest.stages), DEVELOP)[0]
 
 
 def needs_scene(options: Options) -> bool:
@@ -108,7 +112,7 @@ def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
     options = case.options
     model = read_loss_model(case.bundle.manifest.plan)
     work = _first_work(case, default_size(case.bundle, options))
-    if work.method != "net":
+    if work.method != NET:
         return _ruled(case, work)
     if options.max_seconds is not None:
         return _within_seconds(case, work, model, speed())
@@ -123,10 +127,20 @@ def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
 
 
 def _first_work(case: Case, size: str) -> Work:
-    options = case.options
-    has_networks = bool(case.bundle.manifest.networks)
-    method = "wiener" if options.method == "net" and not has_networks else options.method
-    return Work(method=method, size=size, mode=options.mode, undistort=options.undistort)
+    options, stages = case.options, case.bundle.manifest.stages
+    unwanted = {
+        stage.type
+        for stage in stages
+        if (test := getattr(stage_module(stage.type), "is_left_out", None)) and test(options)
+    }
+    work = Work(
+        method=usual_method(case.bundle, options),
+        size=size,
+        mode=options.mode,
+        left_out=frozenset(unwanted),
+    )
+    ways_of(stages, work)  # a method that no stage has is refused before anything is planned
+    return work
 
 
 def _ruled(case: Case, work: Work, note: str = "") -> Plan:
@@ -139,7 +153,7 @@ def _sizes(case: Case) -> list[str]:
     """Give the sizes to choose from, from the best on; never above the reference."""
     if case.options.size is not None:
         return [case.options.size]
-    sizes = sizes_by_work(case.bundle)[::-1]
+    sizes = list(case.bundle.manifest.sizes[::-1])
     return sizes[sizes.index(REFERENCE) :] if REFERENCE in sizes else sizes
 
 
@@ -179,7 +193,8 @@ def _within_seconds(case: Case, work: Work, model: LossModel | None, speed: Spee
         for factor in LADDER if model is not None else LADDER[:1]:
             spend = 0.0 if factor == 0 else size_cost_db(case, size) + factor * unit
             plans.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
-    plans.append(_ruled(case, replace(work, method="wiener")))
+    below = [m for m in methods_of(case.bundle.manifest.stages) if m != NET]
+    plans.append(_ruled(case, replace(work, method=(*below, DEVELOP)[0])))
     # The bank alone is the last resort: what it costs is not bounded by any prediction.
     ordered = sorted(plans[:-1], key=lambda plan: plan.cost_db) + plans[-1:]
     fitting = (p for p in ordered if estimate_seconds(p.case, p.work, speed) <= limit)

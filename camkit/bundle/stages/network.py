@@ -21,6 +21,8 @@ class Network(StageEntry):
         transform: stabilise takes linear planes to equal noise (k-sigma, then square root) before
             the network and back behind it; none hands them on as they are.
         scale: Divisor behind the square root; the noise there is 0.5 / scale at any ISO.
+        most_light: How many times the largest light of its tile an output may have; what exceeds
+            it is not believed.
     """
 
     type: Literal["network"] = "network"
@@ -29,6 +31,7 @@ class Network(StageEntry):
     role: Word = DEFAULT_ROLE
     transform: Literal["stabilise", "none"] = "stabilise"
     scale: Positive = 64.0
+    most_light: Positive = 16.0
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the outputs of the network, on a finer grid where it says so."""
@@ -47,6 +50,13 @@ class Network(StageEntry):
             _check_ports(size, facts.inputs, taken)
         outputs = _outputs(sizes)
         last = taken[-1]
+        if self.transform == "stabilise" and any(
+            port.channels != len(last.channels) for port in outputs
+        ):
+            raise JoinError(
+                f"stabilised outputs become light by the noise of its last plane, which has "
+                f"{len(last.channels)} channel(s)"
+            )
         return tuple(
             last.model_copy(
                 update={

@@ -1,6 +1,6 @@
-"""The network stage of one capture: windows planned within the memory cap, then run.
+"""The windows of the networks of one capture: planned within the memory cap, then run.
 
-    networks, size, memory [, labels] -> NetworkStage -> bands
+    networks, size, memory [, labels] -> NetworkWindows -> bands
 
 Without labels one network runs everywhere (`tiling`), with labels on some lattice cells only
 (`cell_windows`).
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from camkit.bundle.manifest import HaloError, NetworkFacts
+from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.cell_windows import (
@@ -24,6 +24,7 @@ from camkit.runtime.network.cell_windows import (
 from camkit.runtime.network.guard import TileGuard
 from camkit.runtime.network.tiling import (
     Cancel,
+    PixelCost,
     Progress,
     Run,
     TileLimits,
@@ -45,6 +46,16 @@ class SizedNetwork:
     run: Run
     facts: NetworkFacts
 
+    @property
+    def cost(self) -> PixelCost:
+        """Give what the network holds per pixel."""
+        return PixelCost(
+            arena_bytes=self.facts.bytes_per_pixel,
+            channels=self.facts.input_channels,
+            outputs=self.facts.output_channels,
+            scale=self.facts.output_scale,
+        )
+
     def halo_px(self, mode: Mode) -> int:
         """Give the halo of a mode.
 
@@ -55,7 +66,7 @@ class SizedNetwork:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StageLimits:
+class WindowLimits:
     """What the windows must respect.
 
     Attributes:
@@ -79,7 +90,7 @@ class StageLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NetworkStage:
+class NetworkWindows:
     """Windows of one capture, ready to run.
 
     Attributes:
@@ -101,17 +112,34 @@ class NetworkStage:
         progress: Progress | None = None,
         cancel: Cancel | None = None,
         guard: TileGuard | None = None,
+        stand_in: slice | None = None,
     ) -> Iterator[FloatArray]:
-        """Yield (3, rows, w) of the stabilised result from top to bottom."""
+        """Yield (k, s rows, s w) of the result from top to bottom."""
         if self.cells is not None:
             cells = _cell_networks(self.networks, self.mode)
+            if stand_in is None:
+                raise ContractError("cells need planes that stand in where no network runs")
             return infer_cells(
-                cells, source, self.cells, progress=progress, cancel=cancel, guard=guard
+                cells,
+                source,
+                self.cells,
+                progress=progress,
+                cancel=cancel,
+                guard=guard,
+                stand_in=stand_in,
             )
         if self.tiles is None:
-            raise ContractError("a network stage needs tiles or cells")
-        run = self.networks[0].run
-        return infer_bands(run, source, self.tiles, progress=progress, cancel=cancel, guard=guard)
+            raise ContractError("a network needs tiles or cells")
+        network = self.networks[0]
+        return infer_bands(
+            network.run,
+            source,
+            self.tiles,
+            progress=progress,
+            cancel=cancel,
+            guard=guard,
+            scale=network.facts.output_scale,
+        )
 
     @property
     def halo_px(self) -> int:
@@ -131,11 +159,10 @@ class NetworkStage:
     def needed_bytes(self) -> int:
         """Estimate the memory: windows with their arenas, rows held, one output band."""
         if self.tiles is not None:
-            return self.tiles.needed_bytes(self.networks[0].facts.bytes_per_pixel)
+            return self.tiles.needed_bytes(self.networks[0].cost)
         if self.cells is None:
             return 0
-        per_px = [network.facts.bytes_per_pixel for network in self.networks]
-        return self.cells.needed_bytes(per_px)
+        return self.cells.needed_bytes([network.cost for network in self.networks])
 
     def to_json(self) -> dict[str, Any]:
         """Give the windows in a few numbers, for the sidecar."""
@@ -159,12 +186,12 @@ class NetworkStage:
         }
 
 
-def plan_stage(
+def plan_network(
     size_px: tuple[int, int],
     networks: Sequence[SizedNetwork],
-    limits: StageLimits,
+    limits: WindowLimits,
     labels: Labels | None = None,
-) -> NetworkStage:
+) -> NetworkWindows:
     """Plan the windows of a capture.
 
     Args:
@@ -188,9 +215,9 @@ def plan_stage(
 def _plan_windows(
     size_px: tuple[int, int],
     networks: Sequence[SizedNetwork],
-    limits: StageLimits,
+    limits: WindowLimits,
     labels: Labels | None,
-) -> NetworkStage:
+) -> NetworkWindows:
     height, width = size_px
     if labels is not None and limits.mode != "whole":
         cells = plan_cells(
@@ -199,18 +226,18 @@ def _plan_windows(
             _cell_networks(networks, limits.mode),
             CellLimits(cell_px=limits.cell_px, max_bytes=limits.max_bytes, tile_px=limits.tile_px),
         )
-        return NetworkStage(networks=tuple(networks), tiles=None, cells=cells, mode=limits.mode)
+        return NetworkWindows(networks=tuple(networks), tiles=None, cells=cells, mode=limits.mode)
     facts = networks[0].facts
     tile_limits = TileLimits(
         stride_px=facts.stride_px,
         halo_px=networks[0].halo_px(limits.mode),
-        bytes_per_px=facts.bytes_per_pixel,
+        cost=networks[0].cost,
         max_bytes=limits.max_bytes,
         tile_px=limits.tile_px,
         whole=limits.mode == "whole",
     )
     tiles = plan_windows(height, width, tile_limits)
-    return NetworkStage(networks=tuple(networks), tiles=tiles, cells=None, mode=limits.mode)
+    return NetworkWindows(networks=tuple(networks), tiles=tiles, cells=None, mode=limits.mode)
 
 
 def fast_halo_px(curve: tuple[HaloError, ...], least_db: float = FAST_LEAST_DB) -> int:
@@ -231,7 +258,7 @@ def _cell_networks(networks: Sequence[SizedNetwork], mode: Mode) -> list[CellNet
             run=network.run,
             stride_px=network.facts.stride_px,
             halo_px=network.halo_px(mode),
-            bytes_per_px=network.facts.bytes_per_pixel,
+            cost=network.cost,
         )
         for network in networks
     ]
