@@ -95,14 +95,14 @@ def rewired(stages: Sequence[Stage], usual: Sequence[Stage]) -> tuple[Stage, ...
         usual: All of them, wired by their defaults.
 
     Returns:
-        The same stages; what a missing one would have given is replaced by what it would have
-        taken first.
+        The same stages; what a missing one would have given is replaced by what stands in for it.
     """
     kept = {(stage.type, getattr(stage, "role", None)) for stage in stages}
     stand_in = {}
     for stage in usual:
         if (stage.type, getattr(stage, "role", None)) not in kept:
-            first = stand_in.get(stage.takes[0], stage.takes[0])
+            taken = stage.takes[stage.stands_in]
+            first = stand_in.get(taken, taken)
             stand_in |= dict.fromkeys(stage.gives[:1], first)
             # a mask that is not passed on is that which was taken, if one was
             for mask, taken in zip(stage.gives[1:], stage.takes[1:], strict=False):
