@@ -11,7 +11,7 @@ names both ends.
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from camkit.bundle.plane import Plane
+from camkit.bundle.plane import Axes, Plane
 from camkit.bundle.sensor import Sensor, SpadSensor
 from camkit.bundle.stages import JoinError, Parts, Stage
 
@@ -22,7 +22,7 @@ CAPTURE: Final = "capture"
 def capture_plane(sensor: Sensor) -> Plane:
     """Give the plane that a sensor gives: digital numbers, or photons."""
     if isinstance(sensor, SpadSensor):
-        axes = "t y x" if sensor.time_bins else "y x"
+        axes: Axes = "t y x" if sensor.time_bins else "y x"
         return Plane(axes=axes, type="uint32", channels=sensor.captured, domain="counts")
     return Plane(type="uint16", channels=sensor.captured, domain="dn")
 
@@ -98,7 +98,7 @@ def rewired(stages: Sequence[Stage], usual: Sequence[Stage]) -> tuple[Stage, ...
         The same stages; what a missing one would have given is replaced by what stands in for it.
     """
     kept = {(stage.type, getattr(stage, "role", None)) for stage in stages}
-    stand_in = {}
+    stand_in: dict[str, str] = {}
     for stage in usual:
         if (stage.type, getattr(stage, "role", None)) not in kept:
             taken = stage.takes[stage.stands_in]

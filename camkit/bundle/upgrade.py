@@ -96,7 +96,7 @@ def upgrade(data: bytes) -> bytes:
     if not isinstance(members, dict):
         raise UpgradeError("members: it must be a table")
     optics = _optics(old, members, stages)
-    networks = {size: _facts(facts) for size, facts in old.networks.items()}
+    networks = {str(size): _facts(facts) for size, facts in old.networks.items()}
     roles = {DEFAULT_ROLE: networks} if networks else {}
     try:
         planes = join_stages(stages, Parts(sensor=sensor, optics=optics, networks=roles))
