@@ -53,7 +53,7 @@ class Kind:
             UnsupportedError: If that floor knows nothing of it.
         """
         name = f"{self.home}.{floor}" if self.home else f"camkit.{floor}.kinds.{self.name}"
-        if util.find_spec(name) is None:
+        if not _is_there(name):
             raise UnsupportedError(
                 f"cameras of the kind {self.name!r} have no part in {floor}: add the package {name}"
             )
@@ -80,6 +80,7 @@ def find_kind(name: str) -> Kind:
 
     Raises:
         UnsupportedError: If there is none; names those there are.
+        ContractError: If what is installed under that name is no kind.
     """
     if name in KINDS:
         return KINDS[name]
@@ -87,13 +88,28 @@ def find_kind(name: str) -> Kind:
     if name not in found:
         known = ", ".join(sorted({*KINDS, *found}))
         raise UnsupportedError(f"there is no kind of camera {name!r}; there are: {known}")
-    kind = found[name].load()
+    try:
+        kind = found[name].load()
+    except (ImportError, AttributeError) as error:
+        raise ContractError(
+            f"the kind of camera {name!r} cannot be loaded from {found[name].value!r}: {error}"
+        ) from error
     if not isinstance(kind, Kind) or kind.name != name or not kind.home:
         raise ContractError(
             f"the entry point {found[name].value!r} must be a camkit Kind called {name!r} with a "
             "home"
         )
     return kind
+
+
+def _is_there(name: str) -> bool:
+    """Tell whether a module is there; one that fails for another reason still raises."""
+    try:
+        return util.find_spec(name) is not None
+    except ModuleNotFoundError as error:
+        if f"{name}.".startswith(f"{error.name}."):
+            return False
+        raise
 
 
 @cache

@@ -7,29 +7,35 @@ planes. It has 6 channels in, 3 out, a stride of 2, and tiles of it need a halo 
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
+from camkit.bundle.chain import rewired
+from camkit.bundle.facts import NetworkFacts, Port
 from camkit.bundle.golden import GoldenArrays, golden_to_bytes
-from camkit.bundle.manifest import (
-    Camera,
-    ChannelResponse,
+from camkit.bundle.manifest import GoldenCase, Manifest, planes_of
+from camkit.bundle.optics import FrozenPsfOptics
+from camkit.bundle.psf_file import psf_to_bytes
+from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, IsoNoise
+from camkit.bundle.stages import (
     Color,
     Demosaic,
-    GoldenCase,
     Illumination,
-    IsoNoise,
-    Manifest,
+    Linearise,
     Network,
-    NetworkFacts,
+    Parts,
+    RaiseClipped,
+    Repair,
+    Stage,
     Undistort,
     WhiteBalance,
     Wiener,
 )
-from camkit.bundle.psf_file import psf_to_bytes
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FrozenPsf, RadialDistortion
 
@@ -110,12 +116,10 @@ def tiny_psf(*, pitch_um: float = PITCH_UM) -> FrozenPsf:
     )
 
 
-def tiny_camera() -> Camera:
+def tiny_sensor(width_px: int = 96, height_px: int = 64) -> BayerSensor:
     """Give a sensor of 96 x 64 pixels."""
-    return Camera(
-        width_px=96,
-        height_px=64,
-        pixel_pitch_um=PITCH_UM,
+    return BayerSensor(
+        extent=Extent(width_px=width_px, height_px=height_px, pixel_pitch_um=PITCH_UM),
         cfa="RGGB",
         black_level=64,
         white_level=1023,
@@ -133,10 +137,17 @@ def tiny_camera() -> Camera:
     )
 
 
+def tiny_optics(**changes: Any) -> FrozenPsfOptics:
+    """Give the optics of the tiny PSF."""
+    return FrozenPsfOptics(**({"pixel_pitch_um": PITCH_UM} | changes))
+
+
 def tiny_facts() -> NetworkFacts:
     """Give the facts of the tiny network (activations as measured on the golden case)."""
     return NetworkFacts(
         member="network_m.onnx",
+        inputs=(Port(name="capture", channels=3), Port(name="wiener", channels=3)),
+        outputs=(Port(name="clean", channels=3),),
         receptive_field_radius_px=3,
         receptive_field_probe_px=3,
         stride_px=2,
@@ -150,41 +161,50 @@ def tiny_facts() -> NetworkFacts:
     )
 
 
-def tiny_manifest() -> Manifest:
-    """Give a manifest of every stage, without members."""
-    return Manifest(
-        name="tiny",
-        version="1.0.0",
-        licence="Apache-2.0",
-        training_data="untrained",
-        camera=tiny_camera(),
-        input_contract="raw_bayer_v1",
-        stages=(
-            WhiteBalance(),
-            Demosaic(method="fast"),
-            Wiener(block_px=32, overlap_px=8, prior_scale=1e-3, prior_exponent=2.0),
-            Network(scale=64.0),
-            Illumination(),
-            Undistort(),
-            Color(),
-        ),
-        networks={"M": tiny_facts()},
-        golden=(GoldenCase(name="typical", iso=100, recipe={"scene": "noise", "seed": 3}),),
-        exported_with={"camkit": "0.1.0"},
+def tiny_stages(*left_out: str) -> tuple[Stage, ...]:
+    """Give the usual stages, wired as if those left out (by type) were not there."""
+    usual: tuple[Stage, ...] = (
+        Linearise(),
+        Repair(),
+        WhiteBalance(),
+        Demosaic(method="fast"),
+        Wiener(block_px=32, overlap_px=8, prior_scale=1e-3, prior_exponent=2.0),
+        Network(scale=64.0),
+        RaiseClipped(),
+        Illumination(),
+        Undistort(),
+        Color(),
     )
+    return rewired([stage for stage in usual if stage.type not in left_out], usual)
+
+
+def tiny_manifest(**changes: Any) -> Manifest:
+    """Give a manifest of every stage, without members; planes and product follow the stages."""
+    fields: dict[str, Any] = {
+        "name": "tiny",
+        "version": "1.0.0",
+        "licence": "Apache-2.0",
+        "training_data": "untrained",
+        "sensor": tiny_sensor(),
+        "optics": tiny_optics(),
+        "stages": tiny_stages(),
+        "networks": {DEFAULT_ROLE: {"M": tiny_facts()}},
+        "golden": (GoldenCase(name="typical", iso=100, recipe={"scene": "noise", "seed": 3}),),
+        "exported_with": {"camkit": "0.1.0"},
+    } | changes
+    parts = Parts(**{name: fields[name] for name in ("sensor", "optics", "networks")})
+    stages = fields["stages"]
+    joined = {"planes": planes_of(stages, parts), "products": {"image": stages[-1].gives[0]}}
+    return Manifest(**(joined | fields))
 
 
 def tiny_golden() -> dict[str, GoldenArrays]:
-    """Give one golden case of 32 x 48 pixels, the network's output by its definition in numpy."""
+    """Give one golden case of 32 x 48 pixels, without outputs."""
     rng = RNG(3)
-    planes = rng.uniform(0.0, 3.0, (6, 32, 48)).astype(np.float32)
     return {
         "typical": GoldenArrays(
             capture=rng.integers(64, 1024, (32, 48), dtype=np.uint16),
-            reference=rng.random((3, 32, 48), dtype=np.float32),
-            outputs={},
-            network_input=planes,
-            network_outputs={"M": tiny_forward(planes)},
+            reference=rng.random((3, 32, 48), dtype=np.float32).astype(np.float16).astype("f4"),
         )
     }
 

@@ -1,8 +1,8 @@
-"""A small camera with an analytic PSF, for the tests of simulation and geometry."""
+"""A small Bayer camera with an analytic PSF, for the tests of simulation and geometry."""
 
 import numpy as np
 
-from camkit.bundle.camera import Camera, ChannelResponse, IsoNoise
+from camkit.bundle.sensor import BayerSensor, ChannelResponse, IsoNoise, LightSensor, nested_sensor
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
@@ -10,7 +10,8 @@ PITCH_UM = 5.96
 COLOR_MATRIX = ((0.6, -0.1, -0.05), (-0.4, 1.2, 0.2), (-0.1, 0.2, 0.7))
 
 
-def make_camera(width: int = 96, height: int = 64, **changes: object) -> Camera:
+def make_sensor(width: int = 96, height: int = 64, **changes: object) -> BayerSensor:
+    """Give a Bayer sensor; changes are keys of a flat table, as recipes hold it."""
     fields: dict[str, object] = {
         "width_px": width,
         "height_px": height,
@@ -29,15 +30,15 @@ def make_camera(width: int = 96, height: int = 64, **changes: object) -> Camera:
         ),
         "color_matrix": COLOR_MATRIX,
     }
-    return Camera.model_validate(fields | changes)
+    return BayerSensor.model_validate(nested_sensor(fields | changes))
 
 
-def half_diagonal_mm(camera: Camera) -> float:
-    return float(np.hypot(camera.width_px, camera.height_px)) / 2 * camera.pixel_pitch_um / 1000
+def half_diagonal_mm(sensor: LightSensor) -> float:
+    return float(np.hypot(sensor.width_px, sensor.height_px)) / 2 * sensor.pixel_pitch_um / 1000
 
 
 def make_psf(
-    camera: Camera,
+    sensor: LightSensor,
     *,
     side: int = 9,
     fields: int = 5,
@@ -46,7 +47,7 @@ def make_psf(
     spread_px: float = 1.0,
 ) -> FrozenPsf:
     """Gaussians that grow with the field, longer along the radius, shifted with wavelength."""
-    radius_mm = half_diagonal_mm(camera)
+    radius_mm = half_diagonal_mm(sensor)
     heights = np.linspace(0, radius_mm, fields)
     offset = np.arange(side) - side // 2
     y, x = np.meshgrid(offset, offset, indexing="ij")
@@ -63,7 +64,7 @@ def make_psf(
         field_heights_mm=heights,
         depths_mm=np.array([np.inf]),
         wavelengths_um=np.array([0.45, 0.55, 0.62]),
-        pixel_pitch_um=camera.pixel_pitch_um,
+        pixel_pitch_um=sensor.pixel_pitch_um,
         distortion=RadialDistortion(
             coefficients=np.tile(np.array(distortion), (3, 1)), radius_mm=radius_mm
         ),
@@ -71,17 +72,17 @@ def make_psf(
     )
 
 
-def delta_psf(camera: Camera, **changes: object) -> FrozenPsf:
+def delta_psf(sensor: LightSensor, **changes: object) -> FrozenPsf:
     """A perfect lens: one pixel, no distortion, no vignetting."""
-    psf = make_psf(camera, side=3, distortion=(1.0, 0.0, 0.0, 0.0), corner_light=1.0)
+    psf = make_psf(sensor, side=3, distortion=(1.0, 0.0, 0.0, 0.0), corner_light=1.0)
     kernels = np.zeros_like(psf.kernels)
     kernels[..., 1, 1] = 1
     fields = {name: getattr(psf, name) for name in FrozenPsf.__dataclass_fields__}
     return FrozenPsf(**(fields | {"kernels": kernels} | changes))  # type: ignore[arg-type]
 
 
-def whole_window(camera: Camera) -> SensorWindow:
-    size = (camera.width_px, camera.height_px)
+def whole_window(sensor: LightSensor) -> SensorWindow:
+    size = (sensor.width_px, sensor.height_px)
     return SensorWindow(
-        size_px=size, origin_px=(0, 0), sensor_size_px=size, pitch_um=camera.pixel_pitch_um
+        size_px=size, origin_px=(0, 0), sensor_size_px=size, pitch_um=sensor.pixel_pitch_um
     )

@@ -13,12 +13,12 @@ def write_tiny_captures(folder: Path, names: list[str]) -> Path:
     """Write captures NAME.dng that name the tiny bundle, and give the bundle's path."""
     path = write_tiny_bundle(folder)
     bundle = open_bundle(path)
-    camera = bundle.manifest.camera
+    sensor = bundle.manifest.sensor
     for seed, name in enumerate(names):
         rng = np.random.default_rng(seed)
         scene = np.kron(rng.random((3, 8, 12)), np.ones((8, 8))).astype(np.float32)
         options = SimulationOptions(iso=100.0, seed=seed)
         write_capture(
-            folder / f"{name}.dng", simulate(scene, camera, bundle.psf, options), camera, "tiny"
+            folder / f"{name}.dng", simulate(scene, sensor, bundle.psf, options), sensor, "tiny"
         )
     return path

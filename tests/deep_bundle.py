@@ -8,7 +8,7 @@ from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FrozenPsf
-from tests.bundle_factory import tiny_camera, tiny_manifest, tiny_members, tiny_psf
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_optics, tiny_psf, tiny_sensor
 from tests.psf_factory import gaussian_kernel
 
 DEPTHS_MM = (500.0, 1000.0, 2000.0)
@@ -39,11 +39,11 @@ def write_deep_bundle(
     stress_mm: tuple[float, ...] = (),
 ) -> Bundle:
     """Write and open the tiny bundle with several depths and 320 x 240 pixels."""
-    camera = tiny_camera().model_copy(update={"width_px": 320, "height_px": 240})
-    changed = {"name": "deep", "camera": camera, "object_distance_mm": FOCUS_MM}
+    optics = tiny_optics(object_distance_mm=FOCUS_MM)
+    manifest = tiny_manifest(name="deep", sensor=tiny_sensor(320, 240), optics=optics)
     members = tiny_members() | {"psf.safetensors": psf_to_bytes(deep_psf(depths_mm))}
     if stress_mm:
         members |= {"stress_psf.safetensors": psf_to_bytes(deep_psf(stress_mm))}
     path = folder / name
-    write_bundle(path, tiny_manifest().model_copy(update=changed), members)
+    write_bundle(path, manifest, members)
     return open_bundle(path)

@@ -1,9 +1,15 @@
-"""Small lenses for tests: comatic kernels over field, blurred pictures, sensor windows."""
+"""Small PSFs for tests: comatic kernels over field, streaks, blurred pictures, sensor windows."""
 
 import numpy as np
 import scipy.fft
 
-from camkit.contracts import FloatArray, FrozenPsf, NoiseModel, RadialDistortion
+from camkit.contracts import (
+    FloatArray,
+    FrozenPsf,
+    NoiseModel,
+    RadialDistortion,
+    grid_heights_mm,
+)
 from camkit.runtime.bank.blocks import LocalPsf, to_otf
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
@@ -47,16 +53,71 @@ def coma_kernels(
 def frozen_psf(
     kernels: FloatArray, heights_mm: np.ndarray, wavelengths_um: list[float]
 ) -> FrozenPsf:
-    """The colours of `kernels` as wavelength samples of one depth."""
+    """The colours of `kernels` (field, colour, h, w) as wavelength samples of one depth."""
     return FrozenPsf(
         kernels=np.ascontiguousarray(kernels[:, None, : len(wavelengths_um)]),
         field_heights_mm=heights_mm,
         depths_mm=np.array([np.inf]),
         wavelengths_um=np.array(wavelengths_um),
         pixel_pitch_um=PITCH_UM,
-        distortion=RadialDistortion(coefficients=np.tile([1.0, 0, 0, 0], (3, 1)), radius_mm=2.0),
+        distortion=_straight(3),
         relative_illumination=np.ones(heights_mm.size),
     )
+
+
+def streak_kernel(turn_deg: float, length_px: int = 9, radius_px: int = 10) -> FloatArray:
+    """A (h, w) point with a tail to one side: along +x, turned from +x towards +y."""
+    y, x = np.mgrid[-radius_px : radius_px + 1, -radius_px : radius_px + 1].astype(float)
+    turn = np.deg2rad(turn_deg)
+    kernel = np.zeros_like(x)
+    for step in np.linspace(0, length_px, 4 * length_px + 1):
+        at_x, at_y = step * np.cos(turn), step * np.sin(turn)
+        kernel += np.exp(-((x - at_x) ** 2 + (y - at_y) ** 2)) / (1 + step)
+    kernel[kernel < 1e-6] = 0
+    return (kernel / kernel.sum()).astype(np.float32)
+
+
+def uniform_psf(
+    kernel: FloatArray, wavelengths_um: tuple[float, ...] = (0.55,), channels: int = 1
+) -> FrozenPsf:
+    """One (h, w) kernel for the whole field, all wavelengths and one depth; no distortion."""
+    return FrozenPsf(
+        kernels=np.stack([kernel] * len(wavelengths_um))[None, None],
+        field_heights_mm=np.zeros(1),
+        depths_mm=np.array([np.inf]),
+        wavelengths_um=np.array(wavelengths_um),
+        pixel_pitch_um=PITCH_UM,
+        distortion=_straight(channels),
+        relative_illumination=np.ones(1),
+        symmetry="uniform",
+    )
+
+
+def grid_psf(
+    kernels: FloatArray,
+    x_mm: np.ndarray,
+    y_mm: np.ndarray,
+    wavelengths_um: tuple[float, ...] = (0.55,),
+    channels: int = 1,
+) -> FrozenPsf:
+    """Kernels (row, column, h, w) on a grid over the field, the same for all wavelengths."""
+    fields = kernels.reshape(-1, 1, 1, *kernels.shape[-2:])
+    return FrozenPsf(
+        kernels=np.ascontiguousarray(fields.repeat(len(wavelengths_um), axis=2)),
+        field_heights_mm=grid_heights_mm(x_mm, y_mm),
+        depths_mm=np.array([np.inf]),
+        wavelengths_um=np.array(wavelengths_um),
+        pixel_pitch_um=PITCH_UM,
+        distortion=_straight(channels),
+        relative_illumination=np.ones(len(fields)),
+        symmetry="grid",
+        grid_x_mm=x_mm,
+        grid_y_mm=y_mm,
+    )
+
+
+def _straight(channels: int) -> RadialDistortion:
+    return RadialDistortion(coefficients=np.tile([1.0, 0, 0, 0], (channels, 1)), radius_mm=2.0)
 
 
 def local_psf(kernels: FloatArray, heights_mm: np.ndarray, size_px: tuple[int, int]) -> LocalPsf:

@@ -11,7 +11,7 @@ names both ends.
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from camkit.bundle.plane import Plane
+from camkit.bundle.plane import Axes, Plane
 from camkit.bundle.sensor import Sensor, SpadSensor
 from camkit.bundle.stages import JoinError, Parts, Stage
 
@@ -22,7 +22,7 @@ CAPTURE: Final = "capture"
 def capture_plane(sensor: Sensor) -> Plane:
     """Give the plane that a sensor gives: digital numbers, or photons."""
     if isinstance(sensor, SpadSensor):
-        axes = "t y x" if sensor.time_bins else "y x"
+        axes: Axes = "t y x" if sensor.time_bins else "y x"
         return Plane(axes=axes, type="uint32", channels=sensor.captured, domain="counts")
     return Plane(type="uint16", channels=sensor.captured, domain="dn")
 
@@ -95,14 +95,14 @@ def rewired(stages: Sequence[Stage], usual: Sequence[Stage]) -> tuple[Stage, ...
         usual: All of them, wired by their defaults.
 
     Returns:
-        The same stages; what a missing one would have given is replaced by what it would have
-        taken first.
+        The same stages; what a missing one would have given is replaced by what stands in for it.
     """
     kept = {(stage.type, getattr(stage, "role", None)) for stage in stages}
-    stand_in = {}
+    stand_in: dict[str, str] = {}
     for stage in usual:
         if (stage.type, getattr(stage, "role", None)) not in kept:
-            first = stand_in.get(stage.takes[0], stage.takes[0])
+            taken = stage.takes[stage.stands_in]
+            first = stand_in.get(taken, taken)
             stand_in |= dict.fromkeys(stage.gives[:1], first)
             # a mask that is not passed on is that which was taken, if one was
             for mask, taken in zip(stage.gives[1:], stage.takes[1:], strict=False):

@@ -228,6 +228,8 @@ def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
     if match is None:
         raise BundleError(f"format_version must read like 2.0; got {text[:20]!r}")
     version = (int(match[1]), int(match[2]))
+    if version[0] < _OLDEST:
+        raise BundleError(f"there never was a format {text}; export the bundle again")
     newest = FORMAT_VERSION if version[0] >= FORMAT_VERSION[0] else (version[0], 0)
     if version > newest:
         ours = ".".join(map(str, newest))
@@ -238,8 +240,6 @@ def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
             f"this bundle has format {text}, a newer {part} version than this reader knows "
             f"({ours}); update to a camkit that reads format {text}{hint}"
         )
-    if version[0] < _OLDEST:
-        raise BundleError(f"there never was a format {text}; export the bundle again")
     return version[0]
 
 

@@ -357,6 +357,9 @@ def nested_sensor(table: Mapping[str, Any]) -> dict[str, Any]:
     """Give a sensor of a flat table, as recipes and manifests of format 1.0 hold it.
 
     Its size stands beside the rest, and a `cfa` (or none) tells what it is unless it has a type.
+
+    Raises:
+        ContractError: If it states its size in both ways.
     """
     extent = {name: table[name] for name in _EXTENT if name in table}
     rest = {name: value for name, value in table.items() if name not in _EXTENT}
@@ -364,4 +367,6 @@ def nested_sensor(table: Mapping[str, Any]) -> dict[str, Any]:
         rest["type"] = "planes" if rest.get("cfa") is None else "bayer"
     if rest["type"] != "bayer" and rest.get("cfa") is None:
         rest.pop("cfa", None)
+    if extent and rest.get("extent") is not None:
+        raise ContractError(f"extent and {', '.join(extent)} say the same: give one of them")
     return {**rest, "extent": extent} if extent else rest

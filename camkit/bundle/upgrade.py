@@ -1,10 +1,10 @@
 """A manifest of format 1.0 brought up to date, so that its bundle gives the bits it always gave.
 
-Format 1.0 knew one kind of camera: a mosaic (or linear RGB), one network behind the Wiener bank. Its
-list of stages left out what was done anyway: black and white level, repair, white balance,
-demosaicking, neutral highlights and colour were done whether they were listed or not. Here they are
-listed. Two faults of it are mended: a network without a Wiener bank, which was never run, is refused,
-and so is one whose channels are not those of capture and bank.
+Format 1.0 knew one kind of camera: a mosaic (or linear RGB), one network behind the Wiener bank.
+Its list of stages left out what was done anyway: black and white level, repair, white balance,
+demosaicking, neutral highlights and colour were done whether they were listed or not. Here they
+are listed. Two faults of it are mended: a network without a Wiener bank, which was never run, is
+refused, and so is one whose channels are not those of capture and bank.
 
 The schema of 1.0 was strict, and stays so: an unknown key, a stage out of order or a value out of
 range is refused, by the models here where 2.0 has none of their own.
@@ -19,7 +19,7 @@ from pydantic import Field, ValidationError
 from camkit.bundle.chain import join_stages, rewired
 from camkit.bundle.entry import Entry
 from camkit.bundle.facts import NetworkFacts
-from camkit.bundle.optics import FrozenPsfOptics
+from camkit.bundle.optics import PSF, FrozenPsfOptics
 from camkit.bundle.sensor import BayerSensor, PlanesSensor, nested_sensor
 from camkit.bundle.stages import (
     Color,
@@ -50,6 +50,8 @@ STAGE_ORDER: Final = (
 _PSF_STAGES: Final = {"wiener", "illumination", "undistort"}
 _LISTED: Final = ("wiener", "network", "illumination", "undistort")
 """What format 1.0 did only where it was listed."""
+_ADDED: Final = {"kind", "sensor", "optics", "planes", "products"}
+"""What format 1.0 did not have."""
 _COLOURS: Final = 3
 _T = TypeVar("_T", bound=Entry)
 
@@ -80,13 +82,21 @@ def upgrade(data: bytes) -> bytes:
             for what 1.0 did not do.
         ValidationError: Likewise, with pydantic's own words.
     """
-    document: dict[str, Any] = json.loads(data)
+    try:
+        document: dict[str, Any] = json.loads(data)
+    except ValueError as error:
+        raise UpgradeError(f"it cannot be read: {error}") from error
     kept = {name: document.pop(name) for name in list(document) if name not in _Old.model_fields}
     old = _Old.model_validate(document)
+    if newer := kept.keys() & _ADDED:
+        raise UpgradeError(f"{', '.join(sorted(newer))}: extra inputs are not permitted")
     sensor = _sensor(old)
     stages = _stages(old, sensor)
-    optics = _optics(old, kept.get("members", {}), stages)
-    networks = {size: _facts(facts) for size, facts in old.networks.items()}
+    members = kept.get("members", {})
+    if not isinstance(members, dict):
+        raise UpgradeError("members: it must be a table")
+    optics = _optics(old, members, stages)
+    networks = {str(size): _facts(facts) for size, facts in old.networks.items()}
     roles = {DEFAULT_ROLE: networks} if networks else {}
     try:
         planes = join_stages(stages, Parts(sensor=sensor, optics=optics, networks=roles))
@@ -156,11 +166,13 @@ def _stages(old: _Old, sensor: BayerSensor | PlanesSensor) -> tuple[Stage, ...]:
     usual = (*usual, bank, Network(), RaiseClipped(), Illumination(), Undistort(), Color())
     mosaic = isinstance(sensor, BayerSensor)
     done = {"demosaic": mosaic, "raise_clipped": mosaic} | dict.fromkeys(_LISTED, False)
+    # a demosaic that linear RGB listed was checked and passed over
     made = [
         _validated("stages", type(stage), listed.get(stage.type, stage.model_dump()))
         for stage in usual
         if stage.type in listed or done.get(stage.type, True)
     ]
+    made = [stage for stage in made if mosaic or stage.type != "demosaic"]
     return rewired(made, usual)
 
 
@@ -169,7 +181,7 @@ def _optics(
 ) -> FrozenPsfOptics | None:
     """Give the optics: those of every bundle that held a PSF, or whose stages needed one."""
     needs = _PSF_STAGES & {stage.type for stage in stages}
-    if "psf.safetensors" not in members and not needs:
+    if PSF not in members and not needs:
         return None
     table = {
         "pixel_pitch_um": old.camera.get("pixel_pitch_um"),

@@ -21,14 +21,14 @@ Span = tuple[int, int, Tensor]
 
 
 def blur(planes: Tensor, kernels: Tensor) -> Tensor:
-    """Convolve planes with one kernel per colour and keep what has full support.
+    """Convolve planes with one kernel per channel and keep what has full support.
 
     Args:
-        planes: (b, 3, h, w).
-        kernels: (b, 3, kh, kw), as they fall on the sensor (scatter, not flipped).
+        planes: (b, c, h, w).
+        kernels: (b, c, kh, kw), as they fall on the sensor (scatter, not flipped).
 
     Returns:
-        (b, 3, h - kh + 1, w - kw + 1).
+        (b, c, h - kh + 1, w - kw + 1).
 
     Raises:
         ContractError: If a kernel is larger than the planes, or their numbers do not match.
@@ -94,12 +94,12 @@ def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) ->
     Divided by the same of a field of ones, so that equal radiance stays equal.
 
     Args:
-        planes: (3, h + 2 m, w + 2 m), m = k // 2: the picture and what lies around it.
-        kernels: (rows, columns, 3, k, k), one set per block; see `block_centres_px`.
+        planes: (c, h + 2 m, w + 2 m), m = k // 2: the picture and what lies around it.
+        kernels: (rows, columns, c, k, k), one set per block; see `block_centres_px`.
         step_px: Distance of block centres.
 
     Returns:
-        (3, h, w).
+        (c, h, w).
 
     Raises:
         ContractError: If the kernels do not match the blocks.
@@ -110,7 +110,7 @@ def scatter(planes: Tensor, kernels: Tensor, *, step_px: int = BLOCK_STEP_PX) ->
         raise ContractError(
             f"{len(rows)}x{len(columns)} blocks need as many kernels; got {kernels.shape[:2]}"
         )
-    out = planes.new_zeros(3, planes.shape[-2] + side - 1, planes.shape[-1] + side - 1)
+    out = planes.new_zeros(len(planes), planes.shape[-2] + side - 1, planes.shape[-1] + side - 1)
     light = torch.zeros_like(out)
     for row, (top, bottom, row_weight) in enumerate(rows):
         for column, (left, right, column_weight) in enumerate(columns):

@@ -1,14 +1,18 @@
-"""The PSF of a field position, in torch: colours weighted, heights blended, turned to the azimuth.
+"""The PSF of an image point, in torch: wavelengths weighted, fields blended, turned if radial.
+
+    FrozenPsf (field, depth, wavelength) -> color_kernels -> FieldKernels (field, c) -> at(x, y)
 
 Twin of `camkit.runtime.bank.psf`; `tests/parity` holds the two together.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from camkit.contracts import FrozenPsf, depth_weights
+from camkit.contracts import FrozenPsf, Symmetry, depth_weights
 from camkit.errors import ContractError
 
 PAD_PX = 2
@@ -19,7 +23,7 @@ def wavelength_weights(
     wavelengths_um: NDArray[np.float64],
     response: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Integrate the response of the colours against the PSF's wavelength samples.
+    """Integrate the response of the channels against the PSF's wavelength samples.
 
     The PSF is taken as linear between its wavelengths and constant beyond them, the response as
     linear between its own and zero beyond them; the integral of their product is then exact.
@@ -27,16 +31,16 @@ def wavelength_weights(
     Args:
         psf_wavelengths_um: (wavelength,), increasing.
         wavelengths_um: (n,), increasing.
-        response: (3, n) >= 0.
+        response: (c, n) >= 0.
 
     Returns:
-        (3, wavelength) weights; each row sums to 1.
+        (c, wavelength) weights; each row sums to 1.
 
     Raises:
-        ContractError: If shapes disagree or a colour has no response.
+        ContractError: If shapes disagree or a channel has no response.
     """
-    if response.shape != (3, wavelengths_um.size):
-        raise ContractError(f"response must be (3, {wavelengths_um.size}); got {response.shape}")
+    if response.ndim != 2 or response.shape[1] != wavelengths_um.size:
+        raise ContractError(f"response must be (c, {wavelengths_um.size}); got {response.shape}")
     unit = np.eye(psf_wavelengths_um.size)
 
     def product(at_um: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -54,8 +58,45 @@ def wavelength_weights(
         weights = (simpson * ((high - low) / 6)).sum(axis=-1)
     sums = weights.sum(axis=1, keepdims=True)
     if not (sums > 0).all():
-        raise ContractError(f"every colour needs a response > 0; sums are {sums.ravel()}")
+        raise ContractError(f"every channel needs a response > 0; sums are {sums.ravel()}")
     return np.asarray(weights / sums, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldKernels:
+    """Kernels of the channels at the fields of a PSF; see `camkit.contracts.FrozenPsf`.
+
+    Attributes:
+        kernels: (field, c, h, w) float32, odd sides, each sums to 1.
+        field_heights_mm: (field,) float64.
+        symmetry: How the kernels of other image points follow.
+        grid_x_mm: (column,) float64 of a grid.
+        grid_y_mm: (row,) float64 of a grid.
+    """
+
+    kernels: Tensor
+    field_heights_mm: Tensor
+    symmetry: Symmetry = "radial"
+    grid_x_mm: Tensor | None = None
+    grid_y_mm: Tensor | None = None
+
+    def at(self, x_mm: Tensor, y_mm: Tensor) -> Tensor:
+        """Give the kernels of image points.
+
+        Args:
+            x_mm: (b,) positions from the axis, to the right.
+            y_mm: (b,) positions from the axis, down the rows.
+
+        Returns:
+            (b, c, h, w) float32, each kernel sums to 1.
+        """
+        if self.grid_x_mm is not None and self.grid_y_mm is not None:
+            field, share = grid_neighbours((self.grid_x_mm, self.grid_y_mm), x_mm, y_mm)
+            shares = share.to(self.kernels.dtype)[..., None, None, None]
+            return (shares * self.kernels[field]).sum(1)
+        if self.symmetry == "uniform":
+            return self.kernels.expand(x_mm.numel(), -1, -1, -1)
+        return _turned_at(self.kernels, self.field_heights_mm, x_mm, y_mm)
 
 
 def color_kernels(
@@ -64,20 +105,18 @@ def color_kernels(
     response: NDArray[np.float64],
     *,
     depth_mm: float | None = None,
-) -> Tensor:
-    """Weight the wavelength kernels into one kernel per field and colour.
+) -> FieldKernels:
+    """Weight the wavelength kernels into one kernel per field and channel.
 
-    A lens of revolution is symmetric about the meridional plane, so the kernels are made
-    symmetric about their middle column, which also takes half of the noise of the tracing.
+    A lens of revolution is symmetric about the meridional plane, so the kernels of a radial PSF
+    are made symmetric about their middle column, which also takes half of the noise of the
+    tracing. Others are left as they are.
 
     Args:
         psf: The frozen PSF.
         wavelengths_um: (n,) grid of the response.
-        response: (3, n) response of R, G, B.
+        response: (c, n) response of the channels.
         depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
-
-    Returns:
-        (field, 3, h, w) float32; each kernel sums to 1.
 
     Raises:
         ContractError: If the PSF does not reach the depth or the response does not fit.
@@ -86,11 +125,56 @@ def color_kernels(
     shares = torch.from_numpy(depth_weights(psf.depths_mm, depth_mm))
     kernels = torch.from_numpy(psf.kernels.astype(np.float64))
     mixed = torch.einsum("cl,flhw->fchw", weights, torch.einsum("d,fdlhw->flhw", shares, kernels))
-    mixed = 0.5 * (mixed + mixed.flip(-1))
-    return (mixed / mixed.sum(dim=(-2, -1), keepdim=True)).to(torch.float32)
+    if psf.symmetry == "radial":
+        mixed = 0.5 * (mixed + mixed.flip(-1))
+    return field_kernels((mixed / mixed.sum(dim=(-2, -1), keepdim=True)).to(torch.float32), psf)
 
 
-def kernel_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Tensor) -> Tensor:
+def field_kernels(kernels: Tensor, psf: FrozenPsf) -> FieldKernels:
+    """Give (field, c, h, w) kernels at the fields of a PSF."""
+    grid = (psf.grid_x_mm, psf.grid_y_mm)
+    x_mm, y_mm = (None if axis is None else torch.from_numpy(axis.copy()) for axis in grid)
+    return FieldKernels(
+        kernels=kernels,
+        field_heights_mm=torch.from_numpy(psf.field_heights_mm.copy()),
+        symmetry=psf.symmetry,
+        grid_x_mm=x_mm,
+        grid_y_mm=y_mm,
+    )
+
+
+def grid_neighbours(
+    grid_mm: tuple[Tensor, Tensor], x_mm: Tensor, y_mm: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Give the four fields (b, 4) of a grid around image points, and their shares (b, 4).
+
+    Bilinear; a point beyond the rim is taken on it.
+
+    Args:
+        grid_mm: (column,) and (row,) positions, increasing; fields lie row by row.
+        x_mm: (b,).
+        y_mm: (b,).
+    """
+    columns, rows = (
+        _axis_neighbours(axis.to(torch.float64), at.to(torch.float64).contiguous())
+        for axis, at in zip(grid_mm, (x_mm, y_mm), strict=True)
+    )
+    field = rows[0][:, :, None] * grid_mm[0].numel() + columns[0][:, None, :]
+    share = rows[1][:, :, None] * columns[1][:, None, :]
+    return field.flatten(1), share.flatten(1)
+
+
+def _axis_neighbours(axis: Tensor, at: Tensor) -> tuple[Tensor, Tensor]:
+    """Give the (b, 2) neighbours on one axis and their shares."""
+    low = (torch.searchsorted(axis, at, right=True) - 1).clamp(0, max(axis.numel() - 2, 0))
+    high = (low + 1).clamp(max=axis.numel() - 1)
+    step = torch.where(high > low, axis[high] - axis[low], 1.0)
+    share = ((at - axis[low]) / step).clamp(0, 1)
+    share = torch.where(high > low, share, 0.0)
+    return torch.stack([low, high], 1), torch.stack([1 - share, share], 1)
+
+
+def _turned_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Tensor) -> Tensor:
     """Give the kernels of image points, turned so that their radial direction points outward.
 
     Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
@@ -98,13 +182,13 @@ def kernel_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Ten
     of a single field: one PSF for all places has no direction.
 
     Args:
-        kernels: (field, 3, h, w) float32, stored for points along +y (down the rows).
+        kernels: (field, c, h, w) float32, stored for points along +y (down the rows).
         field_heights_mm: (field,) float64, increasing from 0.
-        x_mm: (b,) positions from the axis, to the right.
-        y_mm: (b,) positions from the axis, down the rows.
+        x_mm: (b,).
+        y_mm: (b,).
 
     Returns:
-        (b, 3, h, w) float32, each kernel sums to 1.
+        (b, c, h, w) float32, each kernel sums to 1.
 
     References: Keys 1981, cubic convolution with a = -1/2.
     """
@@ -126,7 +210,7 @@ def kernel_at(kernels: Tensor, field_heights_mm: Tensor, x_mm: Tensor, y_mm: Ten
 
 
 def _blend(kernels: Tensor, heights: Tensor, height: Tensor) -> Tensor:
-    """Interpolate (field, 3, h, w) linearly in height to (b, 3, h, w)."""
+    """Interpolate (field, c, h, w) linearly in height to (b, 3, h, w)."""
     if heights.numel() == 1:
         return kernels.expand(height.numel(), -1, -1, -1)
     low = (torch.searchsorted(heights, height, right=True) - 1).clamp(0, heights.numel() - 2)

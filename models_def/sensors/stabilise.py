@@ -17,8 +17,8 @@ def stabilise(
     The noise of s has the standard deviation 0.5 / scale at any gain.
 
     Args:
-        image: (b, 3, h, w), linear, white balanced.
-        shot: (b, 3) or (3,) variance per unit of signal, > 0.
+        image: (b, c, h, w), linear, white balanced.
+        shot: (b, c) or (c,) variance per unit of signal, > 0.
         read_variance: Same shape, variance at zero signal.
         scale: Divisor behind the square root.
 
@@ -34,8 +34,8 @@ def unstabilise(
     """Undo `stabilise`: x = shot * ((max(s, 0) * scale)^2 - read_variance / shot^2).
 
     Args:
-        stable: (b, 3, h, w) of `stabilise`.
-        shot: (b, 3) or (3,) variance per unit of signal, > 0.
+        stable: (b, c, h, w) of `stabilise`.
+        shot: (b, c) or (c,) variance per unit of signal, > 0.
         read_variance: Same shape, variance at zero signal.
         scale: Divisor behind the square root.
     """

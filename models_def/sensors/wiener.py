@@ -23,12 +23,12 @@ TAPER_SHRINK = 4
 
 
 def to_otf(kernels: Tensor, size: tuple[int, int]) -> Tensor:
-    """Transform (b, 3, kh, kw) kernels to the OTF of a periodic (h, w) block.
+    """Transform (b, c, kh, kw) kernels to the OTF of a periodic (h, w) block.
 
     A kernel that is wider than the block wraps around it, as light in a periodic picture does.
 
     Returns:
-        (b, 3, h, w // 2 + 1) complex; the kernel's centre is the origin.
+        (b, c, h, w // 2 + 1) complex; the kernel's centre is the origin.
     """
     kh, kw = kernels.shape[-2:]
     h, w = size
@@ -52,17 +52,17 @@ def wiener_restore(
     """Deconvolve patches, each a periodic block, with conj(H) / (|H|^2 + NSR).
 
     Args:
-        patches: (b, 3, h, w), linear, white balanced; sides at least those of the kernels.
-        kernels: (b, 3, kh, kw), odd sides, each sums to 1.
-        shot: (b, 3) or (3,), noise after white balance.
+        patches: (b, c, h, w), linear, white balanced; sides at least those of the kernels.
+        kernels: (b, c, kh, kw), odd sides, each sums to 1.
+        shot: (b, c) or (c,), noise after white balance.
         read_variance: Same shape as shot.
         settings: Prior, clip iterations, and the overlap, whose outer quarter is tapered.
-        saturated: (b, 1 or 3, h, w), true where the sensor clipped; those pixels, and the two
+        saturated: (b, 1 or c, h, w), true where the sensor clipped; those pixels, and the two
             beside them that the demosaic reaches, are at least as bright as they read. Their
             patches are explained by Richardson-Lucy first; the rest goes through the filter.
 
     Returns:
-        (b, 3, h, w).
+        (b, c, h, w).
 
     References: Sun 2021, eq. (2.9); van der Schaaf and van Hateren 1996 (natural-image prior).
     """
@@ -97,11 +97,11 @@ def richardson_lucy(
     """Sharpen by Richardson-Lucy; clipped samples are at least as bright as they read.
 
     Args:
-        patches: (b, 3, h, w), periodic.
-        otf: (b, 3, h, w // 2 + 1).
-        background: (b or 1, 3, 1, 1), read_variance / shot.
+        patches: (b, c, h, w), periodic.
+        otf: (b, c, h, w // 2 + 1).
+        background: (b or 1, c, 1, 1), read_variance / shot.
         iterations: Rounds.
-        clipped: (b, 1 or 3, h, w) bool.
+        clipped: (b, 1 or c, h, w) bool.
 
     References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background).
     """
@@ -120,8 +120,8 @@ def taper_edges(patches: Tensor, otf: Tensor, ring_px: int) -> Tensor:
     """Blend the outer ring of patches to their own periodic blur.
 
     Args:
-        patches: (b, 3, h, w).
-        otf: (b, 3, h, w // 2 + 1) of `to_otf`.
+        patches: (b, c, h, w).
+        otf: (b, c, h, w // 2 + 1) of `to_otf`.
         ring_px: Width of the ring; 0 leaves the patches as they are.
 
     References: Reeves 2005 (edge taper as pre-processing).
@@ -156,7 +156,7 @@ def _filter(patches: Tensor, transfer: Tensor) -> Tensor:
 
 
 def _gain(otf: Tensor, ratio: Tensor, exponent: float, size: tuple[int, int]) -> Tensor:
-    """Give conj(H) / (|H|^2 + NSR); `ratio` (b, 3) is NSR where the rise is one."""
+    """Give conj(H) / (|H|^2 + NSR); `ratio` (b, c) is NSR where the rise is one."""
     h, w = size
     fy = torch.fft.fftfreq(h, dtype=torch.float64, device=otf.device)[:, None]
     fx = torch.fft.rfftfreq(w, dtype=torch.float64, device=otf.device)[None, :]

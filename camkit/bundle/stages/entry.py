@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from camkit.bundle.entry import Entry, Word
 from camkit.bundle.facts import NetworkFacts
@@ -43,10 +44,12 @@ class StageEntry(Entry):
     """A stage as the manifest lists it.
 
     Attributes:
+        stands_in: Which of the planes taken stands for what it gives where the stage is left out.
         takes: Names of the planes it reads.
         gives: Names of the planes it makes; each has its entry among the manifest's planes.
     """
 
+    stands_in: ClassVar[int] = 0
     takes: tuple[Word, ...]
     gives: tuple[Word, ...]
 

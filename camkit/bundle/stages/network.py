@@ -1,7 +1,7 @@
 """A network on planes."""
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 from camkit.bundle.entry import Positive, Word
 from camkit.bundle.facts import NetworkFacts, Port
@@ -14,7 +14,8 @@ DEFAULT_ROLE = "restore"
 class Network(StageEntry):
     """A network, in one of the sizes that the bundle holds for its role.
 
-    Its planes are the inputs of the network, in order, and what it gives are its outputs.
+    Its planes are the inputs of the network, in order, and what it gives are its outputs. The last
+    input is the best that is known before it: of its grid and domain are the outputs.
 
     Attributes:
         role: Key of `networks` in the manifest.
@@ -25,6 +26,7 @@ class Network(StageEntry):
             it is not believed.
     """
 
+    stands_in: ClassVar[int] = -1
     type: Literal["network"] = "network"
     takes: tuple[Word, ...] = ("rgb", "restored")
     gives: tuple[Word, ...] = ("clean",)
@@ -46,9 +48,14 @@ class Network(StageEntry):
             if plane.grid != first.grid or plane.axes != first.axes:
                 raise JoinError("its planes must lie on one grid")
             need_domain(plane, "linear" if self.transform == "stabilise" else first.domain)
+            if self.transform == "stabilise":
+                _check_noise(len(plane.channels), parts)
         for size, facts in sizes.items():
             _check_ports(size, facts.inputs, taken)
         outputs = _outputs(sizes)
+        if self.transform == "stabilise":
+            for port in outputs:
+                _check_noise(port.channels, parts)
         last = taken[-1]
         if self.transform == "stabilise" and any(
             port.channels != len(last.channels) for port in outputs
@@ -60,6 +67,7 @@ class Network(StageEntry):
         return tuple(
             last.model_copy(
                 update={
+                    "type": "float32",
                     "channels": _names(port, taken, parts),
                     "grid": last.grid.finer(port.scale),
                 }
@@ -75,6 +83,15 @@ def _check_ports(size: str, ports: Sequence[Port], taken: Sequence[Plane]) -> No
         raise JoinError(
             f"its network of size {size} has inputs of {_listed(wanted)} channels "
             f"({', '.join(port.name for port in ports)}); its planes have {_listed(got)}"
+        )
+
+
+def _check_noise(count: int, parts: Parts) -> None:
+    """Refuse to stabilise what is not of the sensor's channels: their noise alone is known."""
+    channels = parts.sensor.channels
+    if count != len(channels):
+        raise JoinError(
+            f"it stabilises by the noise of {', '.join(channels)}, one of each; a plane has {count}"
         )
 
 

@@ -33,6 +33,11 @@ class Undistort(StageEntry):
             raise JoinError("it takes the geometry of the sensor; this plane is undistorted")
         if taken[0].channels == MOSAIC:
             raise JoinError("a mosaic cannot be moved")
+        if len(taken[0].channels) != len(parts.sensor.channels):
+            raise JoinError(
+                f"the distortion is known for {', '.join(parts.sensor.channels)}, not for "
+                f"{', '.join(taken[0].channels)}"
+            )
         return (
             taken[0].model_copy(
                 update={"grid": taken[0].grid.model_copy(update={"warped": False})}

@@ -56,6 +56,8 @@ class Wiener(StageEntry):
         need_rows(plane)
         for mask in taken[1:]:
             need_domain(mask, "mask")
+            if mask.grid != plane.grid:
+                raise JoinError("its mask must lie on the samples that it deconvolves")
         optics = parts.need_optics("it deconvolves with the kernels of optics")
         if plane.channels != parts.sensor.channels:
             raise JoinError(

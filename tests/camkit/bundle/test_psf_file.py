@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from safetensors.numpy import load, save
 
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_psf, write_psf
-from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.contracts import FrozenPsf, RadialDistortion, Symmetry, grid_heights_mm
 from camkit.errors import BundleError
 from tests.bundle_factory import tiny_psf
+from tests.psf_factory import grid_psf, streak_kernel, uniform_psf
 
 Tensors = dict[str, NDArray[Any]]
 
@@ -22,21 +23,32 @@ Tensors = dict[str, NDArray[Any]]
 @st.composite
 def psfs(draw: st.DrawFn) -> FrozenPsf:
     fields, depths, waves = (draw(st.integers(1, 3)) for _ in range(3))
+    symmetry: Symmetry = draw(st.sampled_from(get_args(Symmetry)))
+    channels = draw(st.integers(1, 5))
+    rows = draw(st.integers(1, 3)) if symmetry == "grid" else 1
+    columns, fields = fields, 1 if symmetry == "uniform" else fields * rows
     h, w = (draw(st.sampled_from([1, 3, 7])) for _ in range(2))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     kernels = rng.uniform(0.1, 1, (fields, depths, waves, h, w)).astype(np.float32)
     kernels /= kernels.sum(axis=(-2, -1), keepdims=True)
     near = np.cumsum(rng.uniform(10, 100, depths))
+    x_mm, y_mm = (np.cumsum(rng.uniform(0.1, 2, n)) - 2 for n in (columns, rows))
+    is_grid = symmetry == "grid"
     return FrozenPsf(
         kernels=kernels,
-        field_heights_mm=np.arange(fields) * rng.uniform(0.5, 2),
+        field_heights_mm=(
+            grid_heights_mm(x_mm, y_mm) if is_grid else np.arange(fields) * rng.uniform(0.5, 2)
+        ),
         depths_mm=np.append(near[:-1], np.inf) if draw(st.booleans()) else near,
         wavelengths_um=0.4 + 0.1 * np.arange(waves),
         pixel_pitch_um=float(rng.uniform(1, 10)),
         distortion=RadialDistortion(
-            coefficients=rng.normal(size=(3, 4)), radius_mm=float(rng.uniform(1, 30))
+            coefficients=rng.normal(size=(channels, 4)), radius_mm=float(rng.uniform(1, 30))
         ),
         relative_illumination=rng.uniform(0.1, 1, fields),
+        symmetry=symmetry,
+        grid_x_mm=x_mm if is_grid else None,
+        grid_y_mm=y_mm if is_grid else None,
     )
 
 
@@ -51,6 +63,11 @@ def test_psf_comes_back_bit_for_bit(psf: FrozenPsf) -> None:
     np.testing.assert_array_equal(back.wavelengths_um, psf.wavelengths_um)
     np.testing.assert_array_equal(back.distortion.coefficients, psf.distortion.coefficients)
     np.testing.assert_array_equal(back.relative_illumination, psf.relative_illumination)
+    assert back.symmetry == psf.symmetry
+    for name in ("grid_x_mm", "grid_y_mm"):
+        one, other = getattr(back, name), getattr(psf, name)
+        assert (one is None) == (other is None)
+        np.testing.assert_array_equal(one, other)
     assert back.pixel_pitch_um == psf.pixel_pitch_um
     assert back.distortion.radius_mm == psf.distortion.radius_mm
     assert psf_to_bytes(back) == data
@@ -94,6 +111,10 @@ def _retype(name: str, dtype: type[np.generic]) -> Callable[[Tensors], None]:
     return change
 
 
+def _ascii(text: str) -> NDArray[Any]:
+    return np.frombuffer(text.encode(), np.uint8)
+
+
 REFUSALS: dict[str, tuple[Callable[[Tensors], object], str]] = {
     "NaN": (_set("kernels", (0, 0, 0, 0, 0), np.nan), "NaN or inf"),
     "inf": (_set("kernels", (0, 0, 0, 0, 0), np.inf), "NaN or inf"),
@@ -121,7 +142,25 @@ REFUSALS: dict[str, tuple[Callable[[Tensors], object], str]] = {
     "distortion radius": (_set("distortion_radius_mm", 0, 0.0), "radius_mm"),
     "distortion shape": (
         lambda t: t.update(distortion_coefficients=np.ones((4, 3))),
-        r"shape \(3, 4\)",
+        r"shape \(4, 4\)",
+    ),
+    "distortion of no channel": (
+        lambda t: t.update(distortion_coefficients=np.ones((0, 4))),
+        "distortion needs",
+    ),
+    "unknown symmetry": (lambda t: t.update(symmetry=_ascii("mirror")), "symmetry must be one of"),
+    "symmetry of another type": (
+        lambda t: t.update(symmetry=np.frombuffer(b"uniform", np.int8)),
+        "symmetry must be one of",
+    ),
+    "uniform with two fields": (lambda t: t.update(symmetry=_ascii("uniform")), "has one field"),
+    "grid without positions": (
+        lambda t: t.update(symmetry=_ascii("grid")),
+        "missing: grid_x_mm, grid_y_mm",
+    ),
+    "positions of no grid": (
+        lambda t: t.update(grid_x_mm=np.zeros(1), grid_y_mm=np.zeros(1)),
+        "unknown: grid_x_mm, grid_y_mm",
     ),
 }
 
@@ -133,6 +172,41 @@ def test_psf_that_is_none_is_refused(change: Callable[[Tensors], object], messag
     data = save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
     with pytest.raises(BundleError, match=message):
         psf_from_bytes(data)
+
+
+GRID_REFUSALS: dict[str, tuple[Callable[[Tensors], object], str]] = {
+    "a position too many": (lambda t: t.update(grid_x_mm=np.arange(3.0)), "position for each"),
+    "no position": (lambda t: t.update(grid_x_mm=np.empty(0)), "position for each"),
+    "positions that fall": (_set("grid_x_mm", 1, -9.0), "must be finite and increase"),
+    "positions that are NaN": (_set("grid_y_mm", 0, np.nan), "must be finite and increase"),
+    "positions at infinity": (_set("grid_y_mm", 1, np.inf), "must be finite and increase"),
+    "heights of other positions": (_set("field_heights_mm", 0, 0.5), "distances of the grid"),
+    "float32 positions": (_retype("grid_x_mm", np.float32), "grid_x_mm must be float64"),
+    "positions in a table": (
+        lambda t: t.update(grid_x_mm=t["grid_x_mm"][None]),
+        "grid_x_mm must be float64",
+    ),
+    "called uniform": (lambda t: t.update(symmetry=_ascii("uniform")), "unknown: grid_x_mm"),
+    "called nothing": (lambda t: t.pop("symmetry"), "unknown: grid_x_mm"),
+    "called radial": (lambda t: t.update(symmetry=_ascii("radial")), "unknown: grid_x_mm"),
+    "kernels of one row": (lambda t: t.update(kernels=t["kernels"][:2]), "axes have"),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), GRID_REFUSALS.values(), ids=GRID_REFUSALS.keys())
+def test_grid_that_is_none_is_refused(change: Callable[[Tensors], object], message: str) -> None:
+    streaks = np.stack([streak_kernel(turn) for turn in (0, 90, 180, 270)]).reshape(2, 2, 21, 21)
+    positions = np.array([-1.0, 1.0])
+    tensors = load(psf_to_bytes(grid_psf(streaks, positions, positions)))
+    change(tensors)
+    data = save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
+    with pytest.raises(BundleError, match=message):
+        psf_from_bytes(data)
+
+
+def test_file_of_a_radial_psf_is_that_of_format_1_0() -> None:
+    assert "symmetry" not in load(psf_to_bytes(tiny_psf()))
+    assert bytes(load(psf_to_bytes(uniform_psf(streak_kernel(0))))["symmetry"]) == b"uniform"
 
 
 @settings(max_examples=200, deadline=None)

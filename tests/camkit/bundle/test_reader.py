@@ -9,6 +9,7 @@ import threading
 import warnings
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,18 @@ from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, bundle_from_bytes, find_bundle, open_bundle
 from camkit.bundle.writer import bundle_to_bytes
 from camkit.errors import BundleError
-from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, write_tiny_bundle
+from tests.bundle_factory import (
+    tiny_facts,
+    tiny_manifest,
+    tiny_members,
+    tiny_optics,
+    tiny_psf,
+    tiny_stages,
+    write_tiny_bundle,
+)
 from tests.deep_bundle import write_deep_bundle
 from tests.disk_watch import nothing_written
+from tests.psf_factory import streak_kernel, uniform_psf
 
 GOOD = bundle_to_bytes(tiny_manifest(), tiny_members())
 EXAMPLE = Path(__file__).resolve().parents[2] / "data" / "example-1.0.camkit"
@@ -249,7 +259,7 @@ def test_huge_manifest_is_refused() -> None:
     _refuse(_zip(_contents() | {"manifest.json": noise}), "manifest.json is larger")
 
 
-@pytest.mark.parametrize("version", ["1.1", "2.0"])
+@pytest.mark.parametrize("version", ["1.1", "2.1", "3.0"])
 def test_newer_format_is_refused_naming_the_version_needed(version: str) -> None:
     data = _with_manifest(lambda document: document.update(format_version=version))
     _refuse(data, f"update to a camkit that reads format {version}")
@@ -283,7 +293,7 @@ def test_manifest_that_lists_itself_is_refused() -> None:
     ("absent", "user"),
     [
         ("network_m.onnx", "network M"),
-        ("psf.safetensors", "stage"),
+        ("psf.safetensors", "the optics"),
         ("golden.safetensors", "golden cases"),
     ],
 )
@@ -294,10 +304,10 @@ def test_missing_part_is_named_with_its_user(absent: str, user: str) -> None:
 
 
 def test_missing_fp16_network_is_refused() -> None:
-    manifest = tiny_manifest()
-    facts = manifest.networks["M"].model_copy(update={"fp16_member": "network_m.fp16.onnx"})
-    manifest = manifest.model_copy(update={"networks": {"M": facts}})
-    _refuse(bundle_to_bytes(manifest, tiny_members()), "network M in fp16 needs")
+    facts = tiny_facts().model_copy(update={"fp16_member": "network_m.fp16.onnx"})
+    manifest = tiny_manifest(networks={"restore": {"M": facts}})
+    data = bundle_to_bytes(manifest, tiny_members())
+    _refuse(data, r"network M \(restore\) in fp16 needs")
 
 
 # ---------------------------------------------------------------------------- PSF
@@ -317,8 +327,29 @@ def test_psf_that_is_none_is_refused(value: float, message: str) -> None:
 def test_psf_of_another_pitch_is_refused() -> None:
     _refuse(
         _with_member("psf.safetensors", psf_to_bytes(tiny_psf(pitch_um=5.0))),
-        "sampled at 5.0 um, the camera has 6.0 um",
+        "sampled at 5.0 um, the manifest says 6.0 um",
     )
+
+
+def test_psf_of_another_symmetry_is_refused() -> None:
+    other = psf_to_bytes(replace(uniform_psf(streak_kernel(0), channels=3), pixel_pitch_um=6.0))
+    _refuse(_with_member("psf.safetensors", other), "is uniform, the manifest says radial")
+    manifest = tiny_manifest(optics=tiny_optics(symmetry="uniform"))
+    _refuse(bundle_to_bytes(manifest, tiny_members()), "is radial, the manifest says uniform")
+    good = bundle_to_bytes(manifest, tiny_members() | {"psf.safetensors": other})
+    assert bundle_from_bytes(good, path=Path("x.camkit")).psf.symmetry == "uniform"
+
+
+def test_psf_of_other_channels_is_refused() -> None:
+    one = replace(tiny_psf(), distortion=uniform_psf(streak_kernel(0)).distortion)
+    message = r"distortion of 1 channel\(s\), the sensor 3"
+    _refuse(_with_member("psf.safetensors", psf_to_bytes(one)), message)
+
+
+def test_psf_without_optics_is_refused() -> None:
+    left_out = "wiener", "network", "illumination", "undistort"
+    manifest = tiny_manifest(stages=tiny_stages(*left_out), optics=None, networks={})
+    _refuse(bundle_to_bytes(manifest, tiny_members()), "its manifest states no optics")
 
 
 # ---------------------------------------------------------------------------- what a good one gives
@@ -331,7 +362,7 @@ def test_bundle_gives_its_members_without_touching_the_disk(tmp_path: Path) -> N
         members = {name: bundle.member(name) for name in bundle.names}
     assert members == tiny_members()
     assert bundle.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
-    assert bundle.network_bytes("M") == members["network_m.onnx"]
+    assert bundle.network_bytes("restore", "M") == members["network_m.onnx"]
     assert bundle.psf.kernels.shape == (2, 1, 3, 5, 5)
     assert bundle.stress_psf() is None
 
@@ -351,8 +382,12 @@ def _bundle() -> Bundle:
     ("ask", "message"),
     [
         (lambda bundle: bundle.member("nothing"), "no member 'nothing'"),
-        (lambda bundle: bundle.network_bytes("L"), "no network of size 'L'; it has: M"),
-        (lambda bundle: bundle.network_bytes("M", fp16=True), "no fp16 network"),
+        (
+            lambda bundle: bundle.network_bytes("restore", "L"),
+            "no network of size 'L' for restore; it has: M",
+        ),
+        (lambda bundle: bundle.network_bytes("sharpen", "M"), "for sharpen; it has: none"),
+        (lambda bundle: bundle.network_bytes("restore", "M", fp16=True), "no fp16 network"),
     ],
 )
 def test_what_is_not_there_is_named(ask: Callable[[Bundle], object], message: str) -> None:
@@ -361,7 +396,8 @@ def test_what_is_not_there_is_named(ask: Callable[[Bundle], object], message: st
 
 
 def test_bundle_without_psf_says_so() -> None:
-    manifest = tiny_manifest().model_copy(update={"stages": ()})
+    left_out = "wiener", "network", "illumination", "undistort"
+    manifest = tiny_manifest(stages=tiny_stages(*left_out), optics=None, networks={})
     members = tiny_members()
     del members["psf.safetensors"]
     bundle = bundle_from_bytes(bundle_to_bytes(manifest, members), path=Path("x.camkit"))
@@ -426,14 +462,13 @@ def test_every_built_in_bundle_opens() -> None:
 def test_example_of_format_1_0_opens_for_ever() -> None:
     bundle = open_bundle(EXAMPLE)
     assert EXAMPLE.stat().st_size < 100_000
-    assert bundle.manifest.format_version == "1.0"
-    assert bundle.manifest.camera.noise_at(100).shot[0] == pytest.approx(1.0427528e-4)
+    assert bundle.manifest.sensor.noise_at(100).shot[0] == pytest.approx(1.0427528e-4)
     assert bundle.psf.wavelengths_um.tolist() == [0.45, 0.55, 0.62]
-    assert [stage.type for stage in bundle.manifest.stages][:3] == [
-        "white_balance",
-        "demosaic",
-        "wiener",
+    assert bundle.psf.symmetry == "radial"
+    assert [stage.type for stage in bundle.manifest.stages][:5] == [
+        *("linearise", "repair", "white_balance", "demosaic", "wiener"),
     ]
+    assert bundle.network_bytes("restore", "M") == bundle.member("network_m.onnx")
     assert bundle.member("card.md").startswith(b"# tiny")
     assert hashlib.sha256(EXAMPLE.read_bytes()).hexdigest() == EXAMPLE_SHA256
 
