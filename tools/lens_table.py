@@ -36,6 +36,7 @@ from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.report.compact_json import to_compact_json
 from camkit.report.journal import append_journal, read_journal
 from camkit.report.lens.lens_table import (
     draw_lens_table,
@@ -47,6 +48,7 @@ from camkit.units import to_degrees
 
 Entry = dict[str, Any]
 JOURNAL: Final = "journal.jsonl"
+DIGITS: Final = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +106,9 @@ def main() -> int:
         ]
         report["lenses"][name] = entry
         print(row(name, entry), flush=True)
-    (folder / "lens_table.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+    (folder / "lens_table.json").write_text(
+        to_compact_json(report, DIGITS) + "\n", encoding="utf-8"
+    )
     (folder / "lens_table.md").write_text(lens_table(report), encoding="utf-8")
     (folder / "lens_table.png").write_bytes(draw_lens_table(report, folder))
     print(f"{folder / 'lens_table.md'}, .json, .png")

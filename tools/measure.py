@@ -1,4 +1,4 @@
-"""Measure what docs/measurements.md states, and print the tables as Markdown.
+"""Measure what docs/results/measurements.md states, and print the tables as Markdown.
 
 python tools/measure.py speed CAPTURE.dng [--runs 3] [--sizes S,M]
 python tools/measure.py tiling [--bundle duet]

@@ -1,4 +1,4 @@
-"""How far the geometric PSF is from the wave PSF: the table of docs/lens.md.
+"""How far the geometric PSF is from the wave PSF: the table of docs/results/lens.md.
 
     python tools/psf_model_error.py
 

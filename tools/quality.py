@@ -1,11 +1,17 @@
 """Measure how well a bundle restores, beside classical methods, by a fixed protocol.
 
-    python tools/quality.py --tune --bundle duet --data DATA/valid_open --out docs/quality.json
-    python tools/quality.py --bundle duet --data DATA/test --out docs/quality.json --resume
+    python tools/quality.py --tune --bundle duet --data DATA/valid_open
+    python tools/quality.py --bundle duet --data DATA/test --resume
 
+<<<<<<< HEAD
 writes the JSON (every measurement, all means) and the page beside it (docs/quality.md). What was
 measured lies in a journal in the work directory; `--resume` measures only what is missing there
 or what has changed, so rows, captures and sources of PSFs may be measured in several runs.
+=======
+writes the JSON (every measurement, all means) and the page beside it (docs/results/quality.*). What
+was measured lies in a journal in the work directory; `--resume` measures only what is missing there
+or what has changed, so rows, captures and kinds of PSF may be measured in several runs.
+>>>>>>> wt-finetune
 """
 
 import argparse
@@ -28,13 +34,17 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.machine import processor_name
+from camkit.report.compact_json import to_compact_json
 from camkit.report.comparison import DEFAULT_METHODS, Rival, make_rows, protocol_text
 from camkit.report.fabricated_psf import fabricated_psf, lens_text
 from camkit.report.measurement import (
+    CAPTURE_COLUMNS,
     COLUMNS,
+    VALUE_COLUMNS,
     Measurement,
     Row,
     append_measurements,
+    by_capture,
     finished_rows,
     latest,
     measure_all,
@@ -57,6 +67,7 @@ from camkit.runtime.network.engine import available_threads
 
 TUNING_SIDE_PX = 272
 SIZES = ("S", "M", "L")
+DIGITS, CAPTURE_DIGITS = 6, 4
 
 
 def main() -> None:
@@ -85,7 +96,7 @@ def parse_arguments() -> argparse.Namespace:
     add("--methods", default="", help=f"default: {','.join(DEFAULT_METHODS)} and all sizes")
     add("--tuned", type=Path, help="report that holds the tuned parameters; default: --out")
     add("--prescription", type=Path, help="the lens, if the bundle does not hold it")
-    add("--out", type=Path, default=Path("docs/quality.json"))
+    add("--out", type=Path, default=Path("docs/results/quality.json"))
     add("--csv", type=Path, help="also write the measurements as a table")
     add("--work-dir", type=Path, default=Path("runs/quality"), help="journal and traced PSFs")
     add("--jobs", type=int, default=1, help="captures at a time")
@@ -170,7 +181,7 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
 
 def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     """Measure all rows on all captures and write the report."""
-    report = read_report(arguments.out)
+    earlier = read_report(arguments.out)
     source = arguments.tuned or arguments.out
     tuned = read_report(source).get("tuned")
     if tuned is None:
@@ -197,10 +208,10 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     measurements = latest(
         m for m in read_measurements(journal) if (m.method, m.identity) in current
     )
-    commands = report.get("commands", []) if arguments.resume else []
+    commands = earlier.get("commands", []) if arguments.resume else []
     command = f"python {shlex.join(sys.argv)}"
     names = [row.name for row in rows]
-    report |= {
+    report = {
         "commands": [*(c for c in commands if c != command), command],
         "json_name": arguments.out.name,
         "machine": {"cpu": processor_name(), "cores": available_threads()},
@@ -211,8 +222,9 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         "methods": names,
         "seconds_per_megapixel": seconds_per_megapixel(measurements),
         "summary": summarise(measurements, names),
-        "columns": list(COLUMNS),
-        "measurements": [list(astuple(m)) for m in measurements],
+        "identities": {row.name: row.identity for row in rows},
+        "columns": {"capture": CAPTURE_COLUMNS, "method": VALUE_COLUMNS},
+        "captures": by_capture(measurements, names),
     }
     write_report(arguments.out, report)
     arguments.out.with_suffix(".md").write_text(to_markdown(report), encoding="utf-8")
@@ -290,15 +302,15 @@ def read_report(path: Path) -> dict[str, Any]:
 
 
 def write_report(path: Path, report: dict[str, Any]) -> None:
-    """Write the report; a line per measurement keeps it readable and small."""
+    """Write the report; a line per entry and capture keeps it small and its changes few."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    rest = {k: v for k, v in report.items() if k != "measurements"}
-    text = json.dumps(rest, indent=1)
-    if "measurements" in report:
-        lines = ",\n".join(json.dumps(row) for row in report["measurements"])
-        text = f'{text.rstrip().removesuffix("}").rstrip()},\n "measurements": [\n{lines}\n ]\n}}'
+    entries = {k: to_compact_json(v, DIGITS) for k, v in report.items() if k != "captures"}
+    if "captures" in report:
+        lines = ",\n".join(to_compact_json(row, CAPTURE_DIGITS) for row in report["captures"])
+        entries["captures"] = f"[\n{lines}\n]"
+    text = ",\n".join(f"{json.dumps(k)}:{entry}" for k, entry in entries.items())
     part = path.with_suffix(".json.part")
-    part.write_text(text + "\n", encoding="utf-8")
+    part.write_text(f"{{{text}}}\n", encoding="utf-8")
     part.replace(path)
 
 

@@ -162,7 +162,7 @@ def measure(runs: dict[str, Run], rounds: int, rays: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print the rows of the table in docs/tracer.md."""
+    """Print the rows of the table in docs/results/tracer.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rays", type=int, default=98_304)
     parser.add_argument("--rounds", type=int, default=7)

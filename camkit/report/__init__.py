@@ -7,6 +7,7 @@
     measurement      the journal of single measurements, which may be resumed
     comparison       the rows of the comparison
     quality_table    means, gains and the page
+    compact_json     results as they are kept
     bench/           speed against accuracy
     stress/          where methods fail
     lens/            one lens on one page

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from camkit.contracts import FloatArray
 from camkit.report.journal import append_journal, read_journal
@@ -28,6 +28,17 @@ COLUMNS: Final = (
     "megapixels",
     "identity",
 )
+CAPTURE_COLUMNS: Final = (
+    "psf",
+    "set_name",
+    "picture",
+    "position",
+    "height_mm",
+    "iso",
+    "seed",
+    "megapixels",
+)
+VALUE_COLUMNS: Final = ("psnr_db", "ssim", "seconds")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +141,22 @@ def finished_rows(
 def latest(measurements: Iterable[Measurement]) -> list[Measurement]:
     """Keep one measurement of every method and capture, the last: two runs may share a journal."""
     return list({(m.capture, m.method): m for m in measurements}.values())
+
+
+def by_capture(measurements: Iterable[Measurement], methods: Sequence[str]) -> list[list[Any]]:
+    """Give a row a capture: CAPTURE_COLUMNS, then VALUE_COLUMNS of every method, None without."""
+    rows: dict[tuple[object, ...], dict[str, Measurement]] = {}
+    for m in measurements:
+        rows.setdefault(m.capture, {})[m.method] = m
+    table = []
+    for found in rows.values():
+        first = next(iter(found.values()))
+        values = [
+            [getattr(found[name], column) for column in VALUE_COLUMNS] if name in found else None
+            for name in methods
+        ]
+        table.append([*(getattr(first, column) for column in CAPTURE_COLUMNS), *values])
+    return table
 
 
 def measure(

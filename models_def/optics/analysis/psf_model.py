@@ -18,7 +18,7 @@ from camkit.units import UM_PER_MM
 PsfKind = Literal["geometric", "wave"]
 
 WAVE_BELOW: Final = 5.0
-"""RMS blur over Airy radius below which diffraction shows in a PSF; see docs/lens.md."""
+"""RMS blur over Airy radius below which diffraction shows in a PSF; see docs/results/lens.md."""
 _BLUR_SAMPLING: Final = "gauss:6x16"
 
 

@@ -13,6 +13,7 @@ from camkit.report.measurement import (
     Measurement,
     Row,
     append_measurements,
+    by_capture,
     finished_rows,
     identity_of,
     latest,
@@ -99,6 +100,15 @@ def test_of_two_measurements_of_the_same_the_last_counts() -> None:
     first, again = make_measurement(psnr_db=20.0), make_measurement(psnr_db=21.0)
     others = [make_measurement(method="S"), make_measurement(psf="bundle")]
     assert latest([first, *others, again]) == [again, *others]
+
+
+def test_a_capture_is_one_row_with_the_values_of_every_method() -> None:
+    found = [make_measurement(), make_measurement(method="S", psnr_db=24.0)]
+    other = make_measurement(picture="b.png", seed=None, method="S")
+    assert by_capture([*found, other], ("S", "M")) == [
+        ["fresh", "set", "a.png", 0, 0.1, 100.0, 2001, 0.25, [24.0, 0.8, 0.5], [25.0, 0.8, 0.5]],
+        ["fresh", "set", "b.png", 0, 0.1, 100.0, None, 0.25, [25.0, 0.8, 0.5], None],
+    ]
 
 
 def test_only_rows_not_yet_measured_are_open() -> None:
