@@ -153,6 +153,11 @@ class Capture:
         return int(self.samples.shape[0]) if self.cfa is None else COLOURS
 
     @property
+    def plane_shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the samples; a mosaic is one channel."""
+        return 1 if self.cfa is not None else self.channels, self.height, self.width
+
+    @property
     def height(self) -> int:
         """Give the number of rows."""
         return int(self.samples.shape[-2])

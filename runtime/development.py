@@ -19,7 +19,7 @@ from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_sidecar
 from camkit.runtime.output.writer import SUFFIXES, open_writer
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.raw import file_sha256, read_capture
+from camkit.runtime.raw import file_sha256
 
 FileFormat = Literal["exr", "tiff", "png", "dng"]
 Status = Literal["ok", "failed", "skipped"]
@@ -143,7 +143,7 @@ def develop_file(
         Cancelled: If `cancel` said so.
     """
     began = time.perf_counter()
-    capture = read_capture(source, mosaic=mosaic)
+    capture = pipeline.read(source, mosaic)
     decode_s = time.perf_counter() - began
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb

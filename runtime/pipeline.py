@@ -20,11 +20,12 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, UnsupportedError
-from camkit.runtime.array_capture import capture_of_array
+from camkit.kinds import BAYER
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.setup import Setup
+from camkit.runtime.kind import runtime_part
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Cancel, Progress
@@ -32,7 +33,6 @@ from camkit.runtime.options import Options
 from camkit.runtime.plan.decision import NET
 from camkit.runtime.plan.planner import default_size, usual_method
 from camkit.runtime.plan.speed import Speed, measure_speed
-from camkit.runtime.raw import read_capture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +90,8 @@ class Pipeline:
         self.options = options
         self.threads = available_threads(options.threads)
         check_choices(bundle, options)
+        # without a bundle captures are read as colour photographs are
+        self._part = runtime_part(BAYER.name if bundle is None else bundle.manifest.kind)
         self._lock = threading.Lock()
         self._engines: dict[tuple[str, str], NetworkEngine] = {}
         self._speeds: dict[tuple[str, str], float] = {}
@@ -130,6 +132,14 @@ class Pipeline:
                 self._speeds.update(made.network_s_per_mp)
                 self._speed = self._speed or made
             return replace(self._speed, network_s_per_mp=dict(self._speeds))
+
+    def read(self, file: Path, mosaic: MosaicOptions | None = None) -> Capture:
+        """Read a capture of the bundle's kind of camera.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+        """
+        return self._part.read(file, mosaic, None if self.bundle is None else self.bundle.manifest)
 
     def start(
         self,
@@ -226,7 +236,7 @@ class Pipeline:
     ) -> tuple[Reconstruction, float]:
         """Read a capture and plan its reconstruction; also give the seconds of reading."""
         began = time.perf_counter()
-        capture = read_capture(Path(file), mosaic=mosaic)
+        capture = self.read(Path(file), mosaic)
         decode_s = time.perf_counter() - began
         return self.start(capture, progress=progress, cancel=cancel), decode_s
 
@@ -277,13 +287,8 @@ class Pipeline:
         """
         if self.bundle is None:
             raise ContractError("process_array needs a bundle: it says what the numbers mean")
-        return capture_of_array(
-            image,
-            self.bundle.manifest,
-            iso=iso,
-            white_balance=white_balance,
-            origin_px=origin_px,
-        )
+        manifest = self.bundle.manifest
+        return self._part.from_array(image, manifest, iso, white_balance, origin_px)
 
 
 def load(

@@ -41,8 +41,8 @@ def stage_module(name: str) -> ModuleType:
 
 def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
     """Name every stage for people and clocks: its type, and its role or number among twins."""
-    types = [stage.type for stage in stages]
-    keys = []
+    types: list[str] = [stage.type for stage in stages]
+    keys: list[str] = []
     for number, stage in enumerate(stages):
         if types.count(stage.type) == 1:
             keys.append(stage.type)

@@ -3,15 +3,9 @@
     python tools/quality.py --tune --bundle duet --data DATA/valid_open
     python tools/quality.py --bundle duet --data DATA/test --resume
 
-<<<<<<< HEAD
-writes the JSON (every measurement, all means) and the page beside it (docs/quality.md). What was
-measured lies in a journal in the work directory; `--resume` measures only what is missing there
-or what has changed, so rows, captures and sources of PSFs may be measured in several runs.
-=======
 writes the JSON (every measurement, all means) and the page beside it (docs/results/quality.*). What
 was measured lies in a journal in the work directory; `--resume` measures only what is missing there
-or what has changed, so rows, captures and kinds of PSF may be measured in several runs.
->>>>>>> wt-finetune
+or what has changed, so rows, captures and sources of PSFs may be measured in several runs.
 """
 
 import argparse

@@ -20,7 +20,6 @@ from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
 from camkit.runtime.plan.ways import LEFT_OUT, stand_in, ways_of
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.stage_finder import stage_keys, stage_module
-from camkit.runtime.stages.linearise import shape_of
 
 FIXED_BYTES: Final = 260_000_000
 """Interpreter and libraries, and what they keep (measured, see docs/performance.md)."""
@@ -170,7 +169,7 @@ def _capture_stream(job: Job, plane: Plane) -> Stream:
         plane = plane.model_copy(update={"channels": RGB})
     return Stream(
         plane=plane,
-        shape=shape_of(capture),
+        shape=capture.plane_shape,
         gains=(1.0,) * capture.channels,
         source=_Samples(job),
         owned=False,
@@ -186,7 +185,7 @@ class _Samples:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Give (channel, h, w); a mosaic is one channel."""
-        return shape_of(self._capture)
+        return self._capture.plane_shape
 
     def read(self, top: int, bottom: int) -> Rows:
         """Give rows top..bottom."""

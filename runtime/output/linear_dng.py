@@ -24,7 +24,7 @@ class LinearDngWriter(PictureWriter):
         path: Path,
         picture: PictureFormat,
         capture: Capture,
-        white_balance: tuple[float, float, float],
+        white_balance: tuple[float, ...],
     ) -> None:
         """Open the writer.
 

@@ -64,7 +64,7 @@ class LinearRows:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Give (channel, h, w)."""
-        return shape_of(self._job.capture)
+        return self._job.capture.plane_shape
 
     def read(self, top: int, bottom: int) -> Rows:
         """Give rows top..bottom as (channel, rows, w) float32, a new array."""
@@ -99,16 +99,10 @@ class MaskRows:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Give (channel, h, w)."""
-        return shape_of(self._capture)
+        return self._capture.plane_shape
 
     def read(self, top: int, bottom: int) -> Rows:
         """Give rows top..bottom as (channel, rows, w) bool, a new array."""
         mask = self._capture.saturated_rows(top, bottom)
         release_pages(self._capture.samples)
         return mask if mask.ndim == 3 else mask[None]
-
-
-def shape_of(capture: Capture) -> tuple[int, int, int]:
-    """Give (channel, h, w) of a capture; a mosaic is one channel."""
-    channels = 1 if capture.cfa is not None else int(capture.samples.shape[0])
-    return channels, capture.height, capture.width
