@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Entry = dict[str, Any]
 MOST_CONTRAST: Final = 1.05
 _SHOWN: Final = 4
-_STAGES: Final = ("PSF", "captured", "recovered")
+_SHOWN_STATES: Final = ("PSF", "captured", "recovered")
 
 
 def worst_contrast(entries: Sequence[Entry]) -> tuple[float, float, float]:
@@ -132,10 +132,10 @@ def _light(lenses: Mapping[str, Entry]) -> str:
 def _contrast(lenses: Mapping[str, Entry]) -> str:
     rows = []
     for name, entry in lenses.items():
-        for stage, entries in (("captured", [entry]), ("recovered", entry["recovered"])):
+        for state, entries in (("captured", [entry]), ("recovered", entry["recovered"])):
             largest, rise, falls = worst_contrast(entries)
             verdict = "yes" if largest <= MOST_CONTRAST else "no"
-            rows.append([name, stage, f"{largest:.3f}", verdict, f"{rise:.3f}", f"{falls:.0%}"])
+            rows.append([name, state, f"{largest:.3f}", verdict, f"{rise:.3f}", f"{falls:.0%}"])
     bound = f"at most {MOST_CONTRAST}"
     return _table(["lens", "contrast", "largest", bound, "largest rise", "only falls"], rows)
 
@@ -151,7 +151,7 @@ def draw_lens_table(report: Entry, folder: Path) -> bytes:
     deep, names = len(report["depths_mm"]) > 1, _names_of_places(report)
     chosen = sorted({round(i * (len(names) - 1) / (_SHOWN - 1)) for i in range(_SHOWN)})
     places = [(place, 0) if deep else (0, place) for place in chosen]
-    pictures = len(_STAGES) * len(chosen)
+    pictures = len(_SHOWN_STATES) * len(chosen)
     figure = new_figure(3.0 + 1.3 * pictures, 0.4 + 1.6 * len(lenses))
     ratios = [1] * pictures + [2, 2]
     grid = figure.add_gridspec(len(lenses), pictures + 2, width_ratios=ratios)
@@ -162,7 +162,7 @@ def draw_lens_table(report: Entry, folder: Path) -> bytes:
         _plot(panels[-2], entry["contrast"], places)
         _plot(panels[-1], entry["recovered"][0]["contrast"], places)
         if line == 0:
-            titles = [f"{stage} {names[place]}" for stage in _STAGES for place in chosen]
+            titles = [f"{state} {names[place]}" for state in _SHOWN_STATES for place in chosen]
             titles += ["contrast, captured", "contrast, recovered"]
             for panel, title in zip(panels, titles, strict=True):
                 panel.set_title(title, fontsize=7)
@@ -176,7 +176,7 @@ def _show(
 ) -> None:
     kernels = [np.sqrt(kept["kernels"][place]) for place in places]
     shown = [kernel / kernel.max() for kernel in kernels]
-    shown += [kept[s][place].transpose(1, 2, 0) for s in _STAGES[1:] for place in places]
+    shown += [kept[s][place].transpose(1, 2, 0) for s in _SHOWN_STATES[1:] for place in places]
     for panel, picture in zip(panels, shown, strict=True):
         panel.imshow(np.clip(picture, 0, 1), cmap="gray", interpolation="nearest")
         panel.set_xticks([])
