@@ -33,17 +33,17 @@ def patch_errors(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
     return gap.square().sum((1, 2, 3)) / judged.sum((1, 2, 3)).clamp(min=1)
 
 
-def training_loss(kind: str, errors: Tensor) -> Tensor:
+def training_loss(name: str, errors: Tensor) -> Tensor:
     """Give the scalar to minimise from the (b,) errors of the patches.
 
     `log_mse` weighs patches by their relative error, as the mean of PSNR does, down to a floor
     below which a patch counts as good.
 
     Raises:
-        ContractError: If the kind is unknown.
+        ContractError: If the name is unknown.
     """
-    if kind == "mse":
+    if name == "mse":
         return errors.mean()
-    if kind == "log_mse":
+    if name == "log_mse":
         return torch.log(errors + LOG_FLOOR).mean()
-    raise ContractError(f"loss must be log_mse or mse; got {kind!r}")
+    raise ContractError(f"loss must be log_mse or mse; got {name!r}")

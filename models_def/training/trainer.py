@@ -41,9 +41,9 @@ from camkit.models_def.training.recipe import (
 )
 from camkit.models_def.training.schedule import progress_of
 from camkit.models_def.training.validation import (
-    Case,
     Score,
-    make_cases,
+    ValidationCapture,
+    make_validation_captures,
     score,
     score_capture,
     score_wiener,
@@ -134,15 +134,15 @@ class TrainResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stage:
-    """A later stage of training, with its own files, schedule and fitter.
+class Refinement:
+    """A later training of the same network, with its own files, schedule and fitter.
 
     Attributes:
         name: Behind the size in the names of its files.
         schedule: Used instead of the network's.
         make_fitter: From the network's entry, with that schedule, and the kernels.
         first: Weights that the fitter starts from.
-        credit: What the stage adds to the training data, for the card.
+        credit: What it adds to the training data, for the card.
     """
 
     name: str
@@ -152,12 +152,16 @@ class Stage:
     credit: str = ""
 
 
+Stage = Refinement
+"""As `training.final` calls it."""
+
+
 def train(
     recipe_path: Path,
     options: TrainOptions,
     *,
     bank: PsfBank | None = None,
-    stage: Stage | None = None,
+    refinement: Refinement | None = None,
 ) -> TrainResult:
     """Train one network of a recipe.
 
@@ -166,7 +170,7 @@ def train(
         options: Where, how long and with what.
         bank: Kernels to train with; None traces the recipe's lens (about a minute, kept in
             `out_dir`).
-        stage: A later stage; None fits a new network to the recipe's loss.
+        refinement: What is trained instead; None fits a new network to the recipe's loss.
 
     Raises:
         ContractError: If recipe, options or the checkpoint to resume do not fit.
@@ -174,18 +178,18 @@ def train(
     torch.set_num_threads(options.threads)
     recipe = read_recipe(recipe_path)
     entry = recipe.network(options.size)
-    schedule = entry.schedule if stage is None else stage.schedule
+    schedule = entry.schedule if refinement is None else refinement.schedule
     # before anything is traced
     network = build_network(entry.network, **entry.config)
     check_patch(entry.network, network, schedule.patch_px)
-    first = None if stage is None else stage.first
+    first = None if refinement is None else refinement.first
     if options.start is not None:
-        if stage is not None:
-            raise ContractError(f"the {stage.name} stage has its own start; leave start away")
+        if refinement is not None:
+            raise ContractError(f"the {refinement.name} stage has its own start; leave start away")
         first = read_first_weights(options.start, options.size)
     if first is not None:
         take_first_weights(network, first)
-    path = checkpoint_path(recipe, options, stage)
+    path = checkpoint_path(recipe, options, refinement)
     if path.exists() and not (options.resume or options.overwrite):
         raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
     options.out_dir.mkdir(parents=True, exist_ok=True)
@@ -198,15 +202,15 @@ def train(
     pool = open_pool(samples, recipe_path, bank, options.data_folder, seed=seed)
     with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
         pool.start_workers(options.workers)
-        cases = make_cases(recipe, bank, options.valid_folder)
-        run = _Run(recipe_path, lens, bank, cases, options, stage, first)
+        captures = make_validation_captures(recipe, bank, options.valid_folder)
+        run = _Run(recipe_path, lens, bank, captures, options, refinement, first)
         run.loop(pool, bar)
         return run.result()
 
 
-def checkpoint_path(recipe: Recipe, options: TrainOptions, stage: Stage | None) -> Path:
+def checkpoint_path(recipe: Recipe, options: TrainOptions, refinement: Refinement | None) -> Path:
     """Give the file that a run writes its checkpoints to."""
-    name = f"{recipe.name}_{options.size}" + ("" if stage is None else f"_{stage.name}")
+    name = f"{recipe.name}_{options.size}" + ("" if refinement is None else f"_{refinement.name}")
     return options.out_dir / f"{name}.pt"
 
 
@@ -218,34 +222,35 @@ class _Run:
         recipe_path: Path,
         lens: Lens,
         bank: PsfBank,
-        cases: list[Case],
+        captures: list[ValidationCapture],
         options: TrainOptions,
-        stage: Stage | None,
+        refinement: Refinement | None,
         first: FirstWeights | None,
     ) -> None:
-        self.options, self.cases, self.bank_digest = options, cases, bank.digest()
+        self.options, self.valid_captures = options, captures
+        self.bank_digest = bank.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
         self.lens_toml = format_prescription(lens)
         self.recipe: Recipe = read_recipe(recipe_path)
         self.entry = self.recipe.network(options.size)
         data = describe_data(self.recipe, options.data_folder)
         self.data = data + ("" if first is None else first.credit(data))
-        if stage is None:
+        if refinement is None:
             self.fitter: Fits = Fitter(self.entry, options.device, first)
         else:
-            self.data += stage.credit
-            self.entry = replace(self.entry, schedule=stage.schedule)
-            self.fitter = stage.make_fitter(self.entry, bank)
+            self.data += refinement.credit
+            self.entry = replace(self.entry, schedule=refinement.schedule)
+            self.fitter = refinement.make_fitter(self.entry, bank)
         self.steps = options.steps or self.entry.schedule.steps
-        self.path = checkpoint_path(self.recipe, options, stage)
+        self.path = checkpoint_path(self.recipe, options, refinement)
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
         if options.resume:
             self._restore(read_checkpoint(self.path))
         until = self.step if options.resume else None
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
-        self.capture = score_capture(cases, self.recipe)
-        self.wiener = score_wiener(cases, self.recipe)
+        self.capture = score_capture(captures, self.recipe)
+        self.wiener = score_wiener(captures, self.recipe)
         self.start_s, self.start_cpu_s = time.perf_counter(), time.process_time()
 
     def _restore(self, saved: Checkpoint) -> None:
@@ -270,9 +275,9 @@ class _Run:
 
     def loop(self, pool: SamplePool, bar: TrainingBar) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
-        plan, options = self.entry.schedule, self.options
+        schedule, options = self.entry.schedule, self.options
         budget_s = None if options.max_minutes is None else 60 * options.max_minutes
-        pool.draw_batch(self.step, 1, plan.patch_px)
+        pool.draw_batch(self.step, 1, schedule.patch_px)
         self.log.write(
             {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
             | {"capture_db": self.capture.mean_db, "wiener_db": self.wiener.mean_db}
@@ -280,7 +285,7 @@ class _Run:
         saved_s = validated_s = self.elapsed_s()
         losses: list[float] = []
         while not self._is_over(progress := self._progress(budget_s)):
-            batch = pool.draw_batch(self.step, plan.batch, plan.patch_px)
+            batch = pool.draw_batch(self.step, schedule.batch, schedule.patch_px)
             losses.append(self.fitter.fit(batch, self.step, progress))
             self.step += 1
             if self.step % LOG_STEPS == 0:
@@ -309,7 +314,7 @@ class _Run:
         self.log.write({"step": self.step, "loss": loss} | self.fitter.notes() | clock | waited)
 
     def _validate(self, pool: SamplePool) -> None:
-        self.valid = score(self.cases, self.recipe, self.fitter.restore)
+        self.valid = score(self.valid_captures, self.recipe, self.fitter.restore)
         entry: dict[str, Any] = {
             "step": self.step,
             "seconds": self.elapsed_s(),

@@ -10,7 +10,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
-    from camkit.models_def.training.trainer import Stage
+    from camkit.models_def.training.trainer import Refinement
 
 
 def train(
@@ -61,9 +61,9 @@ def train(
     from camkit.models_def.training.trainer import TrainOptions
     from camkit.models_def.training.trainer import train as run
 
-    stage: Stage | None = None
+    refinement: Refinement | None = None
     if final is not None:
-        stage = _final_stage(recipe, final, size, vgg, pairs, device)
+        refinement = _refinement(recipe, final, size, vgg, pairs, device)
     elif vgg is not None or pairs is not None:
         raise ContractError("--vgg and --pairs belong to the final stage; say --final FROM too")
     result = run(
@@ -82,15 +82,15 @@ def train(
             workers=workers,
             device=device,
         ),
-        stage=stage,
+        refinement=refinement,
     )
     plain = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(result).items()}
     print_report(plain, json_)
 
 
-def _final_stage(
+def _refinement(
     recipe: Path, start: Path, size: str, vgg: Path | None, pairs: Path | None, device: str
-) -> "Stage":
+) -> "Refinement":
     from camkit.models_def.training.final.stage import WITHOUT_VGG, FinalOptions, make_stage
     from camkit.models_def.training.recipe import read_recipe
 

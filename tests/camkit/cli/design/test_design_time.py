@@ -55,9 +55,9 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
     seen = []
 
     def fake(
-        recipe: Path, options: trainer.TrainOptions, *, stage: trainer.Stage | None
+        recipe: Path, options: trainer.TrainOptions, *, refinement: trainer.Refinement | None
     ) -> trainer.TrainResult:
-        assert stage is None
+        assert refinement is None
         seen.append((recipe, options))
         return trainer.TrainResult(
             checkpoint=options.out_dir / "x.pt",

@@ -15,7 +15,7 @@ def run(folder, recipe_path, recipe, bank, start, **changes):
     stage = make_stage(
         recipe, FinalOptions(start=start, size=given["size"]), distort=lambda *_: None
     )
-    return train(recipe_path, TrainOptions(**given), bank=bank, stage=stage)
+    return train(recipe_path, TrainOptions(**given), bank=bank, refinement=stage)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_a_stage_takes_no_second_start(
     stage = make_stage(final_recipe, FinalOptions(start=trimmed_checkpoint, size="full"))
     options = TrainOptions(out_dir=tmp_path, size="full", start=trimmed_checkpoint)
     with pytest.raises(ContractError, match="final stage has its own start"):
-        train(final_recipe_path, options, bank=final_bank, stage=stage)
+        train(final_recipe_path, options, bank=final_bank, refinement=stage)
 
 
 def test_log_holds_every_term(whole):
