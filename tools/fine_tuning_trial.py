@@ -22,7 +22,7 @@ from camkit.models_def.training.psf_bank import PsfBank, gaussian_bank
 from camkit.models_def.training.recipe import Recipe, read_recipe
 from camkit.models_def.training.samples import corner_height_mm
 from camkit.models_def.training.trainer import TrainOptions, train
-from camkit.models_def.training.validation import make_cases, to_srgb
+from camkit.models_def.training.validation import make_validation_captures, to_srgb
 
 RECIPE = Path(__file__).resolve().parents[1] / "models_def" / "recipes" / "duet.toml"
 SMALLER = {
@@ -110,10 +110,10 @@ def colour_error(checkpoint: Path, recipe: Recipe, bank: PsfBank) -> float:
     """Give the RMS error of hue and saturation of block means, in 1/255 of sRGB."""
     network = load_network(read_checkpoint(checkpoint))
     errors = []
-    for case in make_cases(recipe, bank, None)[::4]:
+    for capture in make_validation_captures(recipe, bank, None)[::4]:
         with torch.no_grad():
-            restored = to_srgb(network(case.sample.planes[None])[0], case, recipe)
-        gap = restored - case.sharp
+            restored = to_srgb(network(capture.sample.planes[None])[0], capture, recipe)
+        gap = restored - capture.sharp
         side = gap.shape[-1] // BLOCK_PX
         means = gap.reshape(3, side, BLOCK_PX, side, BLOCK_PX).mean((2, 4))
         errors.append(np.square(means - means.mean(0)).mean())

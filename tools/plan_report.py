@@ -118,10 +118,10 @@ def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
             height, width = (side // 2 * 2 for side in picture.shape[1:])
             yield paths[index].name, np.ascontiguousarray(picture[:, :height, :width])
     for index in range(options.procedural):
-        # One kind after the other: in turn, a kind would meet the same place in the field always.
-        kind, generator = list(GENERATORS.items())[index * len(GENERATORS) // options.procedural]
+        # One subject after the other: in turn, one would meet the same place in the field always.
+        subject, generator = list(GENERATORS.items())[index * len(GENERATORS) // options.procedural]
         seed = PROCEDURAL_SEED + index
-        yield f"{kind}:{seed}", generator(seed, 1024, 1024)
+        yield f"{subject}:{seed}", generator(seed, 1024, 1024)
 
 
 def _work(bundle: Bundle) -> tuple[TierWork, str | None]:
@@ -167,9 +167,9 @@ def _report(options: argparse.Namespace) -> int:
     from camkit.report.plan_proof import prove, write_report
 
     bundle = open_bundle(find_bundle(options.bundle))
-    kinds = tuple(kind for kind in options.kinds.split(",") if kind)
+    subjects = tuple(name for name in options.kinds.split(",") if name)
     rows = []
-    scenes = proof_scenes(options.height, options.width, options.data, kinds)
+    scenes = proof_scenes(options.height, options.width, options.data, subjects)
     if options.limit:
         scenes = itertools.islice(scenes, options.limit)
     for row in prove(bundle, scenes, quality=options.quality, runs=options.runs):

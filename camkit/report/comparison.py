@@ -150,8 +150,8 @@ def _network_parts(bundle: Bundle, size: str) -> tuple[object, ...]:
     )
 
 
-def _stage_json(bundle: Bundle, kind: type[Wiener] | type[Network]) -> str | None:
-    stage = bundle.manifest.stage(kind)
+def _stage_json(bundle: Bundle, wanted: type[Wiener] | type[Network]) -> str | None:
+    stage = bundle.manifest.stage(wanted)
     return None if stage is None else stage.model_dump_json()
 
 

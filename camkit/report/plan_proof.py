@@ -32,7 +32,7 @@ class ProofRow:
     """One capture.
 
     Attributes:
-        kind: Of the scene.
+        kind: Subject of the scene; the name is that of plan.json.
         name: Of the scene.
         iso: Sensitivity.
         loss_db: PSNR of exact minus PSNR of the quality, on sRGB values in sensor geometry.
@@ -113,7 +113,7 @@ def _row(
     works = [_counted_seconds(bundle, run.work, speed) for run in (first, second)]
     choices = {d["what"]: d["choice"] for d in second.work.plan["decisions"]}
     return ProofRow(
-        kind=scene.kind,
+        kind=scene.subject,
         name=scene.name,
         iso=simulation.iso,
         loss_db=10 * np.log10(errors[1] / errors[0]),
@@ -145,12 +145,12 @@ def _counted_seconds(bundle: Bundle, work: Reconstruction, speed: Speed) -> floa
 
 
 def summarise(rows: Sequence[ProofRow]) -> dict[str, dict[str, float]]:
-    """Give per kind and for all: captures, mean and worst loss, mean savings."""
-    kinds = list(dict.fromkeys(row.kind for row in rows))
-    groups = {kind: [row for row in rows if row.kind == kind] for kind in kinds}
+    """Give per subject and for all: captures, mean and worst loss, mean savings."""
+    subjects = list(dict.fromkeys(row.kind for row in rows))
+    groups = {name: [row for row in rows if row.kind == name] for name in subjects}
     groups["all"] = list(rows)
     return {
-        kind: {
+        name: {
             "captures": len(group),
             "mean_loss_db": float(np.mean([r.loss_db for r in group])),
             "worst_loss_db": float(max(r.loss_db for r in group)),
@@ -158,7 +158,7 @@ def summarise(rows: Sequence[ProofRow]) -> dict[str, dict[str, float]]:
             "saved_seconds": float(np.mean([r.saved_seconds for r in group])),
             "saved_cpu": float(np.mean([r.saved_cpu for r in group])),
         }
-        for kind, group in groups.items()
+        for name, group in groups.items()
     }
 
 
@@ -179,9 +179,9 @@ def write_report(rows: Sequence[ProofRow], bundle: Bundle, folder: Path) -> list
         "| kind | captures | mean loss | worst loss | network + FFT saved | by the clock |",
         "|---|---|---|---|---|---|",
     ]
-    for kind, means in summary.items():
+    for name, means in summary.items():
         lines.append(
-            f"| {kind} | {means['captures']:.0f} | {means['mean_loss_db']:.3f} dB | "
+            f"| {name} | {means['captures']:.0f} | {means['mean_loss_db']:.3f} dB | "
             f"{means['worst_loss_db']:.3f} dB | {means['saved_work']:.0%} | "
             f"{means['saved_seconds']:.0%} |"
         )
@@ -189,14 +189,14 @@ def write_report(rows: Sequence[ProofRow], bundle: Bundle, folder: Path) -> list
 
 
 def _chart(rows: Sequence[ProofRow], folder: Path) -> None:
-    """Draw saving against loss, a colour per kind, with the limits of the loss."""
+    """Draw saving against loss, a colour per subject, with the limits of the loss."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7, 4.5), layout="constrained")
     axes = figure.subplots()
-    for kind in dict.fromkeys(row.kind for row in rows):
-        group = [row for row in rows if row.kind == kind]
-        axes.scatter([r.loss_db for r in group], [100 * r.saved_work for r in group], label=kind)
+    for subject in dict.fromkeys(row.kind for row in rows):
+        group = [row for row in rows if row.kind == subject]
+        axes.scatter([r.loss_db for r in group], [100 * r.saved_work for r in group], label=subject)
     axes.axvline(0.1, color="0.6", linestyle="--", linewidth=1, label="0.1 dB: limit of the mean")
     axes.axvline(0.3, color="0.3", linestyle=":", linewidth=1, label="0.3 dB: limit of each")
     axes.axhline(40, color="0.8", linewidth=1)

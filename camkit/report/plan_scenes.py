@@ -19,7 +19,7 @@ from camkit.report.quality import read_picture
 from camkit.scenes import procedural_scene
 
 SEED: Final = 9_000_000
-PER_KIND: Final = 5
+PER_SUBJECT: Final = 5
 WORDS: Final = (
     "lens",
     "aperture",
@@ -38,7 +38,7 @@ PICTURES: Final = {
     "sky": ("valid_open/coast_07_", "valid_open/city_09_", "valid_open/landscape_03_"),
     "text": ("valid_open/text_09_",),
 }
-"""Kind -> pictures below the data folder; a name that ends with "_" is a beginning."""
+"""Subject -> pictures below the data folder; a name that ends with "_" is a beginning."""
 
 PAPER: Final = 200
 INK: Final = 10
@@ -52,52 +52,52 @@ class ProofScene:
     """One scene of the proof.
 
     Attributes:
-        kind: night, bokeh, texture, sky or text.
+        subject: night, bokeh, texture, sky or text.
         name: Generator and seed, or the file.
         make: Gives (3, h, w) linear Rec.709 with even sides.
     """
 
-    kind: str
+    subject: str
     name: str
     make: Callable[[], FloatArray]
 
 
 def proof_scenes(
-    height: int, width: int, data: Path | None = None, kinds: tuple[str, ...] = ()
+    height: int, width: int, data: Path | None = None, subjects: tuple[str, ...] = ()
 ) -> Iterator[ProofScene]:
-    """Give the scenes, kind by kind.
+    """Give the scenes, subject by subject.
 
     Args:
         height: Rows of the procedural ones.
         width: Their columns.
         data: Folder with the pictures; None for procedural scenes only.
-        kinds: Only these; all when empty.
+        subjects: Only these; all when empty.
 
     Raises:
         ContractError: If a picture is not there.
     """
-    for number, (kind, generator) in enumerate(GENERATORS.items()):
-        if kinds and kind not in kinds:
+    for number, (subject, generator) in enumerate(GENERATORS.items()):
+        if subjects and subject not in subjects:
             continue
-        for index in range(PER_KIND):
+        for index in range(PER_SUBJECT):
             seed = SEED + 100 * number + index
             yield ProofScene(
-                kind=kind,
-                name=f"{kind}:{seed}",
+                subject=subject,
+                name=f"{subject}:{seed}",
                 make=partial(generator, seed, height, width),
             )
-        for path in _pictures(kind, data):
+        for path in _pictures(subject, data):
             yield ProofScene(
-                kind=kind,
+                subject=subject,
                 name=path.name,
                 make=partial(_even_picture, path, max(height, width)),
             )
 
 
-def _pictures(kind: str, data: Path | None) -> list[Path]:
+def _pictures(subject: str, data: Path | None) -> list[Path]:
     if data is None:
         return []
-    return [_picture(data / name) for name in PICTURES[kind]]
+    return [_picture(data / name) for name in PICTURES[subject]]
 
 
 def _picture(start: Path) -> Path:

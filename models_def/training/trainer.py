@@ -41,9 +41,9 @@ from camkit.models_def.training.recipe import (
 )
 from camkit.models_def.training.schedule import progress_of
 from camkit.models_def.training.validation import (
-    Case,
     Score,
-    make_cases,
+    ValidationCapture,
+    make_validation_captures,
     score,
     score_capture,
     score_wiener,
@@ -152,6 +152,10 @@ class Refinement:
     credit: str = ""
 
 
+Stage = Refinement
+"""As `training.final` calls it."""
+
+
 def train(
     recipe_path: Path,
     options: TrainOptions,
@@ -198,8 +202,8 @@ def train(
     pool = open_pool(samples, recipe_path, bank, options.data_folder, seed=seed)
     with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
         pool.start_workers(options.workers)
-        cases = make_cases(recipe, bank, options.valid_folder)
-        run = _Run(recipe_path, lens, bank, cases, options, refinement, first)
+        captures = make_validation_captures(recipe, bank, options.valid_folder)
+        run = _Run(recipe_path, lens, bank, captures, options, refinement, first)
         run.loop(pool, bar)
         return run.result()
 
@@ -218,12 +222,13 @@ class _Run:
         recipe_path: Path,
         lens: Lens,
         bank: PsfBank,
-        cases: list[Case],
+        captures: list[ValidationCapture],
         options: TrainOptions,
         refinement: Refinement | None,
         first: FirstWeights | None,
     ) -> None:
-        self.options, self.cases, self.bank_digest = options, cases, bank.digest()
+        self.options, self.valid_captures = options, captures
+        self.bank_digest = bank.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
         self.lens_toml = format_prescription(lens)
         self.recipe: Recipe = read_recipe(recipe_path)
@@ -244,8 +249,8 @@ class _Run:
             self._restore(read_checkpoint(self.path))
         until = self.step if options.resume else None
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
-        self.capture = score_capture(cases, self.recipe)
-        self.wiener = score_wiener(cases, self.recipe)
+        self.capture = score_capture(captures, self.recipe)
+        self.wiener = score_wiener(captures, self.recipe)
         self.start_s, self.start_cpu_s = time.perf_counter(), time.process_time()
 
     def _restore(self, saved: Checkpoint) -> None:
@@ -270,9 +275,9 @@ class _Run:
 
     def loop(self, pool: SamplePool, bar: TrainingBar) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
-        plan, options = self.entry.schedule, self.options
+        schedule, options = self.entry.schedule, self.options
         budget_s = None if options.max_minutes is None else 60 * options.max_minutes
-        pool.draw_batch(self.step, 1, plan.patch_px)
+        pool.draw_batch(self.step, 1, schedule.patch_px)
         self.log.write(
             {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
             | {"capture_db": self.capture.mean_db, "wiener_db": self.wiener.mean_db}
@@ -280,7 +285,7 @@ class _Run:
         saved_s = validated_s = self.elapsed_s()
         losses: list[float] = []
         while not self._is_over(progress := self._progress(budget_s)):
-            batch = pool.draw_batch(self.step, plan.batch, plan.patch_px)
+            batch = pool.draw_batch(self.step, schedule.batch, schedule.patch_px)
             losses.append(self.fitter.fit(batch, self.step, progress))
             self.step += 1
             if self.step % LOG_STEPS == 0:
@@ -309,7 +314,7 @@ class _Run:
         self.log.write({"step": self.step, "loss": loss} | self.fitter.notes() | clock | waited)
 
     def _validate(self, pool: SamplePool) -> None:
-        self.valid = score(self.cases, self.recipe, self.fitter.restore)
+        self.valid = score(self.valid_captures, self.recipe, self.fitter.restore)
         entry: dict[str, Any] = {
             "step": self.step,
             "seconds": self.elapsed_s(),

@@ -36,7 +36,7 @@ Restorer = Callable[[Tensor], Tensor]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
+class ValidationCapture:
     """One capture: its sample, the (3, s, s) sharp sRGB picture, and where it was taken."""
 
     sample: Sample
@@ -50,7 +50,7 @@ class Score:
     """Mean PSNR in dB on sRGB values.
 
     Attributes:
-        mean_db: Over all cases.
+        mean_db: Over all captures.
         by_iso: ISO -> dB.
         by_field: Field height as a share of the corner's -> dB.
     """
@@ -60,14 +60,16 @@ class Score:
     by_field: dict[float, float]
 
 
-def make_cases(recipe: Recipe, bank: PsfBank, pictures: Path | None) -> list[Case]:
+def make_validation_captures(
+    recipe: Recipe, bank: PsfBank, pictures: Path | None
+) -> list[ValidationCapture]:
     """Photograph the middle of each picture at five field heights, two ISOs, the depths in turn.
 
     The lens is the copy that is not trained on; each Wiener block lies off its place as a block
     of the bank does. Without a folder, procedural scenes are photographed.
     """
     side = scene_side_px(recipe, bank)
-    cases = []
+    captures = []
     for number, crop in enumerate(_crops(pictures, side)):
         for spot, share in enumerate(FIELD_SHARES):
             for iso in ISOS:
@@ -76,8 +78,10 @@ def make_cases(recipe: Recipe, bank: PsfBank, pictures: Path | None) -> list[Cas
                 sample = make_sample(crop, exposure, recipe, bank, rng)
                 inner = (side - recipe.data.sample_px) // 2
                 sharp = encode_srgb(crop[:, inner : side - inner, inner : side - inner])
-                cases.append(Case(sample=sample, sharp=sharp, field_share=share, iso=iso))
-    return cases
+                captures.append(
+                    ValidationCapture(sample=sample, sharp=sharp, field_share=share, iso=iso)
+                )
+    return captures
 
 
 def _crops(pictures: Path | None, side: int) -> list[FloatArray]:
@@ -111,44 +115,46 @@ def _exposure(recipe: Recipe, bank: PsfBank, share: float, iso: float, turn: int
     )
 
 
-def score(cases: Sequence[Case], recipe: Recipe, restore: Restorer) -> Score:
+def score(captures: Sequence[ValidationCapture], recipe: Recipe, restore: Restorer) -> Score:
     """Judge a restoration.
 
     Args:
-        cases: From `make_cases`.
+        captures: From `make_validation_captures`.
         recipe: Camera and scale.
         restore: (1, 6, s, s) stabilised planes -> (1, 3, s, s) stabilised.
     """
     with torch.no_grad():
-        values = [_psnr(case, recipe, restore(case.sample.planes[None])[0]) for case in cases]
-    by_iso = {iso: _mean(values, [c.iso == iso for c in cases]) for iso in ISOS}
-    by_field = {f: _mean(values, [c.field_share == f for c in cases]) for f in FIELD_SHARES}
+        values = [
+            _psnr(capture, recipe, restore(capture.sample.planes[None])[0]) for capture in captures
+        ]
+    by_iso = {iso: _mean(values, [c.iso == iso for c in captures]) for iso in ISOS}
+    by_field = {f: _mean(values, [c.field_share == f for c in captures]) for f in FIELD_SHARES}
     return Score(mean_db=float(np.mean(values)), by_iso=by_iso, by_field=by_field)
 
 
-def score_capture(cases: Sequence[Case], recipe: Recipe) -> Score:
+def score_capture(captures: Sequence[ValidationCapture], recipe: Recipe) -> Score:
     """Judge the capture as it is."""
-    return score(cases, recipe, lambda planes: planes[:, :3])
+    return score(captures, recipe, lambda planes: planes[:, :3])
 
 
-def score_wiener(cases: Sequence[Case], recipe: Recipe) -> Score:
+def score_wiener(captures: Sequence[ValidationCapture], recipe: Recipe) -> Score:
     """Judge the Wiener bank alone."""
-    return score(cases, recipe, lambda planes: planes[:, 3:])
+    return score(captures, recipe, lambda planes: planes[:, 3:])
 
 
-def to_srgb(stable: Tensor, case: Case, recipe: Recipe) -> FloatArray:
+def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: Recipe) -> FloatArray:
     """Take stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
-    noise = case.sample.noise
+    noise = capture.sample.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
     matrix, _ = camera_from_rec709(np.array(recipe.camera.color_matrix))
-    even: FloatArray = (linear / case.sample.illumination).numpy()
+    even: FloatArray = (linear / capture.sample.illumination).numpy()
     to_rec709 = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     return encode_srgb(apply_matrix(to_rec709, even))
 
 
-def _psnr(case: Case, recipe: Recipe, stable: Tensor) -> float:
-    gap = to_srgb(stable, case, recipe) - case.sharp
+def _psnr(capture: ValidationCapture, recipe: Recipe, stable: Tensor) -> float:
+    gap = to_srgb(stable, capture, recipe) - capture.sharp
     return float(-10 * np.log10(np.mean(np.square(gap, dtype=np.float64)) + 1e-12))
 
 

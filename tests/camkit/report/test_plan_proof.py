@@ -48,7 +48,7 @@ def _half() -> FloatArray:
 
 
 def _scene(make: Callable[[], FloatArray]) -> ProofScene:
-    return ProofScene(kind="kind", name=make.__name__, make=partial(make))
+    return ProofScene(subject="subject", name=make.__name__, make=partial(make))
 
 
 def test_a_flat_half_is_saved_and_texture_everywhere_keeps_every_bit_of_exact(
@@ -67,7 +67,7 @@ def test_a_flat_half_is_saved_and_texture_everywhere_keeps_every_bit_of_exact(
     assert f"saves {half.saved_work:.1%} of network and FFT" in half.line()
 
 
-def test_a_summary_has_means_and_the_worst_of_every_kind_and_of_all() -> None:
+def test_a_summary_has_means_and_the_worst_of_every_subject_and_of_all() -> None:
     summary = summarise(ROWS)
     assert list(summary) == ["sky", "text", "all"]
     assert summary["sky"]["captures"] == 2

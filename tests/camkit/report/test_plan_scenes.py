@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from camkit.errors import ContractError
-from camkit.report.plan_scenes import GENERATORS, PER_KIND, SEED, proof_scenes
+from camkit.report.plan_scenes import GENERATORS, PER_SUBJECT, SEED, proof_scenes
 
 
 @pytest.mark.parametrize("kind", list(GENERATORS))
@@ -35,9 +35,11 @@ def test_every_kind_has_its_scenes_and_pictures_are_cut_to_even_sides(tmp_path: 
         path = tmp_path / "valid_open" / f"{name}.png"
         cv2.imwrite(str(path), np.full((41, 61, 3), 90, np.uint8))
     scenes = list(proof_scenes(64, 64, tmp_path, ("sky",)))
-    assert len(scenes) == PER_KIND + 3
+    assert len(scenes) == PER_SUBJECT + 3
     assert scenes[-1].make().shape == (3, 40, 60)
-    assert Counter(s.kind for s in proof_scenes(64, 64)) == dict.fromkeys(GENERATORS, PER_KIND)
+    assert Counter(s.subject for s in proof_scenes(64, 64)) == dict.fromkeys(
+        GENERATORS, PER_SUBJECT
+    )
 
 
 def test_a_folder_without_the_pictures_is_refused(tmp_path: Path) -> None:

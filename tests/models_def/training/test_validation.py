@@ -9,7 +9,7 @@ from camkit.models_def.training.samples import corner_height_mm
 from camkit.models_def.training.validation import (
     FIELD_SHARES,
     ISOS,
-    make_cases,
+    make_validation_captures,
     score,
     score_capture,
     score_wiener,
@@ -18,37 +18,37 @@ from camkit.models_def.training.validation import (
 
 
 @pytest.fixture(scope="module")
-def cases(recipe, bank):
-    return make_cases(recipe, bank, None)
+def captures(recipe, bank):
+    return make_validation_captures(recipe, bank, None)
 
 
-def test_each_scene_is_taken_at_each_field_and_iso_by_the_unseen_copy(cases):
-    places = {(c.field_share, c.iso) for c in cases}
+def test_each_scene_is_taken_at_each_field_and_iso_by_the_unseen_copy(captures):
+    places = {(c.field_share, c.iso) for c in captures}
     assert places == {(f, i) for f in FIELD_SHARES for i in ISOS}
 
 
-def test_the_target_itself_scores_far_above_everything(cases, recipe):
-    whole = [c for c in cases if bool((c.sample.target >= 0).all())]
+def test_the_target_itself_scores_far_above_everything(captures, recipe):
+    whole = [c for c in captures if bool((c.sample.target >= 0).all())]
     targets = {id(c.sample.planes): c.sample.target for c in whole}
-    case = whole[0]
-    values = to_srgb(targets[id(case.sample.planes)], case, recipe)
-    assert np.abs(values - case.sharp).max() < 2e-3
+    capture = whole[0]
+    values = to_srgb(targets[id(capture.sample.planes)], capture, recipe)
+    assert np.abs(values - capture.sharp).max() < 2e-3
 
 
-def test_wiener_scores_above_the_capture(cases, recipe):
-    assert score_wiener(cases, recipe).mean_db > score_capture(cases, recipe).mean_db
+def test_wiener_scores_above_the_capture(captures, recipe):
+    assert score_wiener(captures, recipe).mean_db > score_capture(captures, recipe).mean_db
 
 
-def test_score_means_agree_and_low_iso_is_easier(cases, recipe):
-    result = score_wiener(cases, recipe)
+def test_score_means_agree_and_low_iso_is_easier(captures, recipe):
+    result = score_wiener(captures, recipe)
     assert np.mean(list(result.by_iso.values())) == pytest.approx(result.mean_db)
     assert np.mean(list(result.by_field.values())) == pytest.approx(result.mean_db)
     assert result.by_iso[100.0] > result.by_iso[1600.0]
 
 
-def test_black_scores_far_below(cases, recipe):
-    black = score(cases, recipe, lambda planes: torch.zeros_like(planes[:, :3]))
-    assert black.mean_db < score_capture(cases, recipe).mean_db - 3
+def test_black_scores_far_below(captures, recipe):
+    black = score(captures, recipe, lambda planes: torch.zeros_like(planes[:, :3]))
+    assert black.mean_db < score_capture(captures, recipe).mean_db - 3
 
 
 def test_validation_goes_through_all_depths_of_the_unseen_copy_at_every_field(
@@ -64,7 +64,7 @@ def test_validation_goes_through_all_depths_of_the_unseen_copy_at_every_field(
     for depths in (1, 2, 5):
         taken.clear()
         deep = replace(bank, copies=np.repeat(bank.copies, depths, axis=0), depths=depths)
-        make_cases(recipe, deep, None)
+        make_validation_captures(recipe, deep, None)
         unseen = set(range(deep.training_copies, len(deep.copies)))
         for iso in ISOS:
             for share in FIELD_SHARES:

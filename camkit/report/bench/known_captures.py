@@ -38,7 +38,7 @@ LEAST_PX: Final = 96
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
+class KnownCapture:
     """A capture and what a perfect camera would have made of it.
 
     Attributes:
@@ -64,12 +64,12 @@ class Sample:
     sharp: FloatArray
 
 
-def golden_samples(bundle: Bundle) -> list[Sample]:
+def golden_captures(bundle: Bundle) -> list[KnownCapture]:
     """Give the golden cases of a bundle that are large enough to be judged."""
     cases = bundle.manifest.golden
     arrays = golden_from_bytes(bundle.member(GOLDEN)) if cases else {}
     return [
-        Sample(
+        KnownCapture(
             picture=case.name,
             caption=f"golden case {case.name}, ISO {case.iso:g}",
             psf="bundle",
@@ -85,9 +85,9 @@ def golden_samples(bundle: Bundle) -> list[Sample]:
     ]
 
 
-def picture_samples(
+def picture_captures(
     bundle: Bundle, folder: Path, count: int | None, cache_folder: Path
-) -> Iterator[Sample]:
+) -> Iterator[KnownCapture]:
     """Photograph the first pictures of a folder at every place and sensitivity.
 
     Args:
@@ -136,11 +136,11 @@ def psf_source(bundle: Bundle) -> PsfSource:
 
 def _photograph(
     shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf, share: float
-) -> Sample:
+) -> KnownCapture:
     exposed = expose(shot, scene, bundle, lens)
     simulation = exposed.simulation
     x, y = (int(v) for v in simulation.window.origin_px)
-    return Sample(
+    return KnownCapture(
         picture=shot.picture.name,
         caption=f"{shot.picture.stem}, {share:.0%} of the way to the corner, ISO {shot.iso:g}",
         psf=shot.psf,
