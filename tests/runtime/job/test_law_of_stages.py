@@ -151,7 +151,9 @@ def _bundle(stages: tuple[Stage, ...], folder: Path) -> Bundle:
     return open_bundle(path)
 
 
-def _slowly(stages: tuple[Stage, ...], bundle: Bundle, capture: Capture) -> FloatArray:
+def _slowly(  # noqa: C901 - one arm for each stage
+    stages: tuple[Stage, ...], bundle: Bundle, capture: Capture
+) -> FloatArray:
     """Apply the stages to whole pictures, one after the other, in plain sight."""
     sensor, psf = bundle.manifest.sensor, bundle.psf
     assert sensor.type == "bayer"
