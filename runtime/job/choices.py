@@ -13,7 +13,8 @@ from camkit.errors import ContractError
 from camkit.runtime.job.setup import DEVELOPMENT
 from camkit.runtime.options import Options, flag_of
 from camkit.runtime.plan.decision import DEVELOP
-from camkit.runtime.stage_finder import methods_of, stage_module
+from camkit.runtime.plan.ways import offered_methods
+from camkit.runtime.stage_finder import stage_module
 
 GENERAL: Final = frozenset({"assume", "max_mem_bytes", "threads", "method"})
 
@@ -35,7 +36,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
             f"{', '.join(map(flag_of, foreign))} means nothing {where}: no stage of it knows of "
             "that; leave it out"
         )
-    methods = (*methods_of(stages), DEVELOP)
+    methods = (DEVELOP,) if bundle is None else offered_methods(stages, bundle.manifest.all_planes)
     if options.method is not None and options.method not in methods:
         raise ContractError(
             f"method must be one of {', '.join(methods)} {where}; got {options.method!r}"
