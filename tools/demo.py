@@ -1,6 +1,6 @@
 """The main job, end to end: photograph a scene with `duet`, process the DNG, show what it gained.
 
-    python tools/demo.py --out-dir out
+    python -m tools.demo --out-dir out
 
 leaves demo.dng, demo.exr, demo.png, their sidecars, and before_after.png.
 """

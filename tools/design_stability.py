@@ -39,7 +39,6 @@ from camkit.models_def.design.front import Front
 from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.optics import LensModule
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design, recipe_digest
-from camkit.models_def.design.score import score_design
 from camkit.models_def.design.starts import Starts, disturbed
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
@@ -49,7 +48,8 @@ from camkit.models_def.optics.search.problem import Problem, limits_of, trace_ba
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.report.journal import append_journal, read_journal
-from camkit.report.lens.stability_chart import Rules, Trial, best_trials, to_text, write_stability
+from tools.design.score import score_design
+from tools.design.stability_chart import Rules, Trial, best_trials, to_text, write_stability
 
 LEVELS: Final = (0.05, 0.1, 0.2, 0.5)
 FOCUS_MM: Final = 2.0

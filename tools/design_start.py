@@ -13,8 +13,8 @@ from pathlib import Path
 import torch
 
 from camkit.models_def.optics.prescription import write_prescription
-from camkit.models_def.optics.search.design import design
-from camkit.models_def.optics.search.recipe import read_recipe
+from tools.start.recipe import read_recipe
+from tools.start.search import design
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[1] / "models_def" / "prescriptions"
 

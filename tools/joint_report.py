@@ -1,6 +1,6 @@
 """Is a joint design better than the best lens that spots alone can find?
 
-    python tools/joint_report.py models_def/recipes/duet_joint_lens.toml --data PICTURES \
+    python -m tools.joint_report models_def/recipes/duet_joint_lens.toml --data PICTURES \
         --fresh OTHERS --out-dir out/joint
 
 Same start, same variables, same bounds. The lenses on spots, one a merit, are the best of descents
@@ -34,7 +34,6 @@ from camkit.models_def.design.recipe import (
     read_design,
     recipe_digest,
 )
-from camkit.models_def.design.score import at_lens, score_design
 from camkit.models_def.design.starts import Starts, traced_lenses
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.prescription import Surface
@@ -44,6 +43,7 @@ from camkit.models_def.optics.search.least_squares import descend, evaluations
 from camkit.models_def.optics.search.merit import MERITS, Merit
 from camkit.models_def.optics.search.problem import Problem, residuals
 from camkit.models_def.training.pictures import SceneSource, open_source
+from tools.design.score import at_lens, score_design
 
 Entry = dict[str, Any]
 

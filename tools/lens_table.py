@@ -1,6 +1,6 @@
 """Which lens gives the best picture after recovery? Table 6.1 and figures 6.5, 6.7, 6.8 re-done.
 
-    python tools/lens_table.py RECIPE --lens al2550-a aca254-050-a cooke-triplet ours=lens.toml \
+    python -m tools.lens_table RECIPE --lens al2550-a aca254-050-a cooke-triplet ours=lens.toml \
         --data PICTURES --fresh OTHERS --steps 2000 --out-dir out/lens-table
 
 Every lens is set to F/4 and focused at 1 m. The recipe states the strip of the sensor (fields),
@@ -24,12 +24,9 @@ import torch
 from torch import nn
 
 from camkit.models_def.design.assembly import field_slopes, network_of, recorder_of
-from camkit.models_def.design.edge import ACROSS
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design
-from camkit.models_def.design.rest import Seen, at_rest, at_work, window_of
-from camkit.models_def.design.score import Captures, edge_contrasts, score_parts
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem
@@ -37,13 +34,16 @@ from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.report.journal import append_journal, read_journal
-from camkit.report.lens.lens_table import (
+from camkit.units import to_degrees
+from tools.design.edge import ACROSS
+from tools.design.rest import Seen, at_rest, at_work, window_of
+from tools.design.score import Captures, edge_contrasts, score_parts
+from tools.design.table import (
     draw_lens_table,
     lens_table,
     mean_and_spread,
     worst_contrast,
 )
-from camkit.units import to_degrees
 
 Entry = dict[str, Any]
 JOURNAL: Final = "journal.jsonl"

@@ -1,8 +1,8 @@
 """Measure what docs/measurements.md states, and print the tables as Markdown.
 
-python tools/measure.py speed CAPTURE.dng [--runs 3] [--sizes S,M]
-python tools/measure.py tiling [--bundle duet]
-python tools/measure.py raws FOLDER --out-dir out/raws
+python -m tools.measure speed CAPTURE.dng [--runs 3] [--sizes S,M]
+python -m tools.measure tiling [--bundle duet]
+python -m tools.measure raws FOLDER --out-dir out/raws
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """How far the geometric PSF is from the wave PSF: the table of docs/lens.md.
 
-    python tools/psf_model_error.py
+    python -m tools.psf_model_error
 
 The Cooke triplet, closed down and defocused, on two pixel pitches; about 30 CPU seconds.
 """

@@ -1,10 +1,10 @@
 """Profile `camkit process`: where the time, the threads and the memory of one photograph go.
 
-python tools/stage_profile.py stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
-python tools/stage_profile.py layers [--bundle duet] [--size M] [--threads 2]
-python tools/stage_profile.py jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
-python tools/stage_profile.py sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
-python tools/stage_profile.py exr PICTURE.exr
+python -m tools.stage_profile stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
+python -m tools.stage_profile layers [--bundle duet] [--size M] [--threads 2]
+python -m tools.stage_profile jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
+python -m tools.stage_profile sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
+python -m tools.stage_profile exr PICTURE.exr
 """
 
 import argparse
