@@ -11,7 +11,6 @@ A file here is a command; a folder holds what commands are made of.
     design_check        a design against pictures rendered by rays
     joint_report        a joint design against lenses found on spots alone
     lens_table          lenses compared after recovery
-    final_trial         the final stage of training, small
     render_chart        pictures by rays and by maps of PSFs compared
     psf_model_error     rays against waves
     trace_speed         speed of the tracer

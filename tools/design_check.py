@@ -72,6 +72,7 @@ class Spot:
 
 
 def main() -> None:
+    """Print a row for every place, and the means."""
     arguments = parse()
     torch.set_num_threads(1)
     rows = []
@@ -85,6 +86,7 @@ def main() -> None:
 
 
 def parse(given: list[str] | None = None) -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("lens", help="a lens within the bounds of the recipe: its name or file")
@@ -304,6 +306,7 @@ def psnr_db(one: Tensor, other: Tensor) -> float:
 
 
 def mean(rows: list[dict[str, float]], key: str) -> float:
+    """Give the mean of a column."""
     return sum(row[key] for row in rows) / len(rows)
 
 

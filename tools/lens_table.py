@@ -70,6 +70,7 @@ class Plan:
 
 
 def main() -> int:
+    """Measure every lens and write table and picture."""
     arguments = parse()
     torch.set_num_threads(arguments.threads)
     plan = plan_of(arguments)
@@ -112,6 +113,7 @@ def main() -> int:
 
 
 def parse() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("--lens", nargs="+", required=True, help="names, files or NAME=FILE")
@@ -156,6 +158,7 @@ def named(lenses: list[str]) -> dict[str, str]:
 
 
 def plan_of(arguments: argparse.Namespace) -> Plan:
+    """Give what is the same for all lenses."""
     recipe = read_design(arguments.recipe)
     schedule = recipe.schedule
     steps = arguments.steps or schedule.steps
@@ -175,12 +178,10 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
     if arguments.network:
         network = NetworkChoice(name=arguments.network, config={"in_channels": front.channels})
     loss = recipe.loss if recipe.loss.needs_network else DesignLoss(kind="l1")
-    depths = (arguments.object_mm,)
-    if arguments.depths_mm:
-        depths = tuple(float(word) for word in arguments.depths_mm.split(","))
+    asked = arguments.depths_mm or str(arguments.object_mm)
     return Plan(
         recipe=replace(recipe, schedule=schedule, front=front, network=network, loss=loss),
-        depths_mm=depths,
+        depths_mm=tuple(float(word) for word in asked.split(",")),
         f_number=arguments.f_number,
         object_mm=arguments.object_mm,
         focus=arguments.focus,
@@ -253,6 +254,7 @@ def parts(
 
 
 def fresh_source(plan: Plan) -> SceneSource:
+    """Open the pictures that lenses are judged on."""
     share = 0.0 if plan.fresh is None else 1.0
     return open_source(plan.fresh, picture_share=share, scenes=4, scene_px=512)
 
@@ -308,11 +310,13 @@ def after(lens: Lens, plan: Plan, seed: int, folder: Path) -> Entry:
 
 
 def scores(judged: DesignParts, plan: Plan) -> Entry:
+    """Give PSNR and SSIM of every depth and field."""
     found = score_parts(judged, plan.recipe.schedule, plan.patches)
     return {"db": found.db, "ssim": found.ssim}
 
 
 def contrasts(judged: DesignParts) -> Entry:
+    """Give the contrast of edges in both directions."""
     found = {across: edge_contrasts(judged, across) for across in ACROSS}
     return {
         "cycles_per_px": found["tangential"].cycles_per_px.tolist(),
@@ -330,7 +334,7 @@ def keep_pictures(judged: DesignParts, recipe: DesignRecipe, path: Path) -> None
     captured, recovered = shown(Captures()), shown(judged.network)
     np.savez_compressed(
         path,
-        kernels=judged.lens.kernels.numpy()[:, :, 1],
+        kernels=judged.lens()[0].numpy()[:, :, 1],
         captured=np.stack([p[:, 0].numpy() for _, p, _ in captured], axis=1),
         recovered=np.stack([p[:, 0].numpy() for _, p, _ in recovered], axis=1),
         sharp=np.stack([s[0].numpy() for _, _, s in recovered]),
@@ -338,6 +342,7 @@ def keep_pictures(judged: DesignParts, recipe: DesignRecipe, path: Path) -> None
 
 
 def row(name: str, entry: Entry) -> str:
+    """Give the line of a lens for people."""
     db, spread = mean_and_spread(entry["recovered"], "db")
     alike, _ = mean_and_spread(entry["recovered"], "ssim")
     largest, rise, _ = worst_contrast(entry["recovered"])

@@ -129,7 +129,7 @@ def _work(bundle: Bundle) -> tuple[TierWork, str | None]:
     networks = bundle.manifest.networks
     full = bundle.network_facts(REFERENCE)
     below = [s for s in networks if networks[s].mac_per_pixel < full.mac_per_pixel]
-    small = min(below, key=lambda size: networks[size].mac_per_pixel) if below else None
+    small = min(below, key=lambda name: networks[name].mac_per_pixel, default=None)
     facts = None if small is None else bundle.network_facts(small)
     work = TierWork(
         full_mac=full.mac_per_pixel,

@@ -26,6 +26,7 @@ FREQUENCIES = 26
 
 
 def main() -> None:
+    """Print the table."""
     lens = read_prescription(LENS)
     print("RMS / Airy   pitch, um   largest MTF difference")
     for diameter in DIAMETERS_MM:

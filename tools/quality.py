@@ -53,6 +53,7 @@ SIZES = ("S", "M", "L")
 
 
 def main() -> None:
+    """Tune or compare."""
     arguments = parse_arguments()
     cv2.setNumThreads(1)
     try:
@@ -66,6 +67,7 @@ def main() -> None:
 
 
 def parse_arguments() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     add = parser.add_argument
     add("--bundle", required=True, help="name or path of the bundle")
@@ -234,11 +236,12 @@ def measure_missing(
 def chosen_methods(arguments: argparse.Namespace, bundle: Bundle) -> list[str]:
     """Give the methods asked for, or the usual ones and every size that the bundle holds."""
     if arguments.methods:
-        return arguments.methods.split(",")
+        return str(arguments.methods).split(",")
     return [*DEFAULT_METHODS, *(size for size in SIZES if size in bundle.manifest.networks)]
 
 
 def isos_of(arguments: argparse.Namespace) -> list[float]:
+    """Give the sensitivities that were asked for."""
     return [float(iso) for iso in arguments.isos.split(",")]
 
 
@@ -264,6 +267,7 @@ def list_shots(arguments: argparse.Namespace) -> list[Shot]:
 
 
 def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: float) -> None:
+    """Print how far a run is and what it costs."""
     left_min = elapsed_s / number * (count - number) / 60
     each = f"{elapsed_s / number:.2f} s ({time.process_time() / number:.2f} s of processor) each"
     costs = ", ".join(f"{m.method} {m.seconds:.2f}" for m in found)
@@ -272,6 +276,7 @@ def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: floa
 
 
 def show_result(report: dict[str, Any]) -> None:
+    """Print the means."""
     for psf, summary in report["summary"].items():
         print(f"\n{psf}: " + json.dumps(summary["gain_of_m"]))
         for name, mean in summary["overall"].items():
@@ -279,7 +284,11 @@ def show_result(report: dict[str, Any]) -> None:
 
 
 def read_report(path: Path) -> dict[str, Any]:
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    """Read the report of an earlier run; empty without one."""
+    if not path.exists():
+        return {}
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
 
 
 def write_report(path: Path, report: dict[str, Any]) -> None:
@@ -296,6 +305,7 @@ def write_report(path: Path, report: dict[str, Any]) -> None:
 
 
 def write_csv(path: Path, measurements: Sequence[Measurement]) -> None:
+    """Write the measurements as a table."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
