@@ -23,13 +23,14 @@ from camkit.runtime.job.setup import DEVELOPMENT, Setup
 from camkit.runtime.job.walker import Walk
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
-from camkit.runtime.plan.decision import DEVELOP, NET, Case, Labels, Work
+from camkit.runtime.plan.decision import DEVELOP, Case, Labels, Work
 from camkit.runtime.plan.estimate import Estimate, estimate_seconds
 from camkit.runtime.plan.planner import Plan, make_plan, needs_scene
 from camkit.runtime.plan.speed import Speed
+from camkit.runtime.plan.ways import without_networks
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.scene import Scene, measure_scene
-from camkit.runtime.stage_finder import methods_of, stage_module
+from camkit.runtime.stage_finder import stage_module
 
 BEFORE_STAGES: Final = ("noise", "envelope", "scene")
 
@@ -226,11 +227,12 @@ class Reconstruction:
         """Plan no more than the capture needs; without a bundle there is nothing to plan."""
         job, bundle = self.job, self._setup.bundle
         if bundle is None:
-            job.work = Work(method=DEVELOP)
+            job.work = Work(method=DEVELOP, networks=False)
             return None
         options = job.options
         if job.falls_back:
-            options = replace(options, method=self._method_without_network())
+            below = without_networks(self._setup.stages, Work())
+            options = replace(options, method=below.method)
         case = Case(
             bundle=bundle,
             options=options,
@@ -246,11 +248,6 @@ class Reconstruction:
         self.record["quality"] = options.quality
         self.record["decisions"] = [decision.to_json() for decision in plan.decisions()]
         return plan
-
-    def _method_without_network(self) -> str:
-        """Name the best method below the network."""
-        methods = [m for m in methods_of(self._setup.stages) if m != NET]
-        return methods[0] if methods else DEVELOP
 
     def _measure_scene(self) -> Scene:
         job = self.job

@@ -38,6 +38,11 @@ class Stream:
         if (self.source is None) == (self.made is None):
             raise ContractError("a stream is either a source or bands")
 
+    @property
+    def gives_own_rows(self) -> bool:
+        """Tell whether what `rows` reads is the reader's own to change."""
+        return self.source is not None and self.owned
+
     def rows(self) -> RowSource:
         """Give the rows, to be read from top to bottom with any overlap."""
         if self.source is not None:

@@ -16,8 +16,6 @@ from camkit.runtime.scene import Scene
 
 Labels = NDArray[np.int8]
 
-NET: Final = "net"
-"""The method that runs the networks."""
 DEVELOP: Final = "develop"
 """The method that restores nothing."""
 
@@ -73,7 +71,8 @@ class Work:
 
     Attributes:
         method: Way of a stage, as `--method` names it: the network, a classical method alone, or
-            DEVELOP.
+            DEVELOP; None for the usual way of every stage.
+        networks: Whether any network runs.
         size: Size of network that cells of tier FULL get.
         small: Size that cells of tier SMALL get; None without one.
         mode: Tiling.
@@ -81,7 +80,8 @@ class Work:
         left_out: Types of stages that are left out beside what the method leaves out.
     """
 
-    method: str = NET
+    method: str | None = None
+    networks: bool = True
     size: str = "M"
     small: str | None = None
     mode: Mode = "exact"
@@ -98,7 +98,7 @@ class Work:
 
     def sizes(self) -> tuple[str, ...]:
         """Name the networks that will run."""
-        if self.method != NET:
+        if not self.networks:
             return ()
         if self.labels is None:
             return (self.size,)

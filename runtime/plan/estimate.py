@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from camkit.bundle.stages import Network
-from camkit.runtime.plan.decision import FULL, NET, SMALL, Case, Work
+from camkit.runtime.plan.decision import FULL, SMALL, Case, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import TierWork, work_shares
 from camkit.runtime.plan.ways import LEFT_OUT, ways_of
@@ -79,7 +79,7 @@ def network_seconds(role: str, window_mp: Mapping[str, float], speed: Speed) -> 
 def nominal_window_mp(case: Case, work: Work) -> dict[str, float]:
     """Give size -> megapixels computed by the one network of a camera, from the lattice alone."""
     computed = case.megapixels * WINDOW_OVERLAP
-    if work.method != NET:
+    if not work.networks:
         return {}
     if work.labels is None or case.scene is None:
         return {work.size: computed}

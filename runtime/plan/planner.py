@@ -13,15 +13,15 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
 from camkit.runtime.options import Options
-from camkit.runtime.plan.decision import DEVELOP, NET, Case, Decision, Work
+from camkit.runtime.plan.decision import Case, Decision, Work
 from camkit.runtime.plan.estimate import estimate_seconds, tier_work_of
 from camkit.runtime.plan.loss import LossModel, read_loss_model
 from camkit.runtime.plan.rule import apply_rules
 from camkit.runtime.plan.rules.size import REFERENCE, size_cost_db
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import work_shares
-from camkit.runtime.plan.ways import ways_of
-from camkit.runtime.stage_finder import methods_of, stage_module
+from camkit.runtime.plan.ways import planned, without_networks
+from camkit.runtime.stage_finder import stage_module
 
 LADDER: Final = (0.0, 1.0, 3.0, 10.0, 30.0)
 """Losses tried for --max-seconds, in units of that of `adaptive`."""
@@ -89,13 +89,6 @@ def default_size(bundle: Bundle, options: Options) -> str:
     return REFERENCE if REFERENCE in sizes or len(sizes) > 1 else sizes[0]
 
 
-def usual_method(bundle: Bundle, options: Options) -> str:
-    """Give the method: the caller's, else the best that the stages of a bundle have."""
-    if options.method is not None:
-        return options.method
-    return (*methods_of(bundle.manifest.stages), DEVELOP)[0]
-
-
 def needs_scene(options: Options) -> bool:
     """Tell whether the choice depends on the capture."""
     budgets = options.max_seconds is not None or options.max_error_db is not None
@@ -112,7 +105,7 @@ def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
     options = case.options
     model = read_loss_model(case.bundle.manifest.plan)
     work = _first_work(case, default_size(case.bundle, options))
-    if work.method != NET:
+    if not work.networks:
         return _ruled(case, work)
     if options.max_seconds is not None:
         return _within_seconds(case, work, model, speed())
@@ -133,14 +126,8 @@ def _first_work(case: Case, size: str) -> Work:
         for stage in stages
         if (test := getattr(stage_module(stage.type), "is_left_out", None)) and test(options)
     }
-    work = Work(
-        method=usual_method(case.bundle, options),
-        size=size,
-        mode=options.mode,
-        left_out=frozenset(unwanted),
-    )
-    ways_of(stages, work)  # a method that no stage has is refused before anything is planned
-    return work
+    work = Work(method=options.method, size=size, mode=options.mode, left_out=frozenset(unwanted))
+    return planned(stages, work)
 
 
 def _ruled(case: Case, work: Work, note: str = "") -> Plan:
@@ -193,8 +180,7 @@ def _within_seconds(case: Case, work: Work, model: LossModel | None, speed: Spee
         for factor in LADDER if model is not None else LADDER[:1]:
             spend = 0.0 if factor == 0 else size_cost_db(case, size) + factor * unit
             plans.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
-    below = [m for m in methods_of(case.bundle.manifest.stages) if m != NET]
-    plans.append(_ruled(case, replace(work, method=(*below, DEVELOP)[0])))
+    plans.append(_ruled(case, without_networks(case.bundle.manifest.stages, work)))
     # The bank alone is the last resort: what it costs is not bounded by any prediction.
     ordered = sorted(plans[:-1], key=lambda plan: plan.cost_db) + plans[-1:]
     fitting = (p for p in ordered if estimate_seconds(p.case, p.work, speed) <= limit)

@@ -8,10 +8,11 @@ what it gives: the same samples on the same grid, in the same domain.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from camkit.bundle.plane import Plane
-from camkit.bundle.stages import Stage
+from camkit.bundle.stages import Network, Stage
 from camkit.errors import ContractError
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.stage_finder import methods_of, stage_module
@@ -27,8 +28,8 @@ def ways_of(stages: Sequence[Stage], work: Work) -> tuple[str, ...]:
     Raises:
         ContractError: If no stage has the method.
     """
-    last = _last_with(stages, work.method)
-    ways = []
+    last = len(stages) if work.method is None else _last_with(stages, work.method)
+    ways: list[str] = []
     for number, stage in enumerate(stages):
         methods = stage_module(stage.type).METHODS
         if stage.type in work.left_out:
@@ -38,8 +39,28 @@ def ways_of(stages: Sequence[Stage], work: Work) -> tuple[str, ...]:
         elif number > last:
             ways.append(LEFT_OUT)
         else:
-            ways.append(work.method if number == last else methods[0])
+            ways.append(work.method if number == last and work.method else methods[0])
     return tuple(ways)
+
+
+def planned(stages: Sequence[Stage], work: Work) -> Work:
+    """Give the work with what follows from its ways.
+
+    Raises:
+        ContractError: If no stage has its method.
+    """
+    ways = zip(stages, ways_of(stages, work), strict=True)
+    return replace(
+        work, networks=any(isinstance(stage, Network) and way != LEFT_OUT for stage, way in ways)
+    )
+
+
+def without_networks(stages: Sequence[Stage], work: Work) -> Work:
+    """Give the work by the best method that runs no network."""
+    tried = [
+        planned(stages, replace(work, method=method)) for method in (*methods_of(stages), DEVELOP)
+    ]
+    return next(other for other in tried if not other.networks)
 
 
 def _last_with(stages: Sequence[Stage], method: str) -> int:

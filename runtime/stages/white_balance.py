@@ -30,7 +30,9 @@ def prepare(_entry: WhiteBalance, job: Job) -> StageWork:
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken
         is_mosaic = light.shape[0] == 1
-        rows = BalancedRows(light.rows(), gains, cfa if is_mosaic else None, owned=light.owned)
+        rows = BalancedRows(
+            light.rows(), gains, cfa if is_mosaic else None, owned=light.gives_own_rows
+        )
         return (replace(light.with_source(rows), gains=gains),)
 
     return StageWork(run=run)

@@ -7,7 +7,6 @@ import numpy as np
 
 from camkit.runtime.plan.decision import (
     FULL,
-    NET,
     PLAIN,
     SMALL,
     TIER_NAMES,
@@ -25,7 +24,7 @@ ORDER: Final = 20
 
 def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     """Share the cells among the tiers within the loss that may be spent."""
-    if work.method != NET or case.role is None:
+    if not work.networks or case.role is None:
         return work, None
     model = read_loss_model(case.bundle.manifest.plan)
     if case.scene is None:

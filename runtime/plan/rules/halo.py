@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from camkit.runtime.plan.decision import NET, Case, Decision, Work
+from camkit.runtime.plan.decision import Case, Decision, Work
 
 ORDER: Final = 50
 
@@ -13,7 +13,7 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     With less, pixels near a window's border would depend on where the windows lie, that is on tile
     size and memory cap; for a few percent of the network's time that promise is not given up.
     """
-    if work.method != NET or case.role is None:
+    if not work.networks or case.role is None:
         return work, None
     facts = case.facts(work.size)
     shorter = [e for e in facts.halo_error if e.psnr_db is not None and e.psnr_db >= 80.0]

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from camkit.runtime.plan.decision import NET, Case, Decision, Work
+from camkit.runtime.plan.decision import Case, Decision, Work
 from camkit.runtime.plan.loss import read_loss_model
 
 ORDER: Final = 10
@@ -12,7 +12,7 @@ REFERENCE: Final = "M"
 
 def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     """Report the size that quality, budgets or --size asked for, and what it costs."""
-    if work.method != NET:
+    if not work.networks:
         return work, None
     options = case.options
     if options.size is not None:
