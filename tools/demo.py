@@ -1,6 +1,6 @@
 """The main job, end to end: photograph a scene with `duet`, process the DNG, show what it gained.
 
-    python tools/demo.py --out-dir out
+    python -m tools.demo --out-dir out
 
 leaves demo.dng, demo.exr, demo.png, their sidecars, and before_after.png.
 """
@@ -139,7 +139,7 @@ def _seen(
 def _psnr(image: FloatArray, sharp: FloatArray) -> float:
     inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     error = float(np.mean((np.clip(image, 0, 1)[inside] - sharp[inside]) ** 2))
-    return -10 * np.log10(max(error, 1e-12))
+    return float(-10 * np.log10(max(error, 1e-12)))
 
 
 if __name__ == "__main__":

@@ -39,7 +39,6 @@ from camkit.models_def.design.front import Front
 from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.optics import LensModule
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design, recipe_digest
-from camkit.models_def.design.score import score_design
 from camkit.models_def.design.starts import Starts, disturbed
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
@@ -49,7 +48,8 @@ from camkit.models_def.optics.search.problem import Problem, limits_of, trace_ba
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.report.journal import append_journal, read_journal
-from camkit.report.lens.stability_chart import Rules, Trial, best_trials, to_text, write_stability
+from tools.design.score import score_design
+from tools.design.stability_chart import Rules, Trial, best_trials, to_text, write_stability
 
 LEVELS: Final = (0.05, 0.1, 0.2, 0.5)
 FOCUS_MM: Final = 2.0
@@ -130,6 +130,7 @@ class Found:
 
 
 def main() -> None:
+    """Run what is missing of the trial and report it."""
     arguments = parse()
     torch.set_num_threads(1)
     bench = bench_of(arguments)
@@ -157,6 +158,7 @@ def main() -> None:
 
 
 def kept(bench: Bench, trial: Trial) -> Trial:
+    """Write a finished trial down and print it."""
     append_journal(bench.out_dir / "trials.jsonl", [asdict(trial)])
     print(
         f"{trial.number:2} {trial.arm:10} {100 * trial.level:.0f} % {trial.run}: "
@@ -169,6 +171,7 @@ def kept(bench: Bench, trial: Trial) -> Trial:
 
 
 def parse() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -193,6 +196,7 @@ def parse() -> argparse.Namespace:
 
 
 def bench_of(arguments: argparse.Namespace) -> Bench:
+    """Give what all trials share."""
     recipe = replace(read_design(arguments.recipe), network=NetworkChoice(config={}))
     if recipe.loss.needs_network and recipe.front.kind != "wiener":
         recipe = replace(recipe, front=Front(kind="wiener"))
@@ -240,6 +244,7 @@ def agreed_steps(bench: Bench, arguments: argparse.Namespace) -> int:
 
 
 def measured_steps(bench: Bench, minutes: float) -> int:
+    """Give the steps that fit into so many minutes of CPU, by a few of them."""
     plan = short(bench.recipe.schedule, WARM_STEPS + TIMED_STEPS)
     loop = DesignLoop(bench.parts("after", 0), replace(plan, valid_steps=TIMED_STEPS // 2))
     for _ in loop.run(WARM_STEPS):
@@ -300,6 +305,7 @@ def level_of(number: int) -> float:
 
 
 def to_trial(entry: Mapping[str, Any]) -> Trial:
+    """Read a trial from its line."""
     return Trial(**{**entry, "scaled": tuple(entry["scaled"])})
 
 

@@ -1,6 +1,6 @@
 """Which lens gives the best picture after recovery? Table 6.1 and figures 6.5, 6.7, 6.8 re-done.
 
-    python tools/lens_table.py RECIPE --lens al2550-a aca254-050-a cooke-triplet ours=lens.toml \
+    python -m tools.lens_table RECIPE --lens al2550-a aca254-050-a cooke-triplet ours=lens.toml \
         --data PICTURES --fresh OTHERS --steps 2000 --out-dir out/lens-table
 
 Every lens is set to F/4 and focused at 1 m. The recipe states the strip of the sensor (fields),
@@ -24,27 +24,27 @@ import torch
 from torch import nn
 
 from camkit.models_def.design.assembly import field_slopes, network_of, recorder_of
-from camkit.models_def.design.edge import ACROSS
 from camkit.models_def.design.loop import DesignLoop, DesignParts
 from camkit.models_def.design.loss import DesignLoss
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design
-from camkit.models_def.design.rest import Seen, at_rest, at_work, window_of
-from camkit.models_def.design.score import Captures, edge_contrasts, score_parts
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.problem import Problem
 from camkit.models_def.optics.search.splat import Pixels
 from camkit.models_def.optics.search.variables import FreeLens
 from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.report.compact_json import to_compact_json
 from camkit.report.journal import append_journal, read_journal
-from camkit.report.lens.lens_table import (
+from camkit.units import to_degrees
+from tools.comparison.compact_json import to_compact_json
+from tools.design.edge import ACROSS
+from tools.design.rest import Seen, at_rest, at_work, window_of
+from tools.design.score import Captures, edge_contrasts, score_parts
+from tools.design.table import (
     draw_lens_table,
     lens_table,
     mean_and_spread,
     worst_contrast,
 )
-from camkit.units import to_degrees
 
 Entry = dict[str, Any]
 JOURNAL: Final = "journal.jsonl"
@@ -72,6 +72,7 @@ class Plan:
 
 
 def main() -> int:
+    """Measure every lens and write table and picture."""
     arguments = parse()
     torch.set_num_threads(arguments.threads)
     plan = plan_of(arguments)
@@ -116,6 +117,7 @@ def main() -> int:
 
 
 def parse() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("--lens", nargs="+", required=True, help="names, files or NAME=FILE")
@@ -160,6 +162,7 @@ def named(lenses: list[str]) -> dict[str, str]:
 
 
 def plan_of(arguments: argparse.Namespace) -> Plan:
+    """Give what is the same for all lenses."""
     recipe = read_design(arguments.recipe)
     schedule = recipe.schedule
     steps = arguments.steps or schedule.steps
@@ -179,12 +182,10 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
     if arguments.network:
         network = NetworkChoice(name=arguments.network, config={"in_channels": front.channels})
     loss = recipe.loss if recipe.loss.needs_network else DesignLoss(kind="l1")
-    depths = (arguments.object_mm,)
-    if arguments.depths_mm:
-        depths = tuple(float(word) for word in arguments.depths_mm.split(","))
+    asked = arguments.depths_mm or str(arguments.object_mm)
     return Plan(
         recipe=replace(recipe, schedule=schedule, front=front, network=network, loss=loss),
-        depths_mm=depths,
+        depths_mm=tuple(float(word) for word in asked.split(",")),
         f_number=arguments.f_number,
         object_mm=arguments.object_mm,
         focus=arguments.focus,
@@ -257,6 +258,7 @@ def parts(
 
 
 def fresh_source(plan: Plan) -> SceneSource:
+    """Open the pictures that lenses are judged on."""
     share = 0.0 if plan.fresh is None else 1.0
     return open_source(plan.fresh, picture_share=share, scenes=4, scene_px=512)
 
@@ -312,11 +314,13 @@ def after(lens: Lens, plan: Plan, seed: int, folder: Path) -> Entry:
 
 
 def scores(judged: DesignParts, plan: Plan) -> Entry:
+    """Give PSNR and SSIM of every depth and field."""
     found = score_parts(judged, plan.recipe.schedule, plan.patches)
     return {"db": found.db, "ssim": found.ssim}
 
 
 def contrasts(judged: DesignParts) -> Entry:
+    """Give the contrast of edges in both directions."""
     found = {across: edge_contrasts(judged, across) for across in ACROSS}
     return {
         "cycles_per_px": found["tangential"].cycles_per_px.tolist(),
@@ -334,7 +338,7 @@ def keep_pictures(judged: DesignParts, recipe: DesignRecipe, path: Path) -> None
     captured, recovered = shown(Captures()), shown(judged.network)
     np.savez_compressed(
         path,
-        kernels=judged.lens.kernels.numpy()[:, :, 1],
+        kernels=judged.lens()[0].numpy()[:, :, 1],
         captured=np.stack([p[:, 0].numpy() for _, p, _ in captured], axis=1),
         recovered=np.stack([p[:, 0].numpy() for _, p, _ in recovered], axis=1),
         sharp=np.stack([s[0].numpy() for _, _, s in recovered]),
@@ -342,6 +346,7 @@ def keep_pictures(judged: DesignParts, recipe: DesignRecipe, path: Path) -> None
 
 
 def row(name: str, entry: Entry) -> str:
+    """Give the line of a lens for people."""
     db, spread = mean_and_spread(entry["recovered"], "db")
     alike, _ = mean_and_spread(entry["recovered"], "ssim")
     largest, rise, _ = worst_contrast(entry["recovered"])

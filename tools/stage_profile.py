@@ -1,10 +1,9 @@
 """Profile `camkit process`: where the time, the threads and the memory of one photograph go.
 
-python tools/stage_profile.py stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
-python tools/stage_profile.py layers [--bundle duet] [--size M] [--threads 2]
-python tools/stage_profile.py jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
-python tools/stage_profile.py sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
-python tools/stage_profile.py exr PICTURE.exr
+python -m tools.stage_profile stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
+python -m tools.stage_profile layers [--bundle duet] [--size M] [--threads 2]
+python -m tools.stage_profile jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
+python -m tools.stage_profile sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
 """
 
 import argparse
@@ -20,6 +19,7 @@ import time
 from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +39,8 @@ from camkit.runtime.raw import file_sha256, read_capture
 
 TRANSFORMS = ("wiener", "network")
 SAMPLE_S = 0.02
+SIDE_PX = 1024
+ACTIVATIONS = ("LeakyRelu", "Relu")
 
 
 def main() -> None:
@@ -57,8 +59,6 @@ def main() -> None:
     sizes = commands.add_parser("sizes")
     sizes.add_argument("--megapixels", default="24,100,400")
     sizes.add_argument("--max-mem", default="2G")
-    exr = commands.add_parser("exr")
-    exr.add_argument("picture", type=Path)
     for command in (stages, layers, jobs, sizes):
         command.add_argument("--bundle", default="duet")
         command.add_argument("--size", default="M")
@@ -69,7 +69,6 @@ def main() -> None:
         "layers": profile_layers,
         "jobs": profile_jobs,
         "sizes": profile_sizes,
-        "exr": profile_exr,
     }[arguments.command](arguments)
 
 
@@ -111,16 +110,18 @@ class Samples:
         return found
 
 
+def run_again(arguments: argparse.Namespace) -> str:
+    """Develop the capture once in a process of its own; give what it prints."""
+    script = [sys.executable, "-m", "tools.stage_profile", "stages", str(arguments.capture)]
+    script += ["--runs", "0", "--size", arguments.size, "--bundle", arguments.bundle]
+    script += ["--format", arguments.format]
+    script += [] if arguments.threads is None else ["--threads", str(arguments.threads)]
+    return subprocess.run(script, capture_output=True, text=True, check=True).stdout
+
+
 def profile_stages(arguments: argparse.Namespace) -> None:
     """Develop one capture in this process and say where wall, CPU and memory went."""
-    runs = []
-    for _ in range(arguments.runs):
-        script = [sys.executable, __file__, "stages", str(arguments.capture), "--runs", "0"]
-        script += ["--size", arguments.size, "--bundle", arguments.bundle]
-        script += ["--format", arguments.format]
-        script += [] if arguments.threads is None else ["--threads", str(arguments.threads)]
-        done = subprocess.run(script, capture_output=True, text=True, check=True)
-        runs.append(json.loads(done.stdout))
+    runs = [json.loads(run_again(arguments)) for _ in range(arguments.runs)]
     if not runs:
         print(json.dumps(_profile_once(arguments)))
         return
@@ -141,7 +142,7 @@ def profile_stages(arguments: argparse.Namespace) -> None:
         print(f"| {kind} | {statistics.median(r['threads'].get(kind, 0.0) for r in runs):.2f} |")
 
 
-def _profile_once(arguments: argparse.Namespace) -> dict:
+def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     began = time.perf_counter()
     pipeline = load(arguments.bundle, size=arguments.size, threads=arguments.threads)
     start_s = time.perf_counter() - began
@@ -212,8 +213,8 @@ def profile_layers(arguments: argparse.Namespace) -> None:
 
     threads = available_threads(arguments.threads)
     data = open_bundle(find_bundle(arguments.bundle)).network_bytes(arguments.size)
-    side = 1024
-    macs = _macs_by_node(data, side)
+    side = SIDE_PX
+    all_macs, macs = _count_macs(data, side)
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.enable_mem_pattern = False
@@ -249,7 +250,7 @@ def profile_layers(arguments: argparse.Namespace) -> None:
         speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
         row = f"| {name} | {kinds[name]} | {seconds * 1e3:.1f} | {seconds / total:.1%} | {speed} |"
         print(row)
-    done = sum(macs.values()) / total / 1e9
+    done = all_macs / total / 1e9
     print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
 
 
@@ -259,8 +260,11 @@ def _keys(name: str) -> tuple[str, ...]:
     return name, plain
 
 
-def _macs_by_node(data: bytes, side: int) -> dict[str, float]:
-    """Count the multiplications of every convolution on a square window."""
+def _count_macs(data: bytes, side: int) -> tuple[float, dict[str, float]]:
+    """Count the multiplications of all convolutions on a square window, and of each by name.
+
+    A convolution that is fused with the activation behind it runs under the name of that one.
+    """
     import onnx
 
     model = onnx.load_from_string(data)
@@ -274,18 +278,16 @@ def _macs_by_node(data: bytes, side: int) -> dict[str, float]:
         for value in (*inferred.graph.value_info, *inferred.graph.output)
     }
     weights = {tensor.name: list(tensor.dims) for tensor in model.graph.initializer}
-    macs = {}
+    made: dict[str, float] = {}
+    named: dict[str, float] = {}
     for node in model.graph.node:
         if node.op_type == "Conv" and node.input[1] in weights:
             _, depth, *kernel = weights[node.input[1]]
             size = float(np.prod(shapes[node.output[0]]) * depth * np.prod(kernel))
-            macs[node.name] = macs[node.output[0]] = size
-    # Each convolution is known by two names; only one of them may be summed.
-    return {
-        node.name or node.output[0]: macs[node.name]
-        for node in model.graph.node
-        if node.name in macs
-    }
+            made[node.output[0]] = named[node.name or node.output[0]] = size
+        elif node.op_type in ACTIVATIONS and node.input[0] in made:
+            named[node.name or node.output[0]] = made[node.input[0]]
+    return sum(made.values()), named
 
 
 def profile_jobs(arguments: argparse.Namespace) -> None:
@@ -342,10 +344,12 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
             command = [sys.executable, "-m", "camkit", "process", str(mosaic), "--json"]
             command += ["--bundle", str(large), "--size", arguments.size, "--format", "tiff"]
             command += ["--out-dir", str(Path(folder) / "out"), "--max-mem", arguments.max_mem]
-            command += ["--mosaic", camera.cfa, "--black-level", f"{camera.black_level:g}"]
+            command += ["--mosaic", str(camera.cfa), "--black-level", f"{camera.black_level:g}"]
             command += ["--white-level", f"{camera.white_level:g}"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
-            result = json.loads(done.stdout) if done.stdout.strip() else {"error": done.stderr}
+            result: dict[str, Any] = {"error": done.stderr}
+            if done.stdout.strip():
+                result = json.loads(done.stdout)
             if result.get("status") != "ok":
                 print(f"| {megapixels:g} | {width}x{height} | {result.get('error')} | | |")
                 continue
@@ -368,49 +372,6 @@ def _write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> Non
         update={"width_px": width, "height_px": height, "pixel_pitch_um": pitch_um}
     )
     write_bundle(path, bundle.manifest.model_copy(update={"camera": stretched}), members)
-
-
-def profile_exr(arguments: argparse.Namespace) -> None:
-    """Write rows of a real picture with every compression of EXR; time, size, time to read."""
-    import Imath
-    import OpenEXR
-
-    source = OpenEXR.InputFile(str(arguments.picture))
-    box = source.header()["dataWindow"]
-    width, rows = box.max.x - box.min.x + 1, 384
-    top = max(0, (box.max.y - rows) // 2)
-    half = Imath.PixelType(Imath.PixelType.HALF)
-    planes = {
-        name: np.frombuffer(source.channel(name, half, top, top + rows - 1), np.float16)
-        .reshape(rows, width)
-        .copy()
-        for name in "RGB"
-    }
-    print("| compression | CPU ms/MP | bytes/px | CPU ms/MP to read |\n|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "x.exr"
-        for name in ("NO", "RLE", "ZIPS", "ZIP", "PIZ", "DWAA"):
-            best, best_read = float("inf"), float("inf")
-            for _ in range(5):
-                header = OpenEXR.Header(width, rows)
-                packing = getattr(Imath.Compression, f"{name}_COMPRESSION")
-                header["compression"] = Imath.Compression(packing)
-                header["channels"] = {c: Imath.Channel(half) for c in "RGB"}
-                began = time.process_time()
-                out = OpenEXR.OutputFile(str(path), header)
-                out.writePixels(planes, rows)
-                out.close()
-                best = min(best, time.process_time() - began)
-                began = time.process_time()
-                written = OpenEXR.InputFile(str(path))
-                for channel in "RGB":
-                    written.channel(channel, half)
-                best_read = min(best_read, time.process_time() - began)
-            pixels = width * rows
-            print(
-                f"| {name} | {best * 1e9 / pixels:.0f} | {path.stat().st_size / pixels:.2f} | "
-                f"{best_read * 1e9 / pixels:.0f} |"
-            )
 
 
 if __name__ == "__main__":

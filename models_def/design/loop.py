@@ -22,9 +22,8 @@ from torch import Tensor, nn
 from camkit.errors import ContractError
 from camkit.models_def.design.fabrication import draw_copy
 from camkit.models_def.design.front import Front
+from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.design.loss import DesignLoss, design_loss
-from camkit.models_def.design.optics import LensModule
-from camkit.models_def.design.rest import LensAtRest
 from camkit.models_def.design.sensor import Recorder, capture
 from camkit.models_def.optics.prescription import FabricationErrors
 from camkit.models_def.sensors.tone import encode_srgb
@@ -87,7 +86,7 @@ class DesignParts:
     """What a loop joins.
 
     Attributes:
-        lens: With its free numbers.
+        lens: With its free numbers, if it has any.
         network: Takes what `front` gives; None judges what the front gives last (Wiener alone,
             or the capture).
         front: Between sensor and network.
@@ -98,7 +97,7 @@ class DesignParts:
             nominal lens. None makes them with the lens itself.
     """
 
-    lens: LensModule | LensAtRest
+    lens: DesignLens
     network: nn.Module | None
     front: Front
     recorder: Recorder

@@ -16,7 +16,7 @@ from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.plan.ways import offered_methods
 from camkit.runtime.stage_finder import stage_module
 
-GENERAL: Final = frozenset({"assume", "max_mem_bytes", "threads", "method"})
+GENERAL: Final = frozenset({"assume", "max_mem_bytes", "threads", "method", "unit"})
 
 
 def check_choices(bundle: Bundle | None, options: Options) -> None:
@@ -24,7 +24,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
 
     Raises:
         ContractError: If no stage has the method asked for, an option that was given means nothing
-            to any stage, or the PSF does not reach the depth.
+            to any stage, the unit is of another bundle, or the PSF does not reach the depth.
     """
     stages = DEVELOPMENT if bundle is None else bundle.manifest.stages
     known = GENERAL.union(*(stage_module(stage.type).OPTIONS for stage in stages))
@@ -41,6 +41,8 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
         raise ContractError(
             f"method must be one of {', '.join(methods)} {where}; got {options.method!r}"
         )
+    if options.unit is not None:
+        options.unit.check(bundle)
     if options.depth_m is not None and bundle is not None:
         assert bundle.manifest.stage(Wiener) is not None  # only a bank knows of depths
         depth_weights(bundle.psf.depths_mm, options.depth_mm)

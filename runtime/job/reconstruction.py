@@ -24,6 +24,7 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import Walk
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
+from camkit.runtime.output.origin import Origin
 from camkit.runtime.plan.decision import DEVELOP, Case, Labels, Work
 from camkit.runtime.plan.estimate import Estimate, estimate_seconds
 from camkit.runtime.plan.planner import Plan, make_plan, needs_scene
@@ -119,6 +120,22 @@ class Reconstruction:
         if self.job.color is None:
             raise ContractError("no stage of this camera gives a picture in colour")
         return self.job.color
+
+    @property
+    def origin(self) -> Origin:
+        """Give what every writer should know of where the products come from."""
+        capture, bundle = self.capture, self._setup.bundle
+        return Origin(
+            camera=capture.camera,
+            iso=capture.iso,
+            exposure_time_s=capture.exposure_time_s,
+            orientation=capture.orientation,
+            white_balance=self.white_balance,
+            color_matrix=capture.color_matrix,
+            bundle=None if bundle is None else bundle.manifest.name,
+            bundle_sha256=None if bundle is None else bundle.sha256,
+            unit=self._setup.options.unit,
+        )
 
     @property
     def size(self) -> str | None:
