@@ -12,7 +12,6 @@ from typing import Final
 from camkit.bundle.chain import CAPTURE
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
-from camkit.bundle.stages import Stage
 from camkit.errors import ContractError
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
