@@ -53,7 +53,7 @@ from camkit.report.lens.stability_chart import Rules, Trial, best_trials, to_tex
 
 LEVELS: Final = (0.05, 0.1, 0.2, 0.5)
 FOCUS_MM: Final = 2.0
-STAGES: Final = {
+SHARES: Final = {
     "before": (1.0,),
     "spots": (1.0,),
     "after": (1.0,),
@@ -176,7 +176,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--out-dir", type=Path, default=Path("out/stability"))
     parser.add_argument("--data", type=Path, help="pictures to design on")
     parser.add_argument("--fresh", type=Path, help="pictures to judge on")
-    parser.add_argument("--arms", default="before,after", help=", ".join(STAGES))
+    parser.add_argument("--arms", default="before,after", help=", ".join(SHARES))
     parser.add_argument("--starts", type=int, default=32, help="in all, spread over the levels")
     parser.add_argument("--minutes", type=float, default=3.0, help="CPU time of a start")
     parser.add_argument("--steps", type=int, default=0, help="of a start, instead of --minutes")
@@ -186,9 +186,9 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--within-mm", type=float, default=0.5, help="of the focal length")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    unknown = set(arguments.arms.split(",")) - set(STAGES)
+    unknown = set(arguments.arms.split(",")) - set(SHARES)
     if unknown:
-        parser.error(f"--arms takes {', '.join(STAGES)}; got {', '.join(sorted(unknown))}")
+        parser.error(f"--arms takes {', '.join(SHARES)}; got {', '.join(sorted(unknown))}")
     return arguments
 
 
@@ -240,8 +240,8 @@ def agreed_steps(bench: Bench, arguments: argparse.Namespace) -> int:
 
 
 def measured_steps(bench: Bench, minutes: float) -> int:
-    plan = short(bench.recipe.schedule, WARM_STEPS + TIMED_STEPS)
-    loop = DesignLoop(bench.parts("after", 0), replace(plan, valid_steps=TIMED_STEPS // 2))
+    schedule = short(bench.recipe.schedule, WARM_STEPS + TIMED_STEPS)
+    loop = DesignLoop(bench.parts("after", 0), replace(schedule, valid_steps=TIMED_STEPS // 2))
     for _ in loop.run(WARM_STEPS):
         pass
     begin = time.process_time()
@@ -251,14 +251,14 @@ def measured_steps(bench: Bench, minutes: float) -> int:
     return max(1, round(minutes * 60 * TIMED_STEPS / spent_s))
 
 
-def short(plan: DesignSchedule, steps: int) -> DesignSchedule:
+def short(schedule: DesignSchedule, steps: int) -> DesignSchedule:
     """Give a schedule of so many steps that decays and validates as often as the whole one."""
-    share = steps / plan.steps
+    share = steps / schedule.steps
     return replace(
-        plan,
+        schedule,
         steps=steps,
-        epoch_steps=max(1, round(plan.epoch_steps * share)),
-        valid_steps=max(1, round(plan.valid_steps * share)),
+        epoch_steps=max(1, round(schedule.epoch_steps * share)),
+        valid_steps=max(1, round(schedule.valid_steps * share)),
         hold_steps=0,
         freeze_share=0.0,
     )
@@ -282,14 +282,14 @@ def plain(recipe: DesignRecipe, solved: int, rate: float) -> DesignRecipe:
 
 def steady(recipe: DesignRecipe, solved: int, efl_mm: float) -> DesignRecipe:
     """Give a recipe with all that keeps a design from going astray, where it has not."""
-    optics, plan = recipe.optics, recipe.schedule
+    optics, schedule = recipe.optics, recipe.schedule
     return replace(
         recipe,
         variables=tuple(
             v for v in recipe.variables if (v.kind, v.surface) != ("curvature", solved)
         ),
         optics=replace(optics, efl_mm=efl_mm, rides=True, whiten=True, units="range"),
-        schedule=plan if optics.whiten else replace(plan, lens_rate=WHITENED_RATE),
+        schedule=schedule if optics.whiten else replace(schedule, lens_rate=WHITENED_RATE),
         starts=recipe.starts if recipe.starts.count else SPOTS_STARTS,
     )
 
@@ -304,15 +304,15 @@ def to_trial(entry: Mapping[str, Any]) -> Trial:
 
 
 def from_start(bench: Bench, arm: str, number: int, steps: int) -> Trial:
-    """Design from one disturbed lens for so many steps, in stages of aperture and field."""
+    """Design from one disturbed lens for so many steps, with growing aperture and field."""
     begin = time.process_time()
-    parts, recipe, shares = bench.parts(arm, number), bench.of_arm(arm), STAGES[arm]
-    plan = short(recipe.schedule, max(1, steps // len(shares)))
+    parts, recipe, shares = bench.parts(arm, number), bench.of_arm(arm), SHARES[arm]
+    schedule = short(recipe.schedule, max(1, steps // len(shares)))
     whole, scaled = parts.lens.problem, parts.lens.scaled().detach()
     for share in shares:
         samples = replace(whole.samples, x=whole.samples.x * share, y=whole.samples.y * share)
         part = replace(whole, slopes=whole.slopes * share, samples=samples)
-        scaled = descended(parts, part, scaled, plan, whiten=recipe.optics.whiten)
+        scaled = descended(parts, part, scaled, schedule, whiten=recipe.optics.whiten)
     found = Found(arm=arm, number=number, stage="box", cpu_s=time.process_time() - begin)
     return judged(bench, parts, scaled, found)
 
@@ -323,19 +323,19 @@ def to_the_end(bench: Bench, trial: Trial) -> Trial:
     parts = bench.parts(trial.arm, trial.number, search=False)
     recipe = bench.of_arm(trial.arm)
     given = torch.tensor(trial.scaled, dtype=torch.float64)
-    plan = short(recipe.schedule, recipe.schedule.steps)
-    scaled = descended(parts, parts.lens.problem, given, plan, whiten=recipe.optics.whiten)
+    schedule = short(recipe.schedule, recipe.schedule.steps)
+    scaled = descended(parts, parts.lens.problem, given, schedule, whiten=recipe.optics.whiten)
     cpu_s = time.process_time() - begin
     found = Found(arm=trial.arm, number=trial.number, stage="end", cpu_s=cpu_s)
     return judged(bench, parts, scaled, found)
 
 
 def descended(
-    parts: DesignParts, problem: Problem, begin: Tensor, plan: DesignSchedule, *, whiten: bool
+    parts: DesignParts, problem: Problem, begin: Tensor, schedule: DesignSchedule, *, whiten: bool
 ) -> Tensor:
     """Give the best lens of a loop from `begin`, scaled."""
     lens = LensModule(problem, parts.lens.pixels, begin, whiten=whiten)
-    loop = DesignLoop(replace(parts, lens=lens), plan)
+    loop = DesignLoop(replace(parts, lens=lens), schedule)
     loop.judge()
     for _ in loop.run():
         pass
