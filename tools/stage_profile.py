@@ -38,7 +38,7 @@ from camkit.runtime.pipeline import load
 from camkit.runtime.raw import file_sha256, read_capture
 
 TRANSFORMS = ("wiener", "network")
-SAMPLE_S = 0.02
+WATCH_S = 0.02
 SIDE_PX = 1024
 ACTIVATIONS = ("LeakyRelu", "Relu")
 
@@ -73,7 +73,7 @@ def main() -> None:
 
 
 @dataclass
-class Samples:
+class ThreadWatch:
     """What a thread beside the work sees of it, every 20 ms."""
 
     clock: StageClock
@@ -95,7 +95,7 @@ class Samples:
                 continue  # the thread has ended meanwhile
             self.cpu_s[int(task.name)] = spent / 1e9
 
-    def by_kind(self) -> dict[str, float]:
+    def by_thread(self) -> dict[str, float]:
         """Sum the CPU seconds of main thread, Python threads by name, and native threads."""
         found: dict[str, float] = defaultdict(float)
         for thread, seconds in self.cpu_s.items():
@@ -138,8 +138,8 @@ def profile_stages(arguments: argparse.Namespace) -> None:
     for key in ("all", "neither network nor FFT", "start", "peak MB"):
         print(f"| {key} | {statistics.median(run['total'][key] for run in runs):.2f} | | | |")
     print("\n| thread | CPU s |\n|---|---|")
-    for kind in sorted({k for run in runs for k in run["threads"]}):
-        print(f"| {kind} | {statistics.median(r['threads'].get(kind, 0.0) for r in runs):.2f} |")
+    for name in sorted({k for run in runs for k in run["threads"]}):
+        print(f"| {name} | {statistics.median(r['threads'].get(name, 0.0) for r in runs):.2f} |")
 
 
 def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -152,11 +152,11 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     wall["decode"] = time.perf_counter() - began
     cpu["decode"] = _cpu_s() - began_cpu
     work = pipeline.start(capture)
-    samples, ended = Samples(work.clock), threading.Event()
+    seen, ended = ThreadWatch(work.clock), threading.Event()
 
     def watch() -> None:
-        while not ended.wait(SAMPLE_S):
-            samples.take()
+        while not ended.wait(WATCH_S):
+            seen.take()
 
     watcher = threading.Thread(target=watch, name="profile")
     watcher.start()
@@ -194,8 +194,8 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "wall": wall,
         "cpu": cpu,
-        "rss_mb": samples.rss_mb,
-        "threads": samples.by_kind(),
+        "rss_mb": seen.rss_mb,
+        "threads": seen.by_thread(),
         "total": total,
     }
 
@@ -231,12 +231,12 @@ def profile_layers(arguments: argparse.Namespace) -> None:
             session.run(None, {"input": window})
         events = json.loads(Path(session.end_profiling()).read_text(encoding="utf-8"))
     times: dict[str, list[float]] = defaultdict(list)
-    kinds: dict[str, str] = {}
+    operators: dict[str, str] = {}
     for event in events:
         if event.get("cat") == "Node" and event["name"].endswith("_kernel_time"):
             name = event["name"].removesuffix("_kernel_time")
             times[name].append(event["dur"] / 1e6)
-            kinds[name] = event["args"].get("op_name", "")
+            operators[name] = event["args"].get("op_name", "")
     peak = gemm_peak_gmac_per_s(threads)
     medians = {name: statistics.median(spent[2:] or spent) for name, spent in times.items()}
     total = sum(medians.values())
@@ -248,7 +248,7 @@ def profile_layers(arguments: argparse.Namespace) -> None:
     for name, seconds in sorted(medians.items(), key=lambda item: -item[1]):
         mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
         speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
-        row = f"| {name} | {kinds[name]} | {seconds * 1e3:.1f} | {seconds / total:.1%} | {speed} |"
+        row = f"| {name} | {operators[name]} | {seconds * 1e3:.1f} | {seconds / total:.1%} | {speed} |"
         print(row)
     done = all_macs / total / 1e9
     print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
