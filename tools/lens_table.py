@@ -265,7 +265,7 @@ def parts(
     return made, seen
 
 
-def fresh_source(plan: Plan) -> SceneSource:
+def fresh_source(plan: Conditions) -> SceneSource:
     """Open the pictures that lenses are judged on."""
     share = 0.0 if plan.fresh is None else 1.0
     return open_source(plan.fresh, picture_share=share, scenes=4, scene_px=512)
@@ -321,7 +321,7 @@ def after(lens: Lens, conditions: Conditions, seed: int, folder: Path) -> Entry:
     }
 
 
-def scores(judged: DesignParts, plan: Plan) -> Entry:
+def scores(judged: DesignParts, plan: Conditions) -> Entry:
     """Give PSNR and SSIM of every depth and field."""
     found = score_parts(judged, plan.recipe.schedule, plan.patches)
     return {"db": found.db, "ssim": found.ssim}

@@ -248,8 +248,8 @@ def profile_layers(arguments: argparse.Namespace) -> None:
     for name, seconds in sorted(medians.items(), key=lambda item: -item[1]):
         mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
         speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
-        row = f"| {name} | {operators[name]} | {seconds * 1e3:.1f} | {seconds / total:.1%} | {speed} |"
-        print(row)
+        shown = f"{seconds * 1e3:.1f} | {seconds / total:.1%}"
+        print(f"| {name} | {operators[name]} | {shown} | {speed} |")
     done = all_macs / total / 1e9
     print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
 
