@@ -23,8 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
-from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.reader import STRESS_PSF, Bundle, find_bundle, open_bundle
+from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.writer import write_bundle
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.runtime.clock import StageClock
@@ -162,9 +164,10 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     watcher.start()
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"picture.{arguments.format}"
+        _, height, width = work.shape
         picture = PictureFormat(
-            width=capture.width,
-            height=capture.height,
+            width=width,
+            height=height,
             color=work.color,
             orientation=capture.orientation,
         )
@@ -188,7 +191,7 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     ended.set()
     watcher.join()
     cpu |= work.clock.cpu_seconds
-    rest = all_s - sum(wall.get(name, 0.0) for name in TRANSFORMS)
+    rest = all_s - sum(spent for name, spent in wall.items() if name.split()[0] in TRANSFORMS)
     total = {"all": all_s, "neither network nor FFT": rest, "start": start_s}
     total["peak MB"] = max(peak_rss_mb(), capture.decoder_peak_mb)
     return {
@@ -207,12 +210,19 @@ def _cpu_s() -> float:
 
 
 def profile_layers(arguments: argparse.Namespace) -> None:
+    """Profile the networks of every role."""
+    bundle = open_bundle(find_bundle(arguments.bundle))
+    for role in bundle.manifest.networks:
+        _profile_network(arguments, bundle, role)
+
+
+def _profile_network(arguments: argparse.Namespace, bundle: Bundle, role: str) -> None:
     """Time every node of a network on one window and compare it with the matrix product."""
-    import onnx
     import onnxruntime as ort
 
     threads = available_threads(arguments.threads)
-    data = open_bundle(find_bundle(arguments.bundle)).network_bytes(arguments.size)
+    facts = bundle.network_facts(role, arguments.size)
+    data = bundle.network_bytes(role, arguments.size)
     side = SIDE_PX
     all_macs, macs = _count_macs(data, side)
     options = ort.SessionOptions()
@@ -223,12 +233,11 @@ def profile_layers(arguments: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         options.profile_file_prefix = str(Path(folder) / "ort")
         session = ort.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-        channels = onnx.load_from_string(data).graph.input[0].type.tensor_type.shape.dim[1]
         window = np.random.default_rng(0).random(
-            (1, channels.dim_value, side, side), dtype=np.float32
+            (1, facts.input_channels, side, side), dtype=np.float32
         )
         for _ in range(8):
-            session.run(None, {"input": window})
+            session.run(None, {facts.input_name: window})
         events = json.loads(Path(session.end_profiling()).read_text(encoding="utf-8"))
     times: dict[str, list[float]] = defaultdict(list)
     kinds: dict[str, str] = {}
@@ -240,7 +249,9 @@ def profile_layers(arguments: argparse.Namespace) -> None:
     peak = gemm_peak_gmac_per_s(threads)
     medians = {name: statistics.median(spent[2:] or spent) for name, spent in times.items()}
     total = sum(medians.values())
-    print(f"{arguments.bundle} {arguments.size}, {side}x{side}, {threads} thread(s); ", end="")
+    print(
+        f"{arguments.bundle} {role} {arguments.size}, {side}x{side}, {threads} thread(s); ", end=""
+    )
     print(f"matrix product {peak:.0f} GMAC/s, nodes {total * 1e3:.0f} ms")
     print(
         "| node | kind | ms | share | GMAC/s | of the matrix product |\n|---|---|---|---|---|---|"
@@ -325,6 +336,9 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
     import tifffile
 
     bundle = open_bundle(find_bundle(arguments.bundle))
+    sensor = bundle.manifest.sensor
+    if not isinstance(sensor, BayerSensor):
+        raise SystemExit(f"{bundle.manifest.name} has no mosaic, and this profile makes mosaics")
     print("| megapixels | picture | s | s per megapixel | peak MB |\n|---|---|---|---|---|")
     for megapixels in (float(n) for n in arguments.megapixels.split(",")):
         height = round((megapixels * 1e6 / 1.5) ** 0.5 / 16) * 16
@@ -332,10 +346,9 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
         with tempfile.TemporaryDirectory() as folder:
             large, mosaic = Path(folder) / "large.camkit", Path(folder) / "mosaic.tif"
             _write_stretched(bundle, large, width, height)
-            camera = bundle.manifest.camera
             samples = tifffile.memmap(mosaic, shape=(height, width), dtype=np.uint16)
             rng = np.random.default_rng(0)
-            middle = (camera.black_level + camera.white_level) / 3
+            middle = (sensor.black_level + sensor.white_level) / 3
             for top in range(0, height, 256):
                 shape = samples[top : top + 256].shape
                 samples[top : top + 256] = rng.normal(middle, 20, shape).astype(np.uint16)
@@ -344,8 +357,8 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
             command = [sys.executable, "-m", "camkit", "process", str(mosaic), "--json"]
             command += ["--bundle", str(large), "--size", arguments.size, "--format", "tiff"]
             command += ["--out-dir", str(Path(folder) / "out"), "--max-mem", arguments.max_mem]
-            command += ["--mosaic", str(camera.cfa), "--black-level", f"{camera.black_level:g}"]
-            command += ["--white-level", f"{camera.white_level:g}"]
+            command += ["--mosaic", sensor.cfa, "--black-level", f"{sensor.black_level:g}"]
+            command += ["--white-level", f"{sensor.white_level:g}"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             result: dict[str, Any] = {"error": done.stderr}
             if done.stdout.strip():
@@ -362,16 +375,29 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
 
 def _write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:
     """Write a bundle whose sensor has as many pixels over the same width in millimetres."""
-    camera = bundle.manifest.camera
-    pitch_um = camera.pixel_pitch_um * camera.width_px / width
+    manifest = bundle.manifest
+    extent = manifest.sensor.known_extent
+    ratio = width / extent.width_px
+    pitch_um = extent.pixel_pitch_um / ratio
+    centre = extent.optical_centre_px
+    stretched = extent.model_copy(
+        update={
+            "width_px": width,
+            "height_px": height,
+            "pixel_pitch_um": pitch_um,
+            "optical_centre_px": centre and (centre[0] * ratio, centre[1] * ratio),
+        }
+    )
+    changes: dict[str, Any] = {
+        "sensor": manifest.sensor.model_copy(update={"extent": stretched}),
+    }
+    if manifest.optics is not None:
+        changes["optics"] = manifest.optics.model_copy(update={"pixel_pitch_um": pitch_um})
     members = {name: bundle.member(name) for name in bundle.names}
-    for name in members.keys() & {"psf.safetensors", "stress_psf.safetensors"}:
+    for name in members.keys() & {PSF, STRESS_PSF}:
         psf = psf_from_bytes(members[name])
         members[name] = psf_to_bytes(replace(psf, pixel_pitch_um=pitch_um))
-    stretched = camera.model_copy(
-        update={"width_px": width, "height_px": height, "pixel_pitch_um": pitch_um}
-    )
-    write_bundle(path, bundle.manifest.model_copy(update={"camera": stretched}), members)
+    write_bundle(path, manifest.model_copy(update=changes), members)
 
 
 if __name__ == "__main__":
