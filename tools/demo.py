@@ -69,8 +69,8 @@ def main() -> None:
 
     plan = ("plan", str(capture), "--bundle", arguments.bundle)
     subprocess.run([sys.executable, "-m", "camkit", *plan], check=True)
-    for kind in ("exr", "png"):
-        _process(capture, arguments.bundle, out_dir, kind)
+    for suffix in ("exr", "png"):
+        _process(capture, arguments.bundle, out_dir, suffix)
     _show_quality(simulation, arguments.bundle, arguments.iso, out_dir / "before_after.png")
 
 
@@ -81,12 +81,12 @@ def _mosaic_sensor(bundle: Bundle) -> BayerSensor:
     return sensor
 
 
-def _process(capture: Path, bundle: str, out_dir: Path, kind: str) -> None:
+def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
     """Run the command in a process of its own, so that its memory is its own."""
-    print(f"{capture}: processing to {kind} ...", flush=True)
+    print(f"{capture}: processing to {suffix} ...", flush=True)
     command = [
         *(sys.executable, "-m", "camkit", "process", str(capture), "--bundle", bundle),
-        *("--out-dir", str(out_dir), "--format", kind, "--overwrite", "--json"),
+        *("--out-dir", str(out_dir), "--format", suffix, "--overwrite", "--json"),
     ]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
     result = json.loads(done.stdout or "{}")

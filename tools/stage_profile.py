@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
 from camkit.bundle.reader import STRESS_PSF, Bundle, find_bundle, open_bundle
@@ -40,7 +41,7 @@ from camkit.runtime.pipeline import load
 from camkit.runtime.raw import file_sha256, read_capture
 
 TRANSFORMS = ("wiener", "network")
-SAMPLE_S = 0.02
+WATCH_S = 0.02
 SIDE_PX = 1024
 ACTIVATIONS = ("LeakyRelu", "Relu")
 
@@ -75,7 +76,7 @@ def main() -> None:
 
 
 @dataclass
-class Samples:
+class ThreadWatch:
     """What a thread beside the work sees of it, every 20 ms."""
 
     clock: StageClock
@@ -97,7 +98,7 @@ class Samples:
                 continue  # the thread has ended meanwhile
             self.cpu_s[int(task.name)] = spent / 1e9
 
-    def by_kind(self) -> dict[str, float]:
+    def by_thread(self) -> dict[str, float]:
         """Sum the CPU seconds of main thread, Python threads by name, and native threads."""
         found: dict[str, float] = defaultdict(float)
         for thread, seconds in self.cpu_s.items():
@@ -140,8 +141,8 @@ def profile_stages(arguments: argparse.Namespace) -> None:
     for key in ("all", "neither network nor FFT", "start", "peak MB"):
         print(f"| {key} | {statistics.median(run['total'][key] for run in runs):.2f} | | | |")
     print("\n| thread | CPU s |\n|---|---|")
-    for kind in sorted({k for run in runs for k in run["threads"]}):
-        print(f"| {kind} | {statistics.median(r['threads'].get(kind, 0.0) for r in runs):.2f} |")
+    for name in sorted({k for run in runs for k in run["threads"]}):
+        print(f"| {name} | {statistics.median(r['threads'].get(name, 0.0) for r in runs):.2f} |")
 
 
 def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -154,11 +155,11 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     wall["decode"] = time.perf_counter() - began
     cpu["decode"] = _cpu_s() - began_cpu
     work = pipeline.start(capture)
-    samples, ended = Samples(work.clock), threading.Event()
+    seen, ended = ThreadWatch(work.clock), threading.Event()
 
     def watch() -> None:
-        while not ended.wait(SAMPLE_S):
-            samples.take()
+        while not ended.wait(WATCH_S):
+            seen.take()
 
     watcher = threading.Thread(target=watch, name="profile")
     watcher.start()
@@ -197,8 +198,8 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "wall": wall,
         "cpu": cpu,
-        "rss_mb": samples.rss_mb,
-        "threads": samples.by_kind(),
+        "rss_mb": seen.rss_mb,
+        "threads": seen.by_thread(),
         "total": total,
     }
 
@@ -218,51 +219,56 @@ def profile_layers(arguments: argparse.Namespace) -> None:
 
 def _profile_network(arguments: argparse.Namespace, bundle: Bundle, role: str) -> None:
     """Time every node of a network on one window and compare it with the matrix product."""
-    import onnxruntime as ort
-
     threads = available_threads(arguments.threads)
     facts = bundle.network_facts(role, arguments.size)
     data = bundle.network_bytes(role, arguments.size)
-    side = SIDE_PX
-    all_macs, macs = _count_macs(data, side)
+    times, operators = _node_seconds(data, facts, threads)
+    all_macs, macs = _count_macs(data, SIDE_PX)
+    peak = gemm_peak_gmac_per_s(threads)
+    total = sum(times.values())
+    print(
+        f"{arguments.bundle} {role} {arguments.size}, {SIDE_PX}x{SIDE_PX}, {threads} thread(s); "
+        f"matrix product {peak:.0f} GMAC/s, nodes {total * 1e3:.0f} ms"
+    )
+    print(
+        "| node | kind | ms | share | GMAC/s | of the matrix product |\n|---|---|---|---|---|---|"
+    )
+    for name, seconds in sorted(times.items(), key=lambda item: -item[1]):
+        mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
+        speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
+        shown = f"{seconds * 1e3:.1f} | {seconds / total:.1%}"
+        print(f"| {name} | {operators[name]} | {shown} | {speed} |")
+    done = all_macs / total / 1e9
+    print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
+
+
+def _node_seconds(
+    data: bytes, facts: NetworkFacts, threads: int
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Give the seconds of every node on a square window, the median, and its operator."""
+    import onnxruntime as ort
+
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.enable_mem_pattern = False
     options.enable_profiling = True
     options.log_severity_level = 4
+    shape = (1, facts.input_channels, SIDE_PX, SIDE_PX)
+    window = np.random.default_rng(0).random(shape, dtype=np.float32)
     with tempfile.TemporaryDirectory() as folder:
         options.profile_file_prefix = str(Path(folder) / "ort")
         session = ort.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-        window = np.random.default_rng(0).random(
-            (1, facts.input_channels, side, side), dtype=np.float32
-        )
         for _ in range(8):
             session.run(None, {facts.input_name: window})
         events = json.loads(Path(session.end_profiling()).read_text(encoding="utf-8"))
     times: dict[str, list[float]] = defaultdict(list)
-    kinds: dict[str, str] = {}
+    operators: dict[str, str] = {}
     for event in events:
         if event.get("cat") == "Node" and event["name"].endswith("_kernel_time"):
             name = event["name"].removesuffix("_kernel_time")
             times[name].append(event["dur"] / 1e6)
-            kinds[name] = event["args"].get("op_name", "")
-    peak = gemm_peak_gmac_per_s(threads)
-    medians = {name: statistics.median(spent[2:] or spent) for name, spent in times.items()}
-    total = sum(medians.values())
-    print(
-        f"{arguments.bundle} {role} {arguments.size}, {side}x{side}, {threads} thread(s); ", end=""
-    )
-    print(f"matrix product {peak:.0f} GMAC/s, nodes {total * 1e3:.0f} ms")
-    print(
-        "| node | kind | ms | share | GMAC/s | of the matrix product |\n|---|---|---|---|---|---|"
-    )
-    for name, seconds in sorted(medians.items(), key=lambda item: -item[1]):
-        mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
-        speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
-        row = f"| {name} | {kinds[name]} | {seconds * 1e3:.1f} | {seconds / total:.1%} | {speed} |"
-        print(row)
-    done = all_macs / total / 1e9
-    print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
+            operators[name] = event["args"].get("op_name", "")
+    return {name: statistics.median(t[2:] or t) for name, t in times.items()}, operators
 
 
 def _keys(name: str) -> tuple[str, ...]:
