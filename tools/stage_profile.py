@@ -17,6 +17,8 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +33,7 @@ from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.writer import write_bundle
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.runtime.clock import StageClock
+from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.output.band_queue import BandQueue
@@ -38,7 +41,7 @@ from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.output.picture_writer import PictureFormat
 from camkit.runtime.output.writer import open_writer
 from camkit.runtime.pipeline import load
-from camkit.runtime.raw import file_sha256, read_capture
+from camkit.runtime.raw import file_sha256
 
 TRANSFORMS = ("wiener", "network")
 WATCH_S = 0.02
@@ -151,46 +154,13 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     start_s = time.perf_counter() - began
     wall, cpu = {}, {}
     began, began_cpu = time.perf_counter(), _cpu_s()
-    capture = read_capture(arguments.capture)
+    capture = pipeline.read(arguments.capture)
     wall["decode"] = time.perf_counter() - began
     cpu["decode"] = _cpu_s() - began_cpu
     work = pipeline.start(capture)
-    seen, ended = ThreadWatch(work.clock), threading.Event()
-
-    def watch() -> None:
-        while not ended.wait(WATCH_S):
-            seen.take()
-
-    watcher = threading.Thread(target=watch, name="profile")
-    watcher.start()
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / f"picture.{arguments.format}"
-        _, height, width = work.shape
-        picture = PictureFormat(
-            width=width,
-            height=height,
-            color=work.color,
-            orientation=capture.orientation,
-        )
-        with atomic_output(target) as part:
-            waited = 0.0
-            with open_writer(part, arguments.format, picture) as writer:
-                with BandQueue(writer) as queue:
-                    for band in work.bands():
-                        before = time.perf_counter()
-                        queue.write(band)
-                        waited += time.perf_counter() - before
-                    before = time.perf_counter()
-                waited += time.perf_counter() - before
-            wall |= {**work.seconds, "write": waited}
-            before = time.perf_counter()
-            file_sha256(part)
-            wall["hash"] = time.perf_counter() - before
-            before = time.perf_counter()
-        wall["sync"] = time.perf_counter() - before
-    all_s = time.perf_counter() - began
-    ended.set()
-    watcher.join()
+    with _watched(work.clock) as seen:
+        wall |= _written(work, arguments.format)
+        all_s = time.perf_counter() - began
     cpu |= work.clock.cpu_seconds
     rest = all_s - sum(spent for name, spent in wall.items() if name.split()[0] in TRANSFORMS)
     total = {"all": all_s, "neither network nor FFT": rest, "start": start_s}
@@ -202,6 +172,50 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
         "threads": seen.by_thread(),
         "total": total,
     }
+
+
+@contextmanager
+def _watched(clock: StageClock) -> Iterator[ThreadWatch]:
+    """Look at the work of the block from a thread beside it."""
+    seen, ended = ThreadWatch(clock), threading.Event()
+
+    def watch() -> None:
+        while not ended.wait(WATCH_S):
+            seen.take()
+
+    watcher = threading.Thread(target=watch, name="profile")
+    watcher.start()
+    try:
+        yield seen
+    finally:
+        ended.set()
+        watcher.join()
+
+
+def _written(work: Reconstruction, format_: str) -> dict[str, float]:
+    """Write the picture of a capture and throw it away; give the wall seconds of every stage."""
+    _, height, width = work.shape
+    picture = PictureFormat(
+        width=width, height=height, color=work.color, orientation=work.capture.orientation
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        with atomic_output(Path(folder) / f"picture.{format_}") as part:
+            waited = 0.0
+            with open_writer(part, format_, picture) as writer:
+                with BandQueue(writer) as queue:
+                    for band in work.bands():
+                        before = time.perf_counter()
+                        queue.write(band)
+                        waited += time.perf_counter() - before
+                    before = time.perf_counter()
+                waited += time.perf_counter() - before
+            wall = {**work.seconds, "write": waited}
+            before = time.perf_counter()
+            file_sha256(part)
+            wall["hash"] = time.perf_counter() - before
+            before = time.perf_counter()
+        wall["sync"] = time.perf_counter() - before
+    return wall
 
 
 def _cpu_s() -> float:
