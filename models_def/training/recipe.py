@@ -1,0 +1,308 @@
+"""Recipes: what a person edits to train the networks of a camera, read from TOML.
+
+    name, kind, [sensor], [data], [schedule], [networks]   common to all kinds: here
+    [lens], [wiener], ...                                  of one kind: in its own recipe module
+
+`[networks.SIZE]` is a size of the one network of a kind; a kind with several names their roles,
+`[networks.ROLE.SIZE]`. Keys are strict: an unknown or missing key, a wrong type or a value out of
+range is an error that names the key.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final, TypeVar
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from camkit.bundle.sensor import Sensor, nested_sensor
+from camkit.errors import ContractError
+from camkit.models_def.toml_table import check_keys, section, typed
+
+LOSSES = ("log_mse", "mse")
+PRECISIONS = ("float32", "bfloat16")
+COMMON: Final = frozenset({"name", "kind", "sensor", "data", "schedule", "networks"})
+DEFAULT_KIND: Final = "bayer"
+
+_SENSOR: Final[TypeAdapter[Sensor]] = TypeAdapter(Sensor)
+_FLAT: Final = ("bayer", "planes", "spad", "extent")
+"""Parts of the place of an error that a recipe does not spell out."""
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def check_share(where: str, value: float) -> None:
+    """Refuse a share outside 0..1.
+
+    Raises:
+        ContractError: Naming the key.
+    """
+    if not 0 <= value <= 1:
+        raise ContractError(f"{where} must lie in 0..1; got {value}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataRecipe:
+    """Where samples come from and how many are held; a kind may add keys of its own.
+
+    Attributes:
+        picture_share: Share of samples cut from pictures, the rest is procedural; without a
+            folder of pictures every sample is procedural.
+        procedural_scenes: Different procedural scenes of `scene_px` a side.
+        scene_px: Side of a procedural scene.
+        sample_px: Side of a finished sample; training patches are cut from it.
+        pool_samples: Samples held on disk at one time.
+        first_samples: Samples that must exist before the first step.
+        steps_per_sample: Training steps after which one more sample replaces the oldest.
+    """
+
+    picture_share: float = 0.8
+    procedural_scenes: int = 48
+    scene_px: int = 1024
+    sample_px: int = 256
+    pool_samples: int = 1600
+    first_samples: int = 400
+    steps_per_sample: int = 8
+
+    def __post_init__(self) -> None:
+        check_share("data.picture_share", self.picture_share)
+        if not 0 < self.first_samples < self.pool_samples:
+            raise ContractError("data.first_samples must lie between 0 and pool_samples")
+        if min(self.sample_px, self.scene_px, self.procedural_scenes, self.steps_per_sample) < 1:
+            raise ContractError("sizes and counts of data must be positive")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScheduleRecipe:
+    """How the network is fitted.
+
+    Attributes:
+        steps: Steps of the whole schedule; `--max-minutes` may end it sooner, decay included.
+        batch: Patches per step.
+        patch_px: Side of a training patch.
+        learning_rate: Peak of AdamW's rate: linear warm-up, then a half cosine.
+        final_rate: Rate at the end, relative to the peak.
+        warmup_steps: Steps of warm-up.
+        weight_decay: AdamW's decay.
+        gradient_clip: Largest norm of the gradient.
+        ema_decay: Decay of the weight average that is validated and exported.
+        loss: log_mse or mse, both in the square-root domain of the signal.
+        precision: bfloat16 multiplies (weights stay float32) or float32.
+        float32_share: Share of the schedule, at its end, computed in float32 anyway.
+        seed: Seed of weights, samples and order.
+    """
+
+    steps: int = 40_000
+    batch: int = 8
+    patch_px: int = 128
+    learning_rate: float = 2e-3
+    final_rate: float = 0.005
+    warmup_steps: int = 200
+    weight_decay: float = 1e-4
+    gradient_clip: float = 1.0
+    ema_decay: float = 0.999
+    loss: str = "log_mse"
+    precision: str = "bfloat16"
+    float32_share: float = 0.05
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if self.loss not in LOSSES:
+            raise ContractError(f"schedule.loss must be one of {LOSSES}; got {self.loss!r}")
+        if self.precision not in PRECISIONS:
+            raise ContractError(
+                f"schedule.precision must be one of {PRECISIONS}; got {self.precision!r}"
+            )
+        check_share("schedule.float32_share", self.float32_share)
+        check_share("schedule.ema_decay", self.ema_decay)
+        if min(self.steps, self.batch, self.patch_px) < 1 or self.learning_rate <= 0:
+            raise ContractError("schedule needs positive steps, batch, patch_px, learning_rate")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkRecipe:
+    """One size of network.
+
+    Attributes:
+        network: Name by which its kind builds it.
+        config: Fields of its config that differ from the defaults.
+        schedule: The schedule, with what this network changes of it.
+    """
+
+    network: str
+    config: Mapping[str, Any] = field(default_factory=dict)
+    schedule: ScheduleRecipe = field(default_factory=ScheduleRecipe)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """A camera and how its networks are trained: what all kinds have in common.
+
+    Attributes:
+        name: Name of the camera and its bundle.
+        kind: Kind of camera.
+        sensor: As the bundle will state it.
+        data: Where samples come from.
+        networks: Role -> size -> network.
+    """
+
+    name: str
+    kind: str
+    sensor: Sensor
+    data: DataRecipe
+    networks: Mapping[str, Mapping[str, NetworkRecipe]]
+
+    def role(self, name: str | None) -> str:
+        """Give a role by its name, or the only one.
+
+        Raises:
+            ContractError: If there is no such role, or several to choose from.
+        """
+        have = ", ".join(self.networks)
+        if name is None and len(self.networks) == 1:
+            return next(iter(self.networks))
+        if name is None:
+            raise ContractError(f"recipe {self.name} has networks of the roles {have}; say which")
+        if name not in self.networks:
+            raise ContractError(f"recipe {self.name} has networks of the role {have}; not {name!r}")
+        return name
+
+    def network(self, size: str, role: str | None = None) -> NetworkRecipe:
+        """Give the network of a size, or raise ContractError naming the sizes there are."""
+        sizes = self.networks[self.role(role)]
+        if size not in sizes:
+            raise ContractError(
+                f"recipe {self.name} has the sizes {', '.join(sizes)}; got {size!r}"
+            )
+        return sizes[size]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommonTables:
+    """The common tables of a recipe but [data], which may hold keys of a kind; see `Recipe`."""
+
+    name: str
+    kind: str
+    sensor: Sensor
+    networks: Mapping[str, Mapping[str, NetworkRecipe]]
+
+
+def common_tables(
+    table: Mapping[str, Any], *, own: Iterable[str], roles: Sequence[str]
+) -> CommonTables:
+    """Check the common tables of a recipe.
+
+    Args:
+        table: The whole recipe.
+        own: Keys of its kind.
+        roles: Of the networks of its kind.
+
+    Raises:
+        ContractError: If a key is unknown, missing or wrong.
+    """
+    check_keys("recipe", table, {*COMMON, *own})
+    schedule = section("schedule", ScheduleRecipe, table.get("schedule", {}))
+    return CommonTables(
+        name=typed("name", table.get("name"), str),
+        kind=typed("kind", table.get("kind", DEFAULT_KIND), str),
+        sensor=_sensor(table.get("sensor", {})),
+        networks=_networks(table.get("networks"), schedule, roles),
+    )
+
+
+def with_new_names(table: Mapping[str, Any], older: Mapping[str, str]) -> Mapping[str, Any]:
+    """Give the table of today's names, from one that may hold older ones.
+
+    Checkpoints carry their recipe as text, so older names are read for ever.
+
+    Args:
+        table: A recipe.
+        older: Older name -> today's.
+
+    Raises:
+        ContractError: If a table is there under both names.
+    """
+    for old, new in older.items():
+        if {old, new} <= table.keys():
+            raise ContractError(f"{old} is the older name of {new}; a recipe holds one of them")
+    return {older.get(key, key): value for key, value in table.items()}
+
+
+def differing_part(one: Recipe, other: Recipe, parts: Iterable[str]) -> str | None:
+    """Name the first part by which two recipes describe different cameras, None if none does.
+
+    How networks are trained, and on which samples, may differ from size to size.
+    """
+    return next((part for part in parts if getattr(one, part) != getattr(other, part)), None)
+
+
+def own_schedule(where: str, table: Any, base: ScheduleRecipe) -> ScheduleRecipe:
+    """Give a schedule with what a table changes of it.
+
+    Raises:
+        ContractError: If a key is unknown or wrong.
+    """
+    if not isinstance(table, Mapping):
+        raise ContractError(f"{where} must be a table; got {table!r}")
+    return section(where, ScheduleRecipe, asdict(base) | dict(table))
+
+
+def model(where: str, kind: type[M], table: Mapping[str, Any]) -> M:
+    """Check a table that is part of the manifest too.
+
+    Raises:
+        ContractError: Naming the key.
+    """
+    try:
+        return kind.model_validate(table.get(where, {}))
+    except ValidationError as error:
+        raise _refusal(where, error) from error
+
+
+def _sensor(table: Any) -> Sensor:
+    if not isinstance(table, Mapping):
+        raise ContractError(f"sensor must be a table; got {table!r}")
+    try:
+        return _SENSOR.validate_python(nested_sensor(table))
+    except ValidationError as error:
+        raise _refusal("sensor", error) from error
+
+
+def _refusal(where: str, error: ValidationError) -> ContractError:
+    first = error.errors()[0]
+    parts = (str(part) for part in first["loc"] if part not in _FLAT)
+    return ContractError(f"{'.'.join([where, *parts])}: {first['msg']}")
+
+
+def _networks(
+    table: Any, schedule: ScheduleRecipe, roles: Sequence[str]
+) -> dict[str, dict[str, NetworkRecipe]]:
+    if not isinstance(table, Mapping) or not table:
+        raise ContractError("a recipe needs at least one table [networks.SIZE]")
+    found: dict[str, dict[str, NetworkRecipe]] = {}
+    for name, entry in table.items():
+        if not isinstance(entry, Mapping):
+            raise ContractError(f"networks.{name} must be a table; got {entry!r}")
+        if name in roles and not isinstance(entry.get("network"), str):
+            for size, one in entry.items():
+                found.setdefault(name, {})[size] = _network(
+                    f"networks.{name}.{size}", one, schedule
+                )
+            continue
+        if len(roles) != 1:
+            raise ContractError(
+                f"networks.{name} is of no role; write [networks.ROLE.{name}] with one of the "
+                f"roles {', '.join(roles)}"
+            )
+        found.setdefault(roles[0], {})[name] = _network(f"networks.{name}", entry, schedule)
+    return found
+
+
+def _network(where: str, entry: Any, schedule: ScheduleRecipe) -> NetworkRecipe:
+    if not isinstance(entry, Mapping):
+        raise ContractError(f"{where} must be a table; got {entry!r}")
+    check_keys(where, entry, {"network", "config", "schedule"})
+    return NetworkRecipe(
+        network=typed(f"{where}.network", entry.get("network"), str),
+        config=dict(entry.get("config", {})),
+        schedule=own_schedule(f"{where}.schedule", entry.get("schedule", {}), schedule),
+    )
