@@ -9,10 +9,10 @@ import torch
 from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FrozenPsf
+from camkit.models_def.kinds.bayer import samples as training
 from camkit.models_def.sensors.demosaic import mosaic
 from camkit.models_def.sensors.forward import block_centres_px, scatter
 from camkit.models_def.sensors.psf import color_kernels
-from camkit.models_def.kinds.bayer import samples as training
 from camkit.models_def.training.kind import read_recipe
 from camkit.runtime import simulate as runtime
 from camkit.runtime.geometry.scatter import scatter as runtime_scatter
