@@ -213,7 +213,7 @@ def _shared(options: Options, jobs: int) -> Options:
     """
     if jobs == 1:
         return options
-    from camkit.runtime.job.preparation import FIXED_BYTES
+    from camkit.runtime.job.walker import FIXED_BYTES
     from camkit.runtime.network.engine import available_threads
 
     threads = max(1, available_threads(options.threads) // jobs)

@@ -5,16 +5,15 @@ when a stage asks for them.
 """
 
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.sensor import InputContract
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.memory import mapping_of
-
-Contract = Literal["raw_bayer_v1", "linear_rgb_v1"]
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -24,6 +23,7 @@ tables, companding; the spread seen is under one percent). A sharp sample called
 mistake costs one interpolated highlight, a clipped one called sharp costs a ringing halo.
 """
 
+COLOURS: Final = 3
 _SAMPLE_TYPES: Final = (np.uint8, np.uint16, np.float32)
 
 
@@ -56,9 +56,9 @@ class Capture:
     """One photograph as the sensor saw it.
 
     Attributes:
-        samples: (h, w) mosaic or (3, h, w) planes; uint8, uint16 or float32, in file units.
+        samples: (h, w) mosaic or (c, h, w) planes; uint8, uint16 or float32, in file units.
         cfa: Letters of the 2x2 cell at pixel (0, 0); None for planes.
-        black_level: float32 in file units: (2, 2) by position in the cell for a mosaic, (3,) for
+        black_level: float32 in file units: (2, 2) by position in the cell for a mosaic, (c,) for
             planes.
         white_level: Saturation in file units.
         white_balance: Gains (R, G, B) of the camera's own choice, G = 1; None if not stated.
@@ -112,14 +112,14 @@ class Capture:
         mosaic = self.cfa is not None
         if self.cfa is not None and self.cfa not in CFA_PATTERNS:
             raise ContractError(f"CFA must be one of {CFA_PATTERNS}; got {self.cfa!r}")
-        if (len(shape) != 2) if mosaic else (len(shape) != 3 or shape[0] != 3):
-            wanted = "(h, w) for a mosaic" if mosaic else "(3, h, w) for planes (cfa is None)"
+        if len(shape) != (2 if mosaic else 3):
+            wanted = "(h, w) for a mosaic" if mosaic else "(c, h, w) for planes (cfa is None)"
             raise ContractError(f"samples must be {wanted}; got {shape}")
         if 0 in shape:
             raise ContractError(f"samples must not be empty; got {shape}")
 
     def _check_levels(self) -> None:
-        wanted = (3,) if self.cfa is None else (2, 2)
+        wanted = (self.samples.shape[0],) if self.cfa is None else (2, 2)
         black = self.black_level
         if black.shape != wanted or black.dtype != np.float32 or not np.isfinite(black).all():
             raise ContractError(
@@ -141,9 +141,21 @@ class Capture:
             raise ContractError(f"color matrix must be finite (3, 3); got {matrix.shape}")
 
     @property
-    def contract(self) -> Contract:
-        """Name the input contract of bundles that this capture fulfils."""
-        return "linear_rgb_v1" if self.cfa is None else "raw_bayer_v1"
+    def contract(self) -> InputContract:
+        """Name the input of bundles that this capture is."""
+        if self.cfa is not None:
+            return "raw_bayer_v1"
+        return "linear_rgb_v1" if self.channels == COLOURS else "linear_planes_v1"
+
+    @property
+    def channels(self) -> int:
+        """Give the number of colours: of the planes, or of those behind the mosaic."""
+        return int(self.samples.shape[0]) if self.cfa is None else COLOURS
+
+    @property
+    def plane_shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w) of the samples; a mosaic is one channel."""
+        return 1 if self.cfa is not None else self.channels, self.height, self.width
 
     @property
     def height(self) -> int:
@@ -164,7 +176,7 @@ class Capture:
         """Give rows top..bottom as a linear signal: black is 0, white level 1, negatives kept.
 
         Returns:
-            (bottom - top, w) float32 for a mosaic, (3, bottom - top, w) for planes.
+            (bottom - top, w) float32 for a mosaic, (c, bottom - top, w) for planes.
 
         Raises:
             ContractError: If the rows lie outside the picture.
@@ -207,7 +219,7 @@ class Capture:
         return clipped
 
     def _black_rows(self, top: int) -> FloatArray:
-        """Give black as (3, 1, 1), or as the (2, 2) cell that starts at row `top`."""
+        """Give black as (c, 1, 1), or as the (2, 2) cell that starts at row `top`."""
         if self.cfa is None:
             return self.black_level[:, None, None]
         return np.roll(self.black_level, -(top % 2), axis=0)

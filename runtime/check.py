@@ -17,19 +17,16 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from camkit.bundle.container import read_container
-from camkit.bundle.golden import GoldenArrays
-from camkit.bundle.manifest import GoldenCase, NetworkFacts
-from camkit.bundle.reader import PSF, Bundle, open_bundle, read_container_manifest
-from camkit.contracts import FloatArray, depth_name
+from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.optics import PSF
+from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
+from camkit.contracts import depth_name
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.network.graph import check_graph
-from camkit.runtime.proofs import prove_golden, prove_range, prove_tiling
+from camkit.runtime.proofs import GoldenRun, prove_golden, prove_range, prove_tiling
 
 LAYERS: Final = ("schema", "hash", "graph", "golden", "tiling", "range")
 Status = Literal["pass", "fail", "skip"]
-GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str], FloatArray]
-"""The whole pipeline on one golden capture: (bundle, case, arrays, size) -> (3, h, w)."""
-
 _GROUND: Final = ("schema", "hash", "graph")
 _COST_RTOL: Final = 1e-6
 
@@ -84,8 +81,7 @@ def check_bundle(
         path: The .camkit file.
         level: "all", or one layer, which is checked with those it stands on (schema, hash and
             graph).
-        run: The pipeline, for the golden layer; without it only stored network inputs and
-            outputs are compared.
+        run: The pipeline, for the golden cases; without it networks are proved on noise alone.
         threads: Threads per run of a network.
 
     Raises:
@@ -97,9 +93,9 @@ def check_bundle(
     proofs: dict[str, Callable[[Bundle], tuple[bool, str]]] = {
         "hash": _prove_hashes,
         "graph": _prove_graphs,
-        "golden": lambda bundle: prove_golden(bundle, run=run, threads=threads),
-        "tiling": lambda bundle: prove_tiling(bundle, threads=threads),
-        "range": prove_range,
+        "golden": lambda bundle: prove_golden(bundle, run=run),
+        "tiling": lambda bundle: prove_tiling(bundle, run=run, threads=threads),
+        "range": lambda bundle: prove_range(bundle, run=run),
     }
     layers = [_layer("schema", lambda: (True, _describe(Path(path))))]
     opened: list[Bundle] = []
@@ -136,7 +132,7 @@ def _layer(name: str, prove: Callable[[], tuple[bool, str]]) -> Layer:
 
 def _describe(path: Path) -> str:
     manifest = read_container_manifest(read_container(path))
-    sizes = ", ".join(manifest.networks) or "none"
+    sizes = ", ".join(manifest.sizes) or "none"
     return (
         f"{manifest.name} {manifest.version}, format {manifest.format_version}, "
         f"{len(manifest.members)} members, networks {sizes}"
@@ -155,13 +151,15 @@ def _prove_graphs(bundle: Bundle) -> tuple[bool, str]:
     if not networks:
         return False, "no network"
     notes = []
-    for size, facts in networks.items():
-        notes.append(f"{size}: {_prove_graph(bundle, size, facts)}")
+    for role, sizes in networks.items():
+        for size, facts in sizes.items():
+            what = size if len(networks) == 1 else f"{size} ({role})"
+            notes.append(f"{what}: {_prove_graph(bundle, (role, size), facts)}")
     return True, "; ".join(notes)
 
 
-def _prove_graph(bundle: Bundle, size: str, facts: NetworkFacts) -> str:
-    found = check_graph(bundle.network_bytes(size), facts)
+def _prove_graph(bundle: Bundle, which: tuple[str, str], facts: NetworkFacts) -> str:
+    found = check_graph(bundle.network_bytes(*which), facts)
     costs = {
         "mac_per_pixel": (found.mac_per_pixel, facts.mac_per_pixel),
         "bytes_per_pixel": (found.bytes_per_pixel, facts.bytes_per_pixel),
@@ -174,7 +172,7 @@ def _prove_graph(bundle: Bundle, size: str, facts: NetworkFacts) -> str:
         ):
             raise ContractError(f"{facts.member}: {name} is {got:g}, the manifest says {said:g}")
     if facts.fp16_member is not None:
-        check_graph(bundle.network_bytes(size, fp16=True), facts)
+        check_graph(bundle.network_bytes(*which, fp16=True), facts)
     text = (
         f"halo {found.receptive_field_radius_px} px, stride {found.stride_px}, "
         f"{found.mac_per_pixel / 1000:.3g} kMAC/px"

@@ -4,8 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from camkit.contracts import FloatArray
-from camkit.runtime.rows import RowSource
+from camkit.runtime.rows import Rows, RowSource
 
 
 class StageClock:
@@ -43,7 +42,7 @@ class StageClock:
             self._charge()
             self._running.pop()
 
-    def bands(self, name: str, bands: Iterator[FloatArray]) -> Iterator[FloatArray]:
+    def bands(self, name: str, bands: Iterator[Rows]) -> Iterator[Rows]:
         """Pass bands on, charging the making of each to `name`."""
         while True:
             with self.stage(name):
@@ -74,7 +73,7 @@ class TimedRows:
         """Give (channel, h, w) of the whole picture."""
         return self._source.shape
 
-    def read(self, top: int, bottom: int) -> FloatArray:
+    def read(self, top: int, bottom: int) -> Rows:
         """Give rows top..bottom of the source."""
         with self._clock.stage(self._name):
             return self._source.read(top, bottom)

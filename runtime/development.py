@@ -13,13 +13,12 @@ from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.output.band_queue import BandQueue
-from camkit.runtime.output.linear_dng import LinearDngWriter
 from camkit.runtime.output.part_file import atomic_output
-from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
+from camkit.runtime.output.picture_writer import PictureFormat
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_sidecar
 from camkit.runtime.output.writer import SUFFIXES, open_writer
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.raw import file_sha256, read_capture
+from camkit.runtime.raw import file_sha256
 
 FileFormat = Literal["exr", "tiff", "png", "dng"]
 Status = Literal["ok", "failed", "skipped"]
@@ -108,7 +107,7 @@ class FileResult:
             output=target,
             status="skipped",
             bundle=_bundle_name(pipeline),
-            size=_size(pipeline),
+            size=pipeline.size,
             seconds={},
             peak_rss_mb=peak_rss_mb(),
         )
@@ -143,7 +142,7 @@ def develop_file(
         Cancelled: If `cancel` said so.
     """
     began = time.perf_counter()
-    capture = read_capture(source, mosaic=mosaic)
+    capture = pipeline.read(source, mosaic)
     decode_s = time.perf_counter() - began
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
@@ -165,12 +164,12 @@ def develop_file(
     )
     if estimate is not None:
         total_s = sum(seconds.values())
-        work.plan["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
+        work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
     record = {
         **result.to_json(),
         **_identity(capture.sha256, pipeline, write, mosaic),
         "output_sha256": output_sha256,
-        "plan": work.plan,
+        "plan": work.record,
         "clipped_fraction": work.clipped_fraction,
         "orientation": capture.orientation,
         "camera": capture.camera,
@@ -211,6 +210,7 @@ def _identity(
     chosen = {k: v for k, v in asdict(pipeline.options).items() if k not in free}
     if chosen["depth_m"] == math.inf:
         chosen["depth_m"] = "inf"  # JSON knows no infinity
+    chosen["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
     chosen |= {"format": write.format, "linear": write.linear}
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
     identity = {
@@ -224,15 +224,17 @@ def _identity(
 
 def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> float:
     """Stream the bands into the file; return the seconds for which the writer was waited for."""
+    _, height, width = work.shape
     picture = PictureFormat(
-        width=work.capture.width,
-        height=work.capture.height,
+        width=width,
+        height=height,
         color=work.color,
         orientation=1 if write.format == "dng" else work.capture.orientation,
         tone="linear" if write.linear else "srgb",
+        origin=work.origin,
     )
     seconds = 0.0
-    with _open(path, picture, work, write) as writer, BandQueue(writer) as queue:
+    with open_writer(path, write.format, picture) as writer, BandQueue(writer) as queue:
         for band in work.bands():
             began = time.perf_counter()
             queue.write(band)
@@ -241,17 +243,5 @@ def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> flo
     return seconds + time.perf_counter() - began
 
 
-def _open(
-    path: Path, picture: PictureFormat, work: Reconstruction, write: WriteOptions
-) -> PictureWriter:
-    if write.format == "dng":
-        return LinearDngWriter(path, picture, work.capture, work.white_balance)
-    return open_writer(path, write.format, picture)
-
-
 def _bundle_name(pipeline: Pipeline) -> str | None:
     return None if pipeline.bundle is None else pipeline.bundle.manifest.name
-
-
-def _size(pipeline: Pipeline) -> str | None:
-    return None if pipeline.engine is None else pipeline.size

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 from camkit.errors import ContractError
+from camkit.runtime.unit import Unit
 from camkit.units import MM_PER_M
 
-Method = Literal["net", "wiener", "rl", "admm-tv"]
 Mode = Literal["exact", "fast", "whole"]
 Dtype = Literal["fp32", "fp16"]
 Provider = Literal["cpu", "cuda", "tensorrt", "openvino"]
@@ -16,7 +16,6 @@ Assumption = Literal["centre", "scale"]
 Quality = Literal["exact", "best", "adaptive", "draft"]
 OnUnsafe = Literal["warn", "fallback", "fail"]
 
-SIZES: Final = ("S", "M", "L")
 DEFAULT_MAX_MEM_BYTES: Final = 930_000_000
 LEAST_MAX_MEM_BYTES: Final = 400_000_000
 
@@ -26,7 +25,7 @@ class Options:
     """Everything that changes the pixels or the cost of a reconstruction.
 
     Attributes:
-        size: Network size held by the bundle: S, M or L; None for that of the quality.
+        size: Network size held by the bundle, such as S, M or L; None for that of the quality.
         quality: exact (M, nothing skipped), best (the largest size, nothing skipped), adaptive
             (no more than the capture needs) or draft; see camkit/runtime/plan.
         max_seconds: Time that a capture may take on this machine; None for any.
@@ -34,7 +33,8 @@ class Options:
             quality.
         depth_m: Object distance whose kernels the bank uses, where the bundle knows several (its
             PSF must reach it); None for the mean kernel over the depths.
-        method: The network behind the Wiener bank, or a classical method alone.
+        method: Way of one of the bundle's stages: net (the network), a classical method alone, or
+            develop (no restoration); None for the best that the bundle has.
         mode: Tiling: exact (bits of the whole picture), fast (smaller halo), whole (one window).
         demosaic: fast or quality; None for the method of the bundle, fast without one.
         color: Colour space of the result.
@@ -49,6 +49,7 @@ class Options:
         max_mem_bytes: Memory the process may take; None for the default of 0.93 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
+        unit: The camera body, whose facts the stages may use; None for any.
         dtype: Which graph of the bundle: fp32, or fp16 where it holds one. A CPU computes the
             latter in fp32 too, with weights rounded to fp16.
         provider: What onnxruntime computes the network on.
@@ -59,7 +60,7 @@ class Options:
     max_seconds: float | None = None
     max_error_db: float | None = None
     depth_m: float | None = None
-    method: Method = "net"
+    method: str | None = None
     mode: Mode = "exact"
     demosaic: DemosaicMethod | None = None
     color: OutputColor = "rec709"
@@ -72,18 +73,16 @@ class Options:
     max_mem_bytes: int | None = None
     threads: int | None = None
     tile_px: int | None = None
+    unit: Unit | None = None
     dtype: Dtype = "fp32"
     provider: Provider = "cpu"
 
     def __post_init__(self) -> None:
-        if self.size is not None:
-            _check_choice("size", self.size, SIZES)
         _check_choice("quality", self.quality, get_args(Quality))
         for name, value in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
             if value is not None and not 0 < value < 1e6:
                 raise ContractError(f"the most {name} must be > 0; got {value}")
         _check_depth(self.depth_m)
-        _check_choice("method", self.method, get_args(Method))
         _check_choice("mode", self.mode, get_args(Mode))
         _check_choice("dtype", self.dtype, get_args(Dtype))
         _check_choice("provider", self.provider, get_args(Provider))
@@ -134,3 +133,16 @@ def parse_memory(text: str) -> int:
         return int(float(number) * units[body[len(number) :]])
     except (ValueError, KeyError, OverflowError):
         raise ContractError(f"expected a memory size such as 2G or 900M; got {text!r}") from None
+
+
+FLAGS: Final = {
+    "white_balance": "--wb",
+    "exposure_ev": "--exposure",
+    "max_mem_bytes": "--max-mem",
+}
+"""Names that `camkit process` has for options where they differ from --name-of-the-field."""
+
+
+def flag_of(name: str) -> str:
+    """Name an option as `camkit process` does."""
+    return FLAGS.get(name, "--" + name.replace("_", "-"))

@@ -14,23 +14,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.manifest import Wiener
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.contracts import FloatArray, depth_weights
+from camkit.bundle.stages import Wiener
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError, UnsupportedError
+from camkit.kinds import BAYER
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.setup import Setup
+from camkit.runtime.kind import runtime_part
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.options import Options
+from camkit.runtime.plan.decision import Work
 from camkit.runtime.plan.planner import default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
-from camkit.runtime.raw import read_capture
+from camkit.runtime.plan.ways import planned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +42,7 @@ class Picture:
 
     Attributes:
         image: (3, h, w) float32, linear, in the colour space asked for (Rec.709 by default), in
-            sensor orientation.
+            sensor orientation; h and w are those of the capture unless the camera makes it finer.
         orientation: EXIF orientation (1..8) that a viewer should apply.
         seconds: Seconds per stage.
         warnings: What the user should know.
@@ -69,25 +72,39 @@ class Summary:
 
 
 class Pipeline:
-    """A bundle with options, ready to reconstruct captures; safe to share between threads."""
+    """A bundle with options, ready to reconstruct captures; safe to share between threads.
+
+    Attributes:
+        bundle: The camera; None develops only.
+        options: What the caller chose.
+        threads: Threads to compute with.
+        size: Size of network that is ready; None where none will run.
+    """
 
     def __init__(self, bundle: Bundle | None, options: Options) -> None:
+        """Make ready what captures will need.
+
+        Raises:
+            ContractError: If the bundle lacks what was asked for, or an option means nothing to it.
+        """
         self.bundle = bundle
         self.options = options
         self.threads = available_threads(options.threads)
-        self.size = None if bundle is None else default_size(bundle, options)
-        if options.depth_m is not None:
-            _check_depth(bundle, options)
+        check_choices(bundle, options)
+        # without a bundle captures are read as colour photographs are
+        self._part = runtime_part(BAYER.name if bundle is None else bundle.manifest.kind)
         self._lock = threading.Lock()
-        self._engines: dict[str, NetworkEngine] = {}
-        self._speeds: dict[str, float] = {}
+        self._engines: dict[tuple[str, str], NetworkEngine] = {}
+        self._speeds: dict[tuple[str, str], float] = {}
         self._speed: Speed | None = None
-        self.engine = None
-        if self.size is not None and options.method == "net":
-            self.engine = self.network(self.size)
+        self.size: str | None = None
+        if bundle is not None and _runs_networks(bundle, options):
+            self.size = default_size(bundle, options)
+            for role in bundle.manifest.networks:
+                self.network(role, self.size)
 
-    def network(self, size: str) -> NetworkEngine:
-        """Give the network of a size, made when first asked for.
+    def network(self, role: str, size: str) -> NetworkEngine:
+        """Give the network of a role and size, made when first asked for.
 
         Raises:
             ContractError: If there is no bundle, or it lacks the size.
@@ -95,14 +112,20 @@ class Pipeline:
         if self.bundle is None:
             raise ContractError("without a bundle there is no network")
         with self._lock:
-            if size not in self._engines:
-                options = replace(self.options, size=size)
-                self._engines[size] = _engine(self.bundle, options, self.threads)
-            return self._engines[size]
+            if (role, size) not in self._engines:
+                made = _engine(self.bundle, (role, size), self.options, self.threads)
+                self._engines[role, size] = made
+            return self._engines[role, size]
 
     def speed(self, sizes: Sequence[str]) -> Speed:
         """Give how fast this machine is; networks and bank are timed once per pipeline."""
-        new = {size: self.network(size) for size in sizes if size not in self._speeds}
+        roles = () if self.bundle is None else tuple(self.bundle.manifest.networks)
+        new = {
+            (role, size): self.network(role, size)
+            for role in roles
+            for size in sizes
+            if (role, size) not in self._speeds
+        }
         with self._lock:
             if self._speed is None or new:
                 stage = None if self.bundle is None else self.bundle.manifest.stage(Wiener)
@@ -110,6 +133,14 @@ class Pipeline:
                 self._speeds.update(made.network_s_per_mp)
                 self._speed = self._speed or made
             return replace(self._speed, network_s_per_mp=dict(self._speeds))
+
+    def read(self, file: Path, mosaic: MosaicOptions | None = None) -> Capture:
+        """Read a capture of the bundle's kind of camera.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+        """
+        return self._part.read(file, mosaic, None if self.bundle is None else self.bundle.manifest)
 
     def start(
         self,
@@ -126,7 +157,6 @@ class Pipeline:
         setup = Setup(
             bundle=self.bundle,
             options=self.options,
-            engine=self.engine,
             networks=self.network,
             speed=self.speed,
             threads=self.threads,
@@ -207,7 +237,7 @@ class Pipeline:
     ) -> tuple[Reconstruction, float]:
         """Read a capture and plan its reconstruction; also give the seconds of reading."""
         began = time.perf_counter()
-        capture = read_capture(Path(file), mosaic=mosaic)
+        capture = self.read(Path(file), mosaic)
         decode_s = time.perf_counter() - began
         return self.start(capture, progress=progress, cancel=cancel), decode_s
 
@@ -225,17 +255,17 @@ class Pipeline:
         """Reconstruct a capture that is already in memory.
 
         Args:
-            image: (h, w) mosaic in DN, in the bundle's CFA and levels, or (3, h, w) linear camera
-                RGB with 1.0 = white level, as the bundle's contract says.
+            image: As the bundle's sensor gives it: (h, w) mosaic in DN, in its CFA and levels, or
+                (c, h, w) linear planes with 1.0 = white level.
             iso: For the noise model; None measures the noise.
             white_balance: Gains (R, G, B); None takes those of the bundle's illuminant.
             origin_px: (x, y) of the first pixel on the sensor, for a crop; None for a whole frame.
-            out: (3, h, w) float32 to fill; a new array when None.
+            out: (3, H, W) float32 to fill; a new array when None.
             progress: Called with (tiles done, tiles in all).
             cancel: Asked at every tile; true raises `Cancelled`.
 
         Returns:
-            (3, h, w) float32, linear, Rec.709 unless the options ask otherwise.
+            (3, H, W) float32, linear, Rec.709 unless the options ask otherwise.
 
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
@@ -251,51 +281,15 @@ class Pipeline:
         white_balance: tuple[float, float, float] | None,
         origin_px: tuple[int, int] | None,
     ) -> Capture:
-        """Give an array the meaning that the bundle's contract says; see `process_array`.
+        """Give an array the meaning that the bundle's sensor gives it; see `process_array`.
 
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
         """
         if self.bundle is None:
             raise ContractError("process_array needs a bundle: it says what the numbers mean")
-        if not isinstance(image, np.ndarray):
-            raise ContractError(f"expected a numpy array; got {type(image).__name__}")
-        if image.dtype == np.float32 and not np.isfinite(image).any():
-            raise ContractError("the array holds no finite sample")
-        camera = self.bundle.manifest.camera
-        is_mosaic = image.ndim == 2
-        if not is_mosaic and (image.ndim != 3 or image.shape[0] != 3):
-            raise ContractError(f"expected (h, w) or (3, h, w); got {image.shape}")
-        if is_mosaic and self.bundle.manifest.input_contract != "raw_bayer_v1":
-            raise ContractError(
-                f"the bundle takes {self.bundle.manifest.input_contract}; got an (h, w) mosaic"
-            )
-        if image.dtype not in (np.uint8, np.uint16, np.float32):
-            raise ContractError(f"expected uint8, uint16 or float32 samples; got {image.dtype}")
-        sensor = (camera.width_px, camera.height_px)
-        return Capture(
-            samples=image,
-            cfa=camera.cfa if is_mosaic else None,
-            black_level=(
-                np.full((2, 2), camera.black_level, np.float32)
-                if is_mosaic
-                else np.zeros(3, np.float32)
-            ),
-            white_level=camera.white_level if is_mosaic else 1.0,
-            white_balance=white_balance,
-            color_matrix=np.array(camera.color_matrix, dtype=np.float64),
-            orientation=1,
-            iso=iso,
-            exposure_time_s=None,
-            noise=None,
-            origin_px=origin_px,
-            sensor_size_px=sensor if origin_px is not None else None,
-            pixel_pitch_um=None,
-            bundle_name=self.bundle.manifest.name,
-            camera=self.bundle.manifest.name,
-            sha256=None,
-            notes=(),
-        )
+        manifest = self.bundle.manifest
+        return self._part.from_array(image, manifest, iso, white_balance, origin_px)
 
 
 def load(
@@ -325,32 +319,29 @@ def load(
     return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
 
 
-def _check_depth(bundle: Bundle | None, options: Options) -> None:
-    """Refuse a depth before any work.
-
-    Raises:
-        ContractError: If no bank uses it, or the PSF does not reach it.
-    """
-    if bundle is None or bundle.manifest.stage(Wiener) is None:
-        raise ContractError("a depth chooses kernels of a bundle's bank, and there is none here")
-    depth_weights(bundle.psf.depths_mm, options.depth_mm)
+def _runs_networks(bundle: Bundle, options: Options) -> bool:
+    return planned(bundle.manifest.stages, Work(method=options.method)).networks
 
 
-def _engine(bundle: Bundle, options: Options, threads: int) -> NetworkEngine:
-    size = options.size or "M"
-    networks = bundle.manifest.networks
+def _engine(
+    bundle: Bundle, chosen: tuple[str, str], options: Options, threads: int
+) -> NetworkEngine:
+    (role, size), networks = chosen, bundle.manifest.networks
     if bundle.manifest.border != "edge":
         raise UnsupportedError(
             f"bundle {bundle.manifest.name} continues pictures by {bundle.manifest.border}; "
             "this runtime offers edge"
         )
-    if size not in networks:
+    sizes = networks.get(role, {})
+    if size not in sizes:
         raise ContractError(
-            f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(networks))}; "
-            f"asked for {size}; say --size {min(networks)}"
-            if networks
+            f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(sizes))}; "
+            f"asked for {size}; say --size {min(sizes)}"
+            if sizes
             else f"bundle {bundle.manifest.name} holds no network; use method wiener"
         )
-    data = bundle.network_bytes(size, fp16=options.dtype == "fp16")
-    check_graph(data, networks[size])
-    return NetworkEngine(data, threads=threads, provider=options.provider)
+    data = bundle.network_bytes(role, size, fp16=options.dtype == "fp16")
+    check_graph(data, sizes[size])
+    return NetworkEngine(
+        data, threads=threads, provider=options.provider, scale=sizes[size].output_scale
+    )

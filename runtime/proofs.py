@@ -6,14 +6,15 @@ bundle does not keep its word.
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
-from camkit.bundle.golden import GoldenArrays, golden_from_bytes
-from camkit.bundle.manifest import GoldenCase, Network, NetworkFacts
+from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.golden import NO_SIZE, GoldenArrays, golden_from_bytes
+from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
@@ -26,24 +27,34 @@ from camkit.runtime.rows import ArrayRows
 _SEED: Final = 7
 _TILE_PX: Final = 64
 _SYNTHETIC_PX: Final = 96
+_SYNTHETIC_MOST: Final = 8.0
 # Activations of the same input on another processor differ by rounding only.
 _RANGE_RTOL: Final = 1e-3
 
 Result = tuple[bool, str]
 
 
-def prove_golden(
-    bundle: Bundle,
-    *,
-    run: Callable[[Bundle, GoldenCase, GoldenArrays, str], FloatArray] | None,
-    threads: int,
-) -> Result:
+class CaseWork(Protocol):
+    """A golden capture on its way through the pipeline."""
+
+    def fill(self, out: FloatArray | None = None, product: str = "image") -> FloatArray:
+        """Give a product, (c, h, w)."""
+        ...
+
+    def network_input(self, role: str) -> FloatArray:
+        """Give what the network of a role is given, (c, h, w)."""
+        ...
+
+
+GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str | None], CaseWork]
+
+
+def prove_golden(bundle: Bundle, *, run: GoldenRun | None) -> Result:
     """Compute the golden cases again.
 
     Args:
         bundle: The bundle.
-        run: The whole pipeline, or None to run the stored network inputs only.
-        threads: Threads per run of a network.
+        run: The whole pipeline, or None to prove nothing.
 
     Raises:
         BundleError: If manifest and golden.safetensors hold other cases.
@@ -52,45 +63,39 @@ def prove_golden(
     cases = {case.name: case for case in bundle.manifest.golden}
     if not cases:
         return False, "no golden case"
-    arrays = golden_from_bytes(bundle.member(GOLDEN))
+    arrays = _golden(bundle)
     if arrays.keys() != cases.keys():
         raise BundleError(
             f"the manifest has the golden cases {', '.join(sorted(cases))}; "
             f"{GOLDEN} has {', '.join(sorted(arrays))}"
         )
+    if run is None:
+        return False, "nothing to compare: no pipeline was given"
     worst, compared = 0.0, 0
-    for size in bundle.manifest.networks:
-        engine = NetworkEngine(bundle.network_bytes(size), threads=threads)
+    for size in bundle.manifest.sizes or (None,):
         for name, case in cases.items():
-            for got, stored in _golden_pairs(bundle, case, arrays[name], size, run, engine):
-                worst = max(worst, _compare(got, stored, case, size))
+            for got, stored, what in _pairs(bundle, case, arrays[name], size, run):
+                worst = max(worst, _compare(got, stored, case, what))
                 compared += 1
     if not compared:
-        return False, "nothing to compare: no stored network input, and no pipeline was given"
+        return False, "nothing to compare: no output is stored"
     return True, f"{compared} results, worst at {worst:.3g} of what is allowed"
 
 
-def _golden_pairs(
-    bundle: Bundle,
-    case: GoldenCase,
-    arrays: GoldenArrays,
-    size: str,
-    run: Callable[[Bundle, GoldenCase, GoldenArrays, str], FloatArray] | None,
-    engine: NetworkEngine,
-) -> list[tuple[FloatArray, FloatArray]]:
-    """Give (computed, stored) for the network alone and for the whole pipeline."""
-    pairs = []
-    if arrays.network_input is not None and size in arrays.network_outputs:
-        got = engine.run(np.ascontiguousarray(arrays.network_input[None]))[0]
-        pairs.append((got, arrays.network_outputs[size]))
-    if run is not None and size in arrays.outputs:
-        pairs.append((run(bundle, case, arrays, size), arrays.outputs[size]))
-    return pairs
+def _pairs(
+    bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None, run: GoldenRun
+) -> Iterator[tuple[FloatArray, FloatArray, str]]:
+    """Give (computed, stored, what it is) of every product that is stored for a size."""
+    for product in arrays.outputs:
+        stored = arrays.output(product, size or NO_SIZE)
+        if stored is not None:
+            got = run(bundle, case, arrays, size).fill(product=product)
+            yield got, stored, f"{product} of size {size or NO_SIZE}"
 
 
-def _compare(got: FloatArray, stored: FloatArray, case: GoldenCase, size: str) -> float:
+def _compare(got: FloatArray, stored: FloatArray, case: GoldenCase, what: str) -> float:
     """Give the largest difference as a share of what is allowed."""
-    where = f"golden case {case.name}, size {size}"
+    where = f"golden case {case.name}, {what}"
     if got.shape != stored.shape:
         raise ParityError(f"{where}: computed {got.shape}, stored {stored.shape}")
     allowed = case.atol + case.rtol * max(1.0, float(np.abs(stored).max()))
@@ -103,39 +108,57 @@ def _compare(got: FloatArray, stored: FloatArray, case: GoldenCase, size: str) -
     return difference / allowed if allowed else 0.0
 
 
-def prove_tiling(bundle: Bundle, *, threads: int) -> Result:
+def prove_tiling(bundle: Bundle, *, run: GoldenRun | None, threads: int) -> Result:
     """Show for every network that tiled equals whole and that its reach is what it says.
 
     Raises:
         ParityError: If a single bit differs, or a pixel acts further than stated.
     """
     notes = []
-    for size, facts in bundle.manifest.networks.items():
+    for role, size, facts in _networks(bundle):
+        what = _name(bundle, role, size)
         if facts.global_operators:
-            notes.append(f"{size}: cannot be tiled ({', '.join(facts.global_operators)})")
+            notes.append(f"{what}: cannot be tiled ({', '.join(facts.global_operators)})")
             continue
-        engine = NetworkEngine(bundle.network_bytes(size), threads=threads)
-        count = _prove_equal(engine, facts, _windows(bundle, size)[0], size)
+        engine = _engine(bundle, role, size, threads)
+        sample = _windows(bundle, role, size, run)[0]
+        count = _prove_equal(engine, facts, sample, what)
         probe = perturbation_reach(
             engine.run,
             _probe_px(facts),
             np.random.default_rng(_SEED),
             stride_px=facts.stride_px,
             channels=facts.input_channels,
+            scale=facts.output_scale,
         )
         if probe.halo_px > facts.reach_px:
             raise ParityError(
-                f"size {size}: a pixel acts {probe.halo_px} px far, the manifest says "
+                f"size {what}: a pixel acts {probe.halo_px} px far, the manifest says "
                 f"{facts.reach_px}; export the bundle again"
             )
         notes.append(
-            f"{size}: {count} windows equal the whole, halo {facts.reach_px} px "
+            f"{what}: {count} windows equal the whole, halo {facts.reach_px} px "
             f"(probe {probe.halo_px})"
         )
     return bool(notes), "; ".join(notes) or "no network"
 
 
-def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray, size: str) -> int:
+def _networks(bundle: Bundle) -> Iterator[tuple[str, str, NetworkFacts]]:
+    for role, sizes in bundle.manifest.networks.items():
+        for size, facts in sizes.items():
+            yield role, size, facts
+
+
+def _name(bundle: Bundle, role: str, size: str) -> str:
+    return size if len(bundle.manifest.networks) == 1 else f"{size} ({role})"
+
+
+def _engine(bundle: Bundle, role: str, size: str, threads: int) -> NetworkEngine:
+    scale = bundle.network_facts(role, size).output_scale
+    return NetworkEngine(bundle.network_bytes(role, size), threads=threads, scale=scale)
+
+
+def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray, what: str) -> int:
     """Compare tiled with whole on a picture of odd sides with at least 2 x 2 windows."""
     stride = facts.stride_px
     halo = math.ceil(facts.reach_px / stride) * stride
@@ -148,14 +171,15 @@ def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray,
     difference = _infer(engine, picture, tiled) - _infer(engine, picture, whole)
     if difference.any():
         raise ParityError(
-            f"size {size}: tiled differs from whole by up to {np.abs(difference).max():.3g} with "
+            f"size {what}: tiled differs from whole by up to {np.abs(difference).max():.3g} with "
             f"a halo of {halo} px; exact tiling is not kept"
         )
     return tiled.window_count
 
 
 def _infer(engine: NetworkEngine, picture: FloatArray, plan: TilePlan) -> FloatArray:
-    bands = infer_bands(engine.run, ArrayRows(np.ascontiguousarray(picture)), plan)
+    rows = ArrayRows(np.ascontiguousarray(picture))
+    bands = infer_bands(engine.run, rows, plan, scale=engine.scale)
     return np.concatenate(list(bands), axis=1)
 
 
@@ -165,7 +189,7 @@ def _probe_px(facts: NetworkFacts) -> int:
     return max(4, 2 * (math.ceil(facts.reach_px / stride) + 2)) * stride
 
 
-def prove_range(bundle: Bundle) -> Result:
+def prove_range(bundle: Bundle, *, run: GoldenRun | None) -> Result:
     """Measure activations again and hold them against the manifest and the range of fp16.
 
     Raises:
@@ -173,53 +197,48 @@ def prove_range(bundle: Bundle) -> Result:
             claimed beyond its range.
     """
     notes = []
-    for size, facts in bundle.manifest.networks.items():
-        windows = [window[None] for window in _windows(bundle, size)]
-        found = node_activations(bundle.network_bytes(size), windows)
+    for role, size, facts in _networks(bundle):
+        what = _name(bundle, role, size)
+        windows = [window[None] for window in _windows(bundle, role, size, run)]
+        found = node_activations(bundle.network_bytes(role, size), windows)
         largest = max(found.values())
         if not math.isfinite(largest):
-            raise ParityError(f"size {size}: activations are not finite")
-        if _has_inputs(bundle) and largest > facts.max_activation * (1 + _RANGE_RTOL):
+            raise ParityError(f"size {what}: activations are not finite")
+        known = run is not None and bundle.manifest.golden
+        if known and largest > facts.max_activation * (1 + _RANGE_RTOL):
             raise ParityError(
-                f"size {size}: activations reach {largest:.4g} on the golden cases, the manifest "
+                f"size {what}: activations reach {largest:.4g} on the golden cases, the manifest "
                 f"says {facts.max_activation:.4g}; export the bundle again"
             )
         stated = facts.node_activation | {"stated": facts.max_activation}
         if facts.fp16_safe and not fits_fp16(found | stated, headroom=facts.fp16_headroom):
             raise ParityError(
-                f"size {size}: fp16 is claimed, but {max(largest, *stated.values()):.4g} x "
+                f"size {what}: fp16 is claimed, but {max(largest, *stated.values()):.4g} x "
                 f"{facts.fp16_headroom:g} is not below {FP16_LIMIT:g}"
             )
         safe = "fp16 safe" if facts.fp16_safe else "fp32 only"
-        notes.append(f"{size}: at most {largest:.4g}, {safe}")
+        notes.append(f"{what}: at most {largest:.4g}, {safe}")
     return bool(notes), "; ".join(notes) or "no network"
-
-
-def _has_inputs(bundle: Bundle) -> bool:
-    return any(case.network_input is not None for case in _golden(bundle).values())
 
 
 def _golden(bundle: Bundle) -> dict[str, GoldenArrays]:
     return golden_from_bytes(bundle.member(GOLDEN)) if GOLDEN in bundle.names else {}
 
 
-def _windows(bundle: Bundle, size: str) -> list[FloatArray]:
-    """Give network inputs: the stored ones, else noise over the whole range of the sensor."""
-    facts = bundle.network_facts(size)
-    stored = [
-        np.ascontiguousarray(_whole_cells(case.network_input, facts.stride_px))
-        for case in _golden(bundle).values()
-        if case.network_input is not None
-    ]
-    if stored:
-        return stored
-    stage = bundle.manifest.stage(Network) or Network()
-    noise = bundle.manifest.camera.noise_at(bundle.manifest.camera.noise[0].iso)
-    white = math.sqrt(1 / noise.shot[0]) / stage.scale
+def _windows(bundle: Bundle, role: str, size: str, run: GoldenRun | None) -> list[FloatArray]:
+    """Give inputs of a network: those of the golden captures, else noise."""
+    facts = bundle.network_facts(role, size)
+    if run is not None and bundle.manifest.golden:
+        arrays = _golden(bundle)
+        given = [
+            run(bundle, case, arrays[case.name], size).network_input(role)
+            for case in bundle.manifest.golden
+        ]
+        return [np.ascontiguousarray(_whole_cells(planes, facts.stride_px)) for planes in given]
     side = math.ceil(_SYNTHETIC_PX / facts.stride_px) * facts.stride_px
     rng = np.random.default_rng(_SEED)
     planes = rng.random((facts.input_channels, side, side), dtype=np.float32)
-    return [np.float32(white) * planes]
+    return [np.float32(_SYNTHETIC_MOST) * planes]
 
 
 def _whole_cells(planes: FloatArray, stride: int) -> FloatArray:

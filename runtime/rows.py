@@ -7,14 +7,19 @@ Every stage reads rows from a `RowSource` and yields bands of finished rows from
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.slices import run_chunks
 
+Rows = NDArray[Any]
+"""(channel, rows, w): float32, or bool for a mask."""
+BAND_ROWS: Final = 128
+"""Rows read at a time where nothing asks for another number."""
 STALE_ROWS: Final = 128
 """Rows of a band that may wait for their successors after their last reader has passed."""
 
@@ -27,8 +32,8 @@ class RowSource(Protocol):
         """Give (channel, h, w) of the whole picture."""
         ...
 
-    def read(self, top: int, bottom: int) -> FloatArray:
-        """Give rows top..bottom as (channel, bottom - top, w) float32.
+    def read(self, top: int, bottom: int) -> Rows:
+        """Give rows top..bottom as (channel, bottom - top, w).
 
         Successive calls must not go back above the `top` of an earlier call.
         """
@@ -38,7 +43,7 @@ class RowSource(Protocol):
 class PiecedRows(RowSource, Protocol):
     """A row source that can give its rows as they lie, without joining them."""
 
-    def pieces(self, top: int, bottom: int) -> Sequence[FloatArray]:
+    def pieces(self, top: int, bottom: int) -> Sequence[Rows]:
         """Give rows top..bottom in consecutive pieces (channel, rows, w); otherwise as `read`."""
         ...
 
@@ -46,7 +51,7 @@ class PiecedRows(RowSource, Protocol):
 class ArrayRows:
     """A whole picture in memory as a row source."""
 
-    def __init__(self, planes: FloatArray) -> None:
+    def __init__(self, planes: Rows) -> None:
         if planes.ndim != 3:
             raise ContractError(f"planes must be (channel, h, w); got {planes.shape}")
         self._planes = planes
@@ -57,11 +62,11 @@ class ArrayRows:
         c, h, w = self._planes.shape
         return c, h, w
 
-    def read(self, top: int, bottom: int) -> FloatArray:
+    def read(self, top: int, bottom: int) -> Rows:
         """Give rows top..bottom as a view."""
         return self._planes[:, top:bottom]
 
-    def pieces(self, top: int, bottom: int) -> Sequence[FloatArray]:
+    def pieces(self, top: int, bottom: int) -> Sequence[Rows]:
         """Give the same view as the only piece."""
         return [self.read(top, bottom)]
 
@@ -89,6 +94,13 @@ def changed_bands(
         del band, work  # nothing may hold a band while the next one is made
 
 
+def read_bands(source: RowSource) -> Iterator[Rows]:
+    """Read a source from top to bottom, `BAND_ROWS` at a time."""
+    _, height, _ = source.shape
+    for top in range(0, height, BAND_ROWS):
+        yield source.read(top, min(top + BAND_ROWS, height))
+
+
 class RollingRows:
     """Bands that arrive from top to bottom, kept only while a reader still needs them.
 
@@ -96,10 +108,10 @@ class RollingRows:
     everything is freed as soon as the last reader is.
     """
 
-    def __init__(self, shape: tuple[int, int, int], bands: Iterator[FloatArray]) -> None:
+    def __init__(self, shape: tuple[int, int, int], bands: Iterator[Rows]) -> None:
         self.shape = shape
         self._bands = bands
-        self._kept: list[tuple[int, FloatArray]] = []
+        self._kept: list[tuple[int, Rows]] = []
         self._end = 0
         self._tops: list[int] = []
 
@@ -108,7 +120,7 @@ class RollingRows:
         self._tops.append(0)
         return RowReader(self, len(self._tops) - 1)
 
-    def pieces_for(self, reader: int, top: int, bottom: int) -> list[FloatArray]:
+    def pieces_for(self, reader: int, top: int, bottom: int) -> list[Rows]:
         """Give rows to one of the readers; `RowReader.read` says what is refused."""
         if not 0 <= top < bottom <= self.shape[1]:
             raise ContractError(f"rows {top}..{bottom} lie outside 0..{self.shape[1]}")
@@ -130,7 +142,7 @@ class RollingRows:
         return [p for p in pieces if p.shape[1]]
 
 
-def _without_stale(top: int, band: FloatArray, needed: int) -> tuple[int, FloatArray]:
+def _without_stale(top: int, band: Rows, needed: int) -> tuple[int, Rows]:
     """Copy the rows that are still needed, if so many are not that the band is worth freeing."""
     stale = needed - top
     if stale < max(STALE_ROWS, band.shape[1] // 2):
@@ -150,7 +162,7 @@ class RowReader:
         """Give (channel, h, w) of the whole picture."""
         return self._rows.shape
 
-    def read(self, top: int, bottom: int) -> FloatArray:
+    def read(self, top: int, bottom: int) -> Rows:
         """Give rows top..bottom as (channel, bottom - top, w).
 
         Raises:
@@ -159,6 +171,6 @@ class RowReader:
         pieces = self.pieces(top, bottom)
         return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
 
-    def pieces(self, top: int, bottom: int) -> list[FloatArray]:
+    def pieces(self, top: int, bottom: int) -> list[Rows]:
         """Give the same rows as they lie, in consecutive pieces."""
         return self._rows.pieces_for(self._number, top, bottom)

@@ -126,7 +126,7 @@ def cell_area_px(height_px: int, width_px: int) -> CellArray:
 def measure_scene(
     capture: Capture,
     noise: NoiseModel,
-    white_balance: tuple[float, float, float],
+    white_balance: tuple[float, ...],
     window: SensorWindow,
 ) -> Scene:
     """Measure a capture on the lattice.
@@ -134,7 +134,7 @@ def measure_scene(
     Args:
         capture: A mosaic or planes.
         noise: Noise after white balance.
-        white_balance: Gains (R, G, B).
+        white_balance: One gain per channel.
         window: Where the capture lies on the sensor.
 
     Raises:
@@ -164,8 +164,8 @@ def measure_scene(
     )
 
 
-def _bins(capture: Capture, top: int, gains: tuple[float, float, float]) -> FloatArray:
-    """Give (3, rows / 2, columns / 2): colours of the 2x2 cells of one group of rows."""
+def _bins(capture: Capture, top: int, gains: tuple[float, ...]) -> FloatArray:
+    """Give (c, rows / 2, columns / 2): colours of the 2x2 cells of one group of rows."""
     rows = capture.linear_rows(top, min(top + GROUP_ROWS, capture.height))
     if np.issubdtype(capture.samples.dtype, np.floating):
         rows = np.nan_to_num(rows, posinf=1.0, neginf=0.0)
@@ -203,12 +203,16 @@ class _Sums:
         self._totals = np.zeros((5, rows, columns))
         self._counts = np.zeros((5, rows, columns))
         # Green is the mean of two samples of a mosaic, which halves its variance.
-        share = np.array([1.0, 0.5 if capture.cfa is not None else 1.0, 1.0])
+        share = np.ones(capture.channels)
+        if capture.cfa is not None:
+            share[1] = 0.5
+        middle = capture.channels // 2
+        self._level = slice(middle, middle + 1)
         self._shot = (np.array(noise.shot) * share).astype(np.float32)[:, None, None]
         self._read = (np.array(noise.read_variance) * share).astype(np.float32)[:, None, None]
 
     def add(self, row: int, bins: FloatArray, clipped: FloatArray) -> None:
-        """Add one group; bins are (3, rows, columns), clipped (rows, columns)."""
+        """Add one group; bins are (c, rows, columns), clipped (rows, columns)."""
         lifted = np.maximum(bins + np.float32(BLACK), np.float32(BLACK / 100))
         curved = np.sqrt(lifted)
         variance = self._shot * np.maximum(bins, 0) + self._read
@@ -216,7 +220,7 @@ class _Sums:
         expected = variance / (2 * np.maximum(lifted, np.float32(BLACK)))
         # The first column has no left neighbour: its step counts as 0.
         across = np.square(np.diff(curved, axis=2, prepend=curved[:, :, :1]))
-        self._put(0, row, bins[1:2])
+        self._put(0, row, bins[self._level])
         self._put(1, row, across)
         self._put(2, row, np.square(np.diff(curved, axis=1)))
         self._put(3, row, expected)

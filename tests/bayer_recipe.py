@@ -4,9 +4,9 @@ import pytest
 import torch
 
 from camkit.models_def.kinds.bayer.material import BayerMaterial
-from camkit.models_def.kinds.bayer.psf_bank import gaussian_bank
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
 from camkit.models_def.training.kind import read_recipe
+from tests.gaussian_bank import gaussian_bank
 
 RECIPE = """
 name = "tiny"

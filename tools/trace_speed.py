@@ -70,7 +70,7 @@ def camkit_runs(rays: int, *, aspheric: bool, compiled: bool) -> tuple[Run, Run]
         free.grad = None
         landed = trace(replace(lens, curvature_per_mm=free), beam, compiled=compiled)
         dx, dy = landed.x - landed.x.mean(), landed.y - landed.y.mean()
-        (dx**2 + dy**2).mean().backward()
+        (dx**2 + dy**2).mean().backward()  # type: ignore[no-untyped-call]
         return free.grad
 
     return forward, both
@@ -162,7 +162,7 @@ def measure(runs: dict[str, Run], rounds: int, rays: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print the rows of the table in docs/tracer.md."""
+    """Print the rows of the table in docs/results/tracer.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rays", type=int, default=98_304)
     parser.add_argument("--rounds", type=int, default=7)

@@ -24,6 +24,8 @@ from camkit.errors import BundleError, ContractError
 
 MAX_SIDE_PX: Final = 1024
 IMAGE: Final = "image"
+NO_SIZE: Final = "none"
+"""Stands for the size in the outputs of a bundle without networks."""
 _HALF_MAX: Final = 65504.0
 _CAPTURE_TYPES: Final = (np.uint8, np.uint16, np.uint32, np.float32)
 _OF_1_0: Final = ("network_input", "network_output")

@@ -157,7 +157,9 @@ def _stages(old: _Old, sensor: BayerSensor | PlanesSensor) -> tuple[Stage, ...]:
             f"{'no bank' if 'network' in types else 'no network stage'}"
         )
     listed = {str(stage["type"]): stage for stage in old.stages}
-    if any({"takes", "gives", "role", "transform"} & stage.keys() for stage in old.stages):
+    if any(
+        {"takes", "gives", "role", "transform", "most_light"} & stage.keys() for stage in old.stages
+    ):
         raise UpgradeError("stages: extra inputs are not permitted")
     bank = Wiener(prior_scale=1.0, prior_exponent=0.0)
     usual: tuple[Stage, ...] = (Linearise(), Repair(), WhiteBalance(), Demosaic(method="fast"))

@@ -45,7 +45,7 @@ __all__ = [
     "FreezeReport",
     "Frozen",
     "choose_blocks",
-    "choose_samples",
+    "choose_grid",
     "freeze",
     "freeze_at",
     "freeze_optics",
@@ -117,7 +117,7 @@ class FreezeReport:
         return {k: round(v, 5) if isinstance(v, float) else v for k, v in facts.items()}
 
 
-def choose_samples(
+def choose_grid(
     optics: Optics,
     sensor: ColorSensor,
     bench: Bench,
@@ -259,7 +259,7 @@ def freeze_optics(
     wanted = grid or FreezeGrid()
     tell(f"tracing {optics.name} and its copies")
     bench = make_bench(optics, sensor, chosen, grid=wanted)
-    frozen, loss = choose_samples(optics, sensor, bench, limit_db=limit_db, grid=grid, tell=tell)
+    frozen, loss = choose_grid(optics, sensor, bench, limit_db=limit_db, grid=grid, tell=tell)
     blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db, tell=tell)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape

@@ -81,12 +81,12 @@ class Bench:
         return tuple(self.nominal.depths_mm.tolist())
 
 
-def sample_heights(corner_mm: float, places: int) -> FloatGrid:
+def ring_heights(corner_mm: float, places: int) -> FloatGrid:
     """Give heights (place,) in the middle of rings of equal area."""
     return np.asarray(corner_mm * np.sqrt((np.arange(places) + 0.5) / places))
 
 
-def sample_places(
+def judged_places(
     optics: Optics, sensor: ColorSensor, fields: int
 ) -> tuple[FieldLayout, tuple[FloatGrid, FloatGrid]]:
     """Give where to freeze optics densely, and the x (place,) and y (place,) to judge them at.
@@ -95,7 +95,7 @@ def sample_places(
     samples that they have.
     """
     corner_mm = corner_height_mm(sensor)
-    heights = sample_heights(corner_mm, PLACES)
+    heights = ring_heights(corner_mm, PLACES)
     layout = optics.layout(corner_mm, fields)
     if layout.symmetry == "radial" and optics.wavelengths_um is None:
         dense = radial_layout(np.concatenate([np.zeros(1), heights]))
@@ -131,7 +131,7 @@ def make_bench(
     """
     frozen = grid or FreezeGrid()
     depths = frozen.depths_mm or optics.depths_mm
-    fields, places_mm = sample_places(optics, sensor, frozen.fields)
+    fields, places_mm = judged_places(optics, sensor, frozen.fields)
     true_grid = FreezeGrid(
         wavelengths=TRUE_WAVELENGTHS,
         depths_mm=depths,

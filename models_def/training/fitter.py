@@ -91,8 +91,8 @@ class Fitter:
 
     def run(self, planes: Tensor, progress: float) -> Tensor:
         """Run the network that is being trained; float32 on its device comes back."""
-        plan = self.schedule
-        half = plan.precision == "bfloat16" and progress < 1 - plan.float32_share
+        schedule = self.schedule
+        half = schedule.precision == "bfloat16" and progress < 1 - schedule.float32_share
         planes = planes.to(self.device, memory_format=torch.channels_last)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=half):
             output: Tensor = self.network(planes)
@@ -100,14 +100,14 @@ class Fitter:
 
     def descend(self, loss: Tensor, step: int, progress: float) -> None:
         """Move the weights down a scalar loss of `run`, and their average after them."""
-        plan = self.schedule
+        schedule = self.schedule
         for group in self._optimizer.param_groups:
-            group["lr"] = learning_rate(plan, step, progress)
+            group["lr"] = learning_rate(schedule, step, progress)
         self._optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
-        nn.utils.clip_grad_norm_(self.network.parameters(), plan.gradient_clip)
+        nn.utils.clip_grad_norm_(self.network.parameters(), schedule.gradient_clip)
         self._optimizer.step()
-        update_average(self._average, self.network.parameters(), ema_decay(plan, step))
+        update_average(self._average, self.network.parameters(), ema_decay(schedule, step))
 
     def notes(self) -> dict[str, float]:
         """Give what else the log should hold; nothing."""

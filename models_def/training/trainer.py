@@ -292,9 +292,9 @@ class _Run:
 
     def loop(self, pool: SamplePool, bar: TrainingBar) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
-        plan, options = self.entry.schedule, self.options
+        schedule, options = self.entry.schedule, self.options
         budget_s = None if options.max_minutes is None else 60 * options.max_minutes
-        pool.draw_batch(self.step, 1, plan.patch_px)
+        pool.draw_batch(self.step, 1, schedule.patch_px)
         self.log.write(
             {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
             | self._baseline_entries()
@@ -302,7 +302,7 @@ class _Run:
         saved_s = validated_s = self.elapsed_s()
         losses: list[float] = []
         while not self._is_over(progress := self._progress(budget_s)):
-            batch = pool.draw_batch(self.step, plan.batch, plan.patch_px)
+            batch = pool.draw_batch(self.step, schedule.batch, schedule.patch_px)
             losses.append(self.fitter.fit(batch, self.step, progress))
             self.step += 1
             if self.step % LOG_STEPS == 0:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.bank.psf import kernel_at
+from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, transform
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RowSource
@@ -41,9 +41,9 @@ class Block:
     """What a block filter gets.
 
     Attributes:
-        samples: (3, b, b) float32, the blurred picture, made periodic by `taper_edges`.
-        otf: (3, b, b // 2 + 1) complex64, the local PSF's; its centre is the origin.
-        unknown: (1 or 3, b, b), true where the sensor clipped; None if nowhere.
+        samples: (c, b, b) float32, the blurred picture, made periodic by `taper_edges`.
+        otf: (c, b, b // 2 + 1) complex64, the local PSF's; its centre is the origin.
+        unknown: (1 or c, b, b), true where the sensor clipped; None if nowhere.
     """
 
     samples: FloatArray
@@ -59,14 +59,17 @@ class LocalPsf:
     """The kernels of a camera and where the capture lies on its sensor.
 
     Attributes:
-        kernels: (field, 3, h, w) float32 of `camkit.runtime.bank.psf.color_kernels`.
-        field_heights_mm: (field,), increasing from 0.
+        kernels: Of `camkit.runtime.bank.psf.color_kernels`.
         window: Place of the capture on the sensor.
     """
 
-    kernels: FloatArray
-    field_heights_mm: NDArray[np.float64]
+    kernels: FieldKernels
     window: SensorWindow
+
+    @property
+    def channels(self) -> int:
+        """Give the number of channels."""
+        return int(self.kernels.kernels.shape[1])
 
     def position_mm(self, x_px: float, y_px: float) -> tuple[float, float]:
         """Give the sensor position of a pixel position of the capture."""
@@ -150,18 +153,18 @@ def _clip_span(start: int, weights: FloatArray, size_px: int) -> Span:
 
 
 def to_otf(kernel: FloatArray, block_px: int) -> ComplexArray:
-    """Transform a (3, kh, kw) kernel to its OTF on a periodic block.
+    """Transform a (c, kh, kw) kernel to its OTF on a periodic block.
 
     Returns:
-        (3, b, b // 2 + 1) complex64; the kernel's centre is the origin.
+        (c, b, b // 2 + 1) complex64; the kernel's centre is the origin.
 
     Raises:
         ContractError: If the kernel is larger than the block.
     """
-    _, kh, kw = kernel.shape
+    channels, kh, kw = kernel.shape
     if max(kh, kw) > block_px:
         raise ContractError(f"a kernel of {kh}x{kw} px does not fit a block of {block_px} px")
-    block = np.zeros((3, block_px, block_px), dtype=np.float32)
+    block = np.zeros((channels, block_px, block_px), dtype=np.float32)
     down, across = kh // 2, kw // 2
     for rows, kernel_rows in _halves(kh, down):
         for cols, kernel_cols in _halves(kw, across):
@@ -192,8 +195,8 @@ def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatAr
     Deconvolved as it is, the jump rings through the whole block wherever the OTF is small.
 
     Args:
-        samples: (3, b, b) float32.
-        otf: (3, b, b // 2 + 1) complex64.
+        samples: (c, b, b) float32.
+        otf: (c, b, b // 2 + 1) complex64.
         ring_px: Width of the ring; 0 leaves the block as it is.
 
     References: Reeves 2005 (edge taper as pre-processing).
@@ -281,7 +284,7 @@ class BlockBank:
     def restore_array(
         self, planes: FloatArray, saturated: NDArray[np.bool_] | None = None
     ) -> FloatArray:
-        """Restore a whole (3, h, w) picture; `saturated` is (h, w) or (3, h, w)."""
+        """Restore a whole (c, h, w) picture; `saturated` is (h, w) or (c, h, w)."""
         mask = None if saturated is None else lambda top, bottom: saturated[..., top:bottom, :]
         return np.concatenate(list(self.restore_bands(ArrayRows(planes), mask)), axis=1)
 
@@ -294,22 +297,25 @@ class BlockBank:
         """Restore a picture from top to bottom.
 
         Args:
-            source: (3, h, w) rows, linear, of the size the bank was planned for.
-            saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (3, rows, w);
+            source: (c, h, w) rows, linear, of the size the bank was planned for.
+            saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (c, rows, w);
                 asked after those rows were read.
             plain: Tells which blocks, given as (row span, column span), stay as they are.
 
         Yields:
-            (3, rows, w) float32, consecutive.
+            (c, rows, w) float32, consecutive.
 
         Raises:
             ContractError: If the source has another size.
         """
         width, height = self._psf.window.size_px
-        if source.shape != (3, height, width):
-            raise ContractError(f"the bank is for (3, {height}, {width}); got {source.shape}")
+        channels = self._psf.channels
+        if source.shape != (channels, height, width):
+            raise ContractError(
+                f"the bank is for ({channels}, {height}, {width}); got {source.shape}"
+            )
         tops = [int(span.index.min()) for span in self._rows]
-        total = np.zeros((3, 0, width), dtype=np.float32)
+        total = np.zeros((channels, 0, width), dtype=np.float32)
         done = 0
         for i, span in enumerate(self._rows):
             top, bottom = min(tops[i:]), int(span.index.max()) + 1
@@ -340,11 +346,17 @@ class BlockBank:
         """Give the windowed blocks of one block row, from left to right."""
         places = [self._psf.position_mm(c.centre, strip.span.centre) for c in self._columns]
         filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
-        keys = sorted({(abs(x_mm), abs(y_mm)) for x_mm, y_mm in filtered})
+        # Only a round PSF has quadrants that mirror each other.
+        turns = self._psf.kernels.turns
+
+        def key_of(place_mm: tuple[float, float]) -> tuple[float, float]:
+            if self._psf.kernels.field_heights_mm.size == 1:
+                return 0.0, 0.0
+            return (abs(place_mm[0]), abs(place_mm[1])) if turns else place_mm
+
+        keys = sorted({key_of(place) for place in filtered})
         # The pool takes tasks in order: no block waits for an OTF that nobody is making.
         otfs = {key: pool.submit(self._otf, key) for key in keys}
-        # One PSF for all places has no direction that a quadrant could mirror.
-        turns = self._psf.field_heights_mm.size > 1
 
         def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
             window = strip.span.weights[:, None] * column.weights
@@ -352,7 +364,7 @@ class BlockBank:
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
             x_mm, y_mm = place_mm
             otf = mirror_otf(
-                otfs[abs(x_mm), abs(y_mm)].result(),
+                otfs[key_of(place_mm)].result(),
                 flip_x=turns and x_mm < 0,
                 flip_y=turns and y_mm < 0,
             )
@@ -365,8 +377,7 @@ class BlockBank:
         return pool.map(restore, self._columns, places)
 
     def _otf(self, place_mm: tuple[float, float]) -> ComplexArray:
-        kernel = kernel_at(self._psf.kernels, self._psf.field_heights_mm, *place_mm)
-        return to_otf(kernel, self._block_px)
+        return to_otf(self._psf.kernels.at(*place_mm), self._block_px)
 
 
 def _lengthened(planes: FloatArray, rows: int) -> FloatArray:

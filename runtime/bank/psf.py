@@ -1,20 +1,23 @@
-"""The PSF of an image point: colours weighted, heights blended, turned to the azimuth.
+"""The PSF of an image point: channels weighted, fields blended, turned where optics are round.
 
-    FrozenPsf (field, depth, wavelength) -> color_kernels (field, 3) -> kernel_at (3) at (x, y)
+    FrozenPsf (field, depth, wavelength) -> color_kernels -> FieldKernels (field, c) -> at(x, y)
 
 Several depths are blended into one first: those beside the object distance, or all of them.
 
-Kernels are stored for image points along +y (down the rows). A point in another direction gets
-the kernel turned so that its outward direction stays outward. Everything is computed for the
-quadrant x, y >= 0 and mirrored into the others, so mirrored points have mirrored bits.
+Kernels of a radial PSF are stored for image points along +y (down the rows). A point in another
+direction gets the kernel turned so that its outward direction stays outward. Everything is computed
+for the quadrant x, y >= 0 and mirrored into the others, so mirrored points have mirrored bits. No
+other kernel is turned or mirrored: a streak lies where it was measured.
 """
 
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+import scipy.ndimage
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, FrozenPsf, depth_weights
+from camkit.contracts import FloatArray, FrozenPsf, Symmetry, depth_weights
 from camkit.errors import ContractError
 
 FloatGrid = NDArray[np.float64]
@@ -34,16 +37,18 @@ def wavelength_weights(
     Args:
         psf_wavelengths_um: (wavelength,), increasing.
         wavelengths_um: (n,), increasing.
-        response: (3, n) >= 0.
+        response: (channel, n) >= 0.
 
     Returns:
-        (3, wavelength) weights; each row sums to 1.
+        (channel, wavelength) weights; each row sums to 1.
 
     Raises:
         ContractError: If shapes disagree or a colour has no response.
     """
-    if response.shape != (3, wavelengths_um.size):
-        raise ContractError(f"response must be (3, {wavelengths_um.size}); got {response.shape}")
+    if response.ndim != 2 or response.shape[1] != wavelengths_um.size:
+        raise ContractError(
+            f"response must be (channel, {wavelengths_um.size}); got {response.shape}"
+        )
     if wavelengths_um.size == 1:
         weights = response * _hats(psf_wavelengths_um, wavelengths_um).T
     else:
@@ -65,26 +70,81 @@ def _hats(knots_um: FloatGrid, at_um: FloatGrid) -> FloatGrid:
     return np.stack([np.interp(at_um, knots_um, unit) for unit in np.eye(knots_um.size)])
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldKernels:
+    """The kernels of the channels at the stored fields, and how others follow from them.
+
+    Attributes:
+        kernels: (field, c, h, w) float32, odd sides; each kernel sums to 1.
+        field_heights_mm: (field,); increasing from 0 unless the fields are a grid.
+        symmetry: Of the PSF; see `camkit.contracts.FrozenPsf`.
+        grid_x_mm: (column,), increasing; of a grid.
+        grid_y_mm: (row,), increasing; of a grid.
+    """
+
+    kernels: FloatArray
+    field_heights_mm: FloatGrid
+    symmetry: Symmetry = "radial"
+    grid_x_mm: FloatGrid | None = None
+    grid_y_mm: FloatGrid | None = None
+
+    def __post_init__(self) -> None:
+        if self.kernels.ndim != 4 or self.kernels.shape[0] != self.field_heights_mm.size:
+            raise ContractError(
+                f"expected {self.field_heights_mm.size} fields of (c, h, w) kernels; "
+                f"got {self.kernels.shape}"
+            )
+
+    @property
+    def turns(self) -> bool:
+        """Tell whether kernels are turned with the azimuth, and mirrored from one quadrant."""
+        return self.symmetry == "radial" and self.field_heights_mm.size > 1
+
+    def at(self, x_mm: float, y_mm: float) -> FloatArray:
+        """Give the kernels of an image point.
+
+        Args:
+            x_mm: Position from the axis, to the right.
+            y_mm: Position from the axis, down the rows.
+
+        Returns:
+            (c, h, w) float32, each kernel sums to 1.
+        """
+        if self.grid_x_mm is not None and self.grid_y_mm is not None:
+            return _blend_grid(self.kernels, (self.grid_y_mm, self.grid_x_mm), (y_mm, x_mm))
+        return _kernel_at(self.kernels, self.field_heights_mm, x_mm, y_mm, turns=self.turns)
+
+    def scaled(self, ratio: float) -> "FieldKernels":
+        """Give the kernels scaled about their centres, odd sides and sums of 1 kept.
+
+        Args:
+            ratio: New pixels per old pixel; > 0.
+
+        Raises:
+            ContractError: If the ratio is not.
+        """
+        if ratio <= 0:
+            raise ContractError(f"the scale of kernels must be > 0; got {ratio}")
+        return self if ratio == 1.0 else replace(self, kernels=_scaled(self.kernels, ratio))
+
+
 def color_kernels(
     psf: FrozenPsf,
     wavelengths_um: FloatGrid,
     response: FloatGrid,
     *,
     depth_mm: float | None = None,
-) -> FloatArray:
-    """Weight the wavelength kernels into one kernel per field and colour.
+) -> FieldKernels:
+    """Weight the wavelength kernels into one kernel per field and channel.
 
-    A lens of revolution is symmetric about the meridional plane, so the kernels are made
-    symmetric about their middle column, which also takes half of the noise of the tracing.
+    A lens of revolution is symmetric about the meridional plane, so the kernels of a radial PSF
+    are made symmetric about their middle column, which also takes half of the noise of the tracing.
 
     Args:
         psf: The frozen PSF.
         wavelengths_um: (n,) grid of the response.
-        response: (3, n) response of R, G, B.
+        response: (channel, n) response of the channels.
         depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
-
-    Returns:
-        (field, 3, h, w) float32; each kernel sums to 1.
 
     Raises:
         ContractError: If the PSF does not reach the depth or the response does not fit.
@@ -92,9 +152,16 @@ def color_kernels(
     weights = wavelength_weights(psf.wavelengths_um, wavelengths_um, response)
     mixed = np.tensordot(_at_depth(psf, depth_mm), weights, axes=([1], [1]))
     mixed = np.moveaxis(mixed, -1, 1)
-    mixed = 0.5 * (mixed + mixed[..., ::-1])
+    if psf.symmetry == "radial":
+        mixed = 0.5 * (mixed + mixed[..., ::-1])
     mixed /= mixed.sum(axis=(-2, -1), keepdims=True)
-    return np.ascontiguousarray(mixed, dtype=np.float32)
+    return FieldKernels(
+        kernels=np.ascontiguousarray(mixed, dtype=np.float32),
+        field_heights_mm=psf.field_heights_mm,
+        symmetry=psf.symmetry,
+        grid_x_mm=psf.grid_x_mm,
+        grid_y_mm=psf.grid_y_mm,
+    )
 
 
 def _at_depth(psf: FrozenPsf, depth_mm: float | None) -> FloatArray | FloatGrid:
@@ -106,45 +173,68 @@ def _at_depth(psf: FrozenPsf, depth_mm: float | None) -> FloatArray | FloatGrid:
     return np.tensordot(psf.kernels[:, used], shares[used], axes=([1], [0]))
 
 
-def kernel_at(
-    kernels: FloatArray, field_heights_mm: FloatGrid, x_mm: float, y_mm: float
+def _kernel_at(
+    kernels: FloatArray,
+    field_heights_mm: FloatGrid,
+    x_mm: float,
+    y_mm: float,
+    *,
+    turns: bool,
 ) -> FloatArray:
     """Give the kernel of an image point, turned so that its radial direction points outward.
 
     Linear in the field height (the last one holds beyond it), a Catmull-Rom gather for the turn,
-    zero outside, negatives cut, normalised. On the axis nothing is turned, and neither is the PSF
-    of a single field: one PSF for all places has no direction.
+    zero outside, negatives cut, normalised. On the axis nothing is turned.
 
-    Args:
-        kernels: (field, 3, h, w) float32, stored for points along +y (down the rows), odd sides.
-        field_heights_mm: (field,), increasing from 0.
-        x_mm: Position from the axis, to the right.
-        y_mm: Position from the axis, down the rows.
-
-    Returns:
-        (3, h, w) float32, each kernel sums to 1.
-
-    Raises:
-        ContractError: If the kernels and heights disagree.
     References: Keys 1981, cubic convolution with a = -1/2.
     """
-    if kernels.ndim != 4 or kernels.shape[0] != field_heights_mm.size:
-        raise ContractError(
-            f"expected {field_heights_mm.size} fields of (3, h, w) kernels; got {kernels.shape}"
-        )
     height_mm = float(np.hypot(x_mm, y_mm))
     kernel = _blend(kernels, field_heights_mm, height_mm)
-    has_direction = field_heights_mm.size > 1
-    if x_mm != 0.0 and has_direction:
+    if x_mm != 0.0 and turns:
         kernel = _turn(kernel, abs(x_mm) / height_mm, abs(y_mm) / height_mm)
+    kernel = _normalised(kernel)
+    kernel = kernel[:, :, ::-1] if x_mm < 0 and turns else kernel
+    kernel = kernel[:, ::-1] if y_mm < 0 and turns else kernel
+    return np.ascontiguousarray(kernel)
+
+
+def _normalised(kernel: FloatArray) -> FloatArray:
+    """Cut negatives and scale each kernel to a sum of 1."""
     np.maximum(kernel, 0, out=kernel)
     # Float64 sums: a sum in another order must not move the result.
-    kernel = (kernel / kernel.sum(axis=(-2, -1), keepdims=True, dtype=np.float64)).astype(
-        np.float32
+    total = kernel.sum(axis=(-2, -1), keepdims=True, dtype=np.float64)
+    return np.asarray((kernel / total).astype(np.float32))
+
+
+def _blend_grid(
+    kernels: FloatArray, axes_mm: tuple[FloatGrid, FloatGrid], at_mm: tuple[float, float]
+) -> FloatArray:
+    """Interpolate linearly between the four neighbours on a grid; its rim holds beyond it."""
+    (row, down), (column, across) = (
+        _neighbours(axis, at) for axis, at in zip(axes_mm, at_mm, strict=True)
     )
-    kernel = kernel[:, :, ::-1] if x_mm < 0 and has_direction else kernel
-    kernel = kernel[:, ::-1] if y_mm < 0 and has_direction else kernel
-    return np.ascontiguousarray(kernel)
+    columns = axes_mm[1].size
+    total = np.zeros(kernels.shape[1:], dtype=np.float32)
+    for y, x, share in (
+        (row, column, (1 - down) * (1 - across)),
+        (row, column + 1, (1 - down) * across),
+        (row + 1, column, down * (1 - across)),
+        (row + 1, column + 1, down * across),
+    ):
+        if share > 0:
+            total += np.float32(share) * kernels[y * columns + x]
+    return _normalised(total)
+
+
+def _neighbours(positions_mm: FloatGrid, at_mm: float) -> tuple[int, float]:
+    """Give the sample below a position, and the share of the one above it."""
+    if positions_mm.size == 1:
+        return 0, 0.0
+    inside = min(max(at_mm, positions_mm[0]), positions_mm[-1])
+    low = int(np.searchsorted(positions_mm, inside, "right")) - 1
+    low = min(max(low, 0), positions_mm.size - 2)
+    share = (inside - positions_mm[low]) / (positions_mm[low + 1] - positions_mm[low])
+    return low, float(share)
 
 
 def _blend(kernels: FloatArray, heights_mm: FloatGrid, height_mm: float) -> FloatArray:
@@ -194,3 +284,23 @@ def _catmull_rom(t: FloatGrid) -> tuple[FloatGrid, FloatGrid, FloatGrid, FloatGr
         0.5 * (4 * t2 - 3 * t3 + t),
         0.5 * (t3 - t2),
     )
+
+
+def _scaled(kernels: FloatArray, ratio: float) -> FloatArray:
+    """Scale (field, c, h, w) kernels."""
+    old = kernels.shape[-1]
+    half = max(1, int(np.ceil((old // 2) * ratio)))
+    # Blurring to the coarser grid first keeps energy that falls between the new samples.
+    source = kernels
+    if ratio < 1.0:
+        sigma = 0.5 * np.sqrt(1 / ratio**2 - 1)
+        source = scipy.ndimage.gaussian_filter(kernels, (0, 0, sigma, sigma), mode="constant")
+    at = np.arange(-half, half + 1) / ratio + old // 2
+    grid = np.meshgrid(at, at, indexing="ij")
+    scaled = np.stack(
+        [
+            scipy.ndimage.map_coordinates(k, grid, order=1, mode="constant")
+            for k in source.reshape(-1, old, old)
+        ]
+    ).reshape(*kernels.shape[:2], 2 * half + 1, 2 * half + 1)
+    return np.asarray(scaled / scaled.sum(axis=(-2, -1), keepdims=True), dtype=np.float32)

@@ -26,14 +26,14 @@ def richardson_lucy(
     """Sharpen by Richardson-Lucy for Poisson noise, read noise taken as a known background.
 
     Args:
-        samples: (3, b, b) float32, taken as periodic; negatives count as no light.
-        otf: (3, b, b // 2 + 1) complex64.
-        background: (3, 1, 1), read_variance / shot.
+        samples: (c, b, b) float32, taken as periodic; negatives count as no light.
+        otf: (c, b, b // 2 + 1) complex64.
+        background: (c, 1, 1), read_variance / shot.
         iterations: Rounds; each sharpens and raises noise.
-        clipped: (1 or 3, b, b), samples known to be at least as bright as they read.
+        clipped: (1 or c, b, b), samples known to be at least as bright as they read.
 
     Returns:
-        (3, b, b) float32 >= 0.
+        (c, b, b) float32 >= 0.
 
     References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background).
     """
@@ -51,7 +51,7 @@ def richardson_lucy(
 
 
 def background_of(noise: NoiseModel) -> FloatArray:
-    """Give read_variance / shot as (3, 1, 1): the light that would make the read noise."""
+    """Give read_variance / shot as (c, 1, 1): the light that would make the read noise."""
     shot = np.maximum(np.array(noise.shot), 1e-12)
     return np.asarray(np.array(noise.read_variance) / shot, dtype=np.float32)[:, None, None]
 

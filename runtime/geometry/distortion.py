@@ -23,6 +23,11 @@ FLAT_ROOT: Final = 1e-12
 RANGE_MARGIN: Final = 1.02
 
 
+def reference_channel(distortion: RadialDistortion) -> int:
+    """Give the channel that pictures are centred by: the middle one, green of three."""
+    return int(distortion.coefficients.shape[0]) // 2
+
+
 def distort_points(
     points_mm: FloatGrid, distortion: RadialDistortion, *, channel: int = 1
 ) -> FloatGrid:
@@ -31,7 +36,7 @@ def distort_points(
     Args:
         points_mm: (..., 2) x, y from the axis.
         distortion: The model.
-        channel: Colour, 0 R, 1 G, 2 B.
+        channel: Number of the channel.
 
     References: Sun 2021, eq. (6.10).
     """
@@ -50,7 +55,7 @@ def undistort_points(
     Args:
         points_mm: (..., 2) x, y from the axis, on the sensor.
         distortion: The model.
-        channel: Colour, 0 R, 1 G, 2 B.
+        channel: Number of the channel.
 
     Raises:
         ContractError: If a point lies where the model has no single inverse.

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from camkit.contracts import FloatArray, FrozenPsf
-from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.geometry.sensor_window import FloatGrid, SensorWindow
 
 TABLE_SAMPLES: Final = 4096
 GAIN_SAMPLES: Final = 1 << 21
@@ -29,6 +29,8 @@ def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: in
     """
     width, _ = window.size_px
     x_mm, y_mm = window.to_mm(np.arange(width), np.arange(top, bottom))
+    if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
+        return _on_grid(psf, x_mm, y_mm)
     # A table over the squared height makes the lookup two multiplications per pixel.
     end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
     squares = np.linspace(0.0, end, TABLE_SAMPLES)
@@ -42,25 +44,38 @@ def illumination_band(psf: FrozenPsf, window: SensorWindow, top: int, bottom: in
     return np.asarray(low + at * (table32[index + 1] - low), dtype=np.float32)
 
 
+def _on_grid(psf: FrozenPsf, x_mm: FloatGrid, y_mm: FloatGrid) -> FloatArray:
+    """Give the illumination (row, column) between the positions of a grid; its rim holds beyond."""
+    assert psf.grid_x_mm is not None
+    assert psf.grid_y_mm is not None
+    known = psf.relative_illumination.reshape(psf.grid_y_mm.size, psf.grid_x_mm.size)
+    across = np.stack([np.interp(x_mm, psf.grid_x_mm, row) for row in known])
+    hats = np.stack([np.interp(y_mm, psf.grid_y_mm, unit) for unit in np.eye(psf.grid_y_mm.size)])
+    return np.asarray(hats.T @ across, dtype=np.float32)
+
+
 def divide_illumination(
     band: FloatArray, top: int, psf: FrozenPsf, window: SensorWindow
 ) -> FloatArray:
     """Undo vignetting on a band of a picture in sensor geometry; see `IlluminationGain`.
 
     Args:
-        band: (3, rows, w) float32, linear.
+        band: (c, rows, w) float32, linear.
         top: First row of the band in the picture.
         psf: Frozen PSF.
         window: Where the picture lies on the sensor.
 
     Returns:
-        (3, rows, w) float32, a new array.
+        (c, rows, w) float32, a new array.
     """
     return IlluminationGain(psf, window).divide(band, top)
 
 
 class IlluminationGain:
-    """One over the relative illumination of a window, looked up by the squared field height."""
+    """One over the relative illumination of a window.
+
+    Looked up by the squared field height; on a grid of fields, computed band by band.
+    """
 
     def __init__(self, psf: FrozenPsf, window: SensorWindow) -> None:
         """Make the table.
@@ -69,6 +84,11 @@ class IlluminationGain:
             psf: Frozen PSF; its relative illumination is 1 on the axis.
             window: Where the picture lies on the sensor.
         """
+        self._psf = psf
+        self._window = window
+        self._table = np.zeros(0, np.float32)
+        if psf.symmetry == "grid":
+            return
         width, height = window.size_px
         x_mm, y_mm = window.to_mm(np.arange(width), np.arange(height))
         end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
@@ -82,10 +102,14 @@ class IlluminationGain:
         self._rows = np.rint(y_mm**2 * scale).astype(np.intp)
 
     def divide(self, band: FloatArray, top: int, out: FloatArray | None = None) -> FloatArray:
-        """Undo vignetting on a (3, rows, w) band that starts at row `top`.
+        """Undo vignetting on a (c, rows, w) band that starts at row `top`.
 
         Fills `out`, which may be the band, or a new array.
         """
-        rows = self._rows[top : top + band.shape[1], None]
+        bottom = top + band.shape[1]
+        if self._psf.symmetry == "grid":
+            light = illumination_band(self._psf, self._window, top, bottom)
+            return np.asarray(np.divide(band, light, out=out))
+        rows = self._rows[top:bottom, None]
         gain = self._table.take(rows + self._columns, mode="clip")
         return np.asarray(np.multiply(band, gain, out=out))

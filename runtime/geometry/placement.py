@@ -8,11 +8,7 @@ the axis) or `assume="scale"` (the picture spans the sensor, kernels scaled by t
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-import scipy.ndimage
-
-from camkit.bundle.manifest import Camera
-from camkit.contracts import FloatArray
+from camkit.bundle.sensor import Extent
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.geometry.sensor_window import SensorWindow
@@ -36,33 +32,41 @@ class Placement:
     note: str = ""
 
 
-def place(capture: Capture, camera: Camera, assume: Assumption | None) -> Placement:
+def place(capture: Capture, extent: Extent | None, assume: Assumption | None) -> Placement:
     """Find the place of a capture on the bundle's sensor.
 
     Args:
         capture: The decoded capture.
-        camera: The bundle's camera.
+        extent: Of the bundle's sensor; None where it takes pictures of any size.
         assume: What the caller vouches for where size or pitch do not match.
 
     Raises:
         ContractError: If the capture does not fit the sensor and nothing was assumed.
     """
-    sensor = (camera.width_px, camera.height_px)
     size = (capture.width, capture.height)
-    pitch = camera.pixel_pitch_um
-    if assume == "scale":
-        return _scaled(size, sensor, pitch)
-    if assume == "centre":
-        origin = ((sensor[0] - size[0]) / 2, (sensor[1] - size[1]) / 2)
+    if extent is None:
+        pitch_um = capture.pixel_pitch_um or 1.0
         return Placement(
-            window=_window(size, origin, sensor, pitch),
+            window=SensorWindow(
+                size_px=size, origin_px=(0.0, 0.0), sensor_size_px=size, pitch_um=pitch_um
+            )
+        )
+    sensor = (extent.width_px, extent.height_px)
+    pitch = extent.pixel_pitch_um
+    if assume == "scale":
+        return _scaled(size, extent)
+    if assume == "centre":
+        axis_x, axis_y = _axis(extent)
+        origin = (axis_x - (size[0] - 1) / 2, axis_y - (size[1] - 1) / 2)
+        return Placement(
+            window=_window(size, origin, extent),
             note=f"assumed centred on the axis at {pitch} um pitch, origin {origin}",
         )
     _check_pitch(capture, pitch)
     if capture.origin_px is not None and capture.sensor_size_px == sensor:
-        return _recorded(capture, capture.origin_px, camera)
+        return _recorded(capture, capture.origin_px, extent)
     if size == sensor:
-        return Placement(window=_window(size, (0.0, 0.0), sensor, pitch))
+        return Placement(window=_window(size, (0.0, 0.0), extent))
     raise ContractError(
         f"the capture has {size[0]}x{size[1]} pixels, the bundle's sensor {sensor[0]}x{sensor[1]}; "
         "for a crop say where it lies (origin_px), else use another bundle, or --assume centre "
@@ -70,19 +74,32 @@ def place(capture: Capture, camera: Camera, assume: Assumption | None) -> Placem
     )
 
 
-def _window(
-    size: tuple[int, int],
-    origin: tuple[float, float],
-    sensor: tuple[int, int],
-    pitch_um: float,
-) -> SensorWindow:
-    return SensorWindow(size_px=size, origin_px=origin, sensor_size_px=sensor, pitch_um=pitch_um)
+def _axis(extent: Extent) -> tuple[float, float]:
+    middle = ((extent.width_px - 1) / 2, (extent.height_px - 1) / 2)
+    return extent.optical_centre_px or middle
 
 
-def _scaled(size: tuple[int, int], sensor: tuple[int, int], pitch_um: float) -> Placement:
-    ratio = size[0] / sensor[0]
+def _window(size: tuple[int, int], origin: tuple[float, float], extent: Extent) -> SensorWindow:
+    return SensorWindow(
+        size_px=size,
+        origin_px=origin,
+        sensor_size_px=(extent.width_px, extent.height_px),
+        pitch_um=extent.pixel_pitch_um,
+        axis_px=extent.optical_centre_px,
+    )
+
+
+def _scaled(size: tuple[int, int], extent: Extent) -> Placement:
+    ratio = size[0] / extent.width_px
+    axis = extent.optical_centre_px
     return Placement(
-        window=_window(size, (0.0, 0.0), size, pitch_um / ratio),
+        window=SensorWindow(
+            size_px=size,
+            origin_px=(0.0, 0.0),
+            sensor_size_px=size,
+            pitch_um=extent.pixel_pitch_um / ratio,
+            axis_px=axis and ((axis[0] + 0.5) * ratio - 0.5, (axis[1] + 0.5) * ratio - 0.5),
+        ),
         kernel_scale=ratio,
         note=f"assumed to span the sensor: kernels scaled by {ratio:.4g}",
     )
@@ -97,47 +114,12 @@ def _check_pitch(capture: Capture, pitch_um: float) -> None:
         )
 
 
-def _recorded(capture: Capture, origin: tuple[float, float], camera: Camera) -> Placement:
+def _recorded(capture: Capture, origin: tuple[float, float], extent: Extent) -> Placement:
     right, bottom = origin[0] + capture.width, origin[1] + capture.height
-    if min(origin) < 0 or right > camera.width_px or bottom > camera.height_px:
+    if min(origin) < 0 or right > extent.width_px or bottom > extent.height_px:
         raise ContractError(
             f"the recorded crop {capture.width}x{capture.height} at {origin} leaves the sensor "
-            f"{camera.width_px}x{camera.height_px}"
+            f"{extent.width_px}x{extent.height_px}"
         )
-    return Placement(
-        window=_window(
-            (capture.width, capture.height),
-            (float(origin[0]), float(origin[1])),
-            (camera.width_px, camera.height_px),
-            camera.pixel_pitch_um,
-        )
-    )
-
-
-def scale_kernels(kernels: FloatArray, ratio: float) -> FloatArray:
-    """Scale (field, 3, h, w) kernels about their centres, odd sides and sums of 1 kept.
-
-    Args:
-        kernels: (field, 3, h, w) float32, each sums to 1.
-        ratio: New pixels per old pixel; > 0.
-    """
-    if ratio <= 0:
-        raise ContractError(f"the scale of kernels must be > 0; got {ratio}")
-    if ratio == 1.0:
-        return kernels
-    old = kernels.shape[-1]
-    half = max(1, int(np.ceil((old // 2) * ratio)))
-    # Blurring to the coarser grid first keeps energy that falls between the new samples.
-    source = kernels
-    if ratio < 1.0:
-        sigma = 0.5 * np.sqrt(1 / ratio**2 - 1)
-        source = scipy.ndimage.gaussian_filter(kernels, (0, 0, sigma, sigma), mode="constant")
-    at = np.arange(-half, half + 1) / ratio + old // 2
-    grid = np.meshgrid(at, at, indexing="ij")
-    scaled = np.stack(
-        [
-            scipy.ndimage.map_coordinates(k, grid, order=1, mode="constant")
-            for k in source.reshape(-1, old, old)
-        ]
-    ).reshape(*kernels.shape[:2], 2 * half + 1, 2 * half + 1)
-    return np.asarray(scaled / scaled.sum(axis=(-2, -1), keepdims=True), dtype=np.float32)
+    size = (capture.width, capture.height)
+    return Placement(window=_window(size, (float(origin[0]), float(origin[1])), extent))

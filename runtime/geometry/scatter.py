@@ -37,8 +37,8 @@ def scatter(
     stays equal: vignetting is a factor of its own.
 
     Args:
-        planes: (3, h + 2 margin, w + 2 margin) float32: the window and what lies around it.
-        kernels_at: Gives the (3, k, k) float32 kernels of a sensor position (x_mm, y_mm); k odd,
+        planes: (c, h + 2 margin, w + 2 margin) float32: the window and what lies around it.
+        kernels_at: Gives the (c, k, k) float32 kernels of a sensor position (x_mm, y_mm); k odd,
             at most 2 margin + 1.
         window: Where the inner h x w pixels lie on the sensor.
         margin_px: Width of the margin.
@@ -46,18 +46,18 @@ def scatter(
         workers: Threads of the FFT.
 
     Returns:
-        (3, h, w) float32: the light that arrives inside the window.
+        (c, h, w) float32: the light that arrives inside the window.
 
     Raises:
         ContractError: If the planes do not have the size of the window with its margin.
     """
     width, height = window.size_px
-    if planes.shape != (3, height + 2 * margin_px, width + 2 * margin_px):
+    if planes.shape[1:] != (height + 2 * margin_px, width + 2 * margin_px):
         raise ContractError(
-            f"the planes must be (3, {height} + 2 * {margin_px}, {width} + 2 * {margin_px}); "
+            f"the planes must be (c, {height} + 2 * {margin_px}, {width} + 2 * {margin_px}); "
             f"got {planes.shape}"
         )
-    out = np.zeros((3, height, width), dtype=np.float32)
+    out = np.zeros((planes.shape[0], height, width), dtype=np.float32)
     light = np.zeros_like(out)
     for top, bottom, row_weight in _spans(planes.shape[1], step_px):
         for left, right, column_weight in _spans(planes.shape[2], step_px):

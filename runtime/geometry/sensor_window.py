@@ -15,27 +15,37 @@ PixelGrid = NDArray[np.floating[Any] | np.integer[Any]] | float
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorWindow:
-    """A capture as a window on its sensor; the axis is at the centre of the whole sensor.
+    """A capture as a window on its sensor; positions are those from the optical axis.
 
     Attributes:
         size_px: (width, height) of the capture.
         origin_px: (x, y) of its top left pixel on the sensor; may be half-integer.
         sensor_size_px: (width, height) of the whole sensor.
         pitch_um: Pixel pitch.
+        axis_px: (x, y) on the sensor where the optical axis meets it; None for its middle.
     """
 
     size_px: tuple[int, int]
     origin_px: tuple[float, float]
     sensor_size_px: tuple[int, int]
     pitch_um: float
+    axis_px: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if min(self.size_px) < 1 or not (np.isfinite(self.pitch_um) and self.pitch_um > 0):
             raise ContractError(
                 f"a window needs sides >= 1 and a pitch > 0; got {self.size_px}, {self.pitch_um}"
             )
-        if not np.isfinite(self.origin_px).all():
-            raise ContractError(f"the origin must be finite; got {self.origin_px}")
+        if not np.isfinite([*self.origin_px, *(self.axis_px or ())]).all():
+            raise ContractError(
+                f"origin and axis must be finite; got {self.origin_px}, {self.axis_px}"
+            )
+
+    @property
+    def known_axis_px(self) -> tuple[float, float]:
+        """Give (x, y) on the sensor where the optical axis meets it."""
+        width, height = self.sensor_size_px
+        return self.axis_px or ((width - 1) / 2, (height - 1) / 2)
 
     @property
     def centre_mm(self) -> FloatGrid:
@@ -52,17 +62,17 @@ class SensorWindow:
 
     def to_mm(self, x_px: PixelGrid, y_px: PixelGrid) -> tuple[FloatGrid, FloatGrid]:
         """Give the sensor position of pixel positions of the capture (0, 0 = top left pixel)."""
-        (x0, y0), (width, height) = self.origin_px, self.sensor_size_px
+        (x0, y0), (axis_x, axis_y) = self.origin_px, self.known_axis_px
         pitch_mm = to_mm(self.pitch_um)
-        x_mm = (np.asarray(x_px, dtype=np.float64) + (x0 - (width - 1) / 2)) * pitch_mm
-        y_mm = (np.asarray(y_px, dtype=np.float64) + (y0 - (height - 1) / 2)) * pitch_mm
+        x_mm = (np.asarray(x_px, dtype=np.float64) + (x0 - axis_x)) * pitch_mm
+        y_mm = (np.asarray(y_px, dtype=np.float64) + (y0 - axis_y)) * pitch_mm
         return x_mm, y_mm
 
     def to_px(self, x_mm: FloatGrid, y_mm: FloatGrid) -> tuple[FloatGrid, FloatGrid]:
         """Give the pixel position in the capture of sensor positions; inverse of `to_mm`."""
-        (x0, y0), (width, height) = self.origin_px, self.sensor_size_px
+        (x0, y0), (axis_x, axis_y) = self.origin_px, self.known_axis_px
         pitch_mm = to_mm(self.pitch_um)
-        return x_mm / pitch_mm + ((width - 1) / 2 - x0), y_mm / pitch_mm + ((height - 1) / 2 - y0)
+        return x_mm / pitch_mm + (axis_x - x0), y_mm / pitch_mm + (axis_y - y0)
 
 
 def centred_origin(

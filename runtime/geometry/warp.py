@@ -18,7 +18,12 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
-from camkit.runtime.geometry.distortion import check_distortion, distort_points, undistort_points
+from camkit.runtime.geometry.distortion import (
+    check_distortion,
+    distort_points,
+    reference_channel,
+    undistort_points,
+)
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import RowSource
 from camkit.runtime.slices import run_slices
@@ -42,14 +47,14 @@ def undistort_bands(
     """Undistort a capture, band by band; what lies outside it repeats its edge.
 
     Args:
-        source: (3, h, w) picture in sensor geometry, of the size of the window.
-        distortion: Radial distortion per colour.
+        source: (c, h, w) picture in sensor geometry, of the size of the window.
+        distortion: Radial distortion per channel.
         window: Where the picture lies on the sensor.
         band_rows: Height of the bands, a multiple of 8; the pixels do not depend on it.
         threads: Threads that share a band; the pixels do not depend on them.
 
     Yields:
-        (3, rows, w) float32 in ideal geometry, from top to bottom.
+        (c, rows, w) float32 in ideal geometry, from top to bottom.
 
     Raises:
         ContractError: If sizes disagree or the distortion folds on the sensor.
@@ -65,23 +70,23 @@ def distort_array(
     """Warp an ideal picture into sensor geometry; beyond its border it is mirrored.
 
     Args:
-        scene: (3, h, w) float32 in ideal geometry, of the size of the window.
-        distortion: Radial distortion per colour.
+        scene: (c, h, w) float32 in ideal geometry, of the size of the window.
+        distortion: Radial distortion per channel.
         window: Where the capture lies on the sensor.
         margin_px: Pixels to compute beyond every side of the window.
 
     Returns:
-        (3, h + 2 margin, w + 2 margin) float32.
+        (c, h + 2 margin, w + 2 margin) float32.
 
     Raises:
         ContractError: If sizes disagree or the distortion folds on the sensor.
         UnsupportedError: If a side is too long for cv2.remap.
     """
-    _check_size(scene.shape, window)
+    _check_size(scene.shape, window, distortion)
     height, width = scene.shape[1] + 2 * margin_px, scene.shape[2] + 2 * margin_px
     warp = Warp(distortion, window, to_sensor=True, margin_px=margin_px)
-    out = np.empty((3, height, width), dtype=np.float32)
-    for channel in range(3):
+    out = np.empty((scene.shape[0], height, width), dtype=np.float32)
+    for channel in range(scene.shape[0]):
         for top in range(0, height, BAND_ROWS):
             bottom = min(top + BAND_ROWS, height)
             maps = warp.maps(channel, top, bottom)
@@ -107,30 +112,36 @@ class Warp:
                 "switch undistortion off or crop"
             )
         self.window = window
-        self._distortion = distortion
+        self.distortion = distortion
         self._to_sensor = to_sensor
         self._margin_px = margin_px
         centre = window.centre_mm
-        self._shift_mm = undistort_points(centre, distortion) - centre
+        middle = reference_channel(distortion)
+        self._shift_mm = undistort_points(centre, distortion, channel=middle) - centre
+
+    @property
+    def channels(self) -> int:
+        """Give the number of channels that the distortion knows."""
+        return int(self.distortion.coefficients.shape[0])
 
     def shares_map(self, channel: int) -> bool:
-        """Tell whether a colour has the same map as the colour before it."""
-        rows = self._distortion.coefficients
+        """Tell whether a channel has the same map as the one before it."""
+        rows = self.distortion.coefficients
         return channel > 0 and bool(np.array_equal(rows[channel], rows[channel - 1]))
 
     def positions(self, channel: int, x_px: FloatGrid, y_px: FloatGrid) -> FloatGrid:
         """Give (..., 2) source pixel positions of output pixel positions.
 
         Args:
-            channel: Colour, 0 R, 1 G, 2 B.
+            channel: Number of the channel.
             x_px: Columns of the output, the margin included.
             y_px: Rows of the output, of the same shape.
         """
         points = np.stack(self.window.to_mm(x_px - self._margin_px, y_px - self._margin_px), -1)
         if self._to_sensor:
-            found = undistort_points(points, self._distortion, channel=channel) - self._shift_mm
+            found = undistort_points(points, self.distortion, channel=channel) - self._shift_mm
         else:
-            found = distort_points(points + self._shift_mm, self._distortion, channel=channel)
+            found = distort_points(points + self._shift_mm, self.distortion, channel=channel)
         return np.stack(self.window.to_px(found[..., 0], found[..., 1]), axis=-1)
 
     def lattice(self, channel: int, top: int, bottom: int) -> FloatGrid:
@@ -157,15 +168,15 @@ class Warp:
 def _warp_bands(
     source: RowSource, warp: Warp, *, band_rows: int, threads: int
 ) -> Iterator[FloatArray]:
-    _check_size(source.shape, warp.window)
+    _check_size(source.shape, warp.window, warp.distortion)
     if band_rows < LATTICE_PX or band_rows % LATTICE_PX:
         raise ContractError(f"band_rows must be a multiple of {LATTICE_PX}; got {band_rows}")
-    _, height, width = source.shape
+    channels, height, width = source.shape
     tops = range(0, height, band_rows)
     spans = _source_spans(warp, tops, height)
     for top, (first, last) in zip(tops, spans, strict=True):
         bottom = min(top + band_rows, height)
-        band = np.empty((3, bottom - top, width), dtype=np.float32)
+        band = np.empty((channels, bottom - top, width), dtype=np.float32)
         fill = partial(_warp_rows, warp, (source.read(first, last), first), (band, top))
         run_slices(fill, bottom - top, threads=threads, lattice=LATTICE_PX)
         del fill  # it holds rows that nobody needs while the next band is waited for
@@ -181,7 +192,7 @@ def _warp_rows(
 ) -> None:
     """Fill rows begin..end of a band; source and target come with the row they start at."""
     (rows, first), (band, top) = source, target
-    for channel in range(3):
+    for channel in range(rows.shape[0]):
         if not warp.shares_map(channel):
             whole, fraction = warp.maps(channel, top + begin, top + end)
             whole[..., 1] -= first
@@ -194,7 +205,7 @@ def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]
     lowest = height - 1
     for top in reversed(tops):
         bottom = min(top + tops.step, height)
-        y = np.stack([warp.lattice(c, top, bottom)[..., 1] for c in range(3)])
+        y = np.stack([warp.lattice(c, top, bottom)[..., 1] for c in range(warp.channels)])
         first = int(np.floor(y.min())) - LANCZOS_REACH_PX
         last = int(np.ceil(y.max())) + LANCZOS_REACH_PX + 1
         lowest = min(lowest, max(first, 0))
@@ -210,7 +221,8 @@ def _remap(plane: FloatArray, maps: tuple[NDArray[np.int16], object], border: in
     return np.asarray(out, dtype=np.float32)
 
 
-def _check_size(shape: tuple[int, ...], window: SensorWindow) -> None:
+def _check_size(shape: tuple[int, ...], window: SensorWindow, distortion: RadialDistortion) -> None:
     width, height = window.size_px
-    if shape != (3, height, width):
-        raise ContractError(f"the picture must be (3, {height}, {width}); got {shape}")
+    channels = distortion.coefficients.shape[0]
+    if shape != (channels, height, width):
+        raise ContractError(f"the picture must be ({channels}, {height}, {width}); got {shape}")

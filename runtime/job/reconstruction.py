@@ -1,49 +1,39 @@
-"""One capture on its way to a picture: the stages joined, rows pulled through them, times kept.
+"""One capture on its way to its products: planned, then walked; rows are pulled, times kept.
 
-    capture -> [repair, white balance, demosaic] -> Wiener bank -> stabilise -> network -> back
-            -> divide by relative illumination -> undistort -> camera to output colour
+    capture -> job (what is known) -> walk (the stages of the manifest) -> bands of a product
 
 Nothing is computed before the first band is asked for; a `Reconstruction` serves one thread, once.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from camkit.bundle.manifest import Demosaic, Illumination, Network, Undistort, Wiener
-from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.bundle.golden import IMAGE
+from camkit.bundle.stages import Network
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.bank.baselines import restoration_bank
-from camkit.runtime.bank.blocks import BlockBank, LocalPsf, PlainBlock
-from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.capture import Capture
-from camkit.runtime.clock import StageClock, TimedRows
-from camkit.runtime.color import ColorStage, recover_highlights, to_output
-from camkit.runtime.geometry.illumination import IlluminationGain
-from camkit.runtime.geometry.placement import scale_kernels
-from camkit.runtime.geometry.warp import undistort_bands
-from camkit.runtime.job.preparation import Preparation
-from camkit.runtime.job.setup import Setup
-from camkit.runtime.network.guard import TileGuard
-from camkit.runtime.network.stage import NetworkStage
+from camkit.runtime.clock import StageClock
+from camkit.runtime.color import ColorStage
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.setup import DEVELOPMENT, Setup
+from camkit.runtime.job.walker import Walk
 from camkit.runtime.network.tiling import Cancel, Progress
-from camkit.runtime.options import DemosaicMethod
-from camkit.runtime.plan.blocks import plain_blocks
-from camkit.runtime.plan.decision import Labels
-from camkit.runtime.plan.estimate import Estimate
+from camkit.runtime.network.windows import NetworkWindows
+from camkit.runtime.output.origin import Origin
+from camkit.runtime.plan.decision import DEVELOP, Case, Labels, Work
+from camkit.runtime.plan.estimate import Estimate, estimate_seconds, stage_seconds
+from camkit.runtime.plan.planner import Plan, make_plan, needs_scene
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.rows import RollingRows, RowSource, changed_bands
-from camkit.runtime.signal.front_rows import FrontRows
-from camkit.runtime.signal.stabilise import NetworkRows, unstabilise
+from camkit.runtime.plan.ways import without_networks
+from camkit.runtime.rows import Rows, RowSource
+from camkit.runtime.scene import Scene, measure_scene
+from camkit.runtime.stage_finder import stage_module
 
-BAND_ROWS: Final = 128
-STAGE_ORDER: Final = (
-    *("noise", "envelope", "scene", "demosaic", "wiener", "rl", "admm-tv", "stabilise", "network"),
-    *("illumination", "undistort", "color"),
-)
+BEFORE_STAGES: Final = ("noise", "envelope", "scene")
 
 
 class Reconstruction:
@@ -51,7 +41,8 @@ class Reconstruction:
 
     Attributes:
         capture: What is reconstructed.
-        prepared: What was decided beforehand.
+        job: What is known of it.
+        plan: What was decided; None without a bundle.
     """
 
     def __init__(
@@ -62,59 +53,103 @@ class Reconstruction:
         progress: Progress | None = None,
         cancel: Cancel | None = None,
     ) -> None:
+        """Plan everything that is known before the first row.
+
+        Raises:
+            ContractError: If capture, bundle and options do not fit each other.
+        """
         self.capture = capture
         self._setup = setup
-        self._progress = progress
-        self._cancel = cancel
-        self._clock = StageClock()
-        self._front: FrontRows | None = None
-        self._guard = TileGuard(fallback=setup.options.on_unsafe == "fallback")
-        self.prepared = Preparation(setup, capture, self._clock)
+        self.job = Job(setup, capture, progress=progress, cancel=cancel)
+        self._walk = Walk(self.job)
+        self.plan = self._decide()
+        self._walk.settle()
+
+    @property
+    def products(self) -> dict[str, str]:
+        """Give the products that can be had: name -> plane."""
+        bundle = self._setup.bundle
+        if bundle is None:
+            return {IMAGE: DEVELOPMENT[-1].gives[0]}
+        return dict(bundle.manifest.products)
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (3, h, w) of the picture."""
-        return 3, self.capture.height, self.capture.width
+        """Give (c, h, w) of the image."""
+        return self.shape_of(IMAGE)
+
+    def shape_of(self, product: str) -> tuple[int, int, int]:
+        """Give (c, h, w) of a product.
+
+        Raises:
+            ContractError: If there is none of the name.
+        """
+        plane = self._plane_of(product)
+        bundle = self._setup.bundle
+        if bundle is None:
+            return 3, self.capture.height, self.capture.width
+        stated = bundle.manifest.planes[plane]
+        return len(stated.channels), *self.job.grid_px(stated)
+
+    def _plane_of(self, product: str) -> str:
+        if product not in self.products:
+            raise ContractError(
+                f"there is no product {product!r}; there are {', '.join(self.products)}"
+            )
+        return self.products[product]
 
     @property
-    def plan(self) -> dict[str, Any]:
+    def record(self) -> dict[str, Any]:
         """Give what was decided, for the sidecar."""
-        return self.prepared.record
+        return self.job.record
 
     @property
-    def white_balance(self) -> tuple[float, float, float]:
+    def white_balance(self) -> tuple[float, ...]:
         """Give the gains in use."""
-        return self.prepared.white_balance
+        return self.job.white_balance
 
     @property
     def color(self) -> ColorStage:
-        """Give the way from camera RGB to the colour asked for."""
-        return self.prepared.color
+        """Give the way from camera colour to the colour asked for.
+
+        Raises:
+            ContractError: If no stage gives a picture in colour.
+        """
+        if self.job.color is None:
+            raise ContractError("no stage of this camera gives a picture in colour")
+        return self.job.color
+
+    @property
+    def origin(self) -> Origin:
+        """Give what every writer should know of where the products come from."""
+        capture, bundle = self.capture, self._setup.bundle
+        return Origin(
+            camera=capture.camera,
+            iso=capture.iso,
+            exposure_time_s=capture.exposure_time_s,
+            orientation=capture.orientation,
+            white_balance=self.white_balance,
+            color_matrix=capture.color_matrix,
+            bundle=None if bundle is None else bundle.manifest.name,
+            bundle_sha256=None if bundle is None else bundle.sha256,
+            unit=self._setup.options.unit,
+        )
 
     @property
     def size(self) -> str | None:
         """Give the size of network in use; None if none runs."""
-        decided = self.prepared.decided
-        sizes = () if decided is None else decided.work.sizes()
+        sizes = self.job.work.sizes() if self.job.windows else ()
         return sizes[0] if sizes else None
 
     @property
     def labels(self) -> Labels | None:
         """Give the tier of every lattice cell; None where all get the network."""
-        decided = self.prepared.decided
-        return None if decided is None else decided.work.labels
+        return self.job.work.labels
 
     @property
-    def stage(self) -> NetworkStage | None:
-        """Give the planned windows of the networks; None if none runs."""
-        return self.prepared.network
-
-    def explain(self) -> Estimate | None:
-        """Complete the plan by what every decision saves, and give what the work will take.
-
-        Times the machine for a moment when first asked. None without a bundle.
-        """
-        return self.prepared.explain()
+    def windows(self) -> dict[str, NetworkWindows]:
+        """Give role -> the planned windows of its network; empty if none runs."""
+        return self.job.windows
 
     def measured_speed(self, sizes: Sequence[str]) -> Speed:
         """Give how fast this machine is with the networks of some sizes."""
@@ -123,210 +158,121 @@ class Reconstruction:
     @property
     def seconds(self) -> dict[str, float]:
         """Give the seconds per stage so far, in the order of the data."""
-        spent = self._clock.seconds
-        return {name: spent[name] for name in sorted(spent, key=STAGE_ORDER.index)}
+        spent = self.clock.seconds
+        order = (*BEFORE_STAGES, *self._walk.keys)
+        return {name: spent[name] for name in sorted(spent, key=order.index)}
 
     @property
     def clock(self) -> StageClock:
         """Give the clock of the stages, for profiles."""
-        return self._clock
+        return self.job.clock
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Give what the user should know; complete once the last band is out."""
-        found = list(self.prepared.notes)
-        if self._front is not None and self._front.repaired:
-            found.append(f"{self._front.repaired} dead or invalid pixels were repaired")
-        found += [f"the Wiener result was taken in {tile}" for tile in self._guard.replaced]
-        return tuple(found)
+        return (*self.job.notes, *self._walk.warnings())
 
     @property
     def clipped_fraction(self) -> float:
         """Give the share of clipped samples seen so far."""
-        return 0.0 if self._front is None else self._front.clipped_fraction
+        return self.job.clipped_fraction
 
-    def bands(self) -> Iterator[FloatArray]:
-        """Yield finished bands (3, rows, w) of the output colour, from top to bottom."""
-        bundle = self._setup.bundle
-        front = self._front_rows()
-        if bundle is None:
-            return self._finished_bands(_read_bands(front))
-        return self._finished_bands(self._restored_bands(bundle, front))
+    def bands(self, product: str = IMAGE) -> Iterator[Rows]:
+        """Yield finished bands (c, rows, w) of a product, from top to bottom.
 
-    def fill_plain(self) -> FloatArray:
-        """Give (3, h, w) developed without bank and network, all corrections applied."""
-        bands = self._finished_bands(_read_bands(self._front_rows()))
-        return np.concatenate(list(bands), axis=1)
-
-    def _finished_bands(self, bands: Iterator[FloatArray]) -> Iterator[FloatArray]:
-        """Yield the bands behind the restoration: highlights, corrections, colour.
-
-        Args:
-            bands: Each an array that nobody else reads.
+        Raises:
+            ContractError: If there is no such product.
         """
-        rows = self._undistorted(RollingRows(self.shape, self._evened(bands)).reader())
-        _, height, _ = self.shape
-        for top in range(0, height, BAND_ROWS):
-            band = rows.read(top, min(top + BAND_ROWS, height))
-            with self._clock.stage("color"):
-                band = to_output(band, self.color)
-            yield band
+        return self._walk.stream(self._plane_of(product)).bands()
 
-    def fill(self, out: FloatArray | None) -> FloatArray:
-        """Collect all bands in one (3, h, w) array.
+    def rows_of(self, plane: str) -> RowSource:
+        """Give the rows of any plane of the manifest, for export, reports and tests."""
+        return self._walk.stream(plane).rows()
+
+    def network_input(self, role: str) -> FloatArray:
+        """Give what the network of a role is given for the whole capture, (c, h, w).
+
+        Raises:
+            ContractError: If no stage has the role.
+        """
+        for number, stage in enumerate(self._setup.stages):
+            if isinstance(stage, Network) and stage.role == role:
+                taken = self._walk.taken_by(number)
+                rows = stage_module(stage.type).given_rows(stage, self.job, taken)
+                made: FloatArray = rows.read(0, rows.shape[1])
+                return made
+        raise ContractError(f"no stage has a network of the role {role!r}")
+
+    def fill(self, out: FloatArray | None = None, product: str = IMAGE) -> FloatArray:
+        """Collect all bands of a product in one (c, h, w) array.
 
         Raises:
             ContractError: If `out` has another shape or type.
         """
+        shape = self.shape_of(product)
         if out is None:
-            out = np.empty(self.shape, dtype=np.float32)
-        if out.shape != self.shape or out.dtype != np.float32:
-            raise ContractError(f"out must be float32 {self.shape}; got {out.dtype} {out.shape}")
+            out = np.empty(shape, dtype=np.float32)
+        if out.shape != shape or out.dtype != np.float32:
+            raise ContractError(f"out must be float32 {shape}; got {out.dtype} {out.shape}")
         top = 0
-        for band in self.bands():
+        for band in self.bands(product):
             out[:, top : top + band.shape[1]] = band
             top += band.shape[1]
         return out
 
-    def _front_rows(self) -> RowSource:
-        self._front = FrontRows(
-            self.capture,
-            self.white_balance,
-            method=self._demosaic_method(),
-            repair=self._setup.bundle is not None,
-            threads=self._setup.threads,
-        )
-        return TimedRows(self._front, self._clock, "demosaic")
+    def explain(self) -> Estimate | None:
+        """Complete the plan by what every decision saves, and give what the work will take.
 
-    def _demosaic_method(self) -> DemosaicMethod:
-        chosen, bundle = self._setup.options.demosaic, self._setup.bundle
-        stage = None if bundle is None else bundle.manifest.stage(Demosaic)
-        return chosen or ("fast" if stage is None else stage.method)
-
-    def network_input(self, scale: float) -> FloatArray:
-        """Give what a network is given for the whole capture, (6, h, w), for export and tests.
-
-        Args:
-            scale: Of the network stage.
-
-        Raises:
-            ContractError: If there is no bundle, or it has no Wiener stage.
+        Times the machine for a moment when first asked. None without a bundle.
         """
-        bundle = self._setup.bundle
-        bank = None if bundle is None else self._bank(bundle)
-        noise = self.prepared.noise
-        if bank is None or noise is None:
-            raise ContractError("a network stands behind the Wiener bank of a bundle")
-        rows = self._network_rows(bank, self._front_rows(), noise, scale)
-        return rows.read(0, self.capture.height)
-
-    def _restored_bands(self, bundle: Bundle, front: RowSource) -> Iterator[FloatArray]:
-        """Yield what bank and network make of the rows, each band an array of its own."""
-        bank, run, noise = self._bank(bundle), self.prepared.network, self.prepared.noise
-        stage = bundle.manifest.stage(Network)
-        if bank is None or noise is None:
-            return _read_bands(front)
-        if run is None or stage is None:
-            return self._bank_bands(bank, front)
-        bands = run.bands(
-            self._network_rows(bank, front, noise, stage.scale),
-            progress=self._progress,
-            cancel=self._cancel,
-            guard=self._guard,
-        )
-
-        def undo(rows: FloatArray, _: int) -> None:
-            unstabilise(rows, noise, scale=stage.scale, out=rows)
-
-        linear = changed_bands(
-            self._clock.bands("network", bands), undo, threads=self._setup.threads
-        )
-        return self._clock.bands("stabilise", linear)
-
-    def _network_rows(
-        self, bank: BlockBank, front: RowSource, noise: NoiseModel, scale: float
-    ) -> RowSource:
-        """Give the stabilised rows (6) of the capture and of the bank."""
-        planes = RollingRows(front.shape, _read_bands(front))
-        restored = RollingRows(front.shape, self._bank_bands(bank, planes.reader()))
-        both = planes.reader(), restored.reader()
-        rows = NetworkRows(*both, noise, scale=scale, threads=self._setup.threads)
-        return TimedRows(rows, self._clock, "stabilise")
-
-    def _bank_bands(self, bank: BlockBank, rows: RowSource) -> Iterator[FloatArray]:
-        method = self._setup.options.method
-        bands = bank.restore_bands(rows, self._unknown_rows, self._plain_blocks())
-        return self._clock.bands("wiener" if method == "net" else method, bands)
-
-    def _unknown_rows(self, top: int, bottom: int) -> NDArray[np.bool_]:
-        source = self.capture.saturated_rows if self._front is None else self._front.unknown_rows
-        return source(top, bottom)
-
-    def _plain_blocks(self) -> PlainBlock | None:
-        """Give the test for blocks that nothing but plain cells read."""
-        if self.labels is None:
+        made = self.plan
+        if made is None:
             return None
-        reach = 0 if self.stage is None else self.stage.halo_px
-        return plain_blocks(self.labels, reach)
-
-    def _bank(self, bundle: Bundle) -> BlockBank | None:
-        stage = bundle.manifest.stage(Wiener)
-        if stage is None or self.prepared.placement is None or self.prepared.noise is None:
-            return None
-        psf = bundle.psf
-        response = bundle.manifest.camera.channel_response.to_arrays()
-        kernels = color_kernels(psf, *response, depth_mm=self._setup.options.depth_mm)
-        local = LocalPsf(
-            kernels=scale_kernels(kernels, self.prepared.placement.kernel_scale),
-            field_heights_mm=psf.field_heights_mm,
-            window=self.prepared.placement.window,
+        if made.case.scene is None:
+            made = replace(made, case=replace(made.case, scene=self._measure_scene()))
+        speed = self._setup.speed(made.sizes())
+        self.record["decisions"] = [decision.to_json() for decision in made.decisions(speed)]
+        window_mp = {role: windows.window_mp() for role, windows in self.windows.items()}
+        taken = stage_seconds(made.case, made.work, speed, window_mp or None)
+        for stage, expected_s in zip(self.record["stages"].values(), taken, strict=True):
+            stage["expected_s"] = round(expected_s, 4)
+        estimate = Estimate(
+            seconds=estimate_seconds(made.case, made.work, speed, window_mp or None),
+            peak_mb=self._walk.needed_bytes() / 1e6,
         )
-        method = self._setup.options.method
-        return restoration_bank(
-            local,
-            stage,
-            self.prepared.noise,
-            method="wiener" if method == "net" else method,
-            threads=self._setup.threads,
-        )
+        self.record["estimate"] = estimate.to_json()
+        return estimate
 
-    def _evened(self, bands: Iterator[FloatArray]) -> Iterator[FloatArray]:
-        """Raise clipped lights and divide by the illumination, in place."""
-        raises, gain = self.capture.cfa is not None, self._illumination_gain()
-        if not raises and gain is None:
-            return bands
-
-        def even(rows: FloatArray, top: int) -> None:
-            if raises:
-                recover_highlights(rows, self.white_balance, in_place=True)
-            if gain is not None:
-                gain.divide(rows, top, out=rows)
-
-        evened = changed_bands(bands, even, threads=self._setup.threads)
-        return self._clock.bands("color" if gain is None else "illumination", evened)
-
-    def _illumination_gain(self) -> IlluminationGain | None:
-        bundle, placement = self._setup.bundle, self.prepared.placement
-        if bundle is None or placement is None or not self._setup.options.vignetting:
+    def _decide(self) -> Plan | None:
+        """Plan no more than the capture needs; without a bundle there is nothing to plan."""
+        job, bundle = self.job, self._setup.bundle
+        if bundle is None:
+            job.work = Work(method=DEVELOP, networks=False)
             return None
-        if bundle.manifest.stage(Illumination) is None:
-            return None
-        return IlluminationGain(bundle.psf, placement.window)
-
-    def _undistorted(self, rows: RowSource) -> RowSource:
-        bundle, placement = self._setup.bundle, self.prepared.placement
-        if bundle is None or placement is None or bundle.manifest.stage(Undistort) is None:
-            return rows
-        decided = self.prepared.decided
-        if not (self._setup.options.undistort if decided is None else decided.work.undistort):
-            return rows
-        bands = undistort_bands(
-            rows, bundle.psf.distortion, placement.window, threads=self._setup.threads
+        options = job.options
+        if job.falls_back:
+            below = without_networks(self._setup.stages, Work())
+            options = replace(options, method=below.method)
+        case = Case(
+            bundle=bundle,
+            options=options,
+            height_px=self.capture.height,
+            width_px=self.capture.width,
+            placement=job.placement,
+            scene=self._measure_scene() if needs_scene(options) else None,
         )
-        return RollingRows(self.shape, self._clock.bands("undistort", bands)).reader()
+        plan = make_plan(case, lambda: self._setup.speed(bundle.manifest.sizes))
+        if plan.note:
+            job.notes.append(plan.note)
+        job.case, job.work = plan.case, plan.work
+        self.record["quality"] = options.quality
+        self.record["decisions"] = [decision.to_json() for decision in plan.decisions()]
+        return plan
 
-
-def _read_bands(source: RowSource) -> Iterator[FloatArray]:
-    _, height, _ = source.shape
-    for top in range(0, height, BAND_ROWS):
-        yield source.read(top, min(top + BAND_ROWS, height))
+    def _measure_scene(self) -> Scene:
+        job = self.job
+        noise = job.noise.with_gains(job.white_balance)
+        with job.clock.stage("scene"):
+            scene = measure_scene(self.capture, noise, job.white_balance, job.placement.window)
+        self.record["scene"] = scene.to_json()
+        return scene

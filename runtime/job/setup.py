@@ -2,11 +2,23 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Color, Demosaic, Linearise, RaiseClipped, Stage, WhiteBalance
+from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
 from camkit.runtime.plan.speed import Speed
+
+DEVELOPMENT: Final[tuple[Stage, ...]] = (
+    Linearise(gives=("light",)),
+    WhiteBalance(takes=("light",)),
+    Demosaic(method="fast"),
+    RaiseClipped(takes=("rgb",)),
+    Color(takes=("neutral",)),
+)
+"""What is done to a capture without a bundle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,15 +28,29 @@ class Setup:
     Attributes:
         bundle: The camera; None develops only.
         options: What the caller chose.
-        engine: The network; None for the classical methods.
-        networks: Gives the network of a size.
+        networks: Gives the network of a role and size.
         speed: Gives how fast this machine is with the networks of some sizes.
         threads: Threads to compute with.
     """
 
     bundle: Bundle | None
     options: Options
-    engine: NetworkEngine | None
-    networks: Callable[[str], NetworkEngine]
+    networks: Callable[[str, str], NetworkEngine]
     speed: Callable[[Sequence[str]], Speed]
     threads: int
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """Give the stages that are walked."""
+        return DEVELOPMENT if self.bundle is None else self.bundle.manifest.stages
+
+    @property
+    def known_bundle(self) -> Bundle:
+        """Give the bundle.
+
+        Raises:
+            ContractError: If there is none.
+        """
+        if self.bundle is None:
+            raise ContractError("this needs a bundle, and there is none")
+        return self.bundle

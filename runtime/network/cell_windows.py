@@ -2,10 +2,10 @@
 
     labels (row, column): 0 no network, n the n-th network
     strip of k cell rows -> rectangles of cells -> windows with halo -> kept cells
-    elsewhere the Wiener planes, which the network's input holds anyway
+    elsewhere the planes that stand in for them, which the network's input holds anyway
 
        no network | network            inside a network's cell, over RAMP_PX from the border, the
-                  |ramp|               result passes from the Wiener planes to the network's
+                  |ramp|               result passes from the planes that stand in to the network's
 
 A window reaches a halo beyond its cells (or to the picture's border) and reads the true input
 there, so the pixels of its cells are those of the untiled run whatever rectangle they lie in; the
@@ -24,16 +24,22 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.guard import TileGuard, is_finite
 from camkit.runtime.network.row_buffer import RowBuffer
-from camkit.runtime.network.tiling import BANDS_HELD, Cancel, Cancelled, Progress, Run, is_cancelled
+from camkit.runtime.network.tiling import (
+    BANDS_HELD,
+    Cancel,
+    Cancelled,
+    PixelCost,
+    Progress,
+    Run,
+    is_cancelled,
+)
 from camkit.runtime.rows import RowSource
 
 RAMP_PX: Final = 32
 _CALL_PX: Final = 20_000
 """What starting a window costs, in pixels."""
-_END_BYTES: Final = 36
-"""Input and output of a network per pixel: nine float32."""
+_FLOAT_BYTES: Final = 4
 _MOST_STRIP_CELLS: Final = 8
-_WIENER: Final = slice(3, 6)
 
 Labels = NDArray[np.integer]
 
@@ -46,13 +52,18 @@ class CellNetwork:
         run: (1, c, h, w) float32 -> (1, 3, h, w) float32.
         stride_px: Sides of windows and their origins are multiples of it.
         halo_px: Its reach, or less in fast mode.
-        bytes_per_px: Peak of its live activations per window pixel.
+        cost: What it holds per pixel; its output has the grid of its input.
     """
 
     run: Run
     stride_px: int
     halo_px: int
-    bytes_per_px: float
+    cost: PixelCost
+
+    @property
+    def window_bytes(self) -> float:
+        """Give the memory of a window per pixel: activations, input and output."""
+        return self.cost.arena_bytes + _FLOAT_BYTES * (self.cost.channels + self.cost.outputs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,17 +134,22 @@ class CellPlan:
         """Rows of the padded picture held at a time."""
         return min(self.padded_px[0], self.strip_cells * self.cell_px + 2 * self.halo_px)
 
-    def needed_bytes(self, bytes_per_px: Sequence[float]) -> int:
+    def needed_bytes(self, costs: Sequence[PixelCost]) -> int:
         """Estimate the memory: rows and output strips held, every network's largest window."""
         width = self.padded_px[1]
         strips = BANDS_HELD * self.strip_cells * self.cell_px
-        held = (24 * self.buffer_rows + 12 * strips) * width
-        largest = [0] * len(bytes_per_px)
+        ends = costs[0] if costs else PixelCost()
+        held = _FLOAT_BYTES * (ends.channels * self.buffer_rows + ends.outputs * strips) * width
+        largest = [0] * len(costs)
         for windows in self.strips:
             for window in windows:
                 largest[window.network] = max(largest[window.network], window.area_px)
-        arenas = zip(largest, bytes_per_px, strict=True)
-        return held + int(sum(area * (per_px + _END_BYTES) for area, per_px in arenas))
+        return held + int(
+            sum(
+                area * (cost.arena_bytes + _FLOAT_BYTES * (cost.channels + cost.outputs))
+                for area, cost in zip(largest, costs, strict=True)
+            )
+        )
 
     def area_px(self, network: int) -> int:
         """Give the pixels that one network computes."""
@@ -199,19 +215,21 @@ def infer_cells(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
     guard: TileGuard | None = None,
+    stand_in: slice,
 ) -> Iterator[FloatArray]:
     """Run the networks on their cells and yield the rows of the picture from top to bottom.
 
     Args:
         networks: Those of the plan.
-        source: (6, h, w) picture, stabilised planes and Wiener planes; rows are read once.
+        source: (c, h, w) picture as the networks take it; rows are read once.
         plan: From `plan_cells`.
         progress: Called as progress(done, total) after each window.
         cancel: Asked before each window.
         guard: Looks at every window; None refuses NaN and inf only.
+        stand_in: Channels of the source that stand where no network runs.
 
     Yields:
-        (3, rows, w) float32, consecutive.
+        (k, rows, w) float32, consecutive.
 
     Raises:
         ContractError: If plan and source differ in size, or a network gives NaN or inf.
@@ -227,7 +245,7 @@ def infer_cells(
         bottom = min(top + plan.strip_cells * plan.cell_px, height)
         first = max(0, min(top - plan.halo_px, plan.padded_px[0] - plan.buffer_rows))
         held = buffer.move_to(first)
-        band = held[_WIENER, top - first : bottom - first, :width].copy()
+        band = held[stand_in, top - first : bottom - first, :width].copy()
         for window in windows:
             if is_cancelled(cancel):
                 raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
@@ -337,16 +355,19 @@ def _strip_cells(
     """Give cell rows per strip and the most pixels of a window, by the memory cap."""
     cell, (height, width) = frame.cell, frame.padded
     rows = -(-height // cell)
-    per_px = sum(n.bytes_per_px + _END_BYTES for n in networks)
+    per_px = sum(network.window_bytes for network in networks)
+    ends = networks[0].cost if networks else PixelCost()
+    in_bytes, out_bytes = _FLOAT_BYTES * ends.channels, _FLOAT_BYTES * ends.outputs
     if limits.tile_px is not None:
         cells = min(max(1, -(-limits.tile_px // cell)), rows)
         return cells, _padded_px(cell, cells, cells, halo)
     for cells in range(min(_MOST_STRIP_CELLS, rows), 0, -1):
-        held = min(height, cells * cell + 2 * halo) * width * 24 + cells * cell * width * 12
+        held = min(height, cells * cell + 2 * halo) * width * in_bytes
+        held += cells * cell * width * out_bytes
         most_px = int((limits.max_bytes - held) / max(per_px, 1))
         if most_px >= _padded_px(cell, cells, min(2, cells), halo):
             return cells, most_px
-    need = (cell + 2 * halo) * width * 24 + _padded_px(cell, 1, 1, halo) * per_px
+    need = (cell + 2 * halo) * width * in_bytes + _padded_px(cell, 1, 1, halo) * per_px
     raise ContractError(
         f"{width}x{height} pixels with a halo of {halo} need at least {need / 2**20:.0f} MiB for "
         f"one cell; got {limits.max_bytes / 2**20:.0f} MiB: raise --max-mem"

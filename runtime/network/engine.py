@@ -97,37 +97,41 @@ def usable_providers() -> tuple[str, ...]:
 
 
 class NetworkEngine:
-    """One network, ready to run: (1, channels, h, w) -> (1, 3, h, w), float32.
+    """One network, ready to run: (1, channels, h, w) -> (1, outputs, s h, s w), float32.
 
     On the CPU the graph is optimised at level ALL, where every convolution takes the blocked path
     whose sums do not depend on the window; other providers promise no equal bits. Nothing is
     cached on disk.
     """
 
-    def __init__(self, model: bytes, *, threads: int, provider: str = "cpu") -> None:
+    def __init__(
+        self, model: bytes, *, threads: int, provider: str = "cpu", scale: int = 1
+    ) -> None:
         """Load a model.
 
         Args:
             model: Serialised ONNX model with the weights inside; never a path.
             threads: Threads per run, from `available_threads`.
             provider: Key of `PROVIDER_NAMES`; arrays stay in the memory of the CPU.
+            scale: Samples along a side of the output for one pixel of the input.
 
         Raises:
-            ContractError: If `model` is not bytes or threads < 1.
+            ContractError: If `model` is not bytes, threads or scale < 1.
             BundleError: If onnxruntime refuses the model or its inputs and outputs are not those
                 of a network.
             UnsupportedError: If the installed onnxruntime is too old or lacks the provider.
         """
         if not isinstance(model, bytes):
             raise ContractError(f"the model must be given as bytes; got {type(model).__name__}")
-        if threads < 1:
-            raise ContractError(f"threads must be >= 1; got {threads}")
+        if threads < 1 or scale < 1:
+            raise ContractError(f"threads and scale must be >= 1; got {threads}, {scale}")
         _check_version(ort.__version__)
         with _CREATION:
             self._session = _create_session(model, threads, provider)
         self.threads = threads
         self.provider = provider
-        self.channels = _check_contract(self._session)
+        self.scale = scale
+        self.channels, self.outputs = _check_contract(self._session)
 
     def run(self, window: FloatArray, out: FloatArray | None = None) -> FloatArray:
         """Run the network on one window; may be called from many threads.
@@ -135,7 +139,7 @@ class NetworkEngine:
         Args:
             window: (1, channels, h, w) float32, C-contiguous, h and w multiples of the network's
                 stride.
-            out: (1, 3, h, w) float32, C-contiguous, to be filled; None makes a new one.
+            out: (1, outputs, s h, s w) float32, C-contiguous, to be filled; None makes a new one.
 
         Returns:
             `out`.
@@ -144,7 +148,7 @@ class NetworkEngine:
             ContractError: If shapes or types disagree, or onnxruntime refuses the size.
         """
         window = self._checked(window)
-        shape = (1, 3, *window.shape[2:])
+        shape = (1, self.outputs, *(self.scale * side for side in window.shape[2:]))
         if out is None:
             out = np.empty(shape, np.float32)
         elif out.shape != shape or out.dtype != np.float32 or not out.flags.c_contiguous:
@@ -251,7 +255,8 @@ def _chosen_providers(provider: str) -> list[str | tuple[str, dict[str, str]]]:
     ]
 
 
-def _check_contract(session: Any) -> int:
+def _check_contract(session: Any) -> tuple[int, int]:
+    """Give the channels of input and output."""
     inputs, outputs = session.get_inputs(), session.get_outputs()
     names = [v.name for v in inputs], [v.name for v in outputs]
     types = {v.type for v in (*inputs, *outputs)}
@@ -260,8 +265,10 @@ def _check_contract(session: Any) -> int:
             f'a network has one float "input" and one float "output"; got {names}, {types}'
         )
     shape, out_shape = inputs[0].shape, outputs[0].shape
-    if len(shape) != 4 or shape[0] != 1 or not isinstance(shape[1], int) or out_shape[1:2] != [3]:
+    known = all(len(s) == 4 and s[0] == 1 and isinstance(s[1], int) for s in (shape, out_shape))
+    if not known:
         raise BundleError(
-            f"a network maps (1, channels, h, w) to (1, 3, h, w); got {shape} to {out_shape}"
+            "a network maps (1, channels, h, w) to (1, channels, h, w), channels stated; "
+            f"got {shape} to {out_shape}"
         )
-    return shape[1]
+    return shape[1], out_shape[1]

@@ -241,7 +241,7 @@ def inspect_graph(data: bytes) -> GraphFacts:
         data: The ONNX model.
 
     Raises:
-        BundleError: If it is not admissible, or its output is not on the pixels of its input.
+        BundleError: If it is not admissible, or its output is on no grid of its input.
     """
     graph = parse_graph(data)
     return walk_graph(
@@ -264,7 +264,7 @@ def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
 
     Raises:
         BundleError: If the graph is not admissible or contradicts the manifest in names,
-            channels, stride or global operators, or reaches further than it says.
+            channels, scale, stride or global operators, or reaches further than it says.
     """
     found = inspect_graph(data)
     pairs = {
@@ -272,6 +272,7 @@ def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
         "input channels": (found.input_channels, facts.input_channels),
         "output name": (found.output_name, facts.output_name),
         "output channels": (found.output_channels, facts.output_channels),
+        "output scale": (found.output_scale, facts.output_scale),
         "stride": (found.stride_px, facts.stride_px),
         "global operators": (found.global_operators, facts.global_operators),
     }

@@ -42,14 +42,15 @@ class GraphFacts:
     """What the graph of a network says about itself.
 
     Attributes:
+        output_scale: Samples along a side of the output for one pixel of the input.
         receptive_field_radius_px: How far a window on the lattice of the stride must reach past
             the pixels it keeps, apart from what passes through `global_operators`.
         stride_px: Height and width must be multiples of it.
         global_operators: "name (type)" of nodes that see the whole picture.
         unblocked_convolutions: Nodes off onnxruntime's blocked path; bits of tiled and whole
             may differ there.
-        mac_per_pixel: Multiply-accumulates of all convolutions per output pixel.
-        bytes_per_pixel: Peak of the live float32 activations per output pixel.
+        mac_per_pixel: Multiply-accumulates of all convolutions per pixel of the input.
+        bytes_per_pixel: Peak of the live float32 activations per pixel of the input.
         parameters: Number of constants of floating point.
     """
 
@@ -57,6 +58,7 @@ class GraphFacts:
     input_channels: int
     output_name: str
     output_channels: int
+    output_scale: int
     receptive_field_radius_px: int
     stride_px: int
     global_operators: tuple[str, ...]
@@ -119,15 +121,15 @@ def walk_graph(
         target: Name of the output, and its channels where declared.
 
     Raises:
-        BundleError: If a node cannot be followed, or the output is not one sample per pixel of
-            the input with the declared channels.
+        BundleError: If a node cannot be followed, or the output is not a whole number of samples
+            per pixel of the input with the declared channels.
     """
     start = Extent(channels=source[1], axes=(Axis(), Axis()))
     walk = _Walk(constants=constants, extents={source[0]: start})
     for node in nodes:
         extents = _node_extents(walk, node)
         walk.extents.update(zip(node.outputs, extents, strict=False))
-    final = _final(walk.extents, target)
+    final, scale = _final(walk.extents, target)
     steps = [axis.step for e in walk.extents.values() if e.axes is not None for axis in e.axes]
     stride = math.lcm(*(step.numerator for step in steps))
     return GraphFacts(
@@ -135,7 +137,10 @@ def walk_graph(
         input_channels=source[1],
         output_name=target[0],
         output_channels=final.channels,
-        receptive_field_radius_px=_reach(nodes, walk, ends=(source[0], target[0]), kept=stride),
+        output_scale=scale,
+        receptive_field_radius_px=_reach(
+            nodes, walk, ends=(source[0], target[0]), samples=(stride, scale)
+        ),
         stride_px=stride,
         global_operators=tuple(walk.global_operators),
         unblocked_convolutions=tuple(walk.unblocked),
@@ -145,26 +150,41 @@ def walk_graph(
     )
 
 
-def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> Extent:
+def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> tuple[Extent, int]:
+    """Give the extent of the output, and its samples along a side for one pixel."""
     name, channels = target
     if name not in extents:
         raise BundleError(f"output {name!r} is never computed")
     final = extents[name]
-    if final.axes is None or any(a.step != 1 or a.extra != 0 for a in final.axes):
-        raise BundleError(f"output {name!r} must have the height and width of the input")
+    steps = {axis.step for axis in final.axes or ()}
+    exact = all(axis.extra == 0 for axis in final.axes or ())
+    if not exact or len(steps) != 1 or next(iter(steps)).numerator != 1:
+        raise BundleError(
+            f"output {name!r} must have the height and width of the input, or both multiplied by "
+            "one whole number"
+        )
     if channels is not None and channels != final.channels:
         raise BundleError(
             f"output {name!r} declares {channels} channels, the graph computes {final.channels}"
         )
-    return final
+    return final, next(iter(steps)).denominator
 
 
-def _reach(nodes: Sequence[Node], walk: _Walk, *, ends: tuple[str, str], kept: int) -> int:
-    """Carry the runs that the kept pixels 0 .. kept - 1 read from the output back to the input."""
-    source, target = ends
+def _reach(
+    nodes: Sequence[Node], walk: _Walk, *, ends: tuple[str, str], samples: tuple[int, int]
+) -> int:
+    """Carry the runs that the kept pixels 0 .. n - 1 read from the output back to the input.
+
+    Args:
+        nodes: In the order of computation.
+        walk: What was found on the way there.
+        ends: Names of input and output.
+        samples: n, and how many samples of the output a pixel has.
+    """
+    (source, target), (kept, scale) = ends, samples
     reach = 0
     for axis in range(2):
-        runs = {target: (0, kept - 1)}
+        runs = {target: (0, kept * scale - 1)}
         for node in reversed(nodes):
             for output in node.outputs:
                 if output not in runs:

@@ -50,16 +50,23 @@ class HaloCost:
 
 
 def perturbation_reach(
-    run: Run, size_px: int, rng: np.random.Generator, *, stride_px: int, channels: int = 6
+    run: Run,
+    size_px: int,
+    rng: np.random.Generator,
+    *,
+    stride_px: int,
+    channels: int,
+    scale: int = 1,
 ) -> ProbedReach:
     """Kick one input pixel at every phase of the stride and see where the output changes.
 
     Args:
-        run: (1, channels, h, w) float32 -> (1, 3, h, w) float32.
+        run: (1, channels, h, w) float32 -> (1, k, s h, s w) float32.
         size_px: Side of the probed window, a multiple of the stride; more than twice the reach.
         rng: Draws the base picture.
         stride_px: Total stride.
         channels: Input planes.
+        scale: s, samples along a side of the output for one pixel.
 
     Returns:
         The reach, at most what the window can show.
@@ -81,7 +88,7 @@ def perturbation_reach(
         for kick in (_KICK, -_KICK):
             kicked = base.copy()
             kicked[:, :, cell + phase, cell + phase] += kick
-            changed = (run(kicked) != still).any(axis=(0, 1))
+            changed = _by_pixel((run(kicked) != still).any(axis=(0, 1)), scale)
             for axis in range(2):
                 hit = np.flatnonzero(changed.any(axis=axis))
                 if hit.size and (hit[0] == 0 or hit[-1] == size_px - 1):
@@ -95,6 +102,12 @@ def perturbation_reach(
     return ProbedReach(radius_px=radius, halo_px=halo)
 
 
+def _by_pixel(changed: np.ndarray, scale: int) -> np.ndarray:
+    """Give (h, w): whether any sample of the output on a pixel changed."""
+    height, width = (side // scale for side in changed.shape)
+    return np.asarray(changed.reshape(height, scale, width, scale).any(axis=(1, 3)))
+
+
 def _distance(first: np.ndarray, last: np.ndarray, pixel: int) -> int:
     """Give the largest distance from a pixel to the nearest end of any interval first..last."""
     outside = np.maximum(first - pixel, pixel - last)
@@ -102,7 +115,13 @@ def _distance(first: np.ndarray, last: np.ndarray, pixel: int) -> int:
 
 
 def halo_error_curve(
-    run: Run, sample: FloatArray, halos_px: Iterable[int], *, stride_px: int, tile_px: int = 128
+    run: Run,
+    sample: FloatArray,
+    halos_px: Iterable[int],
+    *,
+    stride_px: int,
+    scale: int = 1,
+    tile_px: int = 128,
 ) -> tuple[HaloCost, ...]:
     """Measure what a halo shorter than the reach costs.
 
@@ -111,6 +130,7 @@ def halo_error_curve(
         sample: (c, h, w) float32, stabilised planes as the network sees them, larger than a tile.
         halos_px: Halos to try; each is rounded up to the stride.
         stride_px: Total stride.
+        scale: Samples along a side of the output for one pixel.
         tile_px: Output tile; small, so that seams are many and the figures are on the safe side.
 
     Returns:
@@ -125,13 +145,16 @@ def halo_error_curve(
             f"the sample must be larger than a tile of {tile_px}; got {width}x{height}"
         )
     whole = _infer(
-        run, sample, TileLimits(stride_px=stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True)
+        run,
+        sample,
+        TileLimits(stride_px=stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True),
+        scale,
     )
     peak = float(np.abs(whole).max())
     costs = []
     for halo in sorted({-(-h // stride_px) * stride_px for h in halos_px}):
         limits = TileLimits(stride_px=stride_px, halo_px=halo, tile_px=tile_px)
-        difference = np.abs(_infer(run, sample, limits) - whole)
+        difference = np.abs(_infer(run, sample, limits, scale) - whole)
         rms = float(np.sqrt(np.mean(np.square(difference, dtype=np.float64))))
         costs.append(
             HaloCost(
@@ -143,7 +166,7 @@ def halo_error_curve(
     return tuple(costs)
 
 
-def _infer(run: Run, sample: FloatArray, limits: TileLimits) -> FloatArray:
+def _infer(run: Run, sample: FloatArray, limits: TileLimits, scale: int) -> FloatArray:
     _, height, width = sample.shape
     plan = plan_windows(height, width, limits)
-    return np.concatenate(list(infer_bands(run, ArrayRows(sample), plan)), axis=1)
+    return np.concatenate(list(infer_bands(run, ArrayRows(sample), plan, scale=scale)), axis=1)

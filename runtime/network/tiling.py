@@ -119,24 +119,42 @@ class TilePlan:
         window = self.window_height_px * self.window_width_px
         return self.window_count * window / (self.height_px * self.width_px)
 
-    def needed_bytes(self, bytes_per_px: float, channels: int = 6) -> int:
+    def needed_bytes(self, cost: "PixelCost") -> int:
         """Estimate the memory of a run: one window and its arena, row buffer, output bands."""
         window = self.window_height_px, self.window_width_px
-        return _needed_bytes(window, self.rows, self.padded_width_px, bytes_per_px, channels)
+        return _needed_bytes(window, self.rows, self.padded_width_px, cost)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PixelCost:
+    """What a network holds per pixel of its input.
+
+    Attributes:
+        arena_bytes: Peak of its live activations.
+        channels: Of its input.
+        outputs: Channels of its output.
+        scale: Samples along a side of the output for one pixel.
+    """
+
+    arena_bytes: float = 150.0
+    channels: int = 6
+    outputs: int = 3
+    scale: int = 1
+
+    @property
+    def out_values(self) -> int:
+        """Give the samples of the output for one pixel."""
+        return self.outputs * self.scale * self.scale
 
 
 def _needed_bytes(
-    window: tuple[int, int],
-    rows: tuple[Span, ...],
-    width_px: int,
-    bytes_per_px: float,
-    channels: int = 6,
+    window: tuple[int, int], rows: tuple[Span, ...], width_px: int, cost: PixelCost
 ) -> int:
     band = max(span.stop_px - span.start_px for span in rows)
     row_bytes = _FLOAT_BYTES * width_px
-    ends = _FLOAT_BYTES * (channels + 3)
-    arena = int(window[0] * window[1] * (bytes_per_px + ends))
-    return arena + row_bytes * (channels * window[0] + 3 * BANDS_HELD * band)
+    ends = _FLOAT_BYTES * (cost.channels + cost.out_values)
+    arena = int(window[0] * window[1] * (cost.arena_bytes + ends))
+    return arena + row_bytes * (cost.channels * window[0] + cost.out_values * BANDS_HELD * band)
 
 
 def _check_axis(spans: tuple[Span, ...], window: int, plan: TilePlan) -> None:
@@ -179,7 +197,7 @@ class TileLimits:
     Attributes:
         stride_px: Total stride of the network, >= 1.
         halo_px: Its reach, or less in fast mode; rounded up to the stride.
-        bytes_per_px: Peak of the network's live activations per window pixel.
+        cost: What the network holds per pixel.
         max_bytes: Cap on one window with its arena, the row buffer and one output band together.
         tile_px: Force output tiles of this size (tests); None lets the planner choose.
         whole: One window whatever the size.
@@ -187,16 +205,16 @@ class TileLimits:
 
     stride_px: int
     halo_px: int
-    bytes_per_px: float = 150.0
+    cost: PixelCost = PixelCost()
     max_bytes: int = DEFAULT_MAX_BYTES
     tile_px: int | None = None
     whole: bool = False
 
     def __post_init__(self) -> None:
-        if self.stride_px < 1 or self.halo_px < 0 or self.bytes_per_px <= 0:
+        if self.stride_px < 1 or self.halo_px < 0 or self.cost.arena_bytes <= 0:
             raise ContractError(
                 "stride must be >= 1, halo >= 0 and bytes per pixel > 0; got "
-                f"{self.stride_px}, {self.halo_px}, {self.bytes_per_px}"
+                f"{self.stride_px}, {self.halo_px}, {self.cost.arena_bytes}"
             )
         if self.tile_px is not None and self.tile_px < 1:
             raise ContractError(f"tile_px must be >= 1; got {self.tile_px}")
@@ -248,7 +266,7 @@ def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[i
     costs = {
         (h, w): (
             len(rows[h]) * columns[w] * h * w,
-            _needed_bytes((h, w), rows[h], size[1], limits.bytes_per_px),
+            _needed_bytes((h, w), rows[h], size[1], limits.cost),
         )
         for h in rows
         for w in columns
@@ -280,19 +298,21 @@ def infer_bands(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
     guard: TileGuard | None = None,
+    scale: int = 1,
 ) -> Iterator[FloatArray]:
     """Run a network over a picture and yield its rows from top to bottom.
 
     Args:
-        run: (1, c, h, w) float32 -> (1, 3, h, w) float32, for the plan's window size.
+        run: (1, c, h, w) float32 -> (1, k, s h, s w) float32, for the plan's window size.
         source: (c, h, w) picture; each of its rows is read once.
         plan: From `plan_windows`, for the size of the source.
         progress: Called as progress(done, total) after each window.
         cancel: Asked before each window.
         guard: Looks at every tile; None refuses NaN and inf only.
+        scale: s, samples along a side of the output for one pixel of the input.
 
     Yields:
-        (3, rows, w) float32 bands, consecutive, together the whole picture.
+        (k, s rows, s w) float32 bands, consecutive, together the whole picture.
 
     Raises:
         ContractError: If plan and source differ in size, or the network gives NaN or inf.
@@ -310,21 +330,24 @@ def infer_bands(
     done = 0
     for i, row in enumerate(plan.rows):
         held = buffer.move_to(row.origin_px)
-        band = np.empty((3, min(row.stop_px, height) - row.start_px, width), np.float32)
+        band: FloatArray | None = None
         for j, column in enumerate(plan.columns):
             if is_cancelled(cancel):
                 raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
             filled = _filled(window, held, column.origin_px)
-            kept = _kept(run(filled), row, column, (height, width))
+            kept = _kept(run(filled), row, column, (height, width), scale)
             if guard is not None:
                 given = _kept(filled, row, column, (height, width))
                 kept = guard.check(kept, given, partial(_describe, i, j, row, column))
             elif not is_finite(kept):
                 raise ContractError(_not_finite_message(i, j, row, column))
-            band[:, :, column.start_px : min(column.stop_px, width)] = kept
+            if band is None:
+                band = np.empty((kept.shape[0], kept.shape[1], scale * width), np.float32)
+            band[:, :, scale * column.start_px : scale * min(column.stop_px, width)] = kept
             done += 1
             if progress is not None:
                 progress(done, plan.window_count)
+        assert band is not None
         yield band
 
 
@@ -336,12 +359,15 @@ def _filled(window: FloatArray | None, held: FloatArray, left: int) -> FloatArra
     return window
 
 
-def _kept(output: FloatArray, row: Span, column: Span, size: tuple[int, int]) -> FloatArray:
+def _kept(
+    output: FloatArray, row: Span, column: Span, size: tuple[int, int], scale: int = 1
+) -> FloatArray:
     """Crop the pixels that a window contributes; none lies in the padding."""
     top, left = row.start_px - row.origin_px, column.start_px - column.origin_px
     bottom = min(row.stop_px, size[0]) - row.origin_px
     right = min(column.stop_px, size[1]) - column.origin_px
-    return output[0, :, top:bottom, left:right]
+    rows, columns = slice(scale * top, scale * bottom), slice(scale * left, scale * right)
+    return output[0, :, rows, columns]
 
 
 def is_cancelled(cancel: Cancel | None) -> bool:

@@ -6,13 +6,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Network
 from camkit.errors import ContractError
 from camkit.runtime.geometry.placement import Placement
-from camkit.runtime.options import Method, Mode, Options
+from camkit.runtime.options import Mode, Options
 from camkit.runtime.scene import Scene
 
 Labels = NDArray[np.int8]
+
+DEVELOP: Final = "develop"
+"""The method that restores nothing."""
 
 PLAIN: Final = 0
 WIENER: Final = 1
@@ -45,6 +50,16 @@ class Case:
     loss_db: float = 0.0
 
     @property
+    def role(self) -> str | None:
+        """Name the role of the one network of the camera; None if it has none or several."""
+        roles = {stage.role for stage in self.bundle.manifest.stages_of(Network)}
+        return next(iter(roles)) if len(roles) == 1 else None
+
+    def facts(self, size: str) -> NetworkFacts:
+        """Give the facts of one size of the first network of the camera."""
+        return self.bundle.network_facts(next(iter(self.bundle.manifest.networks)), size)
+
+    @property
     def megapixels(self) -> float:
         """Give the size of the capture."""
         return self.height_px * self.width_px / 1e6
@@ -55,20 +70,23 @@ class Work:
     """What will be done to a capture.
 
     Attributes:
-        method: The network behind the bank, or a classical method alone.
+        method: Way of a stage, as `--method` names it: the network, a classical method alone, or
+            DEVELOP; None for the usual way of every stage.
+        networks: Whether any network runs.
         size: Size of network that cells of tier FULL get.
         small: Size that cells of tier SMALL get; None without one.
         mode: Tiling.
         labels: (row, column) tier of every lattice cell; None for FULL everywhere.
-        undistort: Undo the distortion.
+        left_out: Types of stages that are left out beside what the method leaves out.
     """
 
-    method: Method = "net"
+    method: str | None = None
+    networks: bool = True
     size: str = "M"
     small: str | None = None
     mode: Mode = "exact"
     labels: Labels | None = None
-    undistort: bool = True
+    left_out: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if self.labels is None:
@@ -80,7 +98,7 @@ class Work:
 
     def sizes(self) -> tuple[str, ...]:
         """Name the networks that will run."""
-        if self.method != "net":
+        if not self.networks:
             return ()
         if self.labels is None:
             return (self.size,)

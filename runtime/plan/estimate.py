@@ -1,24 +1,20 @@
-"""Seconds and peak memory of a piece of work, before it is done."""
+"""Seconds and peak memory of a piece of work, before it is done: the sum of what the stages say."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from camkit.bundle.stages import Undistort, Wiener
-from camkit.runtime.bank.blocks import plan_spans
-from camkit.runtime.plan.blocks import plain_share
+from camkit.bundle.stages import Network
 from camkit.runtime.plan.decision import FULL, SMALL, Case, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import TierWork, work_shares
+from camkit.runtime.plan.ways import LEFT_OUT, ways_of
+from camkit.runtime.stage_finder import stage_module
 
-CLIPPED_BLOCK: Final = 3.3
-"""A block with clipped samples costs so many of one without (six rounds of Richardson-Lucy)."""
 WINDOW_OVERLAP: Final = 1.15
 """Computed over kept pixels of a usual plan, where no windows are planned yet."""
-BLOCK_SET_UP: Final = 1.25
-"""A block with its kernel, window and sum over a block that is only filtered."""
-UNDISTORT_SHARE: Final = 0.25
-"""Share of undistortion in everything but bank and network."""
+FILE_SHARE: Final = 0.15
+"""Share of reading and writing files in everything but bank and network."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,29 +45,48 @@ class Estimate:
 
 
 def estimate_seconds(
-    case: Case, work: Work, speed: Speed, window_mp: Mapping[str, float] | None = None
+    case: Case, work: Work, speed: Speed, window_mp: Mapping[str, Mapping[str, float]] | None = None
 ) -> float:
-    """Give the seconds of a piece of work.
+    """Give the seconds of a piece of work; see `stage_seconds`."""
+    files = FILE_SHARE * speed.rest_s_per_mp * case.megapixels
+    return files + sum(stage_seconds(case, work, speed, window_mp))
+
+
+def stage_seconds(
+    case: Case, work: Work, speed: Speed, window_mp: Mapping[str, Mapping[str, float]] | None = None
+) -> tuple[float, ...]:
+    """Give the seconds of every stage of a piece of work, 0 for what is left out.
 
     Args:
         case: The capture.
         work: What will be done.
         speed: How fast the machine is.
-        window_mp: Size -> megapixels that its windows compute, once they are planned.
+        window_mp: Role -> size -> megapixels that its windows compute, once they are planned.
     """
-    rest = speed.rest_s_per_mp * case.megapixels
-    if case.bundle.manifest.stage(Undistort) is None or not work.undistort:
-        rest *= 1 - UNDISTORT_SHARE
-    if window_mp is None:
-        window_mp = nominal_window_mp(case, work)
-    network = sum(speed.network_s_per_mp[size] * mp for size, mp in window_mp.items())
-    return rest + _bank_seconds(case, work, speed) + network
+    stages = case.bundle.manifest.stages
+    taken: list[float] = []
+    for stage, way in zip(stages, ways_of(stages, work), strict=True):
+        windows = None
+        if isinstance(stage, Network) and window_mp is not None:
+            windows = window_mp.get(stage.role)
+        if way == LEFT_OUT:
+            taken.append(0.0)
+        elif isinstance(stage, Network) and windows is not None:
+            taken.append(network_seconds(stage.role, windows, speed))
+        else:
+            taken.append(stage_module(stage.type).seconds(stage, case, work, speed))
+    return tuple(taken)
+
+
+def network_seconds(role: str, window_mp: Mapping[str, float], speed: Speed) -> float:
+    """Give the seconds of the windows of a role."""
+    return sum(speed.network_s_per_mp[role, size] * mp for size, mp in window_mp.items())
 
 
 def nominal_window_mp(case: Case, work: Work) -> dict[str, float]:
-    """Give size -> megapixels computed, from the lattice alone."""
+    """Give size -> megapixels computed by the one network of a camera, from the lattice alone."""
     computed = case.megapixels * WINDOW_OVERLAP
-    if work.method != "net":
+    if not work.networks:
         return {}
     if work.labels is None or case.scene is None:
         return {work.size: computed}
@@ -90,29 +105,24 @@ def nominal_window_mp(case: Case, work: Work) -> dict[str, float]:
     return found
 
 
+def role_window_mp(role: str, case: Case, work: Work) -> dict[str, float]:
+    """Give size -> megapixels computed by the network of a role, on the grid of what it takes."""
+    if case.role is not None:
+        return nominal_window_mp(case, work)
+    manifest = case.bundle.manifest
+    stage = next(s for s in manifest.stages_of(Network) if s.role == role)
+    taken = manifest.planes.get(stage.takes[0])
+    finer = 1.0 if taken is None else taken.grid.pitch_ratio**-2
+    return {work.size: case.megapixels * WINDOW_OVERLAP * finer}
+
+
 def tier_work_of(case: Case, work: Work) -> TierWork:
     """Give what the tiers of a piece of work cost, from the bundle's facts."""
-    full = case.bundle.network_facts(work.size)
-    small = None if work.small is None else case.bundle.network_facts(work.small)
+    full = case.facts(work.size)
+    small = None if work.small is None else case.facts(work.small)
     return TierWork(
         full_mac=full.mac_per_pixel,
         full_halo_px=full.reach_px,
         small_mac=None if small is None else small.mac_per_pixel,
         small_halo_px=0 if small is None else small.reach_px,
     )
-
-
-def _bank_seconds(case: Case, work: Work, speed: Speed) -> float:
-    stage = case.bundle.manifest.stage(Wiener)
-    if stage is None:
-        return 0.0
-    rows = plan_spans(case.height_px, stage.block_px, stage.overlap_px)
-    columns = plan_spans(case.width_px, stage.block_px, stage.overlap_px)
-    blocks = float(len(rows) * len(columns))
-    if work.labels is not None:
-        reach = max((case.bundle.network_facts(s).reach_px for s in work.sizes()), default=0)
-        blocks *= 1 - plain_share(work.labels, reach, rows, columns)
-    if case.scene is not None and stage.clip_iterations:
-        clipped = float((case.scene.clipped > 0).mean())
-        blocks *= 1 + (CLIPPED_BLOCK - 1) * min(1.0, clipped * (stage.block_px / 256) ** 2)
-    return blocks * speed.block_s * BLOCK_SET_UP / speed.threads

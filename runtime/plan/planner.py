@@ -20,6 +20,8 @@ from camkit.runtime.plan.rule import apply_rules
 from camkit.runtime.plan.rules.size import REFERENCE, size_cost_db
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import work_shares
+from camkit.runtime.plan.ways import planned, without_networks
+from camkit.runtime.stage_finder import stage_module
 
 LADDER: Final = (0.0, 1.0, 3.0, 10.0, 30.0)
 """Losses tried for --max-seconds, in units of that of `adaptive`."""
@@ -50,7 +52,7 @@ class Plan:
         """Name the networks whose speed the savings need."""
         works = [self.work, *(w for before, _, after in self.steps for w in (before, after))]
         named = {size for work in works for size in (work.size, work.small)}
-        return [s for s in sizes_by_work(self.case.bundle) if s in named | {REFERENCE}]
+        return [s for s in self.case.bundle.manifest.sizes if s in named | {REFERENCE}]
 
     def decisions(self, speed: Speed | None = None) -> list[Decision]:
         """Give the decisions; with a speed, with the seconds they save."""
@@ -64,7 +66,7 @@ class Plan:
     def _saving_s(self, before: Work, after: Work, speed: Speed) -> float:
         """Give the seconds between two works; the size is compared with the reference."""
         chosen = before is after is self.steps[0][2] and after.size != REFERENCE
-        if chosen and REFERENCE in speed.network_s_per_mp:
+        if chosen and any(size == REFERENCE for _, size in speed.network_s_per_mp):
             before = replace(before, size=REFERENCE)
         if before is after:
             return 0.0
@@ -77,19 +79,14 @@ def default_size(bundle: Bundle, options: Options) -> str:
     """Give the size that a pipeline gets ready: --size, or that of the quality."""
     if options.size is not None:
         return options.size
-    sizes = sizes_by_work(bundle)
+    sizes = bundle.manifest.sizes
     if not sizes:
         return REFERENCE
     if options.quality == "best":
         return sizes[-1]
-    return sizes[0] if options.quality == "draft" else REFERENCE
-
-
-def sizes_by_work(bundle: Bundle) -> list[str]:
-    """Give the sizes of a bundle from the cheapest on."""
-    return sorted(
-        bundle.manifest.networks, key=lambda size: bundle.network_facts(size).mac_per_pixel
-    )
+    if options.quality == "draft":
+        return sizes[0]
+    return REFERENCE if REFERENCE in sizes or len(sizes) > 1 else sizes[0]
 
 
 def needs_scene(options: Options) -> bool:
@@ -108,7 +105,7 @@ def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
     options = case.options
     model = read_loss_model(case.bundle.manifest.plan)
     work = _first_work(case, default_size(case.bundle, options))
-    if work.method != "net":
+    if not work.networks:
         return _ruled(case, work)
     if options.max_seconds is not None:
         return _within_seconds(case, work, model, speed())
@@ -123,10 +120,14 @@ def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
 
 
 def _first_work(case: Case, size: str) -> Work:
-    options = case.options
-    has_networks = bool(case.bundle.manifest.networks)
-    method = "wiener" if options.method == "net" and not has_networks else options.method
-    return Work(method=method, size=size, mode=options.mode, undistort=options.undistort)
+    options, stages = case.options, case.bundle.manifest.stages
+    unwanted = {
+        stage.type
+        for stage in stages
+        if (test := getattr(stage_module(stage.type), "is_left_out", None)) and test(options)
+    }
+    work = Work(method=options.method, size=size, mode=options.mode, left_out=frozenset(unwanted))
+    return planned(stages, work)
 
 
 def _ruled(case: Case, work: Work, note: str = "") -> Plan:
@@ -139,7 +140,7 @@ def _sizes(case: Case) -> list[str]:
     """Give the sizes to choose from, from the best on; never above the reference."""
     if case.options.size is not None:
         return [case.options.size]
-    sizes = sizes_by_work(case.bundle)[::-1]
+    sizes = list(case.bundle.manifest.sizes[::-1])
     return sizes[sizes.index(REFERENCE) :] if REFERENCE in sizes else sizes
 
 
@@ -179,7 +180,7 @@ def _within_seconds(case: Case, work: Work, model: LossModel | None, speed: Spee
         for factor in LADDER if model is not None else LADDER[:1]:
             spend = 0.0 if factor == 0 else size_cost_db(case, size) + factor * unit
             plans.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
-    plans.append(_ruled(case, replace(work, method="wiener")))
+    plans.append(_ruled(case, without_networks(case.bundle.manifest.stages, work)))
     # The bank alone is the last resort: what it costs is not bounded by any prediction.
     ordered = sorted(plans[:-1], key=lambda plan: plan.cost_db) + plans[-1:]
     fitting = (p for p in ordered if estimate_seconds(p.case, p.work, speed) <= limit)

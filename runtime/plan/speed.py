@@ -27,13 +27,14 @@ class Speed:
     """Seconds of the parts of a reconstruction.
 
     Attributes:
-        network_s_per_mp: Size -> seconds per computed megapixel, on the engine's threads.
+        network_s_per_mp: (role, size) -> seconds per computed megapixel of its input, on the
+            engine's threads.
         block_s: Seconds of one block of the bank on one thread.
         rest_s_per_mp: Seconds per megapixel of everything else.
         threads: Threads that restore blocks.
     """
 
-    network_s_per_mp: Mapping[str, float] = field(default_factory=dict)
+    network_s_per_mp: Mapping[tuple[str, str], float] = field(default_factory=dict)
     block_s: float
     rest_s_per_mp: float
     threads: int
@@ -45,12 +46,12 @@ class Speed:
 
 
 def measure_speed(
-    engines: Mapping[str, NetworkEngine], stage: Wiener | None, *, threads: int
+    engines: Mapping[tuple[str, str], NetworkEngine], stage: Wiener | None, *, threads: int
 ) -> Speed:
     """Time one window of every network and one block, the best of ROUNDS each.
 
     Args:
-        engines: Networks by size.
+        engines: Networks by role and size.
         stage: The bank; None times the block of the default one.
         threads: Threads that restore blocks.
     """
@@ -60,7 +61,7 @@ def measure_speed(
     scale = (REFERENCE_BLOCK_PX / block_px) ** 2
     return Speed(
         network_s_per_mp={
-            size: _window_seconds(engine) / (WINDOW_PX**2 / 1e6) for size, engine in engines.items()
+            key: _window_seconds(engine) / (WINDOW_PX**2 / 1e6) for key, engine in engines.items()
         },
         block_s=block_s,
         rest_s_per_mp=REST_BLOCKS_PER_MP * block_s * scale,

@@ -43,8 +43,9 @@ _FLAT_QUANTILE: Final = 0.3
 _FLAT_QUANTILE_OF_NOISE: Final = 0.892
 """What the quantile gives for white noise of variance one (measured on 4 million samples)."""
 
-FALLBACK_NOISE: Final = NoiseModel(shot=(1e-4,) * 3, read_variance=(1e-6,) * 3)
+FALLBACK_SHOT: Final = 1e-4
 """Taken when a picture is too small to measure: about 10,000 electrons at the white level."""
+FALLBACK_READ_VARIANCE: Final = 1e-6
 
 _log = logging.getLogger(__name__)
 
@@ -174,6 +175,13 @@ def _median(around: FloatArray) -> FloatArray:
     return np.where(count > 0, middle, 0).astype(np.float32)
 
 
+def fallback_noise(channels: int = 3) -> NoiseModel:
+    """Give the noise that is taken when a picture is too small to measure."""
+    return NoiseModel(
+        shot=(FALLBACK_SHOT,) * channels, read_variance=(FALLBACK_READ_VARIANCE,) * channels
+    )
+
+
 def measure_noise(capture: Capture) -> NoiseModel:
     """Measure the noise of a capture from its flat blocks.
 
@@ -183,7 +191,7 @@ def measure_noise(capture: Capture) -> NoiseModel:
         capture: A mosaic or planes.
 
     Returns:
-        Noise of the linear signal before white balance; `FALLBACK_NOISE` if the capture holds
+        Noise of the linear signal before white balance; `fallback_noise` if the capture holds
         fewer than a handful of usable blocks.
 
     References: Foi et al. 2008 (line fit); Immerkaer 1996 (high-pass).
@@ -194,9 +202,10 @@ def measure_noise(capture: Capture) -> NoiseModel:
     usable = np.isfinite(levels) & np.isfinite(variances) & (variances > 0)
     if usable.sum() < _LEAST_BLOCKS:
         _log.info("the capture is too small to measure its noise: a default is taken")
-        return FALLBACK_NOISE
+        return fallback_noise(capture.channels)
     shot, read_variance = _fit_line(levels[usable], variances[usable])
-    return NoiseModel(shot=(shot,) * 3, read_variance=(read_variance,) * 3)
+    count = capture.channels
+    return NoiseModel(shot=(shot,) * count, read_variance=(read_variance,) * count)
 
 
 def _sample_planes(capture: Capture) -> Iterator[FloatArray]:

@@ -1,5 +1,6 @@
 """The noise-stabilising transform before and behind the network: k-sigma, then square root."""
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -25,13 +26,13 @@ def stabilise(
     The noise of s has the standard deviation 0.5 / scale at any gain.
 
     Args:
-        planes: (3, h, w) float32, linear, white balanced.
+        planes: (c, h, w) float32, linear, white balanced.
         noise: Noise after white balance; shot > 0.
         scale: Divisor behind the square root.
-        out: (3, h, w) float32 to fill; a new array when None.
+        out: (c, h, w) float32 to fill; a new array when None.
 
     Returns:
-        (3, h, w) float32 >= 0.
+        (c, h, w) float32 >= 0.
 
     Raises:
         ContractError: If the noise has no shot part or the shapes disagree.
@@ -54,13 +55,13 @@ def unstabilise(
     """Undo `stabilise`: x = shot * ((max(s, 0) * scale)^2 - read_variance / shot^2).
 
     Args:
-        stable: (3, h, w) float32 of `stabilise`.
+        stable: (c, h, w) float32 of `stabilise`.
         noise: Noise after white balance; shot > 0.
         scale: Divisor behind the square root.
-        out: (3, h, w) float32 to fill, may be `stable`; a new array when None.
+        out: (c, h, w) float32 to fill, may be `stable`; a new array when None.
 
     Returns:
-        (3, h, w) float32, linear.
+        (c, h, w) float32, linear.
 
     Raises:
         ContractError: If the noise has no shot part or the shapes disagree.
@@ -73,72 +74,78 @@ def unstabilise(
     return np.asarray(planes)
 
 
-class NetworkRows:
-    """What a network is given: the stabilised capture and, below it, the stabilised Wiener planes.
+class StackedRows:
+    """What a network is given: its planes below one another, stabilised unless they come as needed.
 
-    Equal to stacking both sources and mapping them, with two copies of every sample fewer.
+    Equal to stacking the sources and mapping them, with two copies of every sample fewer.
     """
 
     def __init__(
         self,
-        planes: PiecedRows,
-        restored: PiecedRows,
-        noise: NoiseModel,
+        sources: Sequence[PiecedRows],
+        noises: Sequence[NoiseModel] | None,
         *,
-        scale: float,
+        scale: float = DEFAULT_SCALE,
         threads: int = 1,
     ) -> None:
         """Name the sources.
 
         Args:
-            planes: (3, h, w) linear, white balanced.
-            restored: (3, h, w) likewise, of the Wiener bank.
-            noise: Noise after white balance.
+            sources: (c, h, w) each, of one size.
+            noises: Noise of each, to stabilise it by; None hands the planes on as they are.
             scale: Divisor behind the square root.
             threads: Threads that share the rows of one read; no influence on the bits.
 
         Raises:
             ContractError: If the sources differ in size.
         """
-        if planes.shape != restored.shape:
-            raise ContractError(
-                f"capture and Wiener planes must have one size; got {planes.shape}, "
-                f"{restored.shape}"
-            )
-        self._sources = planes, restored
-        self._noise, self._scale, self._threads = noise, scale, threads
+        sizes = [source.shape[1:] for source in sources]
+        if len(set(sizes)) != 1:
+            raise ContractError(f"the planes of a network must have one size; got {sizes}")
+        self._sources = tuple(sources)
+        self._noises = noises
+        self._scale, self._threads = scale, threads
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (6, h, w)."""
-        channels, height, width = self._sources[0].shape
-        return 2 * channels, height, width
+        """Give (c, h, w) of all sources together."""
+        _, height, width = self._sources[0].shape
+        return sum(source.shape[0] for source in self._sources), height, width
 
     def read(self, top: int, bottom: int) -> FloatArray:
-        """Give the rows top..bottom, (6, rows, w)."""
-        halves = [source.pieces(top, bottom) for source in self._sources]
-        stable = np.empty((6, bottom - top, self.shape[2]), dtype=np.float32)
-        for pieces, half in zip(halves, (stable[:3], stable[3:]), strict=True):
+        """Give the rows top..bottom, (c, rows, w)."""
+        parts = [source.pieces(top, bottom) for source in self._sources]
+        stacked = np.empty((self.shape[0], bottom - top, self.shape[2]), dtype=np.float32)
+        start = 0
+        for number, pieces in enumerate(parts):
+            end = start + self._sources[number].shape[0]
             filled = 0
             for piece in pieces:
-                self._fill(half[:, filled : filled + piece.shape[1]], piece)
+                rows = slice(filled, filled + piece.shape[1])
+                self._fill(stacked[start:end, rows], piece, number)
                 filled += piece.shape[1]
-        return stable
+            start = end
+        return stacked
 
-    def _fill(self, out: FloatArray, piece: FloatArray) -> None:
+    def _fill(self, out: FloatArray, piece: FloatArray, number: int) -> None:
+        if self._noises is None:
+            out[...] = piece
+            return
+        noise = self._noises[number]
+
         def work(first: int, last: int) -> None:
             rows = np.s_[:, first:last]
-            stabilise(piece[rows], self._noise, scale=self._scale, out=out[rows])
+            stabilise(piece[rows], noise, scale=self._scale, out=out[rows])
 
         run_chunks(work, piece.shape[1], piece.shape[2], threads=self._threads)
 
 
 def _line(planes: FloatArray, noise: NoiseModel, scale: float) -> tuple[FloatArray, FloatArray]:
-    """Give slope and offset, (3, 1, 1) each, of s^2 as a line in x."""
+    """Give slope and offset, (c, 1, 1) each, of s^2 as a line in x."""
     shot = np.array(noise.shot, dtype=np.float64)[:, None, None]
     read_variance = np.array(noise.read_variance, dtype=np.float64)[:, None, None]
-    if planes.ndim != 3 or planes.shape[0] != 3:
-        raise ContractError(f"planes must be (3, h, w); got {planes.shape}")
+    if planes.ndim != 3 or planes.shape[0] != len(noise.shot):
+        raise ContractError(f"planes must be ({len(noise.shot)}, h, w); got {planes.shape}")
     if (shot <= 0).any() or not (np.isfinite(scale) and scale > 0):
         raise ContractError(
             f"the transform needs shot noise > 0 and a scale > 0; got {noise.shot} and {scale}"

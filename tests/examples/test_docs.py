@@ -22,6 +22,9 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 MADE_BY_EXPORT = "camkit/bundles/duet.camkit"
 EVERYWHERE = {"--help", "-h", "--debug"}
+KEPT = {".md", ".json", ".jsonl", ".csv", ".png"}
+MADE_ANEW = {".html", ".svg"}  # of results, which git ignores
+MOST_BYTES = 600_000
 
 
 @cache
@@ -108,6 +111,14 @@ def test_every_file_and_module_named_exists(document: Path) -> None:
         places = [Path("camkit", *parts[:n]) for n in range(1, len(parts) + 1)]
         files = [ROOT / p.with_suffix(".py") for p in places] + [ROOT / p for p in places[-1:]]
         assert here or any(f.exists() for f in files), module
+
+
+def test_results_are_data_and_pictures_of_no_great_size() -> None:
+    files = [path for path in (ROOT / "docs" / "results").rglob("*") if path.is_file()]
+    kept = [path for path in files if path.suffix not in MADE_ANEW]
+    assert kept
+    assert {path.suffix for path in kept} <= KEPT
+    assert not [path for path in kept if path.stat().st_size > MOST_BYTES]
 
 
 def _sections() -> dict[str, str]:

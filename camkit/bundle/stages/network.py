@@ -22,6 +22,8 @@ class Network(StageEntry):
         transform: stabilise takes linear planes to equal noise (k-sigma, then square root) before
             the network and back behind it; none hands them on as they are.
         scale: Divisor behind the square root; the noise there is 0.5 / scale at any ISO.
+        most_light: How many times the largest light of its tile an output may have; what exceeds
+            it is not believed.
     """
 
     stands_in: ClassVar[int] = -1
@@ -31,6 +33,7 @@ class Network(StageEntry):
     role: Word = DEFAULT_ROLE
     transform: Literal["stabilise", "none"] = "stabilise"
     scale: Positive = 64.0
+    most_light: Positive = 16.0
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the outputs of the network, on a finer grid where it says so."""
@@ -54,6 +57,13 @@ class Network(StageEntry):
             for port in outputs:
                 _check_noise(port.channels, parts)
         last = taken[-1]
+        if self.transform == "stabilise" and any(
+            port.channels != len(last.channels) for port in outputs
+        ):
+            raise JoinError(
+                f"stabilised outputs become light by the noise of its last plane, which has "
+                f"{len(last.channels)} channel(s)"
+            )
         return tuple(
             last.model_copy(
                 update={

@@ -24,9 +24,9 @@ def check(
     """Prove a bundle: schema, hashes, graphs, golden cases, tiled = whole, fp16 range."""
     from camkit.bundle.reader import find_bundle
     from camkit.runtime.check import check_bundle
-    from camkit.runtime.golden_run import develop_case
+    from camkit.runtime.golden_run import case_work
 
-    report = check_bundle(find_bundle(bundle), level=level, run=develop_case)
+    report = check_bundle(find_bundle(bundle), level=level, run=case_work)
     if json_:
         typer.echo(json.dumps(report.to_json()))
     else:

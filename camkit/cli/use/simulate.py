@@ -32,17 +32,20 @@ def simulate(
     """Photograph a scene with the bundle's camera: blur, vignetting, mosaic, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
     from camkit.contracts import depth_name
+    from camkit.runtime.kind import runtime_part
     from camkit.runtime.network.engine import available_threads
-    from camkit.runtime.simulate import SimulationOptions, write_capture
-    from camkit.runtime.simulate import simulate as simulate_scene
+    from camkit.runtime.simulate import SimulationOptions
 
-    if out.suffix.lower() != ".dng":
-        raise ContractError(f"a simulated capture is a DNG; expected a name in .dng, got {out}")
     if out.exists() and not overwrite:
         raise ContractError(f"{out} exists; say --overwrite or another name")
     opened = open_bundle(find_bundle(bundle))
-    camera = opened.manifest.camera
-    size = (camera.width_px, camera.height_px) if size_px is None else _pair(size_px, "--size-px")
+    part, sensor = runtime_part(opened.manifest.kind), opened.manifest.sensor
+    if out.suffix.lower() != part.suffix:
+        raise ContractError(
+            f"a simulated capture of this camera is a {part.suffix[1:].upper()}; expected a name "
+            f"in {part.suffix}, got {out}"
+        )
+    size = (sensor.width_px, sensor.height_px) if size_px is None else _pair(size_px, "--size-px")
     options = SimulationOptions(
         iso=iso,
         seed=seed,
@@ -51,10 +54,10 @@ def simulate(
         depth_mm=opened.reference_depth_mm if depth_m is None else depth_m * MM_PER_M,
         workers=available_threads(None),
     )
-    simulation = simulate_scene(_scene(scene, size), camera, opened.psf, options)
+    simulation = part.simulate(_scene(scene, size), opened, options)
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_capture(out, simulation, camera, opened.manifest.name)
-    height, width = simulation.mosaic.shape
+    part.write(out, simulation, opened)
+    height, width = simulation.samples.shape[-2:]
     depth = "" if simulation.depth_mm is None else f", {depth_name(simulation.depth_mm)} away"
     typer.echo(f"{out}: {width}x{height}, ISO {iso:g}{depth}")
 

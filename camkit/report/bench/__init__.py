@@ -10,10 +10,10 @@ process_run     a fresh process watched: seconds, memory of its tree, load of ot
 worker          that process, as any user's program
 timing          order of the rounds; median, quantiles and noise of the seconds
 machine, gemm   what the machine is, and the fastest it multiplies
-samples         captures with a known truth
+known_captures  captures with a known truth
 metric          the type of a metric
 metrics/        what is measured on a result; a new metric is one new file
-accuracy        every method on every sample
+accuracy        every method on every known capture
 crops           the same patch of every method
 row             all that is known about a trial as one flat record
 run             the whole bench

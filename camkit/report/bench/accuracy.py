@@ -1,4 +1,4 @@
-"""Every method on every sample: scores over pictures, beside those of the developed capture."""
+"""Every method on every known capture: scores over pictures, beside those of the input."""
 
 import math
 import statistics
@@ -10,8 +10,8 @@ from camkit.bundle.manifest import Network, Wiener
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError
+from camkit.report.bench.known_captures import KnownCapture
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.samples import Sample
 from camkit.report.bench.trial import Trial
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -19,7 +19,7 @@ from camkit.runtime.pipeline import Pipeline
 Key = tuple[object, ...]
 INPUT: Key = ("input",)
 """Key of the capture that was only developed."""
-OnResult = Callable[[Key, Sample, FloatArray], None]
+OnResult = Callable[[Key, KnownCapture, FloatArray], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,25 +49,25 @@ class Restorers:
         self._threads = threads
         self._made: dict[tuple[Key, bool], Pipeline] = {}
 
-    def restore(self, trial: Trial | None, sample: Sample) -> FloatArray:
-        """Give linear Rec.709, (3, h, w), in the geometry of the sample's truth.
+    def restore(self, trial: Trial | None, known: KnownCapture) -> FloatArray:
+        """Give linear Rec.709, (3, h, w), in the geometry of the capture's truth.
 
         Args:
             trial: The method; None or a trial without a bundle develops only.
-            sample: The capture.
+            known: The capture.
 
         Raises:
             CamkitError: If the method cannot do it.
         """
         key = INPUT if trial is None or trial.path is None else trial.accuracy_key
-        place = key, sample.undistort
+        place = key, known.undistort
         if place not in self._made:
-            self._made[place] = self._make(trial, undistort=sample.undistort)
+            self._made[place] = self._make(trial, undistort=known.undistort)
         return self._made[place].process_array(
-            sample.capture,
-            iso=sample.iso,
-            white_balance=sample.white_balance,
-            origin_px=sample.origin_px,
+            known.capture,
+            iso=known.iso,
+            white_balance=known.white_balance,
+            origin_px=known.origin_px,
         )
 
     def _make(self, trial: Trial | None, *, undistort: bool) -> Pipeline:
@@ -86,16 +86,16 @@ def without_restoration(bundle: Bundle) -> Bundle:
 
 def measure_accuracy(
     trials: Iterable[Trial],
-    samples: Iterable[Sample],
+    captures: Iterable[KnownCapture],
     restorers: Restorers,
     metrics: Sequence[Metric],
     on_result: OnResult | None = None,
 ) -> dict[Key, Scores]:
-    """Restore every sample by every method that differs in its pixels.
+    """Restore every capture by every method that differs in its pixels.
 
     Args:
         trials: Of one camera.
-        samples: Captures; each is made once and not kept.
+        captures: With a known truth; each is made once and not kept.
         restorers: Of that camera.
         metrics: What to measure.
         on_result: Called with every result, `INPUT` first.
@@ -106,26 +106,28 @@ def measure_accuracy(
     methods: dict[Key, Trial | None] = {INPUT: None}
     methods |= {t.accuracy_key: t for t in trials if t.path is not None}
     found = {key: Scores() for key in methods}
-    for sample in samples:
+    for known in captures:
         for key, trial in methods.items():
             if found[key].error is not None:
                 continue
             try:
-                restored = restorers.restore(trial, sample)
+                restored = restorers.restore(trial, known)
             except CamkitError as error:
                 found[key] = Scores(error=str(error))
                 continue
-            _add(found[key], sample, restored, metrics)
+            _add(found[key], known, restored, metrics)
             if on_result is not None:
-                on_result(key, sample, restored)
+                on_result(key, known, restored)
     return found
 
 
-def _add(scores: Scores, sample: Sample, restored: FloatArray, metrics: Sequence[Metric]) -> None:
-    scores.psf.add(sample.psf)
-    values = scores.by_picture.setdefault(sample.picture, {})
+def _add(
+    scores: Scores, known: KnownCapture, restored: FloatArray, metrics: Sequence[Metric]
+) -> None:
+    scores.psf.add(known.psf)
+    values = scores.by_picture.setdefault(known.picture, {})
     for metric in metrics:
-        for name, value in metric.measure(restored, sample.sharp).items():
+        for name, value in metric.measure(restored, known.sharp).items():
             values.setdefault(name, []).append(value)
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from camkit.colorimetry import decode_srgb, encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.bench.accuracy import INPUT, Key
-from camkit.report.bench.samples import Sample
+from camkit.report.bench.known_captures import KnownCapture
 from camkit.report.quality import BORDER_PX
 
 SIDE_PX: Final = 128
-MOST_SAMPLES: Final = 4
+MOST_CAPTURES: Final = 4
 SHARP: Final[Key] = ("sharp",)
 DARK: Final = 0.2
 """Linear level below which a patch is shown brighter, so that a person sees something."""
@@ -24,7 +24,7 @@ _STEP_PX: Final = 32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patch:
-    """One sample's patch by every method.
+    """One capture's patch by every method.
 
     Attributes:
         caption: What the capture is.
@@ -38,14 +38,14 @@ class Patch:
 
 
 class CropCollector:
-    """Keeps the patches of some samples while all are measured."""
+    """Keeps the patches of some captures while all are measured."""
 
     def __init__(self, keys: Sequence[Key], *, every: int = 1) -> None:
         """Choose what is kept.
 
         Args:
             keys: Methods.
-            every: Take every n-th sample, up to `MOST_SAMPLES`.
+            every: Take every n-th capture, up to `MOST_CAPTURES`.
         """
         self.patches: list[Patch] = []
         self._keys = {INPUT, *keys}
@@ -54,27 +54,27 @@ class CropCollector:
         self._place: tuple[slice, slice] | None = None
         self._gain = np.float32(1)
 
-    def take(self, key: Key, sample: Sample, restored: FloatArray) -> None:
-        """Keep the patch of a result; a result of `INPUT` begins a new sample."""
+    def take(self, key: Key, known: KnownCapture, restored: FloatArray) -> None:
+        """Keep the patch of a result; a result of `INPUT` begins a new capture."""
         if key == INPUT:
             self._seen += 1
-            wanted = self._seen % self._every == 0 and len(self.patches) < MOST_SAMPLES
-            self._place = busiest_place(sample.sharp) if wanted else None
+            wanted = self._seen % self._every == 0 and len(self.patches) < MOST_CAPTURES
+            self._place = busiest_place(known.sharp) if wanted else None
             if self._place is not None:
-                self._begin(sample, sample.sharp[:, *self._place])
+                self._begin(known, known.sharp[:, *self._place])
         if self._place is None or key not in self._keys:
             return
         linear = np.ascontiguousarray(restored[:, *self._place])
-        error = encode_srgb(linear) - sample.sharp[:, *self._place]
+        error = encode_srgb(linear) - known.sharp[:, *self._place]
         mean_square = float(np.mean(np.square(error), dtype=np.float64))
         self.patches[-1].pictures[key] = png_base64(encode_srgb(linear * self._gain))
         self.patches[-1].psnr_db[key] = -10 * float(np.log10(max(mean_square, 1e-12)))
 
-    def _begin(self, sample: Sample, sharp: FloatArray) -> None:
+    def _begin(self, known: KnownCapture, sharp: FloatArray) -> None:
         linear = decode_srgb(np.ascontiguousarray(sharp))
         self._gain = display_gain(linear)
         shown = f", shown {self._gain:.0f} times brighter" if self._gain > 1 else ""
-        patch = Patch(caption=sample.caption + shown)
+        patch = Patch(caption=known.caption + shown)
         patch.pictures[SHARP] = png_base64(encode_srgb(linear * self._gain))
         self.patches.append(patch)
 

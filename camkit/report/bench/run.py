@@ -10,14 +10,14 @@ from typing import Any, Final
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.accuracy import INPUT, Key, Restorers, Scores, measure_accuracy
-from camkit.report.bench.crops import MOST_SAMPLES, CropCollector, Patch
+from camkit.report.bench.crops import MOST_CAPTURES, CropCollector, Patch
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
+from camkit.report.bench.known_captures import ISOS, KnownCapture, golden_captures, picture_captures
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric, registered_metrics
 from camkit.report.bench.process_run import Job, Run, run_job
 from camkit.report.bench.row import Facts, Row, make_row
 from camkit.report.bench.row_maker import make_trials
-from camkit.report.bench.samples import ISOS, Sample, golden_samples, picture_samples
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
 from camkit.report.bench.timed_capture import SCENE_TEXT, timed_capture
 from camkit.report.bench.timing import interleaved
@@ -198,36 +198,38 @@ def _judge(
     bundle, label = camera.entrant.bundle, camera.entrant.label
     own = [trial for trial in trials if trial.camera == label]
     metrics = tuple(metric for metric in registered_metrics() if metric.applies(bundle))
-    samples, count, text = _samples(bundle, settings, folder)
+    captures, count, text = _known_captures(bundle, settings, folder)
     plain = [trial.accuracy_key for trial in own if not trial.is_variant]
-    collector = CropCollector(plain, every=max(1, count // MOST_SAMPLES))
+    collector = CropCollector(plain, every=max(1, count // MOST_CAPTURES))
 
-    def told(found: Iterable[Sample]) -> Iterable[Sample]:
-        for number, sample in enumerate(found, start=1):
-            tell(f"{label}: judging {sample.caption} ({number}/{count})")
-            yield sample
+    def told(found: Iterable[KnownCapture]) -> Iterable[KnownCapture]:
+        for number, known in enumerate(found, start=1):
+            tell(f"{label}: judging {known.caption} ({number}/{count})")
+            yield known
 
     restorers = Restorers(bundle, available_threads(None))
     try:
-        scores = measure_accuracy(own, told(samples), restorers, metrics, collector.take)
+        scores = measure_accuracy(own, told(captures), restorers, metrics, collector.take)
     except CamkitError as error:
         text = f"not measured: {error}"
         return _Judged(scores={}, patches=[], metrics=metrics, text=text, error=str(error))
     return _Judged(scores=scores, patches=collector.patches, metrics=metrics, text=text)
 
 
-def _samples(bundle: Bundle, settings: Settings, folder: Path) -> tuple[Iterable[Sample], int, str]:
+def _known_captures(
+    bundle: Bundle, settings: Settings, folder: Path
+) -> tuple[Iterable[KnownCapture], int, str]:
     """Give the captures to judge on, how many there are, and what they are."""
     if settings.data is None:
-        golden = golden_samples(bundle)
+        golden = golden_captures(bundle)
         return golden, len(golden), f"{len(golden)} golden cases of the bundle"
     pictures = len(list_set(settings.data, settings.images))
-    samples = picture_samples(bundle, settings.data, settings.images, folder / "psf")
+    captures = picture_captures(bundle, settings.data, settings.images, folder / "psf")
     text = (
         f"{pictures} pictures of {settings.data.name}, {len(FIELD_SHARES)} field positions, "
         f"ISO {' and '.join(f'{iso:g}' for iso in ISOS)}"
     )
-    return samples, pictures * len(FIELD_SHARES) * len(ISOS), text
+    return captures, pictures * len(FIELD_SHARES) * len(ISOS), text
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,7 +72,7 @@ def residual(planes: FloatArray, shot: Shot, lens: Lens) -> Residual | None:
         None where fewer than a tenth of the samples can be judged.
     """
     rows, columns = (_middle(side) for side in planes.shape[1:])
-    judged = judged_samples(shot)[rows, columns]
+    judged = judged_pixels(shot)[rows, columns]
     if judged.size == 0 or judged.mean() < 0.1:
         return None
     blurred = _blur(planes, shot, lens, (rows, columns))
@@ -113,7 +113,7 @@ def _blur(planes: FloatArray, shot: Shot, lens: Lens, part: tuple[slice, slice])
     )
 
 
-def judged_samples(shot: Shot) -> NDArray[np.bool_]:
+def judged_pixels(shot: Shot) -> NDArray[np.bool_]:
     """Give (h, w), true away from the border and from clipped and spoiled samples."""
     capture = shot.capture
     clipped = capture.saturated_rows(0, capture.height)

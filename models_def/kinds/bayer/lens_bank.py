@@ -53,23 +53,25 @@ def build_lens_bank(recipe: BayerRecipe, lens: Lens, cache_folder: Path | None =
 
 
 def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
-    plan = recipe.lens
-    heights = np.linspace(0.0, corner_height_mm(recipe), plan.fields)
+    choices = recipe.lens
+    heights = np.linspace(0.0, corner_height_mm(recipe), choices.fields)
     response = _response(recipe)
-    depths_mm = plan.depths_mm or (lens.object_distance_mm,)
+    depths_mm = choices.depths_mm or (lens.object_distance_mm,)
     kernels = []
-    for copy, depth_mm in product(focused_copies(lens, plan.copies + 2, plan.seed), depths_mm):
+    for copy, depth_mm in product(
+        focused_copies(lens, choices.copies + 2, choices.seed), depths_mm
+    ):
         traced, kept = colour_kernels(
             with_object_distance(copy, depth_mm),
             response,
             heights,
-            size_px=plan.kernel_px,
+            size_px=choices.kernel_px,
             pitch_um=recipe.sensor.pixel_pitch_um,
-            rays=plan.rays,
+            rays=choices.rays,
         )
         if kept < LEAST_ENERGY:
             raise ContractError(
-                f"kernels of {plan.kernel_px} px hold {kept:.3f} of the light, less than "
+                f"kernels of {choices.kernel_px} px hold {kept:.3f} of the light, less than "
                 f"{LEAST_ENERGY}; raise lens.kernel_px"
             )
         kernels.append(traced)

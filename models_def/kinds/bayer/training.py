@@ -35,7 +35,7 @@ from camkit.models_def.kinds.bayer.samples import (
     scene_side_px,
     tint_crop,
 )
-from camkit.models_def.kinds.bayer.validation import BayerJudge, make_cases
+from camkit.models_def.kinds.bayer.validation import BayerJudge, make_validation_captures
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.models_def.training.sample import Sample, SampleLayout
@@ -137,7 +137,9 @@ class BayerTraining:
     ) -> BayerJudge:
         """Photograph pictures that are never trained on."""
         del role
-        return BayerJudge(cases=make_cases(recipe, material.bank, pictures), recipe=recipe)
+        return BayerJudge(
+            captures=make_validation_captures(recipe, material.bank, pictures), recipe=recipe
+        )
 
 
 TRAINING: Final = BayerTraining()

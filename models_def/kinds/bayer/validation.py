@@ -36,7 +36,7 @@ SEED: Final = 424242
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
+class ValidationCapture:
     """One capture: its shot, the (3, s, s) sharp sRGB picture, and where it was taken."""
 
     shot: Shot
@@ -50,11 +50,11 @@ class BayerJudge:
     """Judges by fixed captures.
 
     Attributes:
-        cases: From `make_cases`.
+        captures: From `make_validation_captures`.
         recipe: Camera and scale.
     """
 
-    cases: Sequence[Case]
+    captures: Sequence[ValidationCapture]
     recipe: BayerRecipe
 
     def baselines(self) -> Mapping[str, float]:
@@ -66,17 +66,19 @@ class BayerJudge:
 
     def score(self, restore: Restorer) -> Score:
         """Judge a restoration by its mean PSNR in dB on sRGB values, by ISO and field height."""
-        return score(self.cases, self.recipe, restore)
+        return score(self.captures, self.recipe, restore)
 
 
-def make_cases(recipe: BayerRecipe, bank: PsfBank, pictures: Path | None) -> list[Case]:
+def make_validation_captures(
+    recipe: BayerRecipe, bank: PsfBank, pictures: Path | None
+) -> list[ValidationCapture]:
     """Photograph the middle of each picture at five field heights, two ISOs, the depths in turn.
 
     The lens is the copy that is not trained on; each Wiener block lies off its place as a block
     of the bank does. Without a folder, procedural scenes are photographed.
     """
     side = scene_side_px(recipe, bank)
-    cases = []
+    captures = []
     for number, crop in enumerate(_crops(pictures, side)):
         for spot, share in enumerate(FIELD_SHARES):
             for iso in ISOS:
@@ -85,8 +87,10 @@ def make_cases(recipe: BayerRecipe, bank: PsfBank, pictures: Path | None) -> lis
                 shot = make_shot(crop, exposure, recipe, bank, rng)
                 inner = (side - recipe.data.sample_px) // 2
                 sharp = encode_srgb(crop[:, inner : side - inner, inner : side - inner])
-                cases.append(Case(shot=shot, sharp=sharp, field_share=share, iso=iso))
-    return cases
+                captures.append(
+                    ValidationCapture(shot=shot, sharp=sharp, field_share=share, iso=iso)
+                )
+    return captures
 
 
 def _crops(pictures: Path | None, side: int) -> list[FloatArray]:
@@ -120,11 +124,11 @@ def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn
     )
 
 
-def score(cases: Sequence[Case], recipe: BayerRecipe, restore: Restorer) -> Score:
+def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: Restorer) -> Score:
     """Judge a restoration.
 
     Args:
-        cases: From `make_cases`.
+        captures: From `make_validation_captures`.
         recipe: Camera and scale.
         restore: (1, 6, s, s) stabilised planes -> (1, 3, s, s) stabilised.
 
@@ -133,28 +137,30 @@ def score(cases: Sequence[Case], recipe: BayerRecipe, restore: Restorer) -> Scor
     """
     with torch.no_grad():
         values = [
-            _psnr(case, recipe, restore(case.shot.sample.stacked(LAYOUT)[None])[0])
-            for case in cases
+            _psnr(capture, recipe, restore(capture.shot.sample.stacked(LAYOUT)[None])[0])
+            for capture in captures
         ]
-    by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in cases]) for iso in ISOS}
-    by_field = {f"{f:g}": _mean(values, [c.field_share == f for c in cases]) for f in FIELD_SHARES}
+    by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in captures]) for iso in ISOS}
+    by_field = {
+        f"{f:g}": _mean(values, [c.field_share == f for c in captures]) for f in FIELD_SHARES
+    }
     parts = {"by_iso": by_iso, "by_field": by_field}
     return Score(mean_db=float(np.mean(values)), parts=parts)
 
 
-def to_srgb(stable: Tensor, case: Case, recipe: BayerRecipe) -> FloatArray:
+def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> FloatArray:
     """Take stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
-    noise = case.shot.noise
+    noise = capture.shot.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
     matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
-    even: FloatArray = (linear / case.shot.illumination).numpy()
+    even: FloatArray = (linear / capture.shot.illumination).numpy()
     to_rec709 = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     return encode_srgb(apply_matrix(to_rec709, even))
 
 
-def _psnr(case: Case, recipe: BayerRecipe, stable: Tensor) -> float:
-    gap = to_srgb(stable, case, recipe) - case.sharp
+def _psnr(capture: ValidationCapture, recipe: BayerRecipe, stable: Tensor) -> float:
+    gap = to_srgb(stable, capture, recipe) - capture.sharp
     return float(-10 * np.log10(np.mean(np.square(gap, dtype=np.float64)) + 1e-12))
 
 

@@ -20,7 +20,7 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     count = len(rows) * len(columns)
     if work.labels is None:
         return work, Decision(what="blocks", choice=f"all {count}", reason="no plain cells")
-    reach = max((case.bundle.network_facts(s).reach_px for s in work.sizes()), default=0)
+    reach = max((case.facts(s).reach_px for s in work.sizes()), default=0)
     kept = count - round(plain_share(work.labels, reach, rows, columns) * count)
     return work, Decision(
         what="blocks",

@@ -24,7 +24,7 @@ ORDER: Final = 20
 
 def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     """Share the cells among the tiers within the loss that may be spent."""
-    if work.method != "net":
+    if not work.networks or case.role is None:
         return work, None
     model = read_loss_model(case.bundle.manifest.plan)
     if case.scene is None:
@@ -60,8 +60,8 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
 
 def _smaller(case: Case, work: Work, losses: CellLosses) -> str | None:
     """Give the smallest calibrated size below the one in use."""
-    networks = case.bundle.manifest.networks
-    mac: dict[str, float] = {size: facts.mac_per_pixel for size, facts in networks.items()}
+    manifest = case.bundle.manifest
+    mac = {size: manifest.mac_per_pixel(size) for size in manifest.sizes}
     known = [size for size in mac if size in losses.extra and mac[size] < mac[work.size]]
     return min(known, key=lambda size: mac[size]) if known else None
 

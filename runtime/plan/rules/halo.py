@@ -13,9 +13,9 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     With less, pixels near a window's border would depend on where the windows lie, that is on tile
     size and memory cap; for a few percent of the network's time that promise is not given up.
     """
-    if work.method != "net":
+    if not work.networks or case.role is None:
         return work, None
-    facts = case.bundle.network_facts(work.size)
+    facts = case.facts(work.size)
     shorter = [e for e in facts.halo_error if e.psnr_db is not None and e.psnr_db >= 80.0]
     if work.mode != "exact":
         reason = f"--mode {work.mode} says so"

@@ -12,7 +12,7 @@ REFERENCE: Final = "M"
 
 def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     """Report the size that quality, budgets or --size asked for, and what it costs."""
-    if work.method != "net":
+    if not work.networks:
         return work, None
     options = case.options
     if options.size is not None:

@@ -17,7 +17,7 @@ _NODES: Final = 33
 def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     """Skip undistortion that would move no pixel by half a pixel."""
     stage = case.bundle.manifest.stage(Undistort)
-    if stage is None or not work.undistort:
+    if stage is None or stage.type in work.left_out:
         return work, None
     if case.scene is None:
         reason = f"quality {case.options.quality} skips nothing"
@@ -26,7 +26,7 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     if shift_px >= LEAST_SHIFT_PX:
         reason = f"pixels move by up to {shift_px:.1f} px"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
-    return replace(work, undistort=False), Decision(
+    return replace(work, left_out=work.left_out | {stage.type}), Decision(
         what="undistortion",
         choice="skipped",
         reason=f"no pixel would move by more than {shift_px:.2f} px (limit {LEAST_SHIFT_PX} px); "
@@ -42,6 +42,6 @@ def largest_shift_px(case: Case) -> float:
     )
     moved = [
         np.hypot(*np.moveaxis(warp.positions(c, x, y) - np.stack([x, y], -1), -1, 0))
-        for c in range(3)
+        for c in range(warp.channels)
     ]
     return float(np.max(moved))

@@ -4,8 +4,8 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.material import BayerMaterial
-from camkit.models_def.kinds.bayer.psf_bank import gaussian_bank
 from camkit.models_def.training.pool import AHEAD, MAX_WORKERS, open_pool
+from tests.gaussian_bank import gaussian_bank
 
 
 def draw(pool, step):

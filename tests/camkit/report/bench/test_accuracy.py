@@ -1,4 +1,4 @@
-"""Accuracy: samples of both sorts, scores by the protocol, the input by the same pipeline."""
+"""Accuracy: captures of both sorts, scores by the protocol, the input by the same pipeline."""
 
 import math
 from itertools import islice
@@ -22,13 +22,14 @@ from camkit.report.bench.accuracy import (
     measure_accuracy,
     standard_error_of_gain,
 )
+from camkit.report.bench.known_captures import golden_captures, picture_captures, psf_source
 from camkit.report.bench.metric import registered_metrics
-from camkit.report.bench.samples import golden_samples, picture_samples, psf_source
 from camkit.report.bench.trial import Trial
-from camkit.report.quality import Shot, bundle_restorer, expose, finish_planes, judge
+from camkit.report.quality import Shot, judge
 from tests.bundle_factory import tiny_manifest, tiny_members
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
+from tools.comparison.photograph import bundle_restorer, finish_planes, photograph
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,7 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
     trials = [make_trial(bundle, "wiener"), make_trial(bundle, "net", "M")]
     scores = measure_accuracy(
         trials,
-        picture_samples(bundle, pictures, 1, tmp_path),
+        picture_captures(bundle, pictures, 1, tmp_path),
         Restorers(bundle, threads=1),
         registered_metrics(),
     )
@@ -75,16 +76,16 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
         psf="bundle",
     )
     scene = cv2.imread(str(shot.picture))[..., ::-1].transpose(2, 0, 1) / np.float32(255)
-    exposed = expose(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.psf)
+    taken = photograph(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.psf)
     wanted = {
-        INPUT: finish_planes(exposed.local.planes, exposed, bundle),
-        trials[0].accuracy_key: bundle_restorer(bundle, method="wiener")(exposed),
-        trials[1].accuracy_key: bundle_restorer(bundle, size="M")(exposed),
+        INPUT: finish_planes(taken.local.planes, taken, bundle),
+        trials[0].accuracy_key: bundle_restorer(bundle, method="wiener")(taken),
+        trials[1].accuracy_key: bundle_restorer(bundle, size="M")(taken),
     }
     for key, restored in wanted.items():
         found = scores[key].by_picture["a.png"]
         assert len(found["psnr_db"]) == 10  # five places, two sensitivities
-        score = judge(restored, exposed.sharp)
+        score = judge(restored, taken.sharp)
         assert found["psnr_db"][3] == pytest.approx(score.psnr_db, abs=1e-3)
         assert found["ssim"][3] == pytest.approx(score.ssim, abs=1e-4)
     assert scores[INPUT].psf == {"bundle"}
@@ -100,7 +101,7 @@ def test_a_method_that_fails_says_why_and_the_others_go_on(
     trials = [make_trial(bundle, "net", "L"), make_trial(bundle, "wiener")]
     scores = measure_accuracy(
         trials,
-        islice(picture_samples(bundle, pictures, 1, tmp_path), 2),
+        islice(picture_captures(bundle, pictures, 1, tmp_path), 2),
         Restorers(bundle, threads=1),
         registered_metrics(),
     )
@@ -130,16 +131,16 @@ def test_golden_cases_are_judged_against_their_stored_truth(tmp_path: Path) -> N
     manifest = tiny_manifest().model_copy(update={"camera": camera, "golden": cases})
     write_bundle(path, manifest, members)
     bundle = open_bundle(path)
-    (sample,) = golden_samples(bundle)
-    assert (sample.picture, sample.origin_px, sample.undistort) == ("large", (8, 6), True)
-    np.testing.assert_allclose(decode_srgb(sample.sharp), arrays.reference, atol=1e-5)
-    assert Restorers(bundle, threads=1).restore(None, sample).shape == (3, 96, 128)
+    (known,) = golden_captures(bundle)
+    assert (known.picture, known.origin_px, known.undistort) == ("large", (8, 6), True)
+    np.testing.assert_allclose(decode_srgb(known.sharp), arrays.reference, atol=1e-5)
+    assert Restorers(bundle, threads=1).restore(None, known).shape == (3, 96, 128)
 
 
 def test_a_picture_too_small_to_be_judged_is_refused(bundle: Bundle, tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "small.png"), np.zeros((64, 200, 3), np.uint8))
     with pytest.raises(ContractError, match="200x64 pixels"):
-        list(picture_samples(bundle, tmp_path, None, tmp_path))
+        list(picture_captures(bundle, tmp_path, None, tmp_path))
 
 
 def make_scores(means: dict[str, list[float]]) -> Scores:

@@ -16,7 +16,7 @@ from camkit.report.bench.crops import (
     display_gain,
     png_base64,
 )
-from camkit.report.bench.samples import Sample
+from camkit.report.bench.known_captures import KnownCapture
 
 
 def decode(png: str) -> FloatArray:
@@ -25,8 +25,8 @@ def decode(png: str) -> FloatArray:
     return levels[..., ::-1].transpose(2, 0, 1).astype(np.float32) / 255
 
 
-def make_sample(sharp: FloatArray, name: str = "a") -> Sample:
-    return Sample(
+def make_capture(sharp: FloatArray, name: str = "a") -> KnownCapture:
+    return KnownCapture(
         picture=name,
         caption=name,
         psf="bundle",
@@ -59,9 +59,9 @@ def test_a_png_holds_the_values_in_eight_bits() -> None:
 def test_every_method_shows_the_same_place_with_its_own_psnr() -> None:
     sharp = np.random.default_rng(2).random((3, 200, 220), dtype=np.float32)
     collector = CropCollector([("m",)])
-    sample = make_sample(sharp)
+    known = make_capture(sharp)
     for key, values in ((INPUT, sharp * 0.5), (("m",), sharp), (("other",), sharp)):
-        collector.take(key, sample, decode_srgb(values.astype(np.float32)))
+        collector.take(key, known, decode_srgb(values.astype(np.float32)))
     (patch,) = collector.patches
     assert set(patch.pictures) == {SHARP, INPUT, ("m",)}
     np.testing.assert_array_equal(decode(patch.pictures[SHARP]), decode(patch.pictures[("m",)]))
@@ -70,11 +70,11 @@ def test_every_method_shows_the_same_place_with_its_own_psnr() -> None:
     assert patch.psnr_db[("m",)] > 90
 
 
-def test_every_nth_sample_is_kept() -> None:
+def test_every_nth_capture_is_kept() -> None:
     sharp = np.zeros((3, 200, 200), np.float32)
     collector = CropCollector([], every=3)
     for number in range(7):
-        collector.take(INPUT, make_sample(sharp, str(number)), sharp)
+        collector.take(INPUT, make_capture(sharp, str(number)), sharp)
     assert [patch.caption.split(",")[0] for patch in collector.patches] == ["0", "3", "6"]
 
 
@@ -83,7 +83,7 @@ def test_dark_patches_are_shown_brighter_and_judged_as_they_are() -> None:
     assert display_gain(np.full((3, 9, 9), 0.02, np.float32)) == 20
     sharp = encode_srgb(np.full((3, 200, 200), 0.02, np.float32))
     collector = CropCollector([])
-    collector.take(INPUT, make_sample(sharp), decode_srgb(sharp * np.float32(0.5)))
+    collector.take(INPUT, make_capture(sharp), decode_srgb(sharp * np.float32(0.5)))
     (patch,) = collector.patches
     assert patch.caption == "a, shown 20 times brighter"
     assert decode(patch.pictures[SHARP]).mean() == pytest.approx(

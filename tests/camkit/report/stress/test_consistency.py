@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle
-from camkit.report.stress.consistency import Scale, calibrate, judged_samples, near, residual
+from camkit.report.stress.consistency import Scale, calibrate, judged_pixels, near, residual
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.twin import Setting, photograph
@@ -77,7 +77,7 @@ def test_where_contrast_cannot_explain_the_nominal_it_is_the_unit(truth, judge: 
 def test_what_clipped_is_not_judged(bundle: Bundle, scene: Scene, judge: Judge) -> None:
     light = judge.rig.light(scene)
     bright = photograph(light, bundle.manifest.camera, Setting(exposure=1000.0))
-    assert judged_samples(bright).mean() < 0.1
+    assert judged_pixels(bright).mean() < 0.1
     assert residual(light.clean, bright, judge.rig.lens) is None
 
 

@@ -9,10 +9,10 @@ import pytest
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer import lens_bank
 from camkit.models_def.kinds.bayer.lens_bank import build_lens_bank
-from camkit.models_def.kinds.bayer.psf_bank import gaussian_bank
 from camkit.models_def.optics.kernel_bank import fabricated_copies
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import format_prescription
+from tests.gaussian_bank import gaussian_bank
 
 DUET = find_lens("duet")
 GAUSSIAN = {"sensor_height_mm": 2.0, "axis_px": 1.0, "corner_px": 2.0}

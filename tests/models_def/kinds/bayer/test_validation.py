@@ -10,30 +10,30 @@ from camkit.models_def.kinds.bayer.validation import (
     FIELD_SHARES,
     ISOS,
     BayerJudge,
-    make_cases,
+    make_validation_captures,
     to_srgb,
 )
 
 
 @pytest.fixture(scope="module")
-def cases(recipe, bank):
-    return make_cases(recipe, bank, None)
+def captures(recipe, bank):
+    return make_validation_captures(recipe, bank, None)
 
 
 @pytest.fixture(scope="module")
-def judge(recipe, cases):
-    return BayerJudge(cases=cases, recipe=recipe)
+def judge(recipe, captures):
+    return BayerJudge(captures=captures, recipe=recipe)
 
 
-def test_each_scene_is_taken_at_each_field_and_iso_by_the_unseen_copy(cases):
-    places = {(c.field_share, c.iso) for c in cases}
+def test_each_scene_is_taken_at_each_field_and_iso_by_the_unseen_copy(captures):
+    places = {(c.field_share, c.iso) for c in captures}
     assert places == {(f, i) for f in FIELD_SHARES for i in ISOS}
 
 
-def test_the_target_itself_scores_far_above_everything(cases, recipe):
-    case = next(c for c in cases if bool((c.shot.sample.target >= 0).all()))
-    values = to_srgb(case.shot.sample.target, case, recipe)
-    assert np.abs(values - case.sharp).max() < 2e-3
+def test_the_target_itself_scores_far_above_everything(captures, recipe):
+    capture = next(c for c in captures if bool((c.shot.sample.target >= 0).all()))
+    values = to_srgb(capture.shot.sample.target, capture, recipe)
+    assert np.abs(values - capture.sharp).max() < 2e-3
 
 
 def test_wiener_scores_above_the_capture(judge):
@@ -68,7 +68,7 @@ def test_validation_goes_through_all_depths_of_the_unseen_copy_at_every_field(
     for depths in (1, 2, 5):
         taken.clear()
         deep = replace(bank, copies=np.repeat(bank.copies, depths, axis=0), depths=depths)
-        make_cases(recipe, deep, None)
+        make_validation_captures(recipe, deep, None)
         unseen = set(range(deep.training_copies, len(deep.copies)))
         for iso in ISOS:
             for share in FIELD_SHARES:

@@ -39,7 +39,7 @@ def recipe_path(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def trimmed_checkpoint(tmp_path_factory, recipe_path, material):
+def trimmed_checkpoint(tmp_path_factory, recipe_path, material):  # noqa: F811
     """Four steps of the trimmed U-Net."""
     options = TrainOptions(
         out_dir=tmp_path_factory.mktemp("trimmed"), size="trimmed", workers=0, threads=1

@@ -1,0 +1,73 @@
+"""An array in memory as a capture of a bundle's sensor."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.sensor import BayerSensor, SpadSensor
+from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.capture import Capture
+
+
+def capture_of_array(
+    image: NDArray[Any],
+    manifest: Manifest,
+    *,
+    iso: float | None = None,
+    white_balance: tuple[float, float, float] | None = None,
+    origin_px: tuple[int, int] | None = None,
+) -> Capture:
+    """Give an array the meaning that a bundle's sensor gives it.
+
+    Args:
+        image: (h, w) mosaic in DN, in the sensor's CFA and levels; or (c, h, w) planes: linear with
+            1.0 = white level if they are float, else in the sensor's levels.
+        manifest: Of the bundle.
+        iso: For the noise model; None measures the noise.
+        white_balance: Gains (R, G, B); None for what the bundle says.
+        origin_px: (x, y) of the first pixel on the sensor, for a crop; None for a whole frame.
+
+    Raises:
+        ContractError: If shape or type do not fit the sensor.
+        UnsupportedError: If the sensor counts photons.
+    """
+    if not isinstance(image, np.ndarray):
+        raise ContractError(f"expected a numpy array; got {type(image).__name__}")
+    if image.dtype == np.float32 and not np.isfinite(image).any():
+        raise ContractError("the array holds no finite sample")
+    sensor = manifest.sensor
+    if isinstance(sensor, SpadSensor):
+        raise UnsupportedError("arrays of photon counts are read by the kind of their camera")
+    channels = len(sensor.channels)
+    is_mosaic = image.ndim == 2
+    if not is_mosaic and (image.ndim != 3 or image.shape[0] != channels):
+        shapes = [f"({channels}, h, w)"]
+        if isinstance(sensor, BayerSensor):
+            shapes.insert(0, "(h, w)")
+        raise ContractError(f"expected {' or '.join(shapes)}; got {image.shape}")
+    if is_mosaic and not isinstance(sensor, BayerSensor):
+        raise ContractError(f"the bundle takes {sensor.inputs[0]}; got an (h, w) mosaic")
+    if image.dtype not in (np.uint8, np.uint16, np.float32):
+        raise ContractError(f"expected uint8, uint16 or float32 samples; got {image.dtype}")
+    in_levels = is_mosaic or not np.issubdtype(image.dtype, np.floating)
+    in_levels = is_mosaic or (in_levels and not isinstance(sensor, BayerSensor))
+    black = sensor.black_level if in_levels else 0.0
+    matrix = sensor.color_matrix
+    extent = sensor.extent
+    return Capture(
+        samples=image,
+        cfa=sensor.cfa if is_mosaic else None,
+        black_level=np.full((2, 2) if is_mosaic else channels, black, np.float32),
+        white_level=sensor.white_level if in_levels else 1.0,
+        white_balance=white_balance,
+        color_matrix=None if matrix is None else np.array(matrix, dtype=np.float64),
+        iso=iso,
+        origin_px=origin_px,
+        sensor_size_px=(
+            None if origin_px is None or extent is None else (extent.width_px, extent.height_px)
+        ),
+        bundle_name=manifest.name,
+        camera=manifest.name,
+    )

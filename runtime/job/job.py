@@ -1,0 +1,170 @@
+"""One capture on its way through a bundle: what is known of it before any row, found when asked.
+
+    capture, bundle, options -> place on the sensor, noise, notes for people, record for programs
+
+Stages read it and add to it; each fact is found once, whoever asks first.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+from camkit.bundle.plane import Plane
+from camkit.bundle.reader import Bundle
+from camkit.contracts import NoiseModel
+from camkit.errors import ContractError
+from camkit.runtime.capture import Capture
+from camkit.runtime.clock import StageClock
+from camkit.runtime.color import ColorStage
+from camkit.runtime.geometry.placement import Placement, place
+from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.job.setup import Setup
+from camkit.runtime.network.tiling import Cancel, Progress
+from camkit.runtime.network.windows import NetworkWindows
+from camkit.runtime.options import Options
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.rows import RowSource
+from camkit.runtime.signal.noise import measure_noise
+
+Gains = tuple[float, ...]
+
+
+class Job:
+    """What is known of one capture.
+
+    Attributes:
+        setup: What it shares with others.
+        capture: The capture.
+        clock: Seconds per stage.
+        notes: What the user should know, in the order it was found.
+        record: The plan as the sidecar keeps it.
+        white_balance: Gains in use; ones where the stages balance nothing.
+        color: From the colour of the stages to that asked for; None until a stage says so.
+        falls_back: The capture lies outside what the bundle was shown to help with, and the caller
+            wants no network then.
+        work: What was planned; set before any stage runs.
+        case: What was planned for; None before, and without a bundle.
+        windows: Role -> the windows of its network, once they are planned.
+        probe: Gives the rows of a plane by name, made for the asking stage alone and equal to those
+            that it will be given; set by the walker.
+        clipped_fraction: Share of clipped samples in the rows read so far.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        capture: Capture,
+        *,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> None:
+        self.setup = setup
+        self.capture = capture
+        self.progress = progress
+        self.cancel = cancel
+        self.clock = StageClock()
+        self.notes = list(capture.notes)
+        self.record: dict[str, Any] = {}
+        self.white_balance: Gains = (1.0,) * capture.channels
+        self.color: ColorStage | None = None
+        self.falls_back = False
+        self.work = Work()
+        self.case: Case | None = None
+        self.windows: dict[str, NetworkWindows] = {}
+        self.probe: Callable[[str], RowSource] | None = None
+        self.clipped_fraction = 0.0
+        self._check_input()
+
+    @property
+    def bundle(self) -> Bundle | None:
+        """Give the camera."""
+        return self.setup.bundle
+
+    @property
+    def known_bundle(self) -> Bundle:
+        """Give the camera, which a stage that needs one always has."""
+        return self.setup.known_bundle
+
+    @property
+    def options(self) -> Options:
+        """Give what the caller chose."""
+        return self.setup.options
+
+    @property
+    def threads(self) -> int:
+        """Give the threads to compute with."""
+        return self.setup.threads
+
+    def _check_input(self) -> None:
+        """Refuse a capture that the sensor does not give."""
+        bundle = self.bundle
+        if bundle is None:
+            return
+        wanted = bundle.manifest.sensor.inputs
+        if self.capture.contract not in wanted:
+            raise ContractError(
+                f"bundle {bundle.manifest.name} takes {' or '.join(wanted)}, the capture is "
+                f"{self.capture.contract}; use another bundle or --bundle none"
+            )
+        if self.capture.contract != wanted[0]:
+            self.notes.append(f"a linear RGB capture in a {wanted[0]} bundle: not demosaicked")
+
+    @cached_property
+    def placement(self) -> Placement:
+        """Give where the capture lies on the bundle's sensor.
+
+        Raises:
+            ContractError: If it does not fit and nothing was assumed.
+        """
+        extent = None if self.bundle is None else self.bundle.manifest.sensor.extent
+        placement = place(self.capture, extent, self.options.assume)
+        if placement.note:
+            self.notes.append(placement.note)
+        return placement
+
+    def window_of(self, plane: Plane) -> SensorWindow:
+        """Give where the samples of a plane lie on the sensor, in pixels of its own grid."""
+        window, ratio = self.placement.window, plane.grid.pitch_ratio
+        if ratio == 1:
+            return window
+        (x, y), axis = window.origin_px, window.known_axis_px
+
+        def scaled(position: float) -> float:
+            return (position + 0.5) / ratio - 0.5
+
+        height, width = self.grid_px(plane)
+        return replace(
+            window,
+            size_px=(width, height),
+            origin_px=(x / ratio, y / ratio),
+            sensor_size_px=(
+                round(window.sensor_size_px[0] / ratio),
+                round(window.sensor_size_px[1] / ratio),
+            ),
+            pitch_um=window.pitch_um * ratio,
+            axis_px=(scaled(axis[0]), scaled(axis[1])),
+        )
+
+    def grid_px(self, plane: Plane) -> tuple[int, int]:
+        """Give (height, width) of a plane of this capture."""
+        ratio = plane.grid.pitch_ratio
+        return round(self.capture.height / ratio), round(self.capture.width / ratio)
+
+    @cached_property
+    def noise(self) -> NoiseModel:
+        """Give the noise of the raw signal: the file's, the bundle's at its ISO, or measured."""
+        sensor = self.known_bundle.manifest.sensor
+        if self.capture.noise is not None:
+            source, noise = "file", self.capture.noise
+        elif self.capture.iso is not None and sensor.type != "spad":
+            source, noise = "bundle", sensor.noise_at(self.capture.iso)
+        else:
+            with self.clock.stage("noise"):
+                source, noise = "measured", measure_noise(self.capture)
+        self.record["noise"] = {
+            "source": source,
+            "shot": noise.shot,
+            "read_variance": noise.read_variance,
+        }
+        return noise

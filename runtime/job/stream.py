@@ -1,0 +1,86 @@
+"""A plane on its way from the stage that gives it to the one that takes it.
+
+a source (rows of any place, made when asked for)    or    bands (from top to bottom, once)
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from camkit.bundle.plane import Plane
+from camkit.errors import ContractError
+from camkit.runtime.clock import StageClock, TimedRows
+from camkit.runtime.rows import PiecedRows, RollingRows, Rows, RowSource, read_bands
+
+Shape = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stream:
+    """The rows of a plane, for one taker.
+
+    Attributes:
+        plane: What the rows hold.
+        shape: (channel, h, w).
+        gains: What the light of each channel of the sensor was multiplied by so far.
+        source: Rows that may be read from any row on; None for bands.
+        made: Bands from top to bottom, each an array that nobody else reads; None for a source.
+        owned: Whether what the source reads is the reader's own to change.
+    """
+
+    plane: Plane
+    shape: Shape
+    gains: tuple[float, ...]
+    source: RowSource | None = None
+    made: Iterator[Rows] | None = None
+    owned: bool = True
+
+    def __post_init__(self) -> None:
+        if (self.source is None) == (self.made is None):
+            raise ContractError("a stream is either a source or bands")
+
+    @property
+    def gives_own_rows(self) -> bool:
+        """Tell whether what `rows` reads is the reader's own to change."""
+        return self.source is not None and self.owned
+
+    def rows(self) -> RowSource:
+        """Give the rows, to be read from top to bottom with any overlap."""
+        if self.source is not None:
+            return self.source
+        return self.pieced()
+
+    def pieced(self) -> PiecedRows:
+        """Give the rows as they lie, each kept until it is read."""
+        return RollingRows(self.shape, self.bands()).reader()
+
+    def bands(self) -> Iterator[Rows]:
+        """Yield the rows from top to bottom, each band an array that nobody else reads."""
+        if self.made is not None:
+            return self.made
+        assert self.source is not None
+        bands = read_bands(self.source)
+        return bands if self.owned else (band.copy() for band in bands)
+
+    def timed(self, clock: StageClock, name: str) -> "Stream":
+        """Give the stream whose making is charged to a stage."""
+        if self.made is not None:
+            return replace(self, made=clock.bands(name, self.made))
+        assert self.source is not None
+        return replace(self, source=TimedRows(self.source, clock, name))
+
+    def shared(self, takers: int) -> list["Stream"]:
+        """Give a stream for each of several takers; rows are kept until all have read them."""
+        if takers == 1:
+            return [self]
+        rolling = RollingRows(self.shape, self.bands())
+        return [
+            replace(self, source=rolling.reader(), made=None, owned=False) for _ in range(takers)
+        ]
+
+    def with_bands(self, made: Iterator[Rows]) -> "Stream":
+        """Give what a stage made of this stream, of the same shape and meaning."""
+        return replace(self, made=made, source=None, owned=True)
+
+    def with_source(self, source: RowSource) -> "Stream":
+        """Give what a stage makes of this stream, readable from any row on."""
+        return replace(self, source=source, made=None, shape=source.shape, owned=True)

@@ -1,0 +1,57 @@
+"""What the runtime knows of a kind of camera: how its captures are read, and its digital twin.
+
+A kind's part of the runtime (`camkit.runtime.kinds.NAME`, or the `runtime` of its own package)
+defines `PART`, a `RuntimePart`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.reader import Bundle
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.kinds import find_kind
+from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.simulate import Simulation, SimulationOptions
+
+Gains = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RuntimePart:
+    """A kind of camera at use time.
+
+    Attributes:
+        read: (file, how to read a headerless mosaic, manifest or None) -> capture.
+        from_array: (array, manifest, iso, white balance, origin) -> capture.
+        simulate: (scene (3, h, w) linear Rec.709, bundle, options) -> what the camera records.
+        write: (file, simulation, bundle): the capture as a file that `read` reads.
+        suffix: Of the files that `write` writes, with its dot.
+    """
+
+    read: Callable[[Path, MosaicOptions | None, Manifest | None], Capture]
+    from_array: Callable[
+        [NDArray[Any], Manifest, float | None, Gains | None, tuple[int, int] | None], Capture
+    ]
+    simulate: Callable[[FloatArray, Bundle, SimulationOptions], Simulation]
+    write: Callable[[Path, Simulation, Bundle], None]
+    suffix: str
+
+
+def runtime_part(kind: str) -> RuntimePart:
+    """Give what the runtime knows of a kind.
+
+    Raises:
+        UnsupportedError: If there is no such kind, or the runtime knows nothing of it.
+        ContractError: If its part defines no PART.
+    """
+    module = find_kind(kind).part("runtime")
+    part = getattr(module, "PART", None)
+    if not isinstance(part, RuntimePart):
+        raise ContractError(f"{module.__name__} must define PART as a RuntimePart")
+    return part

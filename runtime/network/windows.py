@@ -1,0 +1,264 @@
+"""The windows of the networks of one capture: planned within the memory cap, then run.
+
+    networks, size, memory [, labels] -> NetworkWindows -> bands
+
+Without labels one network runs everywhere (`tiling`), with labels on some lattice cells only
+(`cell_windows`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from camkit.bundle.facts import HaloError, NetworkFacts
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.network.cell_windows import (
+    CellLimits,
+    CellNetwork,
+    CellPlan,
+    Labels,
+    infer_cells,
+    plan_cells,
+)
+from camkit.runtime.network.guard import TileGuard
+from camkit.runtime.network.tiling import (
+    Cancel,
+    PixelCost,
+    Progress,
+    Run,
+    TileLimits,
+    TilePlan,
+    infer_bands,
+    plan_windows,
+)
+from camkit.runtime.options import Mode
+from camkit.runtime.rows import RowSource
+
+FAST_LEAST_DB: Final = 80.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SizedNetwork:
+    """A network, its size's name and its measured facts."""
+
+    size: str
+    run: Run
+    facts: NetworkFacts
+
+    @property
+    def cost(self) -> PixelCost:
+        """Give what the network holds per pixel."""
+        return PixelCost(
+            arena_bytes=self.facts.bytes_per_pixel,
+            channels=self.facts.input_channels,
+            outputs=self.facts.output_channels,
+            scale=self.facts.output_scale,
+        )
+
+    def halo_px(self, mode: Mode) -> int:
+        """Give the halo of a mode.
+
+        Raises:
+            ContractError: If mode fast is asked of a network without an error curve.
+        """
+        return self.facts.reach_px if mode != "fast" else fast_halo_px(self.facts.halo_error)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindowLimits:
+    """What the windows must respect.
+
+    Attributes:
+        cap_bytes: Memory that the process may take.
+        spent_bytes: What of it everything but the networks takes.
+        mode: exact, fast or whole.
+        cell_px: Side of a lattice cell.
+        tile_px: Force windows of about this size.
+    """
+
+    cap_bytes: int
+    spent_bytes: int
+    mode: Mode
+    cell_px: int
+    tile_px: int | None = None
+
+    @property
+    def max_bytes(self) -> int:
+        """Give what is left for the windows."""
+        return max(self.cap_bytes - self.spent_bytes, 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkWindows:
+    """Windows of one capture, ready to run.
+
+    Attributes:
+        networks: Those of the plan.
+        tiles: One network everywhere; None with cells.
+        cells: Networks on their cells; None with tiles.
+        mode: Of the windows.
+    """
+
+    networks: tuple[SizedNetwork, ...]
+    tiles: TilePlan | None
+    cells: CellPlan | None
+    mode: Mode
+
+    def bands(
+        self,
+        source: RowSource,
+        *,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+        guard: TileGuard | None = None,
+        stand_in: slice | None = None,
+    ) -> Iterator[FloatArray]:
+        """Yield (k, s rows, s w) of the result from top to bottom."""
+        if self.cells is not None:
+            cells = _cell_networks(self.networks, self.mode)
+            if stand_in is None:
+                raise ContractError("cells need planes that stand in where no network runs")
+            return infer_cells(
+                cells,
+                source,
+                self.cells,
+                progress=progress,
+                cancel=cancel,
+                guard=guard,
+                stand_in=stand_in,
+            )
+        if self.tiles is None:
+            raise ContractError("a network needs tiles or cells")
+        network = self.networks[0]
+        return infer_bands(
+            network.run,
+            source,
+            self.tiles,
+            progress=progress,
+            cancel=cancel,
+            guard=guard,
+            scale=network.facts.output_scale,
+        )
+
+    @property
+    def halo_px(self) -> int:
+        """Give the largest halo of its networks."""
+        return max(network.halo_px(self.mode) for network in self.networks)
+
+    def window_mp(self) -> dict[str, float]:
+        """Give size -> megapixels computed, halos included."""
+        if self.tiles is not None:
+            plan = self.tiles
+            area = plan.window_count * plan.window_height_px * plan.window_width_px
+            return {self.networks[0].size: area / 1e6}
+        if self.cells is None:
+            return {}
+        return {n.size: self.cells.area_px(i) / 1e6 for i, n in enumerate(self.networks)}
+
+    def needed_bytes(self) -> int:
+        """Estimate the memory: windows with their arenas, rows held, one output band."""
+        if self.tiles is not None:
+            return self.tiles.needed_bytes(self.networks[0].cost)
+        if self.cells is None:
+            return 0
+        return self.cells.needed_bytes([network.cost for network in self.networks])
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the windows in a few numbers, for the sidecar."""
+        if self.tiles is not None:
+            return {
+                "mode": self.mode,
+                "halo_px": self.tiles.halo_px,
+                "windows": self.tiles.window_count,
+                "work_ratio": round(self.tiles.work_ratio, 3),
+            }
+        if self.cells is None:
+            return {}
+        height, width = self.cells.size_px
+        return {
+            "mode": self.mode,
+            "halo_px": self.cells.halo_px,
+            "windows": self.cells.window_count,
+            "work_ratio": {
+                size: round(mp * 1e6 / (height * width), 3) for size, mp in self.window_mp().items()
+            },
+        }
+
+
+def plan_network(
+    size_px: tuple[int, int],
+    networks: Sequence[SizedNetwork],
+    limits: WindowLimits,
+    labels: Labels | None = None,
+) -> NetworkWindows:
+    """Plan the windows of a capture.
+
+    Args:
+        size_px: (height, width).
+        networks: One, or with labels as many as these name.
+        limits: Memory and mode.
+        labels: (row, column): 0 none, n the n-th network; None for the first one everywhere.
+
+    Raises:
+        ContractError: If the cap is too small.
+    """
+    try:
+        return _plan_windows(size_px, networks, limits, labels)
+    except ContractError as error:
+        raise ContractError(
+            f"of the cap of {limits.cap_bytes // 10**6} MB everything but the network takes "
+            f"{limits.spent_bytes // 10**6} MB; {error}"
+        ) from error
+
+
+def _plan_windows(
+    size_px: tuple[int, int],
+    networks: Sequence[SizedNetwork],
+    limits: WindowLimits,
+    labels: Labels | None,
+) -> NetworkWindows:
+    height, width = size_px
+    if labels is not None and limits.mode != "whole":
+        cells = plan_cells(
+            size_px,
+            labels,
+            _cell_networks(networks, limits.mode),
+            CellLimits(cell_px=limits.cell_px, max_bytes=limits.max_bytes, tile_px=limits.tile_px),
+        )
+        return NetworkWindows(networks=tuple(networks), tiles=None, cells=cells, mode=limits.mode)
+    facts = networks[0].facts
+    tile_limits = TileLimits(
+        stride_px=facts.stride_px,
+        halo_px=networks[0].halo_px(limits.mode),
+        cost=networks[0].cost,
+        max_bytes=limits.max_bytes,
+        tile_px=limits.tile_px,
+        whole=limits.mode == "whole",
+    )
+    tiles = plan_windows(height, width, tile_limits)
+    return NetworkWindows(networks=tuple(networks), tiles=tiles, cells=None, mode=limits.mode)
+
+
+def fast_halo_px(curve: tuple[HaloError, ...], least_db: float = FAST_LEAST_DB) -> int:
+    """Give the smallest halo of a measured error curve that keeps `least_db`.
+
+    Raises:
+        ContractError: If the bundle carries no curve.
+    """
+    good = [e.halo_px for e in curve if e.psnr_db is None or e.psnr_db >= least_db]
+    if not good:
+        raise ContractError("the bundle has no measured halo for mode fast; use mode exact")
+    return min(good)
+
+
+def _cell_networks(networks: Sequence[SizedNetwork], mode: Mode) -> list[CellNetwork]:
+    return [
+        CellNetwork(
+            run=network.run,
+            stride_px=network.facts.stride_px,
+            halo_px=network.halo_px(mode),
+            cost=network.cost,
+        )
+        for network in networks
+    ]

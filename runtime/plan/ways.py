@@ -1,0 +1,97 @@
+"""Which way every stage of a capture takes: its own, that of the method asked for, or none.
+
+    stages, work -> one way per stage: a name, or LEFT_OUT
+
+A method is the name of a way of one stage. What lies before that stage takes its usual way; what
+restores behind it is left out. A stage may be left out only where a plane that it takes stands for
+what it gives: the same samples on the same grid, in the same domain.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+from camkit.bundle.plane import Plane
+from camkit.bundle.stages import Network, Stage
+from camkit.errors import ContractError
+from camkit.runtime.plan.decision import DEVELOP, Work
+from camkit.runtime.stage_finder import methods_of, stage_module
+
+LEFT_OUT: Final = ""
+WHOLE: Final = "whole"
+"""The way of a stage that has only one."""
+
+
+def ways_of(stages: Sequence[Stage], work: Work) -> tuple[str, ...]:
+    """Give the way of every stage.
+
+    Raises:
+        ContractError: If no stage has the method.
+    """
+    last = len(stages) if work.method is None else _last_with(stages, work.method)
+    ways: list[str] = []
+    for number, stage in enumerate(stages):
+        methods = stage_module(stage.type).METHODS
+        if stage.type in work.left_out:
+            ways.append(LEFT_OUT)
+        elif not methods:
+            ways.append(WHOLE)
+        elif number > last:
+            ways.append(LEFT_OUT)
+        else:
+            ways.append(work.method if number == last and work.method else methods[0])
+    return tuple(ways)
+
+
+def planned(stages: Sequence[Stage], work: Work) -> Work:
+    """Give the work with what follows from its ways.
+
+    Raises:
+        ContractError: If no stage has its method.
+    """
+    ways = zip(stages, ways_of(stages, work), strict=True)
+    return replace(
+        work, networks=any(isinstance(stage, Network) and way != LEFT_OUT for stage, way in ways)
+    )
+
+
+def without_networks(stages: Sequence[Stage], work: Work) -> Work:
+    """Give the work by the best method that runs no network."""
+    tried = [
+        planned(stages, replace(work, method=method)) for method in (*methods_of(stages), DEVELOP)
+    ]
+    return next(other for other in tried if not other.networks)
+
+
+def _last_with(stages: Sequence[Stage], method: str) -> int:
+    """Give the number of the last stage that has a method; -1 where nothing is restored."""
+    if method == DEVELOP:
+        return -1
+    found = [n for n, stage in enumerate(stages) if method in stage_module(stage.type).METHODS]
+    if found:
+        return found[-1]
+    if not methods_of(stages):
+        return -1
+    raise ContractError(
+        f"method must be one of {', '.join((*methods_of(stages), DEVELOP))}; got {method!r}"
+    )
+
+
+def stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str:
+    """Name the plane that stands for what a stage gives where it is left out.
+
+    Args:
+        stage: Gives one plane.
+        planes: By name, that of the sensor among them.
+
+    Raises:
+        ContractError: If no plane that it takes does.
+    """
+    given = planes[stage.gives[0]]
+    for name in reversed(stage.takes):
+        if len(stage.gives) == 1 and planes[name].stands_for(given):
+            return name
+    raise ContractError(
+        f"the stage {stage.type} cannot be left out: none of {', '.join(stage.takes)} stands for "
+        f"{', '.join(stage.gives)}"
+    )

@@ -1,0 +1,61 @@
+"""Where the work of a stage is found: the module of its name in `camkit.runtime.stages`.
+
+A module defines
+
+    prepare(entry, job) -> StageWork     what the stage does to one capture; cheap, before any row
+    seconds(entry, case, work, speed)    what it will take, for the plan
+    METHODS                              names of its ways, as `--method` takes them; may be empty
+    OPTIONS                              fields of `Options` that mean something to it
+    is_left_out(options)                 optional: whether the caller wants it left out
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Sequence
+from functools import cache
+from types import ModuleType
+from typing import Final
+
+from camkit.bundle.stages import Stage
+from camkit.errors import UnsupportedError
+
+STAGES: Final = "camkit.runtime.stages"
+"""Named, not imported: its modules import what imports this one."""
+
+
+@cache
+def stage_module(name: str) -> ModuleType:
+    """Give the module of a stage.
+
+    Raises:
+        UnsupportedError: If this runtime has none.
+    """
+    places = importlib.import_module(STAGES).__path__
+    known = {module.name for module in pkgutil.iter_modules(places)}
+    if name not in known:
+        raise UnsupportedError(
+            f"this runtime has no stage {name!r}; it has {', '.join(sorted(known))}"
+        )
+    return importlib.import_module(f"{STAGES}.{name}")
+
+
+def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
+    """Name every stage for people and clocks: its type, and its role or number among twins."""
+    types: list[str] = [stage.type for stage in stages]
+    keys: list[str] = []
+    for number, stage in enumerate(stages):
+        if types.count(stage.type) == 1:
+            keys.append(stage.type)
+            continue
+        twin = types[: number + 1].count(stage.type)
+        keys.append(f"{stage.type} {getattr(stage, 'role', twin)}")
+    return tuple(keys)
+
+
+def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
+    """Name the ways of the stages, as `--method` takes them; those of the last stage first."""
+    return tuple(
+        dict.fromkeys(
+            method for stage in reversed(stages) for method in stage_module(stage.type).METHODS
+        )
+    )

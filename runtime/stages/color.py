@@ -1,0 +1,66 @@
+"""Camera colour to the colour that the caller asked for; one channel becomes grey."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.sensor import RGB
+from camkit.bundle.stages import Color
+from camkit.colorimetry import Matrix
+from camkit.contracts import FloatArray
+from camkit.runtime.color import ColorStage, color_stage, to_output
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import Rows, read_bands
+
+METHODS: Final[tuple[str, ...]] = ()
+OPTIONS: Final = ("color", "exposure_ev")
+BYTES_PER_COLUMN: Final = 1_000
+"""Of rows on their way (measured, see docs/performance.md)."""
+REST_SHARE: Final = 0.06
+
+
+def prepare(_entry: Color, job: Job) -> StageWork:
+    """Choose the colour matrix."""
+    options = job.options
+    job.color = color = color_stage(
+        _color_matrix(job), options.color, exposure_ev=options.exposure_ev
+    )
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = taken
+        plane = light.plane.model_copy(update={"channels": RGB, "domain": "output"})
+        shape = (len(RGB), *light.shape[1:])
+        # a product of matrices may differ in its last bit with the rows that it gets
+        bands = _converted(read_bands(light.pieced()), color)
+        return (replace(light.with_bands(bands), plane=plane, shape=shape),)
+
+    return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width)
+
+
+def _converted(bands: Iterator[Rows], color: ColorStage) -> Iterator[FloatArray]:
+    for band in bands:
+        wide = band if band.shape[0] == len(RGB) else np.repeat(band, len(RGB), axis=0)
+        yield to_output(wide, color)
+
+
+def seconds(_entry: Color, case: Case, _work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+
+
+def _color_matrix(job: Job) -> Matrix | None:
+    if job.capture.color_matrix is not None:
+        return job.capture.color_matrix
+    if job.capture.cfa is None:
+        return None
+    sensor = None if job.bundle is None else job.bundle.manifest.sensor
+    if sensor is not None and sensor.type == "bayer":
+        return np.array(sensor.color_matrix)
+    job.notes.append("the file states no colour matrix: camera RGB is taken as Rec.709")
+    return None

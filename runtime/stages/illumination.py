@@ -1,0 +1,44 @@
+"""Division by the relative illumination, band by band."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from camkit.bundle.stages import Illumination
+from camkit.contracts import FloatArray
+from camkit.runtime.geometry.illumination import IlluminationGain
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.options import Options
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import changed_bands
+
+METHODS: Final[tuple[str, ...]] = ()
+OPTIONS: Final = ("vignetting",)
+REST_SHARE: Final = 0.03
+
+
+def is_left_out(options: Options) -> bool:
+    """Tell whether the caller wants the vignetting kept."""
+    return not options.vignetting
+
+
+def prepare(_entry: Illumination, job: Job) -> StageWork:
+    """Make ready; nothing is decided here."""
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = taken
+        gain = IlluminationGain(job.known_bundle.psf, job.window_of(light.plane))
+
+        def even(rows: FloatArray, top: int) -> None:
+            gain.divide(rows, top, out=rows)
+
+        return (light.with_bands(changed_bands(light.bands(), even, threads=job.threads)),)
+
+    return StageWork(run=run)
+
+
+def seconds(_entry: Illumination, case: Case, _work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return REST_SHARE * speed.rest_s_per_mp * case.megapixels

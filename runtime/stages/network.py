@@ -1,0 +1,211 @@
+"""A network in windows: its planes taken to equal noise, tiled exactly, guarded, taken back."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import sqrt
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.stages import Network
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.envelope import findings, observe, verdict
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.network.guard import TileGuard
+from camkit.runtime.network.windows import (
+    NetworkWindows,
+    SizedNetwork,
+    WindowLimits,
+    plan_network,
+)
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.estimate import network_seconds, role_window_mp
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import RowSource, changed_bands
+from camkit.runtime.scene import CELL_PX
+from camkit.runtime.signal.stabilise import StackedRows, unstabilise
+
+METHODS: Final = ("net",)
+OPTIONS: Final = (
+    *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
+    *("dtype", "provider"),
+)
+
+
+def prepare(entry: Network, job: Job) -> StageWork:
+    """Hold the capture against the envelope; the windows are planned when the memory is known."""
+    if not job.falls_back:
+        job.falls_back = _falls_back(job)
+    stage = _NetworkStage(entry, job)
+    return StageWork(
+        run=stage.run,
+        fit=stage.fit,
+        planned_bytes=stage.planned_bytes,
+        warnings=stage.warnings,
+    )
+
+
+def _falls_back(job: Job) -> bool:
+    """Compare the capture with the bundle's envelope; tell whether the network is left out."""
+    bundle, options = job.known_bundle, job.options
+    if bundle.manifest.envelope is None or options.method not in (None, *METHODS):
+        return False
+    with job.clock.stage("envelope"):
+        seen = observe(job.capture, job.noise)
+    found = findings(bundle.manifest.envelope, seen)
+    warning = verdict(found, bundle.manifest.name, options.on_unsafe)
+    falls_back = warning is not None and options.on_unsafe == "fallback"
+    job.record["envelope"] = {"seen": seen, "outside": found, "fallback": falls_back}
+    if warning is not None:
+        job.notes.append(warning)
+    return falls_back
+
+
+def seconds(entry: Network, case: Case, work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return network_seconds(entry.role, role_window_mp(entry.role, case, work), speed)
+
+
+def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
+    """Give the rows that the network of a stage is given: its planes stacked and stabilised."""
+    noises = None
+    if entry.transform == "stabilise":
+        noises = [job.noise.with_gains(stream.gains) for stream in taken]
+    return StackedRows(
+        [stream.pieced() for stream in taken], noises, scale=entry.scale, threads=job.threads
+    )
+
+
+class _NetworkStage:
+    """The network of one capture."""
+
+    def __init__(self, entry: Network, job: Job) -> None:
+        self._entry = entry
+        self._job = job
+        self._windows: NetworkWindows | None = None
+        self._guard: TileGuard | None = None
+
+    def fit(self, max_bytes: int, spent_bytes: int) -> None:
+        """Plan the windows: `max_bytes` in all, of which others take `spent_bytes`."""
+        job, entry, work = self._job, self._entry, self._job.work
+        bundle = job.known_bundle
+        limits = WindowLimits(
+            cap_bytes=max_bytes,
+            spent_bytes=spent_bytes,
+            mode=work.mode,
+            cell_px=CELL_PX,
+            tile_px=job.options.tile_px,
+        )
+        networks = [
+            SizedNetwork(
+                size=size,
+                run=job.setup.networks(entry.role, size).run,
+                facts=bundle.network_facts(entry.role, size),
+            )
+            for size in work.sizes()
+        ]
+        taken = bundle.manifest.planes[entry.takes[0]]
+        self._windows = plan_network(job.grid_px(taken), networks, limits, work.network_labels())
+        job.windows[entry.role] = self._windows
+
+    def planned_bytes(self) -> int:
+        """Give the memory of the windows."""
+        return 0 if self._windows is None else self._windows.needed_bytes()
+
+    def warnings(self) -> tuple[str, ...]:
+        """Name the tiles that were not believed."""
+        replaced = () if self._guard is None else self._guard.replaced
+        return tuple(f"the Wiener result was taken in {tile}" for tile in replaced)
+
+    def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        """Give the outputs of the network."""
+        if self._windows is None:
+            raise ContractError("the windows of a network are planned before it runs")
+        job, entry = self._job, self._entry
+        facts = self._windows.networks[0].facts
+        stand_in = self._stand_in(taken)
+        factor = sqrt(entry.most_light) if entry.transform == "stabilise" else entry.most_light
+        self._guard = TileGuard(
+            fallback=job.options.on_unsafe == "fallback", stand_in=stand_in, factor=factor
+        )
+        bands = self._windows.bands(
+            given_rows(entry, job, taken),
+            progress=job.progress,
+            cancel=job.cancel,
+            guard=self._guard,
+            stand_in=stand_in,
+        )
+        if entry.transform == "stabilise":
+            bands = self._linear(bands, taken)
+        return self._split(bands, taken[-1], [port.channels for port in facts.outputs])
+
+    def _linear(self, bands: Iterator[FloatArray], taken: Sequence[Stream]) -> Iterator[FloatArray]:
+        """Take stabilised bands back to light, in place."""
+        noise, scale = self._job.noise.with_gains(taken[-1].gains), self._entry.scale
+
+        def undo(rows: FloatArray, _: int) -> None:
+            unstabilise(rows, noise, scale=scale, out=rows)
+
+        return changed_bands(bands, undo, threads=self._job.threads)
+
+    def _stand_in(self, taken: Sequence[Stream]) -> slice | None:
+        """Give the channels of the input that stand for the output where it is not had."""
+        planes = self._job.known_bundle.manifest.planes
+        if len(self._entry.gives) != 1:
+            return None
+        given = planes[self._entry.gives[0]]
+        ends = np.cumsum([stream.shape[0] for stream in taken])
+        for end, stream in zip(ends[::-1], reversed(taken), strict=True):
+            if stream.plane.stands_for(given):
+                return slice(int(end) - stream.shape[0], int(end))
+        return None
+
+    def _split(
+        self, bands: Iterator[FloatArray], last: Stream, channels: Sequence[int]
+    ) -> tuple[Stream, ...]:
+        """Share the channels of the bands among the planes that the stage gives."""
+        entry, planes = self._entry, self._job.known_bundle.manifest.planes
+        height, width = (side * self._scale() for side in last.shape[1:])
+        made = replace(
+            last, shape=(sum(channels), height, width), made=bands, source=None, owned=True
+        )
+        if len(channels) == 1:
+            return (replace(made, plane=planes[entry.gives[0]]),)
+        starts = np.cumsum([0, *channels])
+        streams = made.shared(len(channels))
+        return tuple(
+            replace(
+                stream,
+                plane=planes[name],
+                source=_Channels(stream.rows(), int(start), count),
+                shape=(count, height, width),
+            )
+            for stream, name, start, count in zip(
+                streams, entry.gives, starts[:-1], channels, strict=True
+            )
+        )
+
+    def _scale(self) -> int:
+        assert self._windows is not None
+        return self._windows.networks[0].facts.output_scale
+
+
+class _Channels:
+    """Some of the channels of a source."""
+
+    def __init__(self, source: RowSource, start: int, count: int) -> None:
+        self._source = source
+        self._channels = slice(start, start + count)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w)."""
+        _, height, width = self._source.shape
+        return self._channels.stop - self._channels.start, height, width
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        """Give rows top..bottom."""
+        return self._source.read(top, bottom)[self._channels]

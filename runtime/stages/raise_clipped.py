@@ -1,0 +1,40 @@
+"""Burnt-out light made neutral, band by band."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from camkit.bundle.stages import RaiseClipped
+from camkit.contracts import FloatArray
+from camkit.runtime.color import recover_highlights
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import changed_bands
+
+METHODS: Final[tuple[str, ...]] = ()
+OPTIONS: Final[tuple[str, ...]] = ()
+REST_SHARE: Final = 0.03
+
+
+def prepare(_entry: RaiseClipped, job: Job) -> StageWork:
+    """Make ready; planes that come as such have no known level at which they clip."""
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = taken
+        if job.capture.cfa is None:
+            return (light,)
+        red, green, blue = light.gains
+
+        def lift(rows: FloatArray, _: int) -> None:
+            recover_highlights(rows, (red, green, blue), in_place=True)
+
+        return (light.with_bands(changed_bands(light.bands(), lift, threads=job.threads)),)
+
+    return StageWork(run=run)
+
+
+def seconds(_entry: RaiseClipped, case: Case, _work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return REST_SHARE * speed.rest_s_per_mp * case.megapixels

@@ -1,0 +1,47 @@
+"""The radial distortion undone, band by band."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from camkit.bundle.stages import Undistort
+from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.options import Options
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.speed import Speed
+
+METHODS: Final[tuple[str, ...]] = ()
+OPTIONS: Final = ("undistort",)
+BYTES_PER_COLUMN: Final = 4_280
+"""Of rows on their way (measured, see docs/performance.md)."""
+REST_SHARE: Final = 0.25
+
+
+def is_left_out(options: Options) -> bool:
+    """Tell whether the caller wants the geometry of the sensor kept."""
+    return not options.undistort
+
+
+def prepare(entry: Undistort, job: Job) -> StageWork:
+    """Make ready; nothing is decided here."""
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = taken
+        bands = undistort_bands(
+            light.pieced(),
+            job.known_bundle.psf.distortion,
+            job.window_of(light.plane),
+            threads=job.threads,
+        )
+        plane = job.known_bundle.manifest.planes[entry.gives[0]]
+        return (replace(light.with_bands(bands), plane=plane),)
+
+    return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width)
+
+
+def seconds(_entry: Undistort, case: Case, _work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return REST_SHARE * speed.rest_s_per_mp * case.megapixels

@@ -1,0 +1,86 @@
+"""Gains of the caller, the file, or the bundle's illuminant."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.stages import WhiteBalance
+from camkit.colorimetry import camera_from_rec709
+from camkit.contracts import CfaPattern
+from camkit.runtime.job.job import Gains, Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import Rows, RowSource
+from camkit.runtime.signal.demosaic import apply_gains, shift_rows
+
+METHODS: Final[tuple[str, ...]] = ()
+OPTIONS: Final = ("white_balance",)
+REST_SHARE: Final = 0.04
+
+
+def prepare(_entry: WhiteBalance, job: Job) -> StageWork:
+    """Choose the gains."""
+    job.white_balance = gains = _choose(job)
+    cfa = job.capture.cfa
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        (light,) = taken
+        is_mosaic = light.shape[0] == 1
+        rows = BalancedRows(
+            light.rows(), gains, cfa if is_mosaic else None, owned=light.gives_own_rows
+        )
+        return (replace(light.with_source(rows), gains=gains),)
+
+    return StageWork(run=run)
+
+
+def seconds(_entry: WhiteBalance, case: Case, _work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+
+
+def _choose(job: Job) -> Gains:
+    chosen = job.options.white_balance or job.capture.white_balance
+    if chosen is not None:
+        return chosen
+    if job.capture.cfa is None:
+        return (1.0, 1.0, 1.0)
+    sensor = None if job.bundle is None else job.bundle.manifest.sensor
+    if sensor is None or sensor.type != "bayer":
+        job.notes.append("the file states no white balance: gains of 1 are used")
+        return (1.0, 1.0, 1.0)
+    job.notes.append(f"the capture states no white balance: that of {sensor.illuminant} is used")
+    return camera_from_rec709(np.array(sensor.color_matrix))[1]
+
+
+class BalancedRows:
+    """Rows of a mosaic or of three planes, each colour multiplied by its gain."""
+
+    def __init__(
+        self, source: RowSource, gains: Gains, cfa: CfaPattern | None, *, owned: bool
+    ) -> None:
+        self._source = source
+        self._gains = gains
+        self._cfa = cfa
+        self._owned = owned
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (channel, h, w)."""
+        return self._source.shape
+
+    def read(self, top: int, bottom: int) -> Rows:
+        """Give rows top..bottom as (channel, rows, w) float32, a new array."""
+        rows = self._source.read(top, bottom)
+        if not self._owned:
+            rows = rows.copy()
+        if self._cfa is None:
+            rows *= np.array(self._gains, dtype=np.float32)[:, None, None]
+            return rows
+        red, green, blue = self._gains
+        apply_gains(rows[0], shift_rows(self._cfa, top), (red, green, blue))
+        return rows

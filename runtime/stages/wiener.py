@@ -1,0 +1,89 @@
+"""The Wiener bank, or a classical method on its blocks."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.stages import Wiener
+from camkit.contracts import depth_name
+from camkit.runtime.bank.baselines import restoration_bank
+from camkit.runtime.bank.blocks import BlockBank, LocalPsf, PlainBlock, plan_spans
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.plan.blocks import plain_blocks, plain_share
+from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.speed import Speed
+
+METHODS: Final = ("wiener", "rl", "admm-tv")
+OPTIONS: Final = ("depth_m",)
+CLIPPED_BLOCK: Final = 3.3
+"""A block with clipped samples costs so many of one without (six rounds of Richardson-Lucy)."""
+BLOCK_SET_UP: Final = 1.25
+"""A block with its kernel, window and sum over a block that is only filtered."""
+BYTES_PER_BLOCK_ROW: Final = 80
+"""Of a row of blocks, per column of the picture and row of a block (measured)."""
+
+
+def prepare(entry: Wiener, job: Job) -> StageWork:
+    """Say which kernels are taken, where there is a choice."""
+    bundle, depth_mm = job.known_bundle, job.options.depth_mm
+    depths_mm = bundle.psf.depths_mm
+    if depths_mm.size > 1:
+        known = ", ".join(map(depth_name, depths_mm))
+        job.record["depth"] = f"mean of {known}" if depth_mm is None else depth_name(depth_mm)
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        planes, mask = taken[0], taken[1] if len(taken) > 1 else None
+        bank = make_bank(entry, job, planes.gains)
+        unknown = None if mask is None else mask.rows().read
+        bands = bank.restore_bands(planes.rows(), unknown, _plain(job))
+        return (planes.with_bands(bands),)
+
+    held = BYTES_PER_BLOCK_ROW * entry.block_px * job.capture.width
+    return StageWork(run=run, held_bytes=held)
+
+
+def make_bank(entry: Wiener, job: Job, gains: tuple[float, ...]) -> BlockBank:
+    """Make the bank of a capture.
+
+    Args:
+        entry: The manifest's stage.
+        job: The capture.
+        gains: By which the light of the planes was multiplied.
+    """
+    bundle = job.known_bundle
+    sensor = bundle.manifest.sensor
+    assert sensor.type != "spad"  # a spad's counts never join a bank
+    kernels = color_kernels(bundle.psf, *sensor.response_arrays(), depth_mm=job.options.depth_mm)
+    local = LocalPsf(
+        kernels=kernels.scaled(job.placement.kernel_scale), window=job.placement.window
+    )
+    method = job.work.method if job.work.method in METHODS else METHODS[0]
+    noise = job.noise.with_gains(gains)
+    return restoration_bank(local, entry, noise, method=method, threads=job.threads)
+
+
+def _plain(job: Job) -> PlainBlock | None:
+    """Give the test for blocks that nothing but plain cells read; None without any."""
+    work, case = job.work, job.case
+    if work.labels is None or case is None:
+        return None
+    reach = max((case.facts(size).reach_px for size in work.sizes()), default=0)
+    return plain_blocks(work.labels, reach)
+
+
+def seconds(entry: Wiener, case: Case, work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    rows = plan_spans(case.height_px, entry.block_px, entry.overlap_px)
+    columns = plan_spans(case.width_px, entry.block_px, entry.overlap_px)
+    blocks = float(len(rows) * len(columns))
+    if work.labels is not None:
+        reach = max((case.facts(size).reach_px for size in work.sizes()), default=0)
+        blocks *= 1 - plain_share(work.labels, reach, rows, columns)
+    if case.scene is not None and entry.clip_iterations:
+        clipped = float(np.mean(case.scene.clipped > 0))
+        blocks *= 1 + (CLIPPED_BLOCK - 1) * min(1.0, clipped * (entry.block_px / 256) ** 2)
+    return blocks * speed.block_s * BLOCK_SET_UP / speed.threads

@@ -1,0 +1,5 @@
+"""The digital twin: what the camera would record of a sharp scene.
+
+light        scene -> distortion -> blur that varies over the field -> Light on the sensor
+exposure     Light -> illumination, mosaic, photons, amplifier, converter -> DN
+"""

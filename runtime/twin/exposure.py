@@ -1,0 +1,144 @@
+"""Exposure by a sensor: photons, electrons, full well, amplifier, converter.
+
+References: Foi et al. 2008; EMVA 1288 release 4.0, ch. 2.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.sensor import BayerSensor, ColorSensor
+from camkit.contracts import CfaPattern, FloatArray, NoiseModel, cfa_channels
+from camkit.errors import ContractError
+from camkit.runtime.geometry.illumination import illumination_band
+from camkit.runtime.twin.light import Gains, Light
+
+NOISE_ROWS: Final = 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """How the camera records the light.
+
+    Attributes:
+        iso: Sensitivity; sets the gain and the noise.
+        exposure: Factor on the light.
+        seed: Seed of the noise; the same seed gives the same capture.
+        noise: Apply shot and read noise.
+        noise_factor: Factor on the deviation of all noise, which the file does not state.
+        bits: Of the converter; None for the sensor's.
+    """
+
+    iso: float = 100.0
+    exposure: float = 1.0
+    seed: int = 0
+    noise: bool = True
+    noise_factor: float = 1.0
+    bits: int | None = None
+
+    def __post_init__(self) -> None:
+        if not (self.iso > 0 and np.isfinite(self.iso)):
+            raise ContractError(f"iso must be > 0; got {self.iso}")
+        if self.seed < 0:
+            raise ContractError(f"seed must be >= 0; got {self.seed}")
+        if not (self.exposure > 0 and np.isfinite(self.exposure)):
+            raise ContractError(f"exposure must be > 0; got {self.exposure}")
+
+
+def expose(light: Light, sensor: ColorSensor, setting: Setting) -> NDArray[np.uint16]:
+    """Give the DN that a sensor records of light.
+
+    Args:
+        light: What falls on it.
+        sensor: Mosaic or planes, levels, full well and noise per ISO.
+        setting: Sensitivity, seed, noise.
+
+    Returns:
+        (h, w) of a mosaic, (c, h, w) of planes.
+    """
+    signal = _sampled(light, sensor)
+    rng = np.random.default_rng(setting.seed) if setting.noise else None
+    noise = noise_of(sensor, setting)
+    # Fewer, larger electrons give the larger noise; the well then holds as much light as before.
+    well_e = sensor.full_well_e / setting.noise_factor**2
+    black, white = levels_of(sensor, setting)
+    dn = np.empty(signal.shape, dtype=np.uint16)
+    for top in range(0, signal.shape[-2], NOISE_ROWS):
+        rows = np.s_[..., top : top + NOISE_ROWS, :]
+        exposed = signal[rows].astype(np.float64)
+        if setting.exposure != 1:
+            exposed *= setting.exposure
+        recorded = record(exposed, noise, well_e, rng)
+        levels = black + recorded * (white - black)
+        dn[rows] = np.clip(np.rint(levels), 0, np.floor(white))
+    return dn
+
+
+def noise_of(sensor: ColorSensor, setting: Setting) -> NoiseModel:
+    """Give the noise that a setting really makes."""
+    stated = sensor.noise_at(setting.iso)
+    power = setting.noise_factor**2
+    return NoiseModel(
+        shot=tuple(shot * power for shot in stated.shot),
+        read_variance=tuple(read * power for read in stated.read_variance),
+    )
+
+
+def levels_of(sensor: ColorSensor, setting: Setting) -> tuple[float, float]:
+    """Give black and white level of the converter; with other bits the black keeps its share."""
+    if setting.bits is None:
+        return sensor.black_level, sensor.white_level
+    white = 2.0**setting.bits - 1
+    return float(np.rint(sensor.black_level * white / sensor.white_level)), white
+
+
+def record(
+    signal: NDArray[np.float64],
+    noise: NoiseModel,
+    full_well_e: float,
+    rng: np.random.Generator | None,
+) -> NDArray[np.float64]:
+    """Give the signal after the pixel: Poisson electrons, full well, Gaussian read noise.
+
+    Args:
+        signal: Linear, 1.0 = white level.
+        noise: Noise at the ISO; `shot` is the signal of one electron, alike in all channels.
+        full_well_e: Electrons that a pixel holds.
+        rng: Random generator, or None for no noise.
+    """
+    middle = len(noise.shot) // 2
+    per_electron = noise.shot[middle]
+    electrons = signal / per_electron
+    if rng is None:
+        return np.minimum(electrons, full_well_e) * per_electron
+    read_e = np.sqrt(noise.read_variance[middle]) / per_electron
+    counted = np.minimum(rng.poisson(electrons), full_well_e)
+    return np.asarray((counted + read_e * rng.standard_normal(signal.shape)) * per_electron)
+
+
+def sample_mosaic(planes: FloatArray, cfa: CfaPattern, gains: Gains) -> FloatArray:
+    """Give the (h, w) raw mosaic of (3, h, w) white-balanced planes."""
+    mosaic = np.empty(planes.shape[1:], dtype=np.float32)
+    for row, channels in enumerate(cfa_channels(cfa)):
+        for column, channel in enumerate(channels):
+            site = slice(row, None, 2), slice(column, None, 2)
+            mosaic[site] = planes[channel][site] * np.float32(1 / gains[channel])
+    return mosaic
+
+
+def _sampled(light: Light, sensor: ColorSensor) -> NDArray[Any]:
+    """Give the signal of the pixels, dimmed by the optics."""
+    if isinstance(sensor, BayerSensor):
+        signal = sample_mosaic(light.planes, sensor.cfa, light.gains)
+    else:
+        signal = light.planes / np.array(light.gains, dtype=np.float32)[:, None, None]
+    if light.vignetting is not None:
+        height = light.window.size_px[1]
+        for top in range(0, height, NOISE_ROWS):
+            bottom = min(top + NOISE_ROWS, height)
+            signal[..., top:bottom, :] *= illumination_band(
+                light.vignetting, light.window, top, bottom
+            )
+    return signal

@@ -1,0 +1,223 @@
+"""Light through optics: from a sharp linear scene to what falls on the sensor.
+
+Scene -> camera space -> distortion -> blur that turns and grows over the field (scatter: every
+block of the scene is spread with the PSF of its own centre).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.sensor import MOSAIC, BayerSensor, ColorSensor
+from camkit.colorimetry import apply_matrix, camera_from_rec709
+from camkit.contracts import FloatArray, FrozenPsf, depth_name
+from camkit.errors import ContractError
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.geometry.scatter import KernelLookup, scatter
+from camkit.runtime.geometry.sensor_window import SensorWindow, centred_origin
+from camkit.runtime.geometry.warp import distort_array
+
+Gains = tuple[float, ...]
+KernelChange = Callable[[FloatArray], FloatArray]
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Of linear Rec.709 (ITU-R BT.709-6): what a channel sees that has no colour of its own."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lens:
+    """What the light goes through.
+
+    Attributes:
+        psf: Distortion and illumination.
+        kernels_at: Gives the (c, k, k) kernels at a sensor position in millimetres.
+        margin_px: Half of the largest kernel.
+        gains: White balance of the light; None for that of the sensor's illuminant.
+    """
+
+    psf: FrozenPsf
+    kernels_at: KernelLookup
+    margin_px: int
+    gains: Gains | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Light:
+    """What falls on the sensor.
+
+    Attributes:
+        planes: (c, h, w) float32 blurred, white-balanced camera space, without vignetting.
+        clean: (c, h, w) float32 as a perfect lens would have given it.
+        window: Place on the sensor.
+        gains: White balance, one gain per channel.
+        vignetting: The PSF whose illumination still dims it; None for none.
+    """
+
+    planes: FloatArray
+    clean: FloatArray
+    window: SensorWindow
+    gains: Gains
+    vignetting: FrozenPsf | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LightOptions:
+    """How a scene becomes light.
+
+    Attributes:
+        exposure: Factor on the scene.
+        distort: Apply the radial distortion.
+        vignette: Apply the relative illumination.
+        workers: Threads of the FFT; the result does not depend on them.
+    """
+
+    exposure: float = 1.0
+    distort: bool = True
+    vignette: bool = True
+    workers: int = 1
+
+
+def lens_of(psf: FrozenPsf, sensor: ColorSensor, *, depth_mm: float | None = None) -> Lens:
+    """Give what the light goes through for one object distance.
+
+    Args:
+        psf: Of the optics.
+        sensor: Response of its channels.
+        depth_mm: Object distance; may only be left out where there is one depth.
+
+    Raises:
+        ContractError: If there are several depths and none is given, or the PSF does not reach it.
+    """
+    if depth_mm is None and psf.depths_mm.size > 1:
+        known = ", ".join(map(depth_name, psf.depths_mm))
+        raise ContractError(f"light comes from one depth: give one of those the PSF knows, {known}")
+    kernels = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm)
+    return Lens(psf=psf, kernels_at=kernels.at, margin_px=max(psf.kernels.shape[-2:]) // 2)
+
+
+def with_kernels(lens: Lens, change: KernelChange) -> Lens:
+    """Give a lens whose kernels are changed and normalised again; sizes stay."""
+
+    def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
+        changed = np.maximum(change(lens.kernels_at(x_mm, y_mm)), 0)
+        total = changed.sum(axis=(-2, -1), keepdims=True, dtype=np.float64)
+        return np.asarray(changed / total, dtype=np.float32)
+
+    return replace(lens, kernels_at=kernels_at)
+
+
+def with_axis_moved(lens: Lens, x_mm: float, y_mm: float) -> Lens:
+    """Give a lens whose axis meets the sensor beside its middle."""
+    return replace(lens, kernels_at=lambda x, y: lens.kernels_at(x - x_mm, y - y_mm))
+
+
+def camera_space(sensor: ColorSensor) -> tuple[NDArray[np.float64], Gains]:
+    """Give the matrix (c, 3) from linear Rec.709 to white-balanced channels, and the gains.
+
+    Channels without a colour matrix see Rec.709 as it is where they are three, else its luminance.
+    """
+    if sensor.color_matrix is not None:
+        return camera_from_rec709(np.array(sensor.color_matrix, dtype=np.float64))
+    count = len(sensor.channels)
+    matrix = np.eye(3) if count == 3 else np.tile(LUMINANCE, (count, 1))
+    return matrix, (1.0,) * count
+
+
+def light_of(
+    scene: FloatArray,
+    sensor: ColorSensor,
+    lens: Lens,
+    window: SensorWindow,
+    options: LightOptions | None = None,
+) -> Light:
+    """Let a scene fall on the sensor.
+
+    Args:
+        scene: (3, h, w) float32 linear Rec.709 in ideal geometry, >= 0, of the size of the window.
+        sensor: Colour of its channels.
+        lens: What the light goes through.
+        window: Place on the sensor, see `scene_window`.
+        options: Exposure and which effects to apply.
+    """
+    chosen = options or LightOptions()
+    matrix, gains = camera_space(sensor)
+    margin = lens.margin_px
+    extended = _on_sensor(scene, matrix * chosen.exposure, lens.psf, window, chosen, margin)
+    planes = scatter(extended, lens.kernels_at, window, margin_px=margin, workers=chosen.workers)
+    # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
+    np.maximum(planes, 0, out=planes)
+    _, height, width = scene.shape
+    return Light(
+        planes=planes,
+        clean=extended[:, margin : margin + height, margin : margin + width].copy(),
+        window=window,
+        gains=lens.gains or gains,
+        vignetting=lens.psf if chosen.vignette else None,
+    )
+
+
+def crop_light(light: Light, size_px: tuple[int, int]) -> Light:
+    """Give the top left part of a light, as a smaller capture at the same place."""
+    width, height = size_px
+    window = replace(light.window, size_px=size_px)
+    planes, clean = (p[:, :height, :width].copy() for p in (light.planes, light.clean))
+    return replace(light, planes=planes, clean=clean, window=window)
+
+
+def scene_window(
+    scene: FloatArray, sensor: ColorSensor, origin_px: tuple[int, int] | None
+) -> SensorWindow:
+    """Give where a scene lies on the sensor; centred without an origin.
+
+    Raises:
+        ContractError: If the scene is not finite (3, h, w), or leaves the sensor or the CFA cell.
+    """
+    if scene.ndim != 3 or scene.shape[0] != 3 or min(scene.shape) < 1:
+        raise ContractError(f"a scene must be (3, h, w); got {scene.shape}")
+    low, high = float(scene.min()), float(scene.max())
+    if not (low >= 0 and np.isfinite(high)):
+        raise ContractError(f"a scene must be finite and >= 0; got {low} to {high}")
+    extent = sensor.known_extent
+    step = 2 if sensor.captured == MOSAIC else 1
+    size, whole = (scene.shape[2], scene.shape[1]), (extent.width_px, extent.height_px)
+    origin = centred_origin(size, whole, multiple=step) if origin_px is None else origin_px
+    spans = zip(origin, size, whole, strict=True)
+    if any(start < 0 or start % step or start + side > most for start, side, most in spans):
+        even = " with an even origin" if isinstance(sensor, BayerSensor) else ""
+        raise ContractError(
+            f"a scene of {size} px at {origin} must lie on the sensor of {whole} px{even}; "
+            "give a smaller scene or another origin"
+        )
+    return SensorWindow(
+        size_px=size,
+        origin_px=origin,
+        sensor_size_px=whole,
+        pitch_um=extent.pixel_pitch_um,
+        axis_px=extent.optical_centre_px,
+    )
+
+
+def _on_sensor(
+    scene: FloatArray,
+    matrix: NDArray[np.float64],
+    psf: FrozenPsf,
+    window: SensorWindow,
+    options: LightOptions,
+    margin_px: int,
+) -> FloatArray:
+    """Give the sharp scene in the sensor's channels and geometry, with a mirrored margin."""
+    planes = _apply(matrix, scene)
+    if options.distort:
+        planes = distort_array(planes, psf.distortion, window, margin_px=margin_px)
+    else:
+        pad = ((0, 0), (margin_px, margin_px), (margin_px, margin_px))
+        planes = np.pad(planes, pad, mode="reflect" if min(planes.shape[1:]) > 1 else "edge")
+    # Interpolation rings and saturated colours leave the gamut; light is never negative.
+    return np.maximum(planes, 0.0, out=planes)
+
+
+def _apply(matrix: NDArray[np.float64], scene: FloatArray) -> FloatArray:
+    if matrix.shape == (3, 3):
+        return apply_matrix(matrix, scene)
+    return np.tensordot(matrix.astype(np.float32), scene, axes=1)

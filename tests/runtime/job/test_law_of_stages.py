@@ -1,0 +1,252 @@
+"""What the bundle says is what runs: the stages it lists, in that order, and nothing else."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from camkit.bundle.chain import CAPTURE, capture_plane
+from camkit.bundle.manifest import Manifest, planes_of
+from camkit.bundle.plane import Plane
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.sensor import RGB
+from camkit.bundle.stages import (
+    Color,
+    Demosaic,
+    Illumination,
+    JoinError,
+    Linearise,
+    Network,
+    Parts,
+    RaiseClipped,
+    Repair,
+    Stage,
+    Undistort,
+    WhiteBalance,
+    Wiener,
+)
+from camkit.bundle.writer import write_bundle
+from camkit.contracts import FloatArray
+from camkit.runtime.bank.baselines import restoration_bank
+from camkit.runtime.bank.blocks import LocalPsf
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.capture import Capture
+from camkit.runtime.color import color_stage, recover_highlights, to_output
+from camkit.runtime.geometry.illumination import divide_illumination
+from camkit.runtime.geometry.placement import place
+from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.rows import ArrayRows
+from camkit.runtime.signal.demosaic import apply_gains, demosaic
+from camkit.runtime.signal.noise import repair_mosaic
+from camkit.runtime.signal.stabilise import stabilise, unstabilise
+from camkit.runtime.stage_finder import stage_module
+from tests.bundle_factory import tiny_manifest, tiny_members
+
+GAINS = (1.7, 1.0, 1.4)
+ISO = 100.0
+BANK = {"block_px": 32, "overlap_px": 8, "prior_scale": 1e-3, "prior_exponent": 2.0}
+POOL: tuple[Callable[..., Stage], ...] = (
+    Repair,
+    WhiteBalance,
+    Demosaic,
+    lambda **wiring: Wiener(**BANK, **wiring),
+    Network,
+    RaiseClipped,
+    Illumination,
+    Undistort,
+)
+
+
+class _Drawn:
+    """A list of stages that joins, grown stage by stage."""
+
+    def __init__(self) -> None:
+        manifest = tiny_manifest()
+        self.parts: Parts = manifest.parts
+        self.stages: list[Stage] = []
+        self.planes: dict[str, Plane] = {CAPTURE: capture_plane(manifest.sensor)}
+        self.main, self.mask, self.before = CAPTURE, "", ""
+        self.add(Linearise)
+
+    def tried(self, make: Callable[..., Stage]) -> Stage | None:
+        """Give the stage wired to what there is, None if it does not join."""
+        kind = make(takes=("x",), gives=("y",))
+        number = len(self.stages)
+        takes = [self.main]
+        gives = [f"p{number}"]
+        if isinstance(kind, Network):
+            takes = [self.before or self.main, self.main]
+        elif isinstance(kind, Linearise):
+            gives.append(f"m{number}")
+        elif isinstance(kind, Repair | Wiener) and self.mask:
+            takes.append(self.mask)
+            if isinstance(kind, Repair):
+                gives.append(f"m{number}")
+        stage = make(takes=tuple(takes), gives=tuple(gives))
+        try:
+            stage.join([self.planes[name] for name in takes], self.parts)
+        except JoinError:
+            return None
+        return stage
+
+    def add(self, make: Callable[..., Stage]) -> bool:
+        stage = self.tried(make)
+        if stage is None:
+            return False
+        made = stage.join([self.planes[name] for name in stage.takes], self.parts)
+        self.planes |= dict(zip(stage.gives, made, strict=True))
+        if isinstance(stage, Wiener):
+            self.before = self.main
+        elif self.before and not isinstance(stage, Network):
+            self.before = ""
+        if len(stage.gives) > 1:
+            self.mask = stage.gives[1]
+        if made[0].channels == RGB and isinstance(stage, Demosaic):
+            self.before = ""
+        self.main = stage.gives[0]
+        self.stages.append(stage)
+        return True
+
+
+@st.composite
+def lists(draw: st.DrawFn) -> tuple[Stage, ...]:
+    drawn = _Drawn()
+    for _ in range(draw(st.integers(0, 9))):
+        can = [make for make in POOL if drawn.tried(make) is not None]
+        if not can:
+            break
+        drawn.add(draw(st.sampled_from(can)))
+    if drawn.planes[drawn.main].channels != RGB:
+        drawn.add(Demosaic)
+    drawn.add(Color)
+    return tuple(drawn.stages)
+
+
+def _bundle(stages: tuple[Stage, ...], folder: Path) -> Bundle:
+    tiny, members = tiny_manifest(), tiny_members()
+    has_network = any(isinstance(stage, Network) for stage in stages)
+    networks = tiny.networks if has_network else {}
+    if not has_network:
+        members.pop("network_m.onnx")
+    members.pop("golden.safetensors")
+    parts = Parts(sensor=tiny.sensor, optics=tiny.optics, networks=networks)
+    manifest = Manifest.model_validate(
+        {
+            **dict(tiny),
+            "stages": stages,
+            "planes": planes_of(stages, parts),
+            "products": {"image": stages[-1].gives[0]},
+            "networks": networks,
+            "golden": (),
+        }
+    )
+    path = folder / "drawn.camkit"
+    write_bundle(path, manifest, members)
+    return open_bundle(path)
+
+
+def _slowly(  # noqa: C901 - one arm for each stage
+    stages: tuple[Stage, ...], bundle: Bundle, capture: Capture
+) -> FloatArray:
+    """Apply the stages to whole pictures, one after the other, in plain sight."""
+    sensor, psf = bundle.manifest.sensor, bundle.psf
+    assert sensor.type == "bayer"
+    window = place(capture, sensor.extent, None).window
+    matrix = np.array(sensor.color_matrix)
+    noise = sensor.noise_at(ISO)
+    held: dict[str, np.ndarray] = {}
+    gains: dict[str, tuple[float, float, float]] = {CAPTURE: (1.0, 1.0, 1.0)}
+    for stage in stages:
+        taken = [held[name] for name in stage.takes if name != CAPTURE]
+        gain = gains[stage.takes[-1] if isinstance(stage, Network) else stage.takes[0]]
+        match stage:
+            case Linearise():
+                made = [capture.linear_rows(0, capture.height)]
+                made.append(capture.saturated_rows(0, capture.height))
+            case Repair():
+                sound, broken = repair_mosaic(taken[0]) if taken[0].ndim == 2 else (taken[0], None)
+                assert broken is not None
+                made = [sound, *(mask & ~broken for mask in taken[1:])]
+            case WhiteBalance():
+                planes = taken[0].copy()
+                if planes.ndim == 2:
+                    apply_gains(planes, sensor.cfa, GAINS)
+                else:
+                    planes *= np.array(GAINS, dtype=np.float32)[:, None, None]
+                made, gain = [planes], GAINS
+            case Demosaic():
+                made = [demosaic(taken[0], sensor.cfa, stage.method)]
+            case Wiener():
+                local = LocalPsf(
+                    kernels=color_kernels(psf, *sensor.response_arrays()), window=window
+                )
+                bank = restoration_bank(local, stage, noise.with_gains(gain))
+                made = [bank.restore_array(taken[0], *taken[1:])]
+            case Network():
+                both = [
+                    stabilise(planes, noise.with_gains(gains[name]), scale=stage.scale)
+                    for planes, name in zip(taken, stage.takes, strict=True)
+                ]
+                engine = NetworkEngine(bundle.network_bytes("restore", "M"), threads=1)
+                stable = engine.run(np.concatenate(both)[None])[0]
+                made = [unstabilise(stable, noise.with_gains(gain), scale=stage.scale)]
+            case RaiseClipped():
+                made = [recover_highlights(taken[0], gain)]
+            case Illumination():
+                made = [divide_illumination(taken[0], 0, psf, window)]
+            case Undistort():
+                bands = undistort_bands(ArrayRows(taken[0]), psf.distortion, window)
+                made = [np.concatenate(list(bands), axis=1)]
+            case Color():
+                made = [to_output(taken[0], color_stage(matrix))]
+        held |= dict(zip(stage.gives, made, strict=True))
+        gains |= dict.fromkeys(stage.gives, gain)
+    return held[stages[-1].gives[0]]
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(stages=lists(), seed=st.integers(0, 99))
+def test_the_listed_stages_run_in_their_order_and_nothing_else_does(
+    stages: tuple[Stage, ...], seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle = _bundle(stages, tmp_path)
+    rng = np.random.default_rng(seed)
+    mosaic = rng.integers(64, 1024, (64, 96), dtype=np.uint16)
+    mosaic[20:24, 30:34] = 1023
+    pipeline = Pipeline(bundle, Options(threads=2))
+    ran: list[str] = []
+    with monkeypatch.context() as patch:
+        for name in {stage.type for stage in stages}:
+            patch.setattr(stage_module(name), "prepare", _watched(stage_module(name), ran))
+        work = pipeline.start(
+            pipeline.capture_of(mosaic, iso=ISO, white_balance=GAINS, origin_px=None)
+        )
+        got = work.fill()
+    assert ran == [stage.type for stage in stages]
+    expected = _slowly(stages, bundle, work.capture)
+    np.testing.assert_array_equal(got, expected)
+
+
+def _watched(module: object, ran: list[str]) -> Callable[..., object]:
+    from dataclasses import replace
+
+    prepare = module.prepare  # type: ignore[attr-defined]
+
+    def watched(entry: Stage, job: object) -> object:
+        work = prepare(entry, job)
+
+        def run(taken: object) -> object:
+            ran.append(entry.type)
+            return work.run(taken)
+
+        return replace(work, run=run)
+
+    return watched
