@@ -9,13 +9,13 @@ SOURCES := camkit runtime export models_def tests tools setup.py
 .PHONY: demo test test-slow check format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
-	$(VENV)/bin/python tools/demo.py --out-dir out
+	$(VENV)/bin/python -m tools.demo --out-dir out
 
 test: check  ## set-up with everything, gate, tests with branch coverage
 	$(DEV)/bin/python -m coverage erase
 	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto
 	$(DEV)/bin/python -m coverage combine -q
-	$(DEV)/bin/python tools/coverage_gate.py
+	$(DEV)/bin/python -m tools.coverage_gate
 
 test-slow: $(DEV_STAMP)  ## also the tests that take minutes
 	$(DEV)/bin/python -m pytest -q -m slow --timeout=3600

@@ -13,9 +13,8 @@ from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.output.band_queue import BandQueue
-from camkit.runtime.output.linear_dng import LinearDngWriter
 from camkit.runtime.output.part_file import atomic_output
-from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
+from camkit.runtime.output.picture_writer import PictureFormat
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_sidecar
 from camkit.runtime.output.writer import SUFFIXES, open_writer
 from camkit.runtime.pipeline import Pipeline
@@ -211,6 +210,7 @@ def _identity(
     chosen = {k: v for k, v in asdict(pipeline.options).items() if k not in free}
     if chosen["depth_m"] == math.inf:
         chosen["depth_m"] = "inf"  # JSON knows no infinity
+    chosen["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
     chosen |= {"format": write.format, "linear": write.linear}
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
     identity = {
@@ -231,23 +231,16 @@ def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> flo
         color=work.color,
         orientation=1 if write.format == "dng" else work.capture.orientation,
         tone="linear" if write.linear else "srgb",
+        origin=work.origin,
     )
     seconds = 0.0
-    with _open(path, picture, work, write) as writer, BandQueue(writer) as queue:
+    with open_writer(path, write.format, picture) as writer, BandQueue(writer) as queue:
         for band in work.bands():
             began = time.perf_counter()
             queue.write(band)
             seconds += time.perf_counter() - began
         began = time.perf_counter()
     return seconds + time.perf_counter() - began
-
-
-def _open(
-    path: Path, picture: PictureFormat, work: Reconstruction, write: WriteOptions
-) -> PictureWriter:
-    if write.format == "dng":
-        return LinearDngWriter(path, picture, work.capture, work.white_balance)
-    return open_writer(path, write.format, picture)
 
 
 def _bundle_name(pipeline: Pipeline) -> str | None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 from camkit.errors import ContractError
+from camkit.runtime.unit import Unit
 from camkit.units import MM_PER_M
 
 Mode = Literal["exact", "fast", "whole"]
@@ -48,6 +49,7 @@ class Options:
         max_mem_bytes: Memory the process may take; None for the default of 0.93 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
+        unit: The camera body, whose facts the stages may use; None for any.
         dtype: Which graph of the bundle: fp32, or fp16 where it holds one. A CPU computes the
             latter in fp32 too, with weights rounded to fp16.
         provider: What onnxruntime computes the network on.
@@ -71,6 +73,7 @@ class Options:
     max_mem_bytes: int | None = None
     threads: int | None = None
     tile_px: int | None = None
+    unit: Unit | None = None
     dtype: Dtype = "fp32"
     provider: Provider = "cpu"
 

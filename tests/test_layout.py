@@ -1,8 +1,11 @@
-"""The folders on disk, the import names and the packaging list say the same thing."""
+"""The folders on disk, the import names, the packaging list and who uses what say the same."""
 
+import ast
+import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -11,17 +14,45 @@ ASK = (
     "import setuptools; from distutils.core import run_setup; "
     "print(*run_setup('setup.py', stop_after='config').packages)"
 )
+SHIPPED = ("camkit", "runtime", "export", "models_def")
+FOUND_BY_PLACE = (
+    "camkit.report.bench.rows",
+    "camkit.report.bench.metrics",
+    "camkit.report.stress.scenarios",
+    "camkit.report.kinds",
+    "camkit.models_def.kinds",
+    "camkit.runtime.kinds",
+    "camkit.runtime.plan.rules",
+    "camkit.runtime.stages",
+)
+DATA = {"camkit.bundles", "camkit.models_def.prescriptions", "camkit.models_def.recipes"}
+
+
+def _modules(top: str) -> Iterator[tuple[str, Path]]:
+    """Give import name and file of every module below a top folder, the links left out."""
+    for path in (ROOT / top).rglob("*.py"):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        if top == "camkit" and parts[1] in LINKS:
+            continue
+        named = parts[:-1] if parts[-1] == "__init__" else parts
+        yield ".".join(named if top in {"camkit", "tools"} else ("camkit", *named)), path
+
+
+def _named(path: Path) -> set[str]:
+    """Give the modules that a file may import or run: by import, or by a string."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found.add(node.value)
+    return found
 
 
 def _packages_on_disk() -> set[str]:
-    names = set()
-    for top in ("camkit", "runtime", "export", "models_def"):
-        for init in (ROOT / top).rglob("__init__.py"):
-            parts = init.parent.relative_to(ROOT).parts
-            if top == "camkit" and len(parts) > 1 and parts[1] in LINKS:
-                continue
-            names.add(".".join(parts if top == "camkit" else ("camkit", *parts)))
-    return names
+    return {n for top in SHIPPED for n, path in _modules(top) if path.name == "__init__.py"}
 
 
 def _packages_of_the_wheel(root: Path) -> set[str]:
@@ -70,7 +101,40 @@ def test_links_are_relative_and_lead_to_the_real_folders() -> None:
 
 
 def test_folders_hold_at_most_twenty_modules() -> None:
-    for top in ("camkit", "runtime", "export", "models_def"):
-        for folder in {p.parent for p in (ROOT / top).rglob("*.py")}:
-            modules = [p for p in folder.glob("*.py") if p.name != "__init__.py"]
+    for top in (*SHIPPED, "tools"):
+        for folder in {path.parent for path in (ROOT / top).rglob("*.py")}:
+            modules = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
             assert len(modules) <= 20, folder
+
+
+def test_a_file_of_tools_is_a_command_and_its_folders_hold_what_commands_use() -> None:
+    modules = dict(_modules("tools"))
+    used = {name for path in modules.values() for name in _named(path)}
+    for name, path in modules.items():
+        if path.parent.name == "tools" and path.name != "__init__.py":
+            assert '\nif __name__ == "__main__":\n' in path.read_text(encoding="utf-8"), name
+        elif path.name != "__init__.py":
+            assert name in used, name
+
+
+def test_nothing_that_ships_imports_tools_or_tests() -> None:
+    for top in SHIPPED:
+        for name, path in _modules(top):
+            assert not {n.partition(".")[0] for n in _named(path)} & {"tools", "tests"}, name
+
+
+def test_nothing_that_ships_serves_the_tools_alone() -> None:
+    """A command uses it, or a document tells people to import it."""
+    modules = dict(pair for top in SHIPPED for pair in _modules(top))
+    told = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md"))
+    ahead = {n for n in modules if re.fullmatch(r"camkit(\.__main__|\.cli(\..+)?)?", n)}
+    ahead |= {n for n in modules if n.startswith(FOUND_BY_PLACE)}
+    ahead |= {n for n in modules if f"from {n} import" in told}
+    ahead |= {n for n in modules if f"`{n.rpartition('.')[2]}." in told}
+    reached: set[str] = set()
+    while ahead:
+        name = ahead.pop()
+        reached |= {name}
+        package = name.rpartition(".")[0]
+        ahead |= ((_named(modules[name]) | {package}) & modules.keys()) - reached
+    assert set(modules) - reached <= DATA

@@ -27,8 +27,8 @@ valid_patches = 1
 """
 
 
-def run_tool(monkeypatch: pytest.MonkeyPatch, name: str, *arguments: object) -> None:
-    """Call `main` of tools/NAME.py with arguments."""
+def run_tool(monkeypatch: pytest.MonkeyPatch, name: str, *arguments: object) -> int:
+    """Call `main` of tools/NAME.py with arguments; give its exit code."""
     module = importlib.import_module(f"tools.{name}")
     monkeypatch.setattr("sys.argv", [name, *map(str, arguments)])
-    module.main()
+    return int(module.main() or 0)

@@ -79,6 +79,7 @@ SCHOTT_POWERS = [0.0, 2.0, -2.0, -4.0, -6.0, -8.0]
 
 
 def field(text: str, key: str) -> list[float]:
+    """Give the numbers that stand behind a key of a database file; none if it is not there."""
     found = re.search(rf"^\s*-?\s*{key}: *([-+0-9.eE ]+)$", text, re.MULTILINE)
     return [float(word) for word in found[1].split()] if found else []
 
@@ -108,6 +109,7 @@ def dispersion(text: str) -> tuple[str, list[float]] | None:
 
 
 def entry(path: Path, name: str, source: str = "") -> str | None:
+    """Give a glass as a line of JSON; None where its formula is none of ours."""
     text = path.read_text(encoding="utf-8")
     found = dispersion(text)
     if found is None or "n_is_absolute: true" in text:
@@ -117,10 +119,12 @@ def entry(path: Path, name: str, source: str = "") -> str | None:
 
 
 def stated(text: str) -> list[float | None]:
-    return [(field(text, key) or [None])[0] for key in ("nd", "Vd")]
+    """Give the printed n_d and V_d, where they are stated."""
+    return [next(iter(field(text, key)), None) for key in ("nd", "Vd")]
 
 
 def write(name: str, rows: list[str], source: str, *, literature: bool = False) -> None:
+    """Write a catalogue."""
     head = {"catalogue": name, "literature": literature, "source": source}
     lines = ",\n".join(rows)
     text = f'{json.dumps(head)[:-1]},\n"glasses": [\n{lines}\n]}}\n'
@@ -170,7 +174,9 @@ def classic_rows(text: str) -> list[str]:
 
 
 def holds(glass: Glass) -> bool:
-    return glass.range_um[0] <= WAVES_UM[0] and glass.range_um[1] >= WAVES_UM[-1]
+    """Say whether a glass is known over all wavelengths that are compared."""
+    low_um, high_um = glass.range_um
+    return low_um <= float(WAVES_UM[0]) and high_um >= float(WAVES_UM[-1])
 
 
 def borne_out(apart: torch.Tensor) -> bool:
@@ -181,6 +187,7 @@ def borne_out(apart: torch.Tensor) -> bool:
 
 
 def main() -> None:
+    """Write the catalogues that were asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("database", type=Path, nargs="?")
     parser.add_argument("--classic", type=Path, help="table V, in the package opticalglass")
@@ -192,6 +199,7 @@ def main() -> None:
 
 
 def rewrite(database: Path) -> None:
+    """Write the makers' catalogues and that of the literature."""
     for maker, source in MAKERS.items():
         paths = sorted((database / "glass" / maker.lower()).rglob("*.yml"), key=lambda p: p.stem)
         rows = [row for path in paths if (row := entry(path, path.stem))]

@@ -1,6 +1,6 @@
 """The main job, end to end: photograph a scene with `duet`, process the DNG, show what it gained.
 
-    python tools/demo.py --out-dir out
+    python -m tools.demo --out-dir out
 
 leaves demo.dng, demo.exr, demo.png, their sidecars, and before_after.png.
 """
@@ -67,17 +67,17 @@ def main() -> None:
 
     plan = ("plan", str(capture), "--bundle", arguments.bundle)
     subprocess.run([sys.executable, "-m", "camkit", *plan], check=True)
-    for kind in ("exr", "png"):
-        _process(capture, arguments.bundle, out_dir, kind)
+    for suffix in ("exr", "png"):
+        _process(capture, arguments.bundle, out_dir, suffix)
     _show_quality(simulation, arguments.bundle, arguments.iso, out_dir / "before_after.png")
 
 
-def _process(capture: Path, bundle: str, out_dir: Path, kind: str) -> None:
+def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
     """Run the command in a process of its own, so that its memory is its own."""
-    print(f"{capture}: processing to {kind} ...", flush=True)
+    print(f"{capture}: processing to {suffix} ...", flush=True)
     command = [
         *(sys.executable, "-m", "camkit", "process", str(capture), "--bundle", bundle),
-        *("--out-dir", str(out_dir), "--format", kind, "--overwrite", "--json"),
+        *("--out-dir", str(out_dir), "--format", suffix, "--overwrite", "--json"),
     ]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
     result = json.loads(done.stdout or "{}")
@@ -139,7 +139,7 @@ def _seen(
 def _psnr(image: FloatArray, sharp: FloatArray) -> float:
     inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     error = float(np.mean((np.clip(image, 0, 1)[inside] - sharp[inside]) ** 2))
-    return -10 * np.log10(max(error, 1e-12))
+    return float(-10 * np.log10(max(error, 1e-12)))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,6 @@ from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.loop import DesignParts
 from camkit.models_def.design.recipe import DesignRecipe, read_design
-from camkit.models_def.design.score import DENSE_RAYS, at_lens
 from camkit.models_def.design.starts import Starts
 from camkit.models_def.optics.kernel_bank import ChannelResponse
 from camkit.models_def.optics.psf import with_object_distance
@@ -43,6 +42,7 @@ from camkit.models_def.optics.search.beam import LEAD
 from camkit.models_def.optics.search.problem import trace_batch
 from camkit.models_def.sensors.forward import blur
 from camkit.models_def.sensors.tone import encode_srgb
+from tools.design.score import DENSE_RAYS, at_lens
 
 LINE_UM: Final = 5e-4
 SPARE: Final = 1.2
@@ -72,6 +72,7 @@ class Spot:
 
 
 def main() -> None:
+    """Print a row for every place, and the means."""
     arguments = parse()
     torch.set_num_threads(1)
     rows = []
@@ -85,6 +86,7 @@ def main() -> None:
 
 
 def parse(given: list[str] | None = None) -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("lens", help="a lens within the bounds of the recipe: its name or file")
@@ -304,6 +306,7 @@ def psnr_db(one: Tensor, other: Tensor) -> float:
 
 
 def mean(rows: list[dict[str, float]], key: str) -> float:
+    """Give the mean of a column."""
     return sum(row[key] for row in rows) / len(rows)
 
 

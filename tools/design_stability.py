@@ -39,7 +39,6 @@ from camkit.models_def.design.front import Front
 from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.optics import LensModule
 from camkit.models_def.design.recipe import DesignRecipe, NetworkChoice, read_design, recipe_digest
-from camkit.models_def.design.score import score_design
 from camkit.models_def.design.starts import Starts, disturbed
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.paraxial import paraxial_data
@@ -49,7 +48,8 @@ from camkit.models_def.optics.search.problem import Problem, limits_of, trace_ba
 from camkit.models_def.optics.search.variables import Variable
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.report.journal import append_journal, read_journal
-from camkit.report.lens.stability_chart import Rules, Trial, best_trials, to_text, write_stability
+from tools.design.score import score_design
+from tools.design.stability_chart import Rules, Trial, best_trials, to_text, write_stability
 
 LEVELS: Final = (0.05, 0.1, 0.2, 0.5)
 FOCUS_MM: Final = 2.0
@@ -130,6 +130,7 @@ class Found:
 
 
 def main() -> None:
+    """Run what is missing of the trial and report it."""
     arguments = parse()
     torch.set_num_threads(1)
     bench = bench_of(arguments)
@@ -157,6 +158,7 @@ def main() -> None:
 
 
 def kept(bench: Bench, trial: Trial) -> Trial:
+    """Write a finished trial down and print it."""
     append_journal(bench.out_dir / "trials.jsonl", [asdict(trial)])
     print(
         f"{trial.number:2} {trial.arm:10} {100 * trial.level:.0f} % {trial.run}: "
@@ -169,6 +171,7 @@ def kept(bench: Bench, trial: Trial) -> Trial:
 
 
 def parse() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -193,6 +196,7 @@ def parse() -> argparse.Namespace:
 
 
 def bench_of(arguments: argparse.Namespace) -> Bench:
+    """Give what all trials share."""
     recipe = replace(read_design(arguments.recipe), network=NetworkChoice(config={}))
     if recipe.loss.needs_network and recipe.front.kind != "wiener":
         recipe = replace(recipe, front=Front(kind="wiener"))
@@ -240,6 +244,7 @@ def agreed_steps(bench: Bench, arguments: argparse.Namespace) -> int:
 
 
 def measured_steps(bench: Bench, minutes: float) -> int:
+    """Give the steps that fit into so many minutes of CPU, by a few of them."""
     plan = short(bench.recipe.schedule, WARM_STEPS + TIMED_STEPS)
     loop = DesignLoop(bench.parts("after", 0), replace(plan, valid_steps=TIMED_STEPS // 2))
     for _ in loop.run(WARM_STEPS):
@@ -251,14 +256,14 @@ def measured_steps(bench: Bench, minutes: float) -> int:
     return max(1, round(minutes * 60 * TIMED_STEPS / spent_s))
 
 
-def short(plan: DesignSchedule, steps: int) -> DesignSchedule:
+def short(schedule: DesignSchedule, steps: int) -> DesignSchedule:
     """Give a schedule of so many steps that decays and validates as often as the whole one."""
-    share = steps / plan.steps
+    share = steps / schedule.steps
     return replace(
-        plan,
+        schedule,
         steps=steps,
-        epoch_steps=max(1, round(plan.epoch_steps * share)),
-        valid_steps=max(1, round(plan.valid_steps * share)),
+        epoch_steps=max(1, round(schedule.epoch_steps * share)),
+        valid_steps=max(1, round(schedule.valid_steps * share)),
         hold_steps=0,
         freeze_share=0.0,
     )
@@ -282,14 +287,14 @@ def plain(recipe: DesignRecipe, solved: int, rate: float) -> DesignRecipe:
 
 def steady(recipe: DesignRecipe, solved: int, efl_mm: float) -> DesignRecipe:
     """Give a recipe with all that keeps a design from going astray, where it has not."""
-    optics, plan = recipe.optics, recipe.schedule
+    optics, schedule = recipe.optics, recipe.schedule
     return replace(
         recipe,
         variables=tuple(
             v for v in recipe.variables if (v.kind, v.surface) != ("curvature", solved)
         ),
         optics=replace(optics, efl_mm=efl_mm, rides=True, whiten=True, units="range"),
-        schedule=plan if optics.whiten else replace(plan, lens_rate=WHITENED_RATE),
+        schedule=schedule if optics.whiten else replace(schedule, lens_rate=WHITENED_RATE),
         starts=recipe.starts if recipe.starts.count else SPOTS_STARTS,
     )
 
@@ -300,6 +305,7 @@ def level_of(number: int) -> float:
 
 
 def to_trial(entry: Mapping[str, Any]) -> Trial:
+    """Read a trial from its line."""
     return Trial(**{**entry, "scaled": tuple(entry["scaled"])})
 
 
@@ -323,19 +329,19 @@ def to_the_end(bench: Bench, trial: Trial) -> Trial:
     parts = bench.parts(trial.arm, trial.number, search=False)
     recipe = bench.of_arm(trial.arm)
     given = torch.tensor(trial.scaled, dtype=torch.float64)
-    plan = short(recipe.schedule, recipe.schedule.steps)
-    scaled = descended(parts, parts.lens.problem, given, plan, whiten=recipe.optics.whiten)
+    schedule = short(recipe.schedule, recipe.schedule.steps)
+    scaled = descended(parts, parts.lens.problem, given, schedule, whiten=recipe.optics.whiten)
     cpu_s = time.process_time() - begin
     found = Found(arm=trial.arm, number=trial.number, run="end", cpu_s=cpu_s)
     return judged(bench, parts, scaled, found)
 
 
 def descended(
-    parts: DesignParts, problem: Problem, begin: Tensor, plan: DesignSchedule, *, whiten: bool
+    parts: DesignParts, problem: Problem, begin: Tensor, schedule: DesignSchedule, *, whiten: bool
 ) -> Tensor:
     """Give the best lens of a loop from `begin`, scaled."""
     lens = LensModule(problem, parts.lens.pixels, begin, whiten=whiten)
-    loop = DesignLoop(replace(parts, lens=lens), plan)
+    loop = DesignLoop(replace(parts, lens=lens), schedule)
     loop.judge()
     for _ in loop.run():
         pass

@@ -13,13 +13,14 @@ from pathlib import Path
 import torch
 
 from camkit.models_def.optics.prescription import write_prescription
-from camkit.models_def.optics.search.design import design
-from camkit.models_def.optics.search.recipe import read_recipe
+from tools.start.recipe import read_recipe
+from tools.start.search import design
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[1] / "models_def" / "prescriptions"
 
 
 def main() -> None:
+    """Search the lens and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("-o", "--output", type=Path)

@@ -5,7 +5,7 @@
 An edge of 4 : 1 (`--levels`) along the rows and one along the columns of the sensor are
 photographed through the bundle's PSF at five places between middle and corner and at every
 distance that the PSF knows, and processed as `camkit process` does it, in sensor geometry.
-Contrast is that of green against the sharp edge (ISO 12233, `camkit.models_def.design.edge`).
+Contrast is that of green against the sharp edge (ISO 12233, `tools.design.edge`).
 Writes `contrast.json` and `contrast.png`, and prints a Markdown table.
 """
 
@@ -24,7 +24,11 @@ from numpy.typing import NDArray
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import depth_name
-from camkit.models_def.design.edge import (
+from camkit.report.quality import FIELD_SHARES, crop_origin
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.simulate import SimulationOptions, simulate
+from tools.design.edge import (
     ACROSS,
     LEVELS,
     Across,
@@ -32,11 +36,7 @@ from camkit.models_def.design.edge import (
     edge_contrast,
     slanted_edge,
 )
-from camkit.report.lens.lens_table import MOST_CONTRAST, worst_of_curves
-from camkit.report.quality import FIELD_SHARES, crop_origin
-from camkit.runtime.options import Options
-from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.simulate import SimulationOptions, simulate
+from tools.design.table import MOST_CONTRAST, worst_of_curves
 
 Plane = NDArray[np.floating[Any]]
 

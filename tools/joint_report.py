@@ -1,6 +1,6 @@
 """Is a joint design better than the best lens that spots alone can find?
 
-    python tools/joint_report.py models_def/recipes/duet_joint_lens.toml --data PICTURES \
+    python -m tools.joint_report models_def/recipes/duet_joint_lens.toml --data PICTURES \
         --fresh OTHERS --out-dir out/joint
 
 Same start, same variables, same bounds. The lenses on spots, one a merit, are the best of descents
@@ -17,6 +17,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,6 @@ from camkit.models_def.design.recipe import (
     read_design,
     recipe_digest,
 )
-from camkit.models_def.design.score import at_lens, score_design
 from camkit.models_def.design.starts import Starts, traced_lenses
 from camkit.models_def.optics.lens_file.lens_file import find_lens, write_lens
 from camkit.models_def.optics.prescription import Surface
@@ -44,6 +44,7 @@ from camkit.models_def.optics.search.least_squares import descend, evaluations
 from camkit.models_def.optics.search.merit import MERITS, Merit
 from camkit.models_def.optics.search.problem import Problem, residuals
 from camkit.models_def.training.pictures import SceneSource, open_source
+from tools.design.score import at_lens, score_design
 
 Entry = dict[str, Any]
 
@@ -60,6 +61,7 @@ ASPHERE_TERMS = 8
 
 
 def main() -> None:
+    """Find the lenses, judge them and write the report."""
     arguments = parse()
     torch.set_num_threads(1)
     recipe = read_design(arguments.recipe)
@@ -79,7 +81,7 @@ def main() -> None:
     for merit in MERITS:
         lenses[f"spots {merit}"] = kept_lens(
             out / f"spots_{merit}.json",
-            lambda merit=merit: spots(parts, merit, core_mm(recipe.starts, merit), least),
+            partial(spots, parts, merit, core_mm(recipe.starts, merit), least),
         )
     lenses["joint"] = (
         given_lens(alone, parts, arguments.joint)
@@ -97,18 +99,19 @@ def main() -> None:
     for merit in MERITS:
         path = out / f"spots_{merit}_ends.json"
         ends = json.loads((out / f"spots_{merit}.json").read_text())
-        entry = kept(path, lambda ends=ends: judged_ends(parts, recipe, ends, fresh))
-        report["lenses"][f"spots {merit}"]["ends"] = entry
-        print(f"spots {merit}: ends of merit", *(f"{m:.3g}" for m in entry["merits"]))
+        ended = kept(path, partial(judged_ends, parts, recipe, ends, fresh))
+        report["lenses"][f"spots {merit}"]["ends"] = ended
+        print(f"spots {merit}: ends of merit", *(f"{m:.3g}" for m in ended["merits"]))
         print(
-            "    recovered by the front, dB", *(f"{db:.2f}" for db in entry["front_db"]), flush=True
+            "    recovered by the front, dB", *(f"{db:.2f}" for db in ended["front_db"]), flush=True
         )
     best = max((n for n in lenses if n.startswith("spots")), key=lambda n: front_db(report, n))
     judged = ("start", best, "joint") if judges.name else ()
     for seed, name in product(arguments.seeds, judged):
         entry = kept(
             network_file(out, name, seed),
-            lambda name=name, seed=seed: network_score(
+            partial(
+                network_score,
                 parts,
                 replace(recipe, network=judges),
                 lenses[name],
@@ -134,6 +137,7 @@ def judges_of(recipe: DesignRecipe, name: str | None) -> NetworkChoice:
 
 
 def parse() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("--data", type=Path, help="pictures to design and train on")
@@ -148,14 +152,17 @@ def parse() -> argparse.Namespace:
 
 
 def numbers(text: str) -> tuple[int, ...]:
+    """Read numbers with commas between."""
     return tuple(int(part) for part in text.split(","))
 
 
 def slug(name: str) -> str:
+    """Give a name as it stands in a file name."""
     return name.replace(" ", "_")
 
 
 def front_db(report: Entry, name: str) -> float:
+    """Give what the front alone reaches with a lens."""
     return float(report["lenses"][name]["front_db"])
 
 
@@ -171,12 +178,14 @@ def kept(path: Path, make: Callable[[], Entry]) -> Entry:
 
 
 def written(path: Path, text: str) -> None:
+    """Write a file that appears complete or not at all."""
     part = path.with_name(path.name + ".part")
     part.write_text(text)
     part.replace(path)
 
 
 def network_file(out: Path, name: str, seed: int | str) -> Path:
+    """Name the file of a trained network."""
     return out / f"{slug(name)}_network_{seed}.json"
 
 
@@ -224,6 +233,7 @@ def shape(surface: Surface) -> list[float]:
 
 
 def kept_lens(path: Path, make: Callable[[], Entry]) -> Tensor:
+    """Give the numbers of a lens from its file, or find it."""
     return torch.tensor(kept(path, make)["scaled"], dtype=torch.float64)
 
 
@@ -282,7 +292,8 @@ def in_batches(problem: Problem, begin: Tensor, steps: int) -> tuple[Tensor, Ten
     """Give (start, variable) descended lenses and their merits, best first."""
     held = problem.free.high <= problem.free.low
     ends = [
-        descend(lambda s: residuals(problem, s), part, steps, held) for part in begin.split(BATCH)
+        descend(lambda s: residuals(problem, s), part, steps, held)
+        for part in torch.split(begin, BATCH)
     ]
     merits = torch.cat([end.merits for end in ends])
     order = merits.nan_to_num(torch.inf).argsort()
@@ -328,6 +339,7 @@ def network_score(
 
 
 def line(name: str, entry: Entry) -> str:
+    """Give the line of a lens for people."""
     networks = [n["psnr_db"] for n in entry["networks"] if n]
     seen = f"{np.mean(networks):.2f} +- {np.std(networks):.2f}" if networks else "-"
     return f"{name:28} front {entry['front_db']:.2f} dB, network {seen} dB"

@@ -1,8 +1,8 @@
 """Measure what docs/results/measurements.md states, and print the tables as Markdown.
 
-python tools/measure.py speed CAPTURE.dng [--runs 3] [--sizes S,M]
-python tools/measure.py tiling [--bundle duet]
-python tools/measure.py raws FOLDER --out-dir out/raws
+python -m tools.measure speed CAPTURE.dng [--runs 3] [--sizes S,M]
+python -m tools.measure tiling [--bundle duet]
+python -m tools.measure raws FOLDER --out-dir out/raws
 """
 
 import argparse
@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -134,10 +135,11 @@ def measure_raws(arguments: argparse.Namespace) -> None:
         )
 
 
-def _camkit(*words: str) -> dict:
+def _camkit(*words: str) -> dict[str, Any]:
     command = [sys.executable, "-m", "camkit", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return json.loads(done.stdout) if done.stdout.strip() else {}
+    found: dict[str, Any] = json.loads(done.stdout) if done.stdout.strip() else {}
+    return found
 
 
 if __name__ == "__main__":

@@ -1,14 +1,14 @@
 """Calibrate what `--quality adaptive` may skip, and prove it on scenes it never saw.
 
-    python tools/plan_report.py calibrate --bundle duet --data DATA/train_open --out plan.json
-    python tools/plan_report.py calibrate ... --write camkit/bundles/duet.camkit
-    python tools/plan_report.py report --bundle duet --data DATA --out-dir out/plan
-    python tools/plan_report.py overhead --bundle duet
+    python -m tools.plan_report calibrate --bundle duet --data DATA/train_open --out plan.json
+    python -m tools.plan_report calibrate ... --write camkit/bundles/duet.camkit
+    python -m tools.plan_report report --bundle duet --data DATA --out-dir out/plan
+    python -m tools.plan_report overhead --bundle duet
 
 `calibrate` simulates captures of pictures and procedural scenes, measures per lattice cell what
 less than the exact result loses, fits the loss model and writes it as the manifest's `plan`:
 into a JSON file, which `camkit export --plan` takes, and with --write into a bundle.
-`report` measures saving and loss on the scenes of camkit/report/plan_scenes.py.
+`report` measures saving and loss on the scenes of tools/plan/scenes.py.
 """
 
 import argparse
@@ -25,15 +25,15 @@ from camkit.bundle.manifest import Threshold
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
-from camkit.report.plan_cells import CaptureCells, measure_cells, photograph, pipelines, start
-from camkit.report.plan_fit import Calibration, fit_model, saving_of_the_all_knowing
-from camkit.report.plan_scenes import GENERATORS, proof_scenes
 from camkit.report.quality import list_set, read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.loss import EXACT, plan_entries
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.tiers import TierWork
+from tools.plan.cells import CaptureCells, measure_cells, photograph, pipelines, start
+from tools.plan.fit import Calibration, fit_model, saving_of_the_all_knowing
+from tools.plan.scenes import GENERATORS, proof_scenes
 
 ISOS = (100.0, 400.0, 1600.0)
 SIDE_PX = 1280
@@ -129,7 +129,7 @@ def _work(bundle: Bundle) -> tuple[TierWork, str | None]:
     networks = bundle.manifest.networks
     full = bundle.network_facts(REFERENCE)
     below = [s for s in networks if networks[s].mac_per_pixel < full.mac_per_pixel]
-    small = min(below, key=lambda size: networks[size].mac_per_pixel) if below else None
+    small = min(below, key=lambda name: networks[name].mac_per_pixel, default=None)
     facts = None if small is None else bundle.network_facts(small)
     work = TierWork(
         full_mac=full.mac_per_pixel,
@@ -164,7 +164,7 @@ def _print_calibration(made: Calibration, captures: list[CaptureCells]) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from camkit.report.plan_proof import prove, write_report
+    from tools.plan.proof import prove, write_report
 
     bundle = open_bundle(find_bundle(options.bundle))
     subjects = tuple(name for name in options.kinds.split(",") if name)

@@ -1,6 +1,6 @@
 """How far the geometric PSF is from the wave PSF: the table of docs/results/lens.md.
 
-    python tools/psf_model_error.py
+    python -m tools.psf_model_error
 
 The Cooke triplet, closed down and defocused, on two pixel pitches; about 30 CPU seconds.
 """
@@ -26,6 +26,7 @@ FREQUENCIES = 26
 
 
 def main() -> None:
+    """Print the table."""
     lens = read_prescription(LENS)
     print("RMS / Airy   pitch, um   largest MTF difference")
     for diameter in DIAMETERS_MM:

@@ -1,7 +1,7 @@
 """Measure how well a bundle restores, beside classical methods, by a fixed protocol.
 
-    python tools/quality.py --tune --bundle duet --data DATA/valid_open
-    python tools/quality.py --bundle duet --data DATA/test --resume
+    python -m tools.quality --tune --bundle duet --data DATA/valid_open
+    python -m tools.quality --bundle duet --data DATA/test --resume
 
 writes the JSON (every measurement, all means) and the page beside it (docs/results/quality.*). What
 was measured lies in a journal in the work directory; `--resume` measures only what is missing there
@@ -28,10 +28,11 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.machine import processor_name
-from camkit.report.compact_json import to_compact_json
-from camkit.report.comparison import DEFAULT_METHODS, Rival, make_rows, protocol_text
 from camkit.report.fabricated_psf import fabricated_psf, lens_text
-from camkit.report.measurement import (
+from camkit.report.quality import FIELD_SHARES, Shot, list_set, read_picture
+from camkit.runtime.network.engine import available_threads
+from tools.comparison.compact_json import to_compact_json
+from tools.comparison.measurement import (
     CAPTURE_COLUMNS,
     COLUMNS,
     VALUE_COLUMNS,
@@ -45,19 +46,11 @@ from camkit.report.measurement import (
     open_rows,
     read_measurements,
 )
-from camkit.report.peers import PEERS
-from camkit.report.quality import (
-    FIELD_SHARES,
-    TUNING_SEED,
-    Exposed,
-    Shot,
-    expose,
-    list_set,
-    read_picture,
-)
-from camkit.report.quality_table import seconds_per_megapixel, summarise, to_markdown
-from camkit.report.tuning import at_edge, choose, try_peers, tuned_from_json, tuned_to_json
-from camkit.runtime.network.engine import available_threads
+from tools.comparison.peers import PEERS
+from tools.comparison.photograph import TUNING_SEED, Photograph, photograph
+from tools.comparison.quality_table import seconds_per_megapixel, summarise, to_markdown
+from tools.comparison.rows import DEFAULT_METHODS, Rival, make_rows, protocol_text
+from tools.comparison.tuning import at_edge, choose, try_peers, tuned_from_json, tuned_to_json
 
 TUNING_SIDE_PX = 272
 SIZES = ("S", "M", "L")
@@ -65,6 +58,7 @@ DIGITS, CAPTURE_DIGITS = 6, 4
 
 
 def main() -> None:
+    """Tune or compare."""
     arguments = parse_arguments()
     cv2.setNumThreads(1)
     try:
@@ -78,6 +72,7 @@ def main() -> None:
 
 
 def parse_arguments() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     add = parser.add_argument
     add("--bundle", required=True, help="name or path of the bundle")
@@ -101,7 +96,7 @@ def parse_arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Shot], Exposed]:
+def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Shot], Photograph]:
     """Give the function that photographs a shot; PSFs stay in memory."""
     tracing = threading.Lock()
 
@@ -118,19 +113,19 @@ def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Sho
         with tracing:
             return traced(seed)
 
-    def photograph(shot: Shot) -> Exposed:
+    def take(shot: Shot) -> Photograph:
         psf = bundle.psf
         if shot.psf == "fresh":
             psf = lens(TUNING_SEED if arguments.tune else shot.fabrication_seed)
         most_px = TUNING_SIDE_PX if arguments.tune else None
-        return expose(shot, read_picture(shot.picture, most_px), bundle, psf)
+        return photograph(shot, read_picture(shot.picture, most_px), bundle, psf)
 
-    return photograph
+    return take
 
 
 def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
     """Choose the parameters of the peers on development pictures, each at `--places` places."""
-    photograph = photographer(arguments, bundle)
+    take = photographer(arguments, bundle)
     pictures = list_set(arguments.data, arguments.per_set)
     peers = [name for name in chosen_methods(arguments, bundle) if name in PEERS]
     shots = [
@@ -149,7 +144,7 @@ def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
     trials = []
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=arguments.jobs) as pool:
-        tried = pool.map(lambda shot: try_peers(photograph(shot), bundle, peers), shots)
+        tried = pool.map(lambda shot: try_peers(take(shot), bundle, peers), shots)
         for number, found in enumerate(tried, start=1):
             trials += found
             print(
@@ -203,7 +198,7 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         m for m in read_measurements(journal) if (m.method, m.identity) in current
     )
     commands = earlier.get("commands", []) if arguments.resume else []
-    command = f"python {shlex.join(sys.argv)}"
+    command = f"python -m tools.quality {shlex.join(sys.argv[1:])}"
     names = [row.name for row in rows]
     report = {
         "commands": [*(c for c in commands if c != command), command],
@@ -235,9 +230,9 @@ def measure_missing(
     done = finished_rows(read_measurements(journal))
     work = [(shot, left) for shot in shots if (left := open_rows(shot, rows, done))]
     print(f"{len(shots)} captures, {len(work)} to do, {len(rows)} methods", flush=True)
-    photograph = photographer(arguments, bundle)
+    take = photographer(arguments, bundle)
     began = time.perf_counter()
-    finished = measure_all(work, photograph, jobs=arguments.jobs, limit_s=arguments.limit_seconds)
+    finished = measure_all(work, take, jobs=arguments.jobs, limit_s=arguments.limit_seconds)
     for number, found in enumerate(finished, start=1):
         append_measurements(journal, found)
         if number in (3, 10) or number % 25 == 0 or number == len(work):
@@ -247,11 +242,12 @@ def measure_missing(
 def chosen_methods(arguments: argparse.Namespace, bundle: Bundle) -> list[str]:
     """Give the methods asked for, or the usual ones and every size that the bundle holds."""
     if arguments.methods:
-        return arguments.methods.split(",")
+        return str(arguments.methods).split(",")
     return [*DEFAULT_METHODS, *(size for size in SIZES if size in bundle.manifest.networks)]
 
 
 def isos_of(arguments: argparse.Namespace) -> list[float]:
+    """Give the sensitivities that were asked for."""
     return [float(iso) for iso in arguments.isos.split(",")]
 
 
@@ -277,6 +273,7 @@ def list_shots(arguments: argparse.Namespace) -> list[Shot]:
 
 
 def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: float) -> None:
+    """Print how far a run is and what it costs."""
     left_min = elapsed_s / number * (count - number) / 60
     each = f"{elapsed_s / number:.2f} s ({time.process_time() / number:.2f} s of processor) each"
     costs = ", ".join(f"{m.method} {m.seconds:.2f}" for m in found)
@@ -285,6 +282,7 @@ def show_pace(found: list[Measurement], number: int, count: int, elapsed_s: floa
 
 
 def show_result(report: dict[str, Any]) -> None:
+    """Print the means."""
     for psf, summary in report["summary"].items():
         print(f"\n{psf}: " + json.dumps(summary["gain_of_m"]))
         for name, mean in summary["overall"].items():
@@ -292,7 +290,11 @@ def show_result(report: dict[str, Any]) -> None:
 
 
 def read_report(path: Path) -> dict[str, Any]:
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    """Read the report of an earlier run; empty without one."""
+    if not path.exists():
+        return {}
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
 
 
 def write_report(path: Path, report: dict[str, Any]) -> None:
@@ -309,6 +311,7 @@ def write_report(path: Path, report: dict[str, Any]) -> None:
 
 
 def write_csv(path: Path, measurements: Sequence[Measurement]) -> None:
+    """Write the measurements as a table."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)

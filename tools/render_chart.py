@@ -11,10 +11,12 @@ the peak resident size in a child process.
 
 import argparse
 import json
+import math
 import multiprocessing
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,7 +26,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.kernel_bank import gaussian_response, wavelength_grid
-from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_image, with_paraxial_focus
 from camkit.models_def.optics.psf import with_object_distance
 from camkit.models_def.optics.render.alignment import fit_alignment
@@ -40,9 +42,10 @@ HEIGHTS_MM: Final = (1.0, 5.0, 9.0, 13.0, 17.0)
 WIDEST_MM: Final = 18.0
 BLOCK_PX: Final = 12
 RESPONSE = gaussian_response(wavelength_grid(33))
-FOCUSED = with_paraxial_focus(
-    with_object_distance(read_lens(Path("models_def/prescriptions/duet.toml")), FOCUS_MM)
-)
+RAYS: Final = ((4, 1), (16, 1), (64, 1), (128, 1), (64, 4), (64, 10))
+DEPTHS: Final = (2, 3, 4, 6)
+MAP_RAYS: Final = 2048
+FOCUSED = with_paraxial_focus(with_object_distance(find_lens("duet"), FOCUS_MM))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,8 +65,15 @@ class Choice:
             wavelengths_um=wavelength_grid(self.waves) if self.waves > 1 else np.array([0.54]),
             kernel_px=(KERNEL_PX - 1) * self.oversample + 1,
             pitch_um=PITCH_UM / self.oversample,
-            rays=2048,
+            rays=MAP_RAYS,
         )
+
+
+MAPS: Final = (
+    *(Choice(fields=n) for n in (2, 3, 5, 9, 17)),
+    *(Choice(waves=n) for n in (1, 2, 3, 5, 9)),
+    Choice(oversample=2),
+)
 
 
 def windows(side_px: int) -> list[Window]:
@@ -108,6 +118,11 @@ def by_rays(seen: Subject, sampling: Sampling) -> Tensor:
     optics = lens_optics(with_object_distance(FOCUSED, seen.depth_mm))
     pairs = zip(seen.textures, seen.windows, strict=True)
     return torch.stack([render(t, optics, RESPONSE, w, sampling) for t, w in pairs])
+
+
+def untraced(seen: Subject, sampling: Sampling) -> tuple[Tensor, float]:
+    """Render all windows by rays, which need no tracing beforehand."""
+    return by_rays(seen, sampling), 0.0
 
 
 def by_map(seen: Subject, choice: Choice) -> tuple[Tensor, float]:
@@ -169,7 +184,7 @@ class Reference:
 
     def error(self, picture: Tensor) -> float:
         """Give the RMS error; the noise of the reference, which is independent, is taken off."""
-        return max(0.0, rms(picture - self.picture) ** 2 - self.noise**2) ** 0.5
+        return math.sqrt(max(0.0, rms(picture - self.picture) ** 2 - self.noise**2))
 
 
 def reference_of(seen: Subject, spp: int) -> Reference:
@@ -182,9 +197,8 @@ def reference_of(seen: Subject, spp: int) -> Reference:
 def rows_of_rays(seen: Subject, reference: Reference) -> list[dict[str, Any]]:
     """Measure renders by rays."""
     rows = []
-    for spp, passes in ((4, 1), (16, 1), (64, 1), (128, 1), (64, 4), (64, 10)):
-        sampling = Sampling(spp=spp, passes=passes, seed=1)
-        picture, cost = measured(lambda s=sampling: (by_rays(seen, s), 0.0))
+    for spp, passes in RAYS:
+        picture, cost = measured(partial(untraced, seen, Sampling(spp=spp, passes=passes, seed=1)))
         rows.append({"method": "rays", "spp": spp, "passes": passes, **cost})
         rows[-1]["error"] = reference.error(picture)
     return rows
@@ -193,19 +207,14 @@ def rows_of_rays(seen: Subject, reference: Reference) -> list[dict[str, Any]]:
 def rows_of_maps(seen: Subject, reference: Reference) -> list[dict[str, Any]]:
     """Measure renders by maps: at the focus over fields and wavelengths, else over depths."""
     near, depth_mm = FOCUS_MM / 2, seen.depth_mm
-    if depth_mm == FOCUS_MM:
-        choices = [
-            *(Choice(fields=n) for n in (2, 3, 5, 9, 17)),
-            *(Choice(waves=n) for n in (1, 2, 3, 5, 9)),
-            Choice(oversample=2),
-        ]
-    else:
-        sets = [1 / np.linspace(1 / near, 1 / FOCUS_MM, n) for n in (2, 3, 4, 6)]
+    choices = [*MAPS]
+    if depth_mm != FOCUS_MM:
+        sets = [1 / np.linspace(1 / near, 1 / FOCUS_MM, n) for n in DEPTHS]
         choices = [Choice(), *(Choice(depths_mm=tuple(map(float, some))) for some in sets)]
         choices.append(Choice(depths_mm=(depth_mm,)))
     rows = []
     for choice in choices:
-        picture, cost = measured(lambda c=choice: by_map(seen, c))
+        picture, cost = measured(partial(by_map, seen, choice))
         row = {
             "method": "map",
             "depth_mm": depth_mm,

@@ -1,10 +1,9 @@
 """Profile `camkit process`: where the time, the threads and the memory of one photograph go.
 
-python tools/stage_profile.py stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
-python tools/stage_profile.py layers [--bundle duet] [--size M] [--threads 2]
-python tools/stage_profile.py jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
-python tools/stage_profile.py sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
-python tools/stage_profile.py exr PICTURE.exr
+python -m tools.stage_profile stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
+python -m tools.stage_profile layers [--bundle duet] [--size M] [--threads 2]
+python -m tools.stage_profile jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
+python -m tools.stage_profile sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
 """
 
 import argparse
@@ -20,6 +19,7 @@ import time
 from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +38,9 @@ from camkit.runtime.pipeline import load
 from camkit.runtime.raw import file_sha256, read_capture
 
 TRANSFORMS = ("wiener", "network")
-SAMPLE_S = 0.02
+WATCH_S = 0.02
+SIDE_PX = 1024
+ACTIVATIONS = ("LeakyRelu", "Relu")
 
 
 def main() -> None:
@@ -57,8 +59,6 @@ def main() -> None:
     sizes = commands.add_parser("sizes")
     sizes.add_argument("--megapixels", default="24,100,400")
     sizes.add_argument("--max-mem", default="2G")
-    exr = commands.add_parser("exr")
-    exr.add_argument("picture", type=Path)
     for command in (stages, layers, jobs, sizes):
         command.add_argument("--bundle", default="duet")
         command.add_argument("--size", default="M")
@@ -69,12 +69,11 @@ def main() -> None:
         "layers": profile_layers,
         "jobs": profile_jobs,
         "sizes": profile_sizes,
-        "exr": profile_exr,
     }[arguments.command](arguments)
 
 
 @dataclass
-class Samples:
+class ThreadWatch:
     """What a thread beside the work sees of it, every 20 ms."""
 
     clock: StageClock
@@ -96,7 +95,7 @@ class Samples:
                 continue  # the thread has ended meanwhile
             self.cpu_s[int(task.name)] = spent / 1e9
 
-    def by_kind(self) -> dict[str, float]:
+    def by_thread(self) -> dict[str, float]:
         """Sum the CPU seconds of main thread, Python threads by name, and native threads."""
         found: dict[str, float] = defaultdict(float)
         for thread, seconds in self.cpu_s.items():
@@ -111,16 +110,18 @@ class Samples:
         return found
 
 
+def run_again(arguments: argparse.Namespace) -> str:
+    """Develop the capture once in a process of its own; give what it prints."""
+    script = [sys.executable, "-m", "tools.stage_profile", "stages", str(arguments.capture)]
+    script += ["--runs", "0", "--size", arguments.size, "--bundle", arguments.bundle]
+    script += ["--format", arguments.format]
+    script += [] if arguments.threads is None else ["--threads", str(arguments.threads)]
+    return subprocess.run(script, capture_output=True, text=True, check=True).stdout
+
+
 def profile_stages(arguments: argparse.Namespace) -> None:
     """Develop one capture in this process and say where wall, CPU and memory went."""
-    runs = []
-    for _ in range(arguments.runs):
-        script = [sys.executable, __file__, "stages", str(arguments.capture), "--runs", "0"]
-        script += ["--size", arguments.size, "--bundle", arguments.bundle]
-        script += ["--format", arguments.format]
-        script += [] if arguments.threads is None else ["--threads", str(arguments.threads)]
-        done = subprocess.run(script, capture_output=True, text=True, check=True)
-        runs.append(json.loads(done.stdout))
+    runs = [json.loads(run_again(arguments)) for _ in range(arguments.runs)]
     if not runs:
         print(json.dumps(_profile_once(arguments)))
         return
@@ -137,11 +138,11 @@ def profile_stages(arguments: argparse.Namespace) -> None:
     for key in ("all", "neither network nor FFT", "start", "peak MB"):
         print(f"| {key} | {statistics.median(run['total'][key] for run in runs):.2f} | | | |")
     print("\n| thread | CPU s |\n|---|---|")
-    for kind in sorted({k for run in runs for k in run["threads"]}):
-        print(f"| {kind} | {statistics.median(r['threads'].get(kind, 0.0) for r in runs):.2f} |")
+    for name in sorted({k for run in runs for k in run["threads"]}):
+        print(f"| {name} | {statistics.median(r['threads'].get(name, 0.0) for r in runs):.2f} |")
 
 
-def _profile_once(arguments: argparse.Namespace) -> dict:
+def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     began = time.perf_counter()
     pipeline = load(arguments.bundle, size=arguments.size, threads=arguments.threads)
     start_s = time.perf_counter() - began
@@ -151,11 +152,11 @@ def _profile_once(arguments: argparse.Namespace) -> dict:
     wall["decode"] = time.perf_counter() - began
     cpu["decode"] = _cpu_s() - began_cpu
     work = pipeline.start(capture)
-    samples, ended = Samples(work.clock), threading.Event()
+    seen, ended = ThreadWatch(work.clock), threading.Event()
 
     def watch() -> None:
-        while not ended.wait(SAMPLE_S):
-            samples.take()
+        while not ended.wait(WATCH_S):
+            seen.take()
 
     watcher = threading.Thread(target=watch, name="profile")
     watcher.start()
@@ -193,8 +194,8 @@ def _profile_once(arguments: argparse.Namespace) -> dict:
     return {
         "wall": wall,
         "cpu": cpu,
-        "rss_mb": samples.rss_mb,
-        "threads": samples.by_kind(),
+        "rss_mb": seen.rss_mb,
+        "threads": seen.by_thread(),
         "total": total,
     }
 
@@ -212,8 +213,8 @@ def profile_layers(arguments: argparse.Namespace) -> None:
 
     threads = available_threads(arguments.threads)
     data = open_bundle(find_bundle(arguments.bundle)).network_bytes(arguments.size)
-    side = 1024
-    macs = _macs_by_node(data, side)
+    side = SIDE_PX
+    all_macs, macs = _count_macs(data, side)
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.enable_mem_pattern = False
@@ -230,12 +231,12 @@ def profile_layers(arguments: argparse.Namespace) -> None:
             session.run(None, {"input": window})
         events = json.loads(Path(session.end_profiling()).read_text(encoding="utf-8"))
     times: dict[str, list[float]] = defaultdict(list)
-    kinds: dict[str, str] = {}
+    operators: dict[str, str] = {}
     for event in events:
         if event.get("cat") == "Node" and event["name"].endswith("_kernel_time"):
             name = event["name"].removesuffix("_kernel_time")
             times[name].append(event["dur"] / 1e6)
-            kinds[name] = event["args"].get("op_name", "")
+            operators[name] = event["args"].get("op_name", "")
     peak = gemm_peak_gmac_per_s(threads)
     medians = {name: statistics.median(spent[2:] or spent) for name, spent in times.items()}
     total = sum(medians.values())
@@ -247,9 +248,9 @@ def profile_layers(arguments: argparse.Namespace) -> None:
     for name, seconds in sorted(medians.items(), key=lambda item: -item[1]):
         mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
         speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
-        row = f"| {name} | {kinds[name]} | {seconds * 1e3:.1f} | {seconds / total:.1%} | {speed} |"
-        print(row)
-    done = sum(macs.values()) / total / 1e9
+        shown = f"{seconds * 1e3:.1f} | {seconds / total:.1%}"
+        print(f"| {name} | {operators[name]} | {shown} | {speed} |")
+    done = all_macs / total / 1e9
     print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
 
 
@@ -259,8 +260,11 @@ def _keys(name: str) -> tuple[str, ...]:
     return name, plain
 
 
-def _macs_by_node(data: bytes, side: int) -> dict[str, float]:
-    """Count the multiplications of every convolution on a square window."""
+def _count_macs(data: bytes, side: int) -> tuple[float, dict[str, float]]:
+    """Count the multiplications of all convolutions on a square window, and of each by name.
+
+    A convolution that is fused with the activation behind it runs under the name of that one.
+    """
     import onnx
 
     model = onnx.load_from_string(data)
@@ -274,18 +278,16 @@ def _macs_by_node(data: bytes, side: int) -> dict[str, float]:
         for value in (*inferred.graph.value_info, *inferred.graph.output)
     }
     weights = {tensor.name: list(tensor.dims) for tensor in model.graph.initializer}
-    macs = {}
+    made: dict[str, float] = {}
+    named: dict[str, float] = {}
     for node in model.graph.node:
         if node.op_type == "Conv" and node.input[1] in weights:
             _, depth, *kernel = weights[node.input[1]]
             size = float(np.prod(shapes[node.output[0]]) * depth * np.prod(kernel))
-            macs[node.name] = macs[node.output[0]] = size
-    # Each convolution is known by two names; only one of them may be summed.
-    return {
-        node.name or node.output[0]: macs[node.name]
-        for node in model.graph.node
-        if node.name in macs
-    }
+            made[node.output[0]] = named[node.name or node.output[0]] = size
+        elif node.op_type in ACTIVATIONS and node.input[0] in made:
+            named[node.name or node.output[0]] = made[node.input[0]]
+    return sum(made.values()), named
 
 
 def profile_jobs(arguments: argparse.Namespace) -> None:
@@ -342,10 +344,12 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
             command = [sys.executable, "-m", "camkit", "process", str(mosaic), "--json"]
             command += ["--bundle", str(large), "--size", arguments.size, "--format", "tiff"]
             command += ["--out-dir", str(Path(folder) / "out"), "--max-mem", arguments.max_mem]
-            command += ["--mosaic", camera.cfa, "--black-level", f"{camera.black_level:g}"]
+            command += ["--mosaic", str(camera.cfa), "--black-level", f"{camera.black_level:g}"]
             command += ["--white-level", f"{camera.white_level:g}"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
-            result = json.loads(done.stdout) if done.stdout.strip() else {"error": done.stderr}
+            result: dict[str, Any] = {"error": done.stderr}
+            if done.stdout.strip():
+                result = json.loads(done.stdout)
             if result.get("status") != "ok":
                 print(f"| {megapixels:g} | {width}x{height} | {result.get('error')} | | |")
                 continue
@@ -368,49 +372,6 @@ def _write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> Non
         update={"width_px": width, "height_px": height, "pixel_pitch_um": pitch_um}
     )
     write_bundle(path, bundle.manifest.model_copy(update={"camera": stretched}), members)
-
-
-def profile_exr(arguments: argparse.Namespace) -> None:
-    """Write rows of a real picture with every compression of EXR; time, size, time to read."""
-    import Imath
-    import OpenEXR
-
-    source = OpenEXR.InputFile(str(arguments.picture))
-    box = source.header()["dataWindow"]
-    width, rows = box.max.x - box.min.x + 1, 384
-    top = max(0, (box.max.y - rows) // 2)
-    half = Imath.PixelType(Imath.PixelType.HALF)
-    planes = {
-        name: np.frombuffer(source.channel(name, half, top, top + rows - 1), np.float16)
-        .reshape(rows, width)
-        .copy()
-        for name in "RGB"
-    }
-    print("| compression | CPU ms/MP | bytes/px | CPU ms/MP to read |\n|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "x.exr"
-        for name in ("NO", "RLE", "ZIPS", "ZIP", "PIZ", "DWAA"):
-            best, best_read = float("inf"), float("inf")
-            for _ in range(5):
-                header = OpenEXR.Header(width, rows)
-                packing = getattr(Imath.Compression, f"{name}_COMPRESSION")
-                header["compression"] = Imath.Compression(packing)
-                header["channels"] = {c: Imath.Channel(half) for c in "RGB"}
-                began = time.process_time()
-                out = OpenEXR.OutputFile(str(path), header)
-                out.writePixels(planes, rows)
-                out.close()
-                best = min(best, time.process_time() - began)
-                began = time.process_time()
-                written = OpenEXR.InputFile(str(path))
-                for channel in "RGB":
-                    written.channel(channel, half)
-                best_read = min(best_read, time.process_time() - began)
-            pixels = width * rows
-            print(
-                f"| {name} | {best * 1e9 / pixels:.0f} | {path.stat().st_size / pixels:.2f} | "
-                f"{best_read * 1e9 / pixels:.0f} |"
-            )
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ def camkit_runs(rays: int, *, aspheric: bool, compiled: bool) -> tuple[Run, Run]
         free.grad = None
         landed = trace(replace(lens, curvature_per_mm=free), beam, compiled=compiled)
         dx, dy = landed.x - landed.x.mean(), landed.y - landed.y.mean()
-        (dx**2 + dy**2).mean().backward()
+        (dx**2 + dy**2).mean().backward()  # type: ignore[no-untyped-call]
         return free.grad
 
     return forward, both

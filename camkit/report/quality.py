@@ -8,7 +8,6 @@ the border of `BORDER_PX` cut off.
 """
 
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -21,25 +20,14 @@ from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
-from camkit.report.peers import LocalCapture
-from camkit.runtime.bank.blocks import LocalPsf
-from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.capture import Capture
-from camkit.runtime.color import recover_highlights
 from camkit.runtime.files.picture import read_scene
-from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.geometry.sensor_window import centred_origin
-from camkit.runtime.options import Method, Options
-from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.signal.front_rows import FrontRows
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
 
-PROTOCOL_VERSION: Final = 1
 FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Places from centred on the axis to touching the sensor's corner, as shares of that way."""
 QUADRANTS: Final = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 FABRICATION_SEEDS: Final = (2001, 2002, 2003)
-TUNING_SEED: Final = 2004
 BORDER_PX: Final = 32
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
@@ -86,17 +74,10 @@ class Exposed:
     Attributes:
         simulation: Mosaic and place.
         sharp: (3, h, w) float32 sRGB values of the sharp picture in sensor geometry.
-        local: The developed planes for methods that are not of the bundle.
     """
 
     simulation: Simulation
     sharp: FloatArray
-    local: LocalCapture
-
-    @property
-    def height_mm(self) -> float:
-        """Give the distance of the crop's middle from the axis."""
-        return float(np.hypot(*self.simulation.window.centre_mm))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,9 +86,6 @@ class Score:
 
     psnr_db: float
     ssim: float
-
-
-Restorer = Callable[[Exposed], FloatArray]
 
 
 def list_set(folder: Path, count: int | None = None) -> tuple[Path, ...]:
@@ -176,7 +154,6 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Ex
     return Exposed(
         simulation=simulation,
         sharp=encode_srgb(apply_matrix(matrix, simulation.clean)),
-        local=_develop(simulation, bundle),
     )
 
 
@@ -190,45 +167,6 @@ def read_picture(path: Path, most_px: int | None = None) -> FloatArray:
     return np.ascontiguousarray(scene)
 
 
-def finish_planes(planes: FloatArray, exposed: Exposed, bundle: Bundle) -> FloatArray:
-    """Give linear Rec.709 of white-balanced camera planes, vignetting divided out.
-
-    These are the last stages of the pipeline, for planes that a foreign method restored.
-    """
-    raised = recover_highlights(planes, exposed.simulation.white_balance)
-    even = divide_illumination(raised, 0, bundle.psf, exposed.simulation.window)
-    color_matrix = np.array(bundle.manifest.camera.color_matrix, dtype=np.float64)
-    return apply_matrix(rec709_from_camera(color_matrix), even)
-
-
-def bundle_restorer(bundle: Bundle, *, method: Method = "net", size: str = "M") -> Restorer:
-    """Give a restoration of the bundle's pipeline, in sensor geometry, on one thread.
-
-    Args:
-        bundle: The camera.
-        method: The network, the Wiener bank or another classical method on its blocks.
-        size: Of the network.
-
-    Raises:
-        ContractError: If the bundle lacks the size.
-    """
-    pipeline = Pipeline(
-        bundle, Options(method=method, size=size, undistort=False, vignetting=True, threads=1)
-    )
-
-    def restore(exposed: Exposed) -> FloatArray:
-        simulation = exposed.simulation
-        x, y = (int(v) for v in simulation.window.origin_px)
-        return pipeline.process_array(
-            simulation.mosaic,
-            iso=simulation.iso,
-            white_balance=simulation.white_balance,
-            origin_px=(x, y),
-        )
-
-    return restore
-
-
 def judge(restored: FloatArray, sharp: FloatArray) -> Score:
     """Compare a restoration with the sharp picture.
 
@@ -238,7 +176,7 @@ def judge(restored: FloatArray, sharp: FloatArray) -> Score:
 
     References: Wang et al. 2004 (SSIM with Gaussian weights of sigma 1.5).
     """
-    truth, got = _inner_srgb(restored, sharp)
+    truth, got = inner_srgb(restored, sharp)
     ssim = structural_similarity(
         truth,
         got,
@@ -248,46 +186,19 @@ def judge(restored: FloatArray, sharp: FloatArray) -> Score:
         sigma=1.5,
         use_sample_covariance=False,
     )
-    return Score(psnr_db=_psnr(truth, got), ssim=float(ssim))
+    return Score(psnr_db=psnr(truth, got), ssim=float(ssim))
 
 
-def psnr(restored: FloatArray, sharp: FloatArray) -> float:
-    """Give the PSNR of `judge` alone, in a tenth of its time."""
-    return _psnr(*_inner_srgb(restored, sharp))
-
-
-def _inner_srgb(restored: FloatArray, sharp: FloatArray) -> tuple[FloatGrid, FloatGrid]:
+def inner_srgb(restored: FloatArray, sharp: FloatArray) -> tuple[FloatGrid, FloatGrid]:
     """Give truth and restoration as (h, w, 3) sRGB values without the border."""
     inside = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
     truth = sharp[inside].transpose(1, 2, 0).astype(np.float64)
     return truth, encode_srgb(restored[inside]).transpose(1, 2, 0).astype(np.float64)
 
 
-def _psnr(truth: FloatGrid, got: FloatGrid) -> float:
+def psnr(truth: FloatGrid, got: FloatGrid) -> float:
+    """Give the PSNR in dB of values up to 1."""
     # equal pictures would be infinitely good, which no mean survives
     if (truth == got).all():
         return 120.0
     return float(peak_signal_noise_ratio(truth, got, data_range=1.0))
-
-
-def _develop(simulation: Simulation, bundle: Bundle) -> LocalCapture:
-    camera = bundle.manifest.camera
-    x, y = (int(v) for v in simulation.window.origin_px)
-    capture: Capture = Pipeline(bundle, Options(method="wiener", threads=1)).capture_of(
-        simulation.mosaic,
-        iso=simulation.iso,
-        white_balance=simulation.white_balance,
-        origin_px=(x, y),
-    )
-    front = FrontRows(capture, simulation.white_balance, method="fast", repair=True)
-    saturated: NDArray[np.bool_] = capture.saturated_rows(0, capture.height)
-    return LocalCapture(
-        planes=front.read(0, capture.height),
-        psf=LocalPsf(
-            kernels=color_kernels(bundle.psf, *camera.channel_response.to_arrays()),
-            field_heights_mm=bundle.psf.field_heights_mm,
-            window=simulation.window,
-        ),
-        noise=camera.noise_at(simulation.iso).with_gains(simulation.white_balance),
-        saturated=saturated if saturated.any() else None,
-    )

@@ -6,15 +6,13 @@
 
 - `recipe`: a joint design as TOML
 - `starts`: where a design begins: the best of many starts
+- `lens`: what a loop asks of its lens
 - `optics`: the lens as a torch module: free numbers, kernels over fields and depths
 - `front`: what stands between sensor and network
 - `sensor`: sharp patches blurred and recorded
 - `similarity`: SSIM with gradients
 - `loss`: eq. (6.15) and (6.16) of the thesis, and the loss of a recovered picture
 - `loop`: the training loop: parameter groups, decay, hold and freeze, the best lens kept, resume
-- `rest`: any lens file in the place of a free lens, set to work and traced once
-- `edge`: slanted edges and their contrast
-- `score`: a lens and its network judged on fresh pictures and edges
 - `assembly`: a recipe turned into the parts of a loop
 - `tolerance`: what fabrication costs after recovery
 - `run`: a loop with its files: checkpoint, log, the lens

@@ -8,6 +8,7 @@ from torch import Tensor, nn
 
 from camkit.errors import ContractError
 from camkit.models_def.design.fabrication import Copy, made_with
+from camkit.models_def.design.lens import DesignLens
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.search.least_squares import jacobian
 from camkit.models_def.optics.search.problem import Problem, limits_of, residuals, trace_batch
@@ -42,7 +43,7 @@ class _Bounded(torch.autograd.Function):
         return torch.where(outward, 0.0, slope)
 
 
-class LensModule(nn.Module):
+class LensModule(DesignLens):
     """A lens with free numbers.
 
     The parameter `moves` is 0 for the lens as it began. With `whiten` one unit of any of its
@@ -54,7 +55,6 @@ class LensModule(nn.Module):
         pixels: The sensor.
     """
 
-    begin: Tensor
     basis: Tensor
 
     def __init__(

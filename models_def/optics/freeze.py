@@ -43,7 +43,7 @@ __all__ = [
     "FreezeReport",
     "Frozen",
     "choose_blocks",
-    "choose_samples",
+    "choose_grid",
     "freeze",
     "freeze_at",
     "freeze_prescription",
@@ -113,7 +113,7 @@ class FreezeReport:
         return {k: round(v, 5) if isinstance(v, float) else v for k, v in facts.items()}
 
 
-def choose_samples(
+def choose_grid(
     lens: Lens,
     camera: Camera,
     bench: Bench,
@@ -246,7 +246,7 @@ def freeze_prescription(
     wanted = grid or FreezeGrid()
     tell(f"tracing {lens.name} and its copies")
     bench = make_bench(lens, camera, chosen, grid=wanted)
-    frozen, loss = choose_samples(lens, camera, bench, limit_db=limit_db, grid=grid, tell=tell)
+    frozen, loss = choose_grid(lens, camera, bench, limit_db=limit_db, grid=grid, tell=tell)
     blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db, tell=tell)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape

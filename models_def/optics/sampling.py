@@ -87,7 +87,7 @@ class Bench:
         return self.nominal.field_heights_mm[1:]
 
 
-def sample_heights(corner_mm: float, places: int) -> FloatGrid:
+def ring_heights(corner_mm: float, places: int) -> FloatGrid:
     """Give heights (place,) in the middle of rings of equal area."""
     return np.asarray(corner_mm * np.sqrt((np.arange(places) + 0.5) / places))
 
@@ -114,7 +114,7 @@ def make_bench(
     """
     frozen = grid or FreezeGrid()
     depths = frozen.depths_mm or (lens.object_distance_mm,)
-    places = sample_heights(corner_height_mm(camera), PLACES)
+    places = ring_heights(corner_height_mm(camera), PLACES)
     heights = np.concatenate([np.zeros(1), places])
     true_grid = FreezeGrid(
         wavelengths=TRUE_WAVELENGTHS,

@@ -15,7 +15,7 @@ from camkit.runtime.options import Options, flag_of
 from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.stage_finder import methods_of, stage_module
 
-GENERAL: Final = frozenset({"assume", "max_mem_bytes", "threads", "method"})
+GENERAL: Final = frozenset({"assume", "max_mem_bytes", "threads", "method", "unit"})
 
 
 def check_choices(bundle: Bundle | None, options: Options) -> None:
@@ -23,7 +23,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
 
     Raises:
         ContractError: If no stage has the method asked for, an option that was given means nothing
-            to any stage, or the PSF does not reach the depth.
+            to any stage, the unit is of another bundle, or the PSF does not reach the depth.
     """
     stages = DEVELOPMENT if bundle is None else bundle.manifest.stages
     known = GENERAL.union(*(stage_module(stage.type).OPTIONS for stage in stages))
@@ -40,6 +40,8 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
         raise ContractError(
             f"method must be one of {', '.join(methods)} {where}; got {options.method!r}"
         )
+    if options.unit is not None:
+        options.unit.check(bundle)
     if options.depth_m is not None and bundle is not None:
         assert bundle.manifest.stage(Wiener) is not None  # only a bank knows of depths
         depth_weights(bundle.psf.depths_mm, options.depth_mm)

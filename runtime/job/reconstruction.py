@@ -23,8 +23,9 @@ from camkit.runtime.job.setup import DEVELOPMENT, Setup
 from camkit.runtime.job.walker import Walk
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
+from camkit.runtime.output.origin import Origin
 from camkit.runtime.plan.decision import DEVELOP, Case, Labels, Work
-from camkit.runtime.plan.estimate import Estimate, estimate_seconds
+from camkit.runtime.plan.estimate import Estimate, estimate_seconds, stage_seconds
 from camkit.runtime.plan.planner import Plan, make_plan, needs_scene
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import without_networks
@@ -117,6 +118,22 @@ class Reconstruction:
         if self.job.color is None:
             raise ContractError("no stage of this camera gives a picture in colour")
         return self.job.color
+
+    @property
+    def origin(self) -> Origin:
+        """Give what every writer should know of where the products come from."""
+        capture, bundle = self.capture, self._setup.bundle
+        return Origin(
+            camera=capture.camera,
+            iso=capture.iso,
+            exposure_time_s=capture.exposure_time_s,
+            orientation=capture.orientation,
+            white_balance=self.white_balance,
+            color_matrix=capture.color_matrix,
+            bundle=None if bundle is None else bundle.manifest.name,
+            bundle_sha256=None if bundle is None else bundle.sha256,
+            unit=self._setup.options.unit,
+        )
 
     @property
     def size(self) -> str | None:
@@ -216,6 +233,9 @@ class Reconstruction:
         speed = self._setup.speed(made.sizes())
         self.record["decisions"] = [decision.to_json() for decision in made.decisions(speed)]
         window_mp = {role: windows.window_mp() for role, windows in self.windows.items()}
+        taken = stage_seconds(made.case, made.work, speed, window_mp or None)
+        for stage, expected_s in zip(self.record["stages"].values(), taken, strict=True):
+            stage["expected_s"] = round(expected_s, 4)
         estimate = Estimate(
             seconds=estimate_seconds(made.case, made.work, speed, window_mp or None),
             peak_mb=self._walk.needed_bytes() / 1e6,

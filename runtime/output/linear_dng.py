@@ -7,7 +7,6 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.capture import Capture
 from camkit.runtime.output.dng import DngTags, write_linear_dng
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
 
@@ -23,16 +22,13 @@ class LinearDngWriter(PictureWriter):
         self,
         path: Path,
         picture: PictureFormat,
-        capture: Capture,
-        white_balance: tuple[float, ...],
     ) -> None:
         """Open the writer.
 
         Args:
             path: The file.
-            picture: Its format: colour "camera", orientation 1 (the tag tells the viewer).
-            capture: Where orientation, ISO, exposure time and colour matrix come from.
-            white_balance: Gains (R, G, B) in the bands.
+            picture: Its format: colour "camera", orientation 1 (the tag tells the viewer); its
+                origin gives the tags, and the gains that are divided out.
 
         Raises:
             ContractError: If the bands are not upright camera colour.
@@ -40,18 +36,19 @@ class LinearDngWriter(PictureWriter):
         super().__init__(path, picture)
         if picture.color.space != "camera" or picture.orientation != 1:
             raise ContractError("a DNG takes upright camera RGB; choose --color camera")
-        self._gains = white_balance
-        red, green, blue = white_balance
+        origin = picture.origin
+        self._gains = origin.white_balance
+        red, green, blue = origin.white_balance
         self._tags = DngTags(
             cfa=None,
             black=BLACK,
             white=WHITE,
-            color_matrix=capture.color_matrix,
+            color_matrix=origin.color_matrix,
             as_shot_neutral=(1 / red, 1 / green, 1 / blue),
-            camera_model=capture.camera or "camkit",
-            iso=capture.iso,
-            exposure_time_s=capture.exposure_time_s,
-            orientation=capture.orientation,
+            camera_model=origin.camera or "camkit",
+            iso=origin.iso,
+            exposure_time_s=origin.exposure_time_s,
+            orientation=origin.orientation,
         )
         self._planes = np.empty((3, picture.height, picture.width), dtype=np.uint16)
         self._stored = 0

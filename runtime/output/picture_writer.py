@@ -5,7 +5,7 @@ must be turned is held until it is whole.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Self, final
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import ColorStage
+from camkit.runtime.output.origin import Origin
 
 Tone = Literal["srgb", "linear"]
 Codes = NDArray[Any]
@@ -32,6 +33,7 @@ class PictureFormat:
         color: What the numbers mean.
         orientation: EXIF orientation 1..8; the pixels are turned so that the file needs none.
         tone: Curve of TIFF and PNG.
+        origin: Where the picture comes from.
     """
 
     width: int
@@ -39,6 +41,7 @@ class PictureFormat:
     color: ColorStage
     orientation: int = UPRIGHT
     tone: Tone = "srgb"
+    origin: Origin = field(default_factory=Origin)
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.height < 1:

@@ -1,37 +1,66 @@
-"""Opens the writer of a format."""
+"""Opens the writer of a product in a format."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
+from camkit.bundle.golden import IMAGE
 from camkit.errors import ContractError
 from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
 
-PictureKind = Literal["exr", "tiff", "png"]
 SUFFIXES: Final = {"exr": "exr", "tiff": "tif", "png": "png", "dng": "dng"}
+Open = Callable[[Path, PictureFormat], PictureWriter]
 
 
-def open_writer(path: Path, kind: PictureKind, picture: PictureFormat) -> PictureWriter:
-    """Open a picture for writing, best as a context.
+def _exr(path: Path, picture: PictureFormat) -> PictureWriter:
+    from camkit.runtime.output.exr import ExrWriter
+
+    return ExrWriter(path, picture)
+
+
+def _tiff(path: Path, picture: PictureFormat) -> PictureWriter:
+    from camkit.runtime.output.tiff import TiffWriter
+
+    return TiffWriter(path, picture)
+
+
+def _png(path: Path, picture: PictureFormat) -> PictureWriter:
+    from camkit.runtime.output.png import PngWriter
+
+    return PngWriter(path, picture)
+
+
+def _dng(path: Path, picture: PictureFormat) -> PictureWriter:
+    from camkit.runtime.output.linear_dng import LinearDngWriter
+
+    return LinearDngWriter(path, picture)
+
+
+WRITERS: Final[dict[str, dict[str, Open]]] = {
+    IMAGE: {"exr": _exr, "tiff": _tiff, "png": _png, "dng": _dng},
+}
+"""Product -> format -> what opens its writer."""
+
+
+def open_writer(
+    path: Path, format_: str, picture: PictureFormat, *, product: str = IMAGE
+) -> PictureWriter:
+    """Open a product for writing, best as a context.
 
     Args:
         path: The file, usually the `.part` of `atomic_output`.
-        kind: "exr" (linear), "tiff" or "png" (16 bits, tone of the format). A DNG needs more than
-            a format: see `linear_dng`.
-        picture: Size, colour, orientation and tone.
+        format_: exr (linear), tiff or png (16 bits, tone of the format), or dng (camera colour).
+        picture: Size, colour, orientation, tone and origin.
+        product: What is written.
 
     Raises:
-        ContractError: If the format is unknown.
+        ContractError: If nothing writes the product, or not in this format.
     """
-    if kind == "exr":
-        from camkit.runtime.output.exr import ExrWriter
-
-        return ExrWriter(path, picture)
-    if kind == "tiff":
-        from camkit.runtime.output.tiff import TiffWriter
-
-        return TiffWriter(path, picture)
-    if kind == "png":
-        from camkit.runtime.output.png import PngWriter
-
-        return PngWriter(path, picture)
-    raise ContractError(f"format must be exr, tiff or png; got {kind!r}")
+    formats = WRITERS.get(product)
+    if formats is None:
+        raise ContractError(f"nothing writes {product!r}; there are {', '.join(WRITERS)}")
+    if format_ not in formats:
+        raise ContractError(
+            f"format must be one of {', '.join(formats)} for {product}; got {format_!r}"
+        )
+    return formats[format_](path, picture)

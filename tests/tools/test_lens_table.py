@@ -1,13 +1,12 @@
 """tools/lens_table.py on two lenses and two steps: table, picture, journal."""
 
-import importlib.util
 import json
-import sys
 from pathlib import Path
 
 import pytest
 
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "lens_table.py"
+from tests.tiny_design import run_tool
+
 RECIPE = """
 name = "strip"
 prescription = "duet"
@@ -32,18 +31,6 @@ scene_px = 128
 """
 
 
-def _call(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    spec = importlib.util.spec_from_file_location("lens_table", TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    # its dataclass looks its module up
-    monkeypatch.setitem(sys.modules, "lens_table", module)
-    spec.loader.exec_module(module)
-    monkeypatch.setattr("sys.argv", [str(TOOL), *map(str, arguments)])
-    return int(module.main())
-
-
 def test_table_has_every_lens_and_depth_and_a_second_run_measures_nothing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -51,7 +38,7 @@ def test_table_has_every_lens_and_depth_and_a_second_run_measures_nothing(
     recipe.write_text(RECIPE, encoding="utf-8")
     options = [recipe, "--lens", "duet", "doublet=aca254-050-a", "--seeds", 1, "--out-dir", out]
     options += ["--largest-kernel-px", 33, "--patches", 1, "--depths-mm", "700,1000"]
-    assert _call(monkeypatch, *options) == 0
+    assert run_tool(monkeypatch, "lens_table", *options) == 0
     report = json.loads((out / "lens_table.json").read_text(encoding="utf-8"))
     assert list(report["lenses"]) == ["duet", "doublet"]
     assert report["depths_mm"] == [700.0, 1000.0]
@@ -67,7 +54,7 @@ def test_table_has_every_lens_and_depth_and_a_second_run_measures_nothing(
     assert "| lens | 700 mm | 1000 mm | spread |" in table
     journal = (out / "journal.jsonl").read_text(encoding="utf-8")
     assert len(journal.splitlines()) == 4
-    assert _call(monkeypatch, *options) == 0
+    assert run_tool(monkeypatch, "lens_table", *options) == 0
     assert (out / "journal.jsonl").read_text(encoding="utf-8") == journal
     assert (out / "lens_table.md").read_text(encoding="utf-8") == table
 
@@ -79,7 +66,7 @@ def test_two_lenses_of_one_name_are_refused(
     recipe.write_text(RECIPE, encoding="utf-8")
     options = [recipe, "--lens", "a/lens.toml", "b/lens.toml", "--out-dir", tmp_path]
     with pytest.raises(SystemExit, match="two lenses are called lens"):
-        _call(monkeypatch, *options)
+        run_tool(monkeypatch, "lens_table", *options)
 
 
 def test_a_wider_margin_gives_the_filter_all_of_a_wide_kernel(
@@ -93,7 +80,7 @@ def test_a_wider_margin_gives_the_filter_all_of_a_wide_kernel(
         options = [recipe, "--lens", "aca254-050-a", "--seeds", 1, "--out-dir", out]
         options += ["--front", "wiener", "--filter-margin-px", margin]
         options += ["--largest-kernel-px", 33, "--patches", 1]
-        assert _call(monkeypatch, *options) == 0
+        assert run_tool(monkeypatch, "lens_table", *options) == 0
         report = json.loads((out / "lens_table.json").read_text(encoding="utf-8"))
         assert report["recovered_px"] == 24 + 2 * margin
         pages[margin] = (out / "lens_table.md").read_text(encoding="utf-8")

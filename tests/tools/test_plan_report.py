@@ -1,9 +1,9 @@
 """tools/plan_report.py on a tiny bundle: calibration, proof and overhead, each by its command."""
 
-import importlib.util
 import json
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -13,8 +13,7 @@ import pytest
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.runtime.plan.loss import read_loss_model
 from tests.plan_factory import HEIGHT_PX, WIDTH_PX, half_textured_mosaic, write_planned_bundle
-
-TOOL = Path(__file__).resolve().parents[2] / "tools" / "plan_report.py"
+from tests.tiny_design import run_tool
 
 
 @pytest.fixture(scope="module")
@@ -25,17 +24,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 @pytest.fixture
 def tool(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
     """Run the tool in this process."""
-    spec = importlib.util.spec_from_file_location("plan_report", TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-
-    def call(*arguments: object) -> int:
-        monkeypatch.setattr("sys.argv", [str(TOOL), *map(str, arguments)])
-        return int(module.main())
-
-    return call
+    return partial(run_tool, monkeypatch, "plan_report")
 
 
 def test_calibrate_writes_one_plan_into_a_file_and_into_a_bundle(

@@ -19,7 +19,8 @@ def process(
         typer.Option(help="Bundle NAME or PATH; 'none' only develops. Default: the file's own."),
     ] = None,
     size: Annotated[
-        str | None, typer.Option(help="Size of the network: S, M or L. Default: the quality's.")
+        str | None,
+        typer.Option(help="Size of network, such as S, M, L. Default: the quality's."),
     ] = None,
     quality: Quality = "exact",
     max_seconds: MaxSeconds = None,
@@ -43,8 +44,14 @@ def process(
     black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
     white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
     depth_m: DepthM = None,
-    method: Annotated[str, typer.Option(help="net, wiener, rl or admm-tv.")] = "net",
+    method: Annotated[
+        str | None,
+        typer.Option(help="Way of a stage: net, wiener, rl, admm-tv, develop. Default: the best."),
+    ] = None,
     mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",
+    unit: Annotated[
+        Path | None, typer.Option(help="The camera body: a TOML with the bundle's sha256.")
+    ] = None,
     assume: Annotated[
         str | None, typer.Option(help="centre or scale, for a picture that is no full frame.")
     ] = None,
@@ -70,6 +77,7 @@ def process(
     from camkit.runtime.batch import process as run
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options, parse_memory
+    from camkit.runtime.unit import read_unit
 
     options = Options(
         size=size,
@@ -77,7 +85,7 @@ def process(
         max_seconds=max_seconds,
         max_error_db=max_error_db,
         depth_m=depth_m,
-        method=method,  # type: ignore[arg-type]  # checked by Options
+        method=method,
         mode=mode,  # type: ignore[arg-type]
         demosaic=demosaic,  # type: ignore[arg-type]
         color=color,  # type: ignore[arg-type]
@@ -89,6 +97,7 @@ def process(
         on_unsafe=on_unsafe,  # type: ignore[arg-type]
         max_mem_bytes=None if max_mem is None else parse_memory(max_mem),
         threads=threads,
+        unit=None if unit is None else read_unit(unit),
     )
     write = WriteOptions(
         out_dir=out_dir,

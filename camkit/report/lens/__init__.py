@@ -10,8 +10,6 @@ seidel_chart   third-order sums by surface
 figure         a chart as SVG and PNG
 design_picture a moment of a joint design
 yield_chart    fabricated copies: yield, classes of errors, table and JSON
-stability_chart success of designs against how far off their starts were
-lens_table     lenses compared after recovery
 page           the HTML page, complete in itself
 output         all files written
 """

@@ -8,8 +8,6 @@
 - `least_squares`: damped least squares on a batch of starts
 - `finish`: a found lens made into a prescription
 - `splat`: PSFs of a batch in the colours of a sensor
-- `recipe`: a search within ranges, as TOML
-- `design`: the best of many random starts within the ranges of a recipe
 - `improvement`: a given lens made better
 - `own_frame`: its vignetting, and limits no stricter than it keeps
 """

@@ -1,4 +1,4 @@
-"""A found lens made into a prescription: apertures that pass its light, numbers of a drawing."""
+"""A found lens made into a prescription: apertures that pass its light."""
 
 from dataclasses import replace
 from typing import Final
@@ -36,20 +36,3 @@ def finished(problem: Problem, scaled: Tensor) -> Lens:
             )
         surfaces.append(replace(surface, semi_diameter_mm=semi_mm))
     return replace(lens, surfaces=tuple(surfaces))
-
-
-def with_rounded_numbers(lens: Lens) -> Lens:
-    """Give the lens as a drawing would state it: 0.1 um, conics to 4 places, terms to 6 digits."""
-    return replace(
-        lens,
-        surfaces=tuple(
-            replace(
-                s,
-                curvature_per_mm=1 / round(s.radius_mm, 4) if s.curvature_per_mm else 0.0,
-                thickness_mm=round(s.thickness_mm, 4),
-                conic=round(s.conic, 4),
-                even_asphere=tuple(float(f"{a:.6g}") for a in s.even_asphere),
-            )
-            for s in lens.surfaces
-        ),
-    )

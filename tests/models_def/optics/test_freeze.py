@@ -118,9 +118,7 @@ def test_loss_that_no_grid_can_keep_is_an_error(
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     with pytest.raises(ContractError, match="more than the allowed"):
-        freeze_module.choose_samples(
-            read_prescription(DUET), camera, bench, limit_db=1e-4, grid=SMALL
-        )
+        freeze_module.choose_grid(read_prescription(DUET), camera, bench, limit_db=1e-4, grid=SMALL)
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.pupil import half_disc
-from camkit.models_def.optics.search.design import design
-from camkit.models_def.optics.search.recipe import read_recipe
 from camkit.models_def.optics.spot import Spots, trace_spots
 from camkit.models_def.optics.trace import sag
+from tools.start.recipe import read_recipe
+from tools.start.search import design
 
 RECIPES = Path(__file__).resolve().parents[3] / "models_def" / "recipes"
 STARTS = pytest.mark.parametrize("name", ["lfov", "edof"])

@@ -3,9 +3,9 @@
 import pytest
 import torch
 
-from camkit.models_def.training.psf_bank import gaussian_bank
 from camkit.models_def.training.recipe import read_recipe
 from camkit.models_def.training.samples import corner_height_mm
+from tests.gaussian_bank import gaussian_bank
 
 RECIPE = """
 name = "tiny"

@@ -12,7 +12,7 @@ from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import format_prescription
 from camkit.models_def.training import lens_bank
 from camkit.models_def.training.lens_bank import build_lens_bank
-from camkit.models_def.training.psf_bank import gaussian_bank
+from tests.gaussian_bank import gaussian_bank
 
 DUET = find_lens("duet")
 GAUSSIAN = {"sensor_height_mm": 2.0, "axis_px": 1.0, "corner_px": 2.0}

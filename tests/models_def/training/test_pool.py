@@ -4,6 +4,7 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.training.pool import AHEAD, MAX_WORKERS, open_pool
+from tests.gaussian_bank import gaussian_bank
 
 
 def draw(pool, step):
@@ -40,8 +41,6 @@ def test_an_existing_pool_is_used_again(tmp_path, recipe_path, bank):
 
 
 def test_other_kernels_get_a_pool_of_their_own(tmp_path, recipe_path, bank, recipe):
-    from camkit.models_def.training.psf_bank import gaussian_bank
-
     other = gaussian_bank(sensor_height_mm=2.0, axis_px=0.9, corner_px=1.7)
     open_pool(tmp_path, recipe_path, bank, None, seed=1)
     open_pool(tmp_path, recipe_path, other, None, seed=1)

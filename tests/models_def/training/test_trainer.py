@@ -8,8 +8,8 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, write_checkpoint
 from camkit.models_def.training.log import plot_logs, read_log
-from camkit.models_def.training.psf_bank import gaussian_bank
 from camkit.models_def.training.trainer import TrainOptions, train
+from tests.gaussian_bank import gaussian_bank
 
 
 def options(folder, **changes):

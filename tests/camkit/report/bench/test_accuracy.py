@@ -25,10 +25,11 @@ from camkit.report.bench.accuracy import (
 from camkit.report.bench.known_captures import golden_captures, picture_captures, psf_source
 from camkit.report.bench.metric import registered_metrics
 from camkit.report.bench.trial import Trial
-from camkit.report.quality import Shot, bundle_restorer, expose, finish_planes, judge
+from camkit.report.quality import Shot, judge
 from tests.bundle_factory import tiny_manifest, tiny_members
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
+from tools.comparison.photograph import bundle_restorer, finish_planes, photograph
 
 
 @pytest.fixture(scope="module")
@@ -75,16 +76,16 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
         psf="bundle",
     )
     scene = cv2.imread(str(shot.picture))[..., ::-1].transpose(2, 0, 1) / np.float32(255)
-    exposed = expose(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.psf)
+    taken = photograph(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.psf)
     wanted = {
-        INPUT: finish_planes(exposed.local.planes, exposed, bundle),
-        trials[0].accuracy_key: bundle_restorer(bundle, method="wiener")(exposed),
-        trials[1].accuracy_key: bundle_restorer(bundle, size="M")(exposed),
+        INPUT: finish_planes(taken.local.planes, taken, bundle),
+        trials[0].accuracy_key: bundle_restorer(bundle, method="wiener")(taken),
+        trials[1].accuracy_key: bundle_restorer(bundle, size="M")(taken),
     }
     for key, restored in wanted.items():
         found = scores[key].by_picture["a.png"]
         assert len(found["psnr_db"]) == 10  # five places, two sensitivities
-        score = judge(restored, exposed.sharp)
+        score = judge(restored, taken.sharp)
         assert found["psnr_db"][3] == pytest.approx(score.psnr_db, abs=1e-3)
         assert found["ssim"][3] == pytest.approx(score.ssim, abs=1e-4)
     assert scores[INPUT].psf == {"bundle"}

@@ -3,10 +3,10 @@
 import pytest
 
 from camkit.models_def.training import validation
-from camkit.models_def.training.psf_bank import gaussian_bank
 from camkit.models_def.training.recipe import read_recipe
 from camkit.models_def.training.samples import corner_height_mm
 from camkit.models_def.training.trainer import TrainOptions, train
+from tests.gaussian_bank import gaussian_bank
 from tests.models_def.training.conftest import RECIPE, one_thread  # noqa: F401
 
 FINE_TUNING = """

@@ -1,0 +1,42 @@
+"""What a loop asks of its lens, whether its numbers are free or not."""
+
+from abc import ABC, abstractmethod
+
+from torch import Tensor, nn
+
+from camkit.models_def.design.fabrication import Copy
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.search.problem import Problem
+from camkit.models_def.optics.search.splat import Pixels
+
+
+class DesignLens(nn.Module, ABC):
+    """A lens in a loop.
+
+    Attributes:
+        problem: Its fields, wavelengths and depths.
+        pixels: The sensor.
+        begin: (variable,), its free numbers as it began, scaled.
+        moves: (variable,), what a loop changes; 0 for the lens as it began.
+    """
+
+    problem: Problem
+    pixels: Pixels
+    begin: Tensor
+    moves: nn.Parameter
+
+    @abstractmethod
+    def scaled(self) -> Tensor:
+        """Give the present lens (variable,)."""
+
+    @abstractmethod
+    def forward(self) -> tuple[Tensor, Tensor]:
+        """Give kernels (depth, field, 3, k, k) and the penalty of the limits (a scalar)."""
+
+    @abstractmethod
+    def made_kernels(self, copy: Copy) -> Tensor:
+        """Give the kernels (depth, field, 3, k, k) of a copy of the present lens."""
+
+    @abstractmethod
+    def lens(self) -> Lens:
+        """Give the present lens as a prescription."""

@@ -1,0 +1,70 @@
+"""tools/stage_profile.py on tiny captures: each of its profiles."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.bundle_factory import write_tiny_bundle
+from tests.capture_factory import write_tiny_captures
+from tests.tiny_design import run_tool
+from tools import stage_profile
+
+
+def rows(printed: str) -> list[list[str]]:
+    """Give the cells of all Markdown tables without their rules."""
+    lines = [line for line in printed.splitlines() if line.startswith("|") and "---" not in line]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def test_stages_are_told_by_wall_and_processor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle = write_tiny_captures(tmp_path, ["a"])
+    monkeypatch.setattr(stage_profile, "SAMPLE_S", 0.001)
+    command = ("stages", tmp_path / "a.dng", "--bundle", bundle, "--threads", 1)
+    run_tool(monkeypatch, "stage_profile", *command, "--runs", 0)
+    once = capsys.readouterr().out
+    monkeypatch.setattr(stage_profile, "run_again", lambda _: once)
+    run_tool(monkeypatch, "stage_profile", *command, "--runs", 2)
+    table = {row[0]: row[1:] for row in rows(capsys.readouterr().out)}
+    assert {"decode", "wiener", "network", "write", "hash", "sync", "all", "peak MB"} <= set(table)
+    assert float(table["all"][0]) > float(table["network"][0]) >= 0
+    assert "main" in table
+
+
+def test_layers_are_told_with_their_multiplications(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle = write_tiny_bundle(tmp_path)
+    monkeypatch.setattr(stage_profile, "SIDE_PX", 64)
+    monkeypatch.setattr(stage_profile, "gemm_peak_gmac_per_s", lambda _: 100.0)
+    run_tool(monkeypatch, "stage_profile", "layers", "--bundle", bundle, "--threads", 1)
+    said = capsys.readouterr().out
+    assert "64x64, 1 thread(s); matrix product 100 GMAC/s" in said
+    head, *nodes, everything = rows(said)
+    assert head[:3] == ["node", "kind", "ms"]
+    assert sum(float(row[2]) for row in nodes) == pytest.approx(float(everything[2]), abs=1)
+    assert sum(bool(row[4]) for row in nodes) == 3
+
+
+@pytest.mark.usefixtures("camkit_in_process")
+def test_jobs_are_compared_on_as_many_links(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle = write_tiny_captures(tmp_path, ["a"])
+    count = ("--files", 1, "--jobs", 2)
+    run_tool(monkeypatch, "stage_profile", "jobs", tmp_path / "a.dng", "--bundle", bundle, *count)
+    _, *found = rows(capsys.readouterr().out)
+    assert [row[:2] for row in found] == [["1", "1"], ["2", "1"]]
+
+
+@pytest.mark.usefixtures("camkit_in_process")
+def test_sizes_stretch_the_sensor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle = write_tiny_bundle(tmp_path)
+    size = ("--megapixels", "0.02", "--max-mem", "1G")
+    run_tool(monkeypatch, "stage_profile", "sizes", "--bundle", bundle, *size)
+    _, row = rows(capsys.readouterr().out)
+    assert row[:2] == ["0.02", "168x112"]
+    assert float(row[2]) >= 0

@@ -1,0 +1,10 @@
+"""A bundle beside classical methods, in the order of the work.
+
+- `peers`: the classical methods that camkit is compared with
+- `photograph`: a capture, developed for them and finished
+- `tuning`: their parameters, chosen on validation pictures
+- `measurement`: the journal of single measurements, which may be resumed
+- `rows`: the rows of the comparison
+- `quality_table`: means, gains and the page
+- `compact_json`: results as they are kept, those of `lens_table` too
+"""

@@ -1,0 +1,186 @@
+"""The rows of the quality comparison, made from bundles and tuned parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.bundle.manifest import Network, Wiener
+from camkit.bundle.reader import PSF, Bundle
+from camkit.contracts import FloatArray, depth_name
+from camkit.errors import ContractError
+from camkit.report.quality import BORDER_PX, FABRICATION_SEEDS, FIELD_SHARES
+from tools.comparison.measurement import Row, identity_of
+from tools.comparison.peers import PEERS, Setting, part_sides
+from tools.comparison.photograph import (
+    PROTOCOL_VERSION,
+    Photograph,
+    Restorer,
+    bundle_restorer,
+    finish_planes,
+)
+from tools.comparison.tuning import Tuned, tuned_to_json
+
+BANK_METHODS: Final = {"bank": "wiener", "bank_rl": "rl", "bank_admm_tv": "admm-tv"}
+PEER_VERSION: Final = 2
+"""Part of the identity of the peers' rows; 2: cut into parts, the PSF no longer mirrored twice."""
+DEFAULT_METHODS: Final = ("input", *PEERS, "bank")
+"""Rows of every comparison; the sizes of the networks follow them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rival:
+    """Another bundle of the same camera to compare with."""
+
+    bundle: Bundle
+    label: str
+
+    @property
+    def size(self) -> str:
+        """Give the size that is compared: M, or the only one there is."""
+        sizes = sorted(self.bundle.manifest.networks)
+        if "M" in sizes or len(sizes) == 1:
+            return "M" if "M" in sizes else sizes[0]
+        raise ContractError(
+            f"{self.bundle.path.name} holds sizes {', '.join(sizes) or 'none'}; a bundle to "
+            "compare with needs M or one size only"
+        )
+
+
+def make_rows(
+    bundle: Bundle,
+    methods: Sequence[str],
+    rivals: Sequence[Rival],
+    tuned: Tuned,
+    isos: Sequence[float],
+    lens: str,
+) -> list[Row]:
+    """Make the rows in the order of the tables.
+
+    Args:
+        bundle: The camera.
+        methods: Names of `DEFAULT_METHODS`, of sizes, or bank_rl and bank_admm_tv.
+        rivals: Further bundles.
+        tuned: Parameters of the classical peers.
+        isos: Sensitivities that parameters are needed for.
+        lens: Text of the prescription, part of what decides a measurement.
+
+    Raises:
+        ContractError: If a name is unknown, a parameter is not tuned or a rival is another camera.
+    """
+    base = identity_of(
+        PROTOCOL_VERSION,
+        bundle.manifest.camera.model_dump_json(),
+        bundle.manifest.members[PSF].sha256,
+        lens,
+    )
+    rows = [_row(bundle, name, tuned, isos, base) for name in methods]
+    for rival in rivals:
+        if rival.bundle.manifest.camera != bundle.manifest.camera:
+            raise ContractError(
+                f"{rival.bundle.path.name} is another camera than {bundle.path.name}; "
+                "compare bundles of one camera"
+            )
+        rows.append(
+            Row(
+                name=rival.label,
+                restore=bundle_restorer(rival.bundle, size=rival.size),
+                identity=identity_of(base, *_network_parts(rival.bundle, rival.size)),
+            )
+        )
+    return rows
+
+
+def _row(bundle: Bundle, name: str, tuned: Tuned, isos: Sequence[float], base: str) -> Row:
+    if name == "input":
+        return Row(name=name, restore=_developer(bundle), identity=identity_of(base, name))
+    if name in PEERS:
+        values = tuned.get(name, {})
+        if missing := [f"{iso:g}" for iso in isos if iso not in values]:
+            raise ContractError(
+                f"{name} is not tuned for ISO {', '.join(missing)}; run with --tune first"
+            )
+        return Row(
+            name=name,
+            restore=_peer_restorer(bundle, name, values),
+            identity=identity_of(base, PEER_VERSION, tuned_to_json({name: values})),
+        )
+    if name in BANK_METHODS:
+        method: Any = BANK_METHODS[name]
+        return Row(
+            name=name,
+            restore=bundle_restorer(bundle, method=method),
+            identity=identity_of(base, name, _stage_json(bundle, Wiener)),
+        )
+    if name in bundle.manifest.networks:
+        return Row(
+            name=name,
+            restore=bundle_restorer(bundle, size=name),
+            identity=identity_of(base, *_network_parts(bundle, name)),
+        )
+    known = (*("input", *PEERS, *BANK_METHODS), *bundle.manifest.networks)
+    raise ContractError(f"methods are {', '.join(known)}; got {name!r}")
+
+
+def _developer(bundle: Bundle) -> Restorer:
+    def restore(taken: Photograph) -> FloatArray:
+        return finish_planes(taken.local.planes, taken, bundle)
+
+    return restore
+
+
+def _peer_restorer(bundle: Bundle, name: str, values: dict[float, Setting]) -> Restorer:
+    def restore(taken: Photograph) -> FloatArray:
+        planes = PEERS[name].restore(taken.local, values[taken.simulation.iso])
+        return finish_planes(planes, taken, bundle)
+
+    return restore
+
+
+def _network_parts(bundle: Bundle, size: str) -> tuple[object, ...]:
+    members = bundle.manifest.members
+    return (
+        members[PSF].sha256,
+        members[bundle.network_facts(size).member].sha256,
+        _stage_json(bundle, Wiener),
+        _stage_json(bundle, Network),
+    )
+
+
+def _stage_json(bundle: Bundle, wanted: type[Wiener] | type[Network]) -> str | None:
+    stage = bundle.manifest.stage(wanted)
+    return None if stage is None else stage.model_dump_json()
+
+
+def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
+    """Say in sentences how the captures are made and judged."""
+    psf, camera = bundle.psf, bundle.manifest.camera
+    fields, waves = psf.field_heights_mm.size, psf.wavelengths_um.size
+    corner_mm = np.hypot(camera.width_px, camera.height_px) / 2 * camera.pixel_pitch_um / 1000
+    shares = ", ".join(f"{share:g}" for share in FIELD_SHARES)
+    seeds = ", ".join(map(str, FABRICATION_SEEDS))
+    part_px, overlap_px = part_sides(psf.kernels.shape[-1])
+    where = f"Pictures lie at {depth_name(bundle.reference_depth_mm)}; methods have the mean kernel"
+    depths = [f"{where} of {psf.depths_mm.size} depths."] if psf.depths_mm.size > 1 else []
+    return [
+        *depths,
+        f"Each picture (sRGB decoded to linear light) is a crop of the {camera.width_px} x "
+        f"{camera.height_px} sensor at {len(FIELD_SHARES)} places: {shares} of the way from "
+        f"centred to touching a corner ({corner_mm:.1f} mm from the axis); picture i of a set "
+        "takes corner i mod 4.",
+        f"ISO {', '.join(f'{iso:g}' for iso in isos)}; mosaic, shot and read noise, saturation "
+        "and quantisation as `camkit simulate` makes them.",
+        f"Fabricated lenses: radius +-0.2 %, thickness +-0.03 mm, index +-0.0005, uniform, seeds "
+        f"{seeds}; focused at assembly to +-0.02 mm; picture i takes seed i mod 3. Their PSFs are "
+        f"traced afresh at {2 * fields - 1} field heights and {3 * waves - 2} wavelengths (the "
+        f"bundle's frozen PSF has {fields} and {waves}). Methods know the bundle's PSF only. No "
+        "seed was used in training or tuning.",
+        f"PSNR and SSIM (Gaussian weights) on sRGB values, in sensor geometry, vignetting divided "
+        f"out, {BORDER_PX} pixels cut at every border.",
+        f"The three classical methods get linear white-balanced demosaicked planes, cut into parts "
+        f"of {part_px} px with {overlap_px} px overlap, mirrored past the borders of the picture; "
+        "every part is tapered and restored with the bundle's PSF at its middle for each colour; "
+        "nothing is clipped. Richardson-Lucy is scikit-image's round for round, on transforms that "
+        "are made once. scikit-image has no ADMM-TV: that one is camkit's own.",
+    ]

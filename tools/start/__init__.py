@@ -1,0 +1,5 @@
+"""A start lens from nothing.
+
+- `recipe`: a search within ranges, as TOML
+- `search`: the best of many random starts within the ranges of a recipe
+"""
