@@ -256,14 +256,14 @@ def measured_steps(bench: Bench, minutes: float) -> int:
     return max(1, round(minutes * 60 * TIMED_STEPS / spent_s))
 
 
-def short(plan: DesignSchedule, steps: int) -> DesignSchedule:
+def short(schedule: DesignSchedule, steps: int) -> DesignSchedule:
     """Give a schedule of so many steps that decays and validates as often as the whole one."""
-    share = steps / plan.steps
+    share = steps / schedule.steps
     return replace(
-        plan,
+        schedule,
         steps=steps,
-        epoch_steps=max(1, round(plan.epoch_steps * share)),
-        valid_steps=max(1, round(plan.valid_steps * share)),
+        epoch_steps=max(1, round(schedule.epoch_steps * share)),
+        valid_steps=max(1, round(schedule.valid_steps * share)),
         hold_steps=0,
         freeze_share=0.0,
     )
@@ -287,14 +287,14 @@ def plain(recipe: DesignRecipe, solved: int, rate: float) -> DesignRecipe:
 
 def steady(recipe: DesignRecipe, solved: int, efl_mm: float) -> DesignRecipe:
     """Give a recipe with all that keeps a design from going astray, where it has not."""
-    optics, plan = recipe.optics, recipe.schedule
+    optics, schedule = recipe.optics, recipe.schedule
     return replace(
         recipe,
         variables=tuple(
             v for v in recipe.variables if (v.kind, v.surface) != ("curvature", solved)
         ),
         optics=replace(optics, efl_mm=efl_mm, rides=True, whiten=True, units="range"),
-        schedule=plan if optics.whiten else replace(plan, lens_rate=WHITENED_RATE),
+        schedule=schedule if optics.whiten else replace(schedule, lens_rate=WHITENED_RATE),
         starts=recipe.starts if recipe.starts.count else SPOTS_STARTS,
     )
 
@@ -329,19 +329,19 @@ def to_the_end(bench: Bench, trial: Trial) -> Trial:
     parts = bench.parts(trial.arm, trial.number, search=False)
     recipe = bench.of_arm(trial.arm)
     given = torch.tensor(trial.scaled, dtype=torch.float64)
-    plan = short(recipe.schedule, recipe.schedule.steps)
-    scaled = descended(parts, parts.lens.problem, given, plan, whiten=recipe.optics.whiten)
+    schedule = short(recipe.schedule, recipe.schedule.steps)
+    scaled = descended(parts, parts.lens.problem, given, schedule, whiten=recipe.optics.whiten)
     cpu_s = time.process_time() - begin
     found = Found(arm=trial.arm, number=trial.number, run="end", cpu_s=cpu_s)
     return judged(bench, parts, scaled, found)
 
 
 def descended(
-    parts: DesignParts, problem: Problem, begin: Tensor, plan: DesignSchedule, *, whiten: bool
+    parts: DesignParts, problem: Problem, begin: Tensor, schedule: DesignSchedule, *, whiten: bool
 ) -> Tensor:
     """Give the best lens of a loop from `begin`, scaled."""
     lens = LensModule(problem, parts.lens.pixels, begin, whiten=whiten)
-    loop = DesignLoop(replace(parts, lens=lens), plan)
+    loop = DesignLoop(replace(parts, lens=lens), schedule)
     loop.judge()
     for _ in loop.run():
         pass

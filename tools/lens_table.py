@@ -52,7 +52,7 @@ DIGITS: Final = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class Conditions:
     """What is the same for all lenses."""
 
     recipe: DesignRecipe
@@ -75,33 +75,36 @@ def main() -> int:
     """Measure every lens and write table and picture."""
     arguments = parse()
     torch.set_num_threads(arguments.threads)
-    plan = plan_of(arguments)
+    conditions = conditions_of(arguments)
     folder: Path = arguments.out_dir
     folder.mkdir(parents=True, exist_ok=True)
     report: Entry = {
-        "recipe": plan.recipe.name,
-        "steps": plan.recipe.schedule.steps,
-        "network": plan.recipe.network.name,
-        "front": plan.recipe.front.kind,
-        "recovered_px": plan.recipe.schedule.patch_px + 2 * plan.recipe.front.margin_px,
-        "f_number": plan.f_number,
-        "object_mm": plan.object_mm,
-        "focus": plan.focus,
-        "depths_mm": plan.depths_mm,
+        "recipe": conditions.recipe.name,
+        "steps": conditions.recipe.schedule.steps,
+        "network": conditions.recipe.network.name,
+        "front": conditions.recipe.front.kind,
+        "recovered_px": conditions.recipe.schedule.patch_px + 2 * conditions.recipe.front.margin_px,
+        "f_number": conditions.f_number,
+        "object_mm": conditions.object_mm,
+        "focus": conditions.focus,
+        "depths_mm": conditions.depths_mm,
         "field_angles_deg": [
-            round(to_degrees(float(s)), 3) for s in torch.atan(field_slopes(plan.recipe.optics))
+            round(to_degrees(float(s)), 3)
+            for s in torch.atan(field_slopes(conditions.recipe.optics))
         ],
         "lenses": {},
     }
     for name, place in named(arguments.lens).items():
-        lens = working_lens(place, plan)
+        lens = working_lens(place, conditions)
         write_lens(lens, folder / f"{name}.toml")
-        entry = kept(folder, plan.digest(asdict(lens)), lambda lens=lens: before(lens, plan))
+        entry = kept(
+            folder, conditions.digest(asdict(lens)), lambda lens=lens: before(lens, conditions)
+        )
         entry["recovered"] = [
             kept(
                 folder,
-                plan.digest(asdict(lens), seed),
-                lambda lens=lens, seed=seed: after(lens, plan, seed, folder),
+                conditions.digest(asdict(lens), seed),
+                lambda lens=lens, seed=seed: after(lens, conditions, seed, folder),
             )
             for seed in range(1, arguments.seeds + 1)
         ]
@@ -161,7 +164,7 @@ def named(lenses: list[str]) -> dict[str, str]:
     return found
 
 
-def plan_of(arguments: argparse.Namespace) -> Plan:
+def conditions_of(arguments: argparse.Namespace) -> Conditions:
     """Give what is the same for all lenses."""
     recipe = read_design(arguments.recipe)
     schedule = recipe.schedule
@@ -183,7 +186,7 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
         network = NetworkChoice(name=arguments.network, config={"in_channels": front.channels})
     loss = recipe.loss if recipe.loss.needs_network else DesignLoss(kind="l1")
     asked = arguments.depths_mm or str(arguments.object_mm)
-    return Plan(
+    return Conditions(
         recipe=replace(recipe, schedule=schedule, front=front, network=network, loss=loss),
         depths_mm=tuple(float(word) for word in asked.split(",")),
         f_number=arguments.f_number,
@@ -196,19 +199,19 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
     )
 
 
-def working_lens(name: str, plan: Plan) -> Lens:
+def working_lens(name: str, conditions: Conditions) -> Lens:
     """Give the lens as it works; foci on spots count the fields of the strip."""
-    slopes = field_slopes(plan.recipe.optics)
+    slopes = field_slopes(conditions.recipe.optics)
     lens = replace(
         find_lens(name),
         field_angles_rad=tuple(torch.atan(slopes).tolist()),
-        wavelengths_um=plan.recipe.pixels.wavelengths_um,
+        wavelengths_um=conditions.recipe.pixels.wavelengths_um,
     )
-    focus = None if plan.focus == "own" else plan.focus
+    focus = None if conditions.focus == "own" else conditions.focus
     return at_work(
         lens,
-        f_number=plan.f_number,
-        object_distance_mm=plan.object_mm,
+        f_number=conditions.f_number,
+        object_distance_mm=conditions.object_mm,
         focus=focus,  # type: ignore[arg-type]
     )
 
@@ -227,24 +230,29 @@ def kept(folder: Path, key: str, make: Any) -> Entry:
 
 
 def parts(
-    lens: Lens, plan: Plan, source: SceneSource, network: nn.Module | None, *, widest: bool
+    lens: Lens,
+    conditions: Conditions,
+    source: SceneSource,
+    network: nn.Module | None,
+    *,
+    widest: bool,
 ) -> tuple[DesignParts, Seen]:
     """Give a loop's parts: to judge in the widest window, so that patches are the same for all."""
-    recipe = plan.recipe
+    recipe = conditions.recipe
     weights = torch.tensor(recipe.pixels.color_weights, dtype=torch.float64)
     pixels = Pixels(
         pitch_um=recipe.pixels.pitch_um,
-        kernel_px=plan.largest_px,
+        kernel_px=conditions.largest_px,
         color_weights=weights / weights.sum(1, keepdim=True),
     )
     problem = Problem(
         free=FreeLens(lens=lens, variables=(), rides=False),
         slopes=field_slopes(recipe.optics),
         wavelengths_um=torch.tensor(recipe.pixels.wavelengths_um, dtype=torch.float64),
-        object_distances_mm=plan.depths_mm,
+        object_distances_mm=conditions.depths_mm,
     )
     if not widest:
-        pixels = replace(pixels, kernel_px=window_of(problem, pixels, plan.largest_px))
+        pixels = replace(pixels, kernel_px=window_of(problem, pixels, conditions.largest_px))
     rest, seen = at_rest(lens, problem, pixels)
     made = DesignParts(
         lens=rest,
@@ -257,42 +265,42 @@ def parts(
     return made, seen
 
 
-def fresh_source(plan: Plan) -> SceneSource:
+def fresh_source(plan: Conditions) -> SceneSource:
     """Open the pictures that lenses are judged on."""
     share = 0.0 if plan.fresh is None else 1.0
     return open_source(plan.fresh, picture_share=share, scenes=4, scene_px=512)
 
 
-def before(lens: Lens, plan: Plan) -> Entry:
+def before(lens: Lens, conditions: Conditions) -> Entry:
     """Judge captures, and what the front alone makes of them."""
-    judged, seen = parts(lens, plan, fresh_source(plan), Captures(), widest=True)
-    fitting, _ = parts(lens, plan, judged.source, None, widest=False)
+    judged, seen = parts(lens, conditions, fresh_source(conditions), Captures(), widest=True)
+    fitting, _ = parts(lens, conditions, judged.source, None, widest=False)
     entry = {
         "window_px": fitting.lens.pixels.kernel_px,
         "held": seen.held.tolist(),
         "arriving": seen.arriving.tolist(),
         "rms_um": (1000 * seen.rms_mm.nan_to_num(-1e-3)).tolist(),
-        "capture": scores(judged, plan),
+        "capture": scores(judged, conditions),
         "contrast": contrasts(judged),
     }
-    if plan.recipe.front.kind != "none":
-        entry["front"] = scores(replace(judged, network=None), plan)
+    if conditions.recipe.front.kind != "none":
+        entry["front"] = scores(replace(judged, network=None), conditions)
     return entry
 
 
-def after(lens: Lens, plan: Plan, seed: int, folder: Path) -> Entry:
+def after(lens: Lens, conditions: Conditions, seed: int, folder: Path) -> Entry:
     """Train a network for the lens at rest, and judge it."""
-    recipe = replace(plan.recipe, schedule=replace(plan.recipe.schedule, seed=seed))
+    recipe = replace(conditions.recipe, schedule=replace(conditions.recipe.schedule, seed=seed))
     network = network_of(recipe)
     if network is None:
         raise SystemExit("the recipe has no network: give --network")
     source = open_source(
-        plan.data,
+        conditions.data,
         picture_share=recipe.data.picture_share,
         scenes=recipe.data.procedural_scenes,
         scene_px=recipe.data.scene_px,
     )
-    trained, _ = parts(lens, plan, source, network, widest=False)
+    trained, _ = parts(lens, conditions, source, network, widest=False)
     loop = DesignLoop(trained, recipe.schedule)
     for moment in loop.run():
         if sys.stderr.isatty():
@@ -301,19 +309,19 @@ def after(lens: Lens, plan: Plan, seed: int, folder: Path) -> Entry:
                 file=sys.stderr,
             )
     loop.take_best()
-    judged, _ = parts(lens, plan, fresh_source(plan), network.eval(), widest=True)
-    pictures = f"{plan.digest(asdict(lens), seed)[:16]}.npz"
+    judged, _ = parts(lens, conditions, fresh_source(conditions), network.eval(), widest=True)
+    pictures = f"{conditions.digest(asdict(lens), seed)[:16]}.npz"
     keep_pictures(judged, recipe, folder / pictures)
     return {
         "seed": seed,
         "pictures": pictures,
         "valid_db": loop.best_db,
-        **scores(judged, plan),
+        **scores(judged, conditions),
         "contrast": contrasts(judged),
     }
 
 
-def scores(judged: DesignParts, plan: Plan) -> Entry:
+def scores(judged: DesignParts, plan: Conditions) -> Entry:
     """Give PSNR and SSIM of every depth and field."""
     found = score_parts(judged, plan.recipe.schedule, plan.patches)
     return {"db": found.db, "ssim": found.ssim}

@@ -10,7 +10,7 @@ from camkit.errors import ContractError
 from camkit.models_def.sensors.tone import encode_srgb
 from camkit.models_def.sensors.wiener import to_otf
 
-FrontKind = Literal["none", "wiener"]
+FrontName = Literal["none", "wiener"]
 _CORNER: Final = 1 / 512
 
 
@@ -27,7 +27,7 @@ class Front:
             mean kernel over depths, as where a bundle is not told the depth.
     """
 
-    kind: FrontKind = "none"
+    kind: FrontName = "none"
     signal_to_noise: float = 0.3
     exponent: float = 2.5
     filter_margin_px: int = 32

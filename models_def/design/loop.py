@@ -154,28 +154,28 @@ class DesignLoop:
 
     def run(self, until: int | None = None) -> Iterator[Progress]:
         """Go on to a step (the last by default), giving every validated moment."""
-        plan, begin = self.schedule, time.monotonic()
-        end = plan.steps if until is None else min(until, plan.steps)
+        schedule, begin = self.schedule, time.monotonic()
+        end = schedule.steps if until is None else min(until, schedule.steps)
         while self.step < end:
             loss = self._one_step()
-            if self.step % plan.valid_steps == 0 or self.step == end:
+            if self.step % schedule.valid_steps == 0 or self.step == end:
                 yield self.judge(loss, time.monotonic() - begin)
 
     def _one_step(self) -> float:
-        plan, parts = self.schedule, self.parts
+        schedule, parts = self.schedule, self.parts
         moving = self._lens_moves()
-        decay = plan.decay ** (self.step // plan.epoch_steps)
+        decay = schedule.decay ** (self.step // schedule.epoch_steps)
         for group, rate in zip(self._optimizer.param_groups, self._rates, strict=True):
             group["lr"] = rate * decay
         self._optimizer.param_groups[0]["lr"] *= moving
-        batch = self._draw(_step_seed(plan.seed, self.step), plan.batch)
+        batch = self._draw(_step_seed(schedule.seed, self.step), schedule.batch)
         with torch.set_grad_enabled(True):
             parts.lens.moves.requires_grad_(moving)
             kernels, penalty = self._kernels(moving=moving)
-            made = self._made(kernels, _step_seed(plan.seed, self.step), moving=moving)
+            made = self._made(kernels, _step_seed(schedule.seed, self.step), moving=moving)
             pictures, sharp = self._pictures(batch, kernels, made)
             loss = design_loss(parts.loss, pictures, sharp)
-            total = loss + plan.penalty_weight * penalty
+            total = loss + schedule.penalty_weight * penalty
         self._optimizer.zero_grad(set_to_none=True)
         if total.requires_grad:
             total.backward()  # type: ignore[no-untyped-call]
@@ -187,9 +187,9 @@ class DesignLoop:
         return float(loss.detach())
 
     def _lens_moves(self) -> bool:
-        plan = self.schedule
-        last = plan.steps - round(plan.freeze_share * plan.steps)
-        return plan.lens_rate > 0 and plan.hold_steps <= self.step < last
+        schedule = self.schedule
+        last = schedule.steps - round(schedule.freeze_share * schedule.steps)
+        return schedule.lens_rate > 0 and schedule.hold_steps <= self.step < last
 
     def _kernels(self, *, moving: bool) -> tuple[Tensor, Tensor]:
         with torch.set_grad_enabled(moving):
@@ -220,7 +220,7 @@ class DesignLoop:
             kernels: That the filter knows.
             made: That captures are made with; None for the same.
         """
-        parts, plan = self.parts, self.schedule
+        parts, schedule = self.parts, self.schedule
         found = []
         for depth, of_depth in enumerate(kernels if made is None else made):
             chosen = of_depth[batch.fields]
@@ -228,15 +228,15 @@ class DesignLoop:
             told = kernels[depth] if parts.front.depth_known else kernels.mean(0)
             planes = parts.front.planes(recorded, told[batch.fields])
             found.append(planes[:, -3:] if parts.network is None else parts.network(planes))
-        edge = (batch.sharp.shape[-1] - plan.patch_px) // 2
-        sharp = batch.sharp[..., edge : edge + plan.patch_px, edge : edge + plan.patch_px]
+        edge = (batch.sharp.shape[-1] - schedule.patch_px) // 2
+        sharp = batch.sharp[..., edge : edge + schedule.patch_px, edge : edge + schedule.patch_px]
         return torch.stack(found), encode_srgb(sharp)
 
     def _draw(self, seed: int, count: int) -> Batch:
-        parts, plan = self.parts, self.schedule
+        parts, schedule = self.parts, self.schedule
         rng = np.random.default_rng(seed)
         kernel_px, fields = parts.lens.pixels.kernel_px, len(parts.lens.problem.slopes)
-        inner = plan.patch_px + 2 * parts.front.margin_px
+        inner = schedule.patch_px + 2 * parts.front.margin_px
         side = inner + kernel_px - 1
         crops = np.stack([parts.source.draw_crop(rng, side) for _ in range(count)])
         depths = len(parts.lens.problem.object_distances_mm) or 1

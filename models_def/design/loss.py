@@ -15,8 +15,8 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.design.similarity import ssim
 
-Kind = Literal["l1", "log_mse", "edof"]
-KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+LossName = Literal["l1", "log_mse", "edof"]
+LOSS_NAMES: Final[tuple[LossName, ...]] = get_args(LossName)
 _LOG_FLOOR: Final = 1e-4
 
 
@@ -26,20 +26,20 @@ class DesignLoss:
 
     Attributes:
         kind: Which.
-        depth_weights: zeta of eq. (6.16), one a depth; for the other kinds the weights of the
+        depth_weights: zeta of eq. (6.16), one a depth; for the others the weights of the
             depths' losses; empty for all alike.
         reference_depth: Index of the depth that eq. (6.16) compares with.
         ssim_weight: Of 1 - SSIM in eq. (6.16).
     """
 
-    kind: Kind = "l1"
+    kind: LossName = "l1"
     depth_weights: tuple[float, ...] = ()
     reference_depth: int = 0
     ssim_weight: float = 3.0
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ContractError(f"a loss is one of {', '.join(KINDS)}; got {self.kind!r}")
+        if self.kind not in LOSS_NAMES:
+            raise ContractError(f"a loss is one of {', '.join(LOSS_NAMES)}; got {self.kind!r}")
         if min(self.depth_weights, default=1.0) < 0:
             raise ContractError(f"depth weights must be >= 0; got {self.depth_weights}")
 

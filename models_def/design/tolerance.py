@@ -29,7 +29,7 @@ from camkit.models_def.optics.tolerance.deviation import (
     no_deviations,
     single_deviations,
 )
-from camkit.models_def.optics.tolerance.errors import ErrorKind, Tolerances
+from camkit.models_def.optics.tolerance.errors import ErrorClass, Tolerances
 from camkit.models_def.optics.tolerance.fabricated import View, land
 from camkit.models_def.optics.tolerance.landing import copy_kernels, spot_rms_mm, window_px
 from camkit.models_def.sensors.tone import encode_srgb
@@ -60,7 +60,7 @@ class ToleranceRun:
     """How copies are drawn and judged.
 
     Attributes:
-        samples: Fabricated copies.
+        copies: Fabricated copies.
         limit_copies: Copies per class with that class alone at its half-width.
         seed: Of errors, patches and noise.
         pitch_um: Of the pixels.
@@ -71,7 +71,7 @@ class ToleranceRun:
         pictures: Folder of sharp pictures; None for procedural scenes.
     """
 
-    samples: int = 50
+    copies: int = 50
     limit_copies: int = 4
     seed: int = 1
     pitch_um: float = 6.0
@@ -82,7 +82,7 @@ class ToleranceRun:
     pictures: Path | None = None
 
     def __post_init__(self) -> None:
-        counts = (self.samples, self.limit_copies, self.patch_px, self.patches, self.rays // 2)
+        counts = (self.copies, self.limit_copies, self.patch_px, self.patches, self.rays // 2)
         if min(counts) < 1 or self.seed < 0:
             raise ContractError(
                 f"counts of a tolerance run must be >= 1, the seed >= 0; got {self}"
@@ -118,13 +118,13 @@ class ClassLoss:
     """What one class of errors costs, alone and at its half-width.
 
     Attributes:
-        kind: The class.
+        error_class: The class.
         half_width: In its unit.
         loss_db: (copy,), mean over fields.
         spot_growth_mm: Of the RMS radius over all fields, the mean over copies.
     """
 
-    kind: ErrorKind
+    error_class: ErrorClass
     half_width: float
     loss_db: Array
     spot_growth_mm: float
@@ -149,7 +149,7 @@ class ToleranceResult:
         fields: (share of the largest slope, azimuth in degrees).
         kernel_px: Window of the kernels.
         nominal: The lens as designed.
-        samples: Fabricated copies.
+        copies: Fabricated copies.
         classes: The largest loss first.
         offenders: Single errors, the largest growth first.
     """
@@ -160,17 +160,17 @@ class ToleranceResult:
     fields: tuple[tuple[float, float], ...]
     kernel_px: int
     nominal: Measured
-    samples: Measured
+    copies: Measured
     classes: tuple[ClassLoss, ...]
     offenders: tuple[Offender, ...]
 
     def percentile_db(self, percent: float) -> float:
         """Give the PSNR that `percent` of the copies fall short of."""
-        return float(np.percentile(self.samples.mean_db, percent))
+        return float(np.percentile(self.copies.mean_db, percent))
 
     def share_at_least(self, psnr_db: float) -> float:
         """Give the yield: the share of copies with at least this PSNR."""
-        return float((self.samples.mean_db >= psnr_db).mean())
+        return float((self.copies.mean_db >= psnr_db).mean())
 
 
 def run_tolerance(
@@ -188,10 +188,10 @@ def run_tolerance(
         ContractError: If a field of the lens or of a copy loses its light.
     """
     judge = _judge(lens, tolerances, run)
-    kinds = tolerances.active()
-    parts = _batches(run.samples)
+    classes = tolerances.active()
+    parts = _batches(run.copies)
     limits = _batches(run.limit_copies)
-    total = run.samples + run.limit_copies * len(kinds)
+    total = run.copies + run.limit_copies * len(classes)
     done = 0
 
     def measure(given: Tolerances, numbers: list[range], *, at_limits: bool) -> Measured:
@@ -206,12 +206,10 @@ def run_tolerance(
         return _joined(found)
 
     nominal = judge.measure(no_deviations(lens))
-    samples = measure(tolerances, parts, at_limits=False)
-    classes = [
-        _class_loss(
-            tolerances, kind, nominal, measure(tolerances.only(kind), limits, at_limits=True)
-        )
-        for kind in kinds
+    copies = measure(tolerances, parts, at_limits=False)
+    losses = [
+        _class_loss(tolerances, one, nominal, measure(tolerances.only(one), limits, at_limits=True))
+        for one in classes
     ]
     return ToleranceResult(
         lens=lens,
@@ -220,8 +218,8 @@ def run_tolerance(
         fields=judge.fields,
         kernel_px=judge.kernels.shape[-1],
         nominal=nominal,
-        samples=samples,
-        classes=tuple(sorted(classes, key=lambda found: -float(found.loss_db.mean()))),
+        copies=copies,
+        classes=tuple(sorted(losses, key=lambda found: -float(found.loss_db.mean()))),
         offenders=_offenders(judge),
     )
 
@@ -335,11 +333,11 @@ def _joined(parts: list[Measured]) -> Measured:
 
 
 def _class_loss(
-    tolerances: Tolerances, kind: ErrorKind, nominal: Measured, found: Measured
+    tolerances: Tolerances, error_class: ErrorClass, nominal: Measured, found: Measured
 ) -> ClassLoss:
     return ClassLoss(
-        kind=kind,
-        half_width=tolerances.of(kind).half_width,
+        error_class=error_class,
+        half_width=tolerances.of(error_class).half_width,
         loss_db=nominal.mean_db[0] - found.mean_db,
         spot_growth_mm=float((_overall(found.spot_rms_mm) - _overall(nominal.spot_rms_mm)).mean()),
     )

@@ -18,7 +18,7 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.tracing import kernel
 from camkit.models_def.optics.tracing.compilation import compiled_engine
 from camkit.models_def.optics.tracing.gradient import Eager, trace_tensors
-from camkit.models_def.optics.tracing.kernel import LensTensors, Plan, State
+from camkit.models_def.optics.tracing.kernel import LensTensors, State, TraceSettings
 from camkit.models_def.optics.tracing.profile import TINY, profile
 
 
@@ -202,7 +202,7 @@ def _trace(
     compiled: bool = False,
 ) -> Rays:
     first, end = surfaces.start, surfaces.stop
-    plan = Plan(aspheric=tensors.aspheric[first:end], path=path)
+    settings = TraceSettings(aspheric=tensors.aspheric[first:end], path=path)
     lens = LensTensors(
         tensors.curvature_per_mm[first:end],
         tensors.conic[first:end],
@@ -216,7 +216,7 @@ def _trace(
     lens = LensTensors(*(v.to(dtype) for v in lens))
     state = State(*(v.to(dtype) for v in state))
     engine = compiled_engine() if compiled and seen is None else Eager()
-    result = trace_tensors(plan, engine, lens, state, rays.fate, with_seen=seen is not None)
+    result = trace_tensors(settings, engine, lens, state, rays.fate, with_seen=seen is not None)
     if seen is not None:
         states = zip(result.kept.seen, result.kept.fates, strict=True)
         seen += [Rays(**on._asdict(), fate=fate) for on, fate in states]

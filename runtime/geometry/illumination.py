@@ -72,7 +72,10 @@ def divide_illumination(
 
 
 class IlluminationGain:
-    """One over the relative illumination of a window, looked up by the squared field height."""
+    """One over the relative illumination of a window.
+
+    Looked up by the squared field height; on a grid of fields, computed band by band.
+    """
 
     def __init__(self, psf: FrozenPsf, window: SensorWindow) -> None:
         """Make the table.
@@ -81,15 +84,16 @@ class IlluminationGain:
             psf: Frozen PSF; its relative illumination is 1 on the axis.
             window: Where the picture lies on the sensor.
         """
-        width, height = window.size_px
-        self._grid = psf if psf.symmetry == "grid" else None
+        self._psf = psf
         self._window = window
+        self._table = np.zeros(0, np.float32)
+        if psf.symmetry == "grid":
+            return
+        width, height = window.size_px
         x_mm, y_mm = window.to_mm(np.arange(width), np.arange(height))
         end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
         squares = np.linspace(0.0, end, TABLE_SAMPLES)
-        heights = psf.field_heights_mm if self._grid is None else np.zeros(1)
-        light = psf.relative_illumination if self._grid is None else np.ones(1)
-        coarse = np.interp(squares, heights**2, light)
+        coarse = np.interp(squares, psf.field_heights_mm**2, psf.relative_illumination)
         # Rounded one by one, the two indices of a pixel may sum to one more than the last.
         fine = np.linspace(0.0, end, GAIN_SAMPLES + 1)
         self._table = (1 / np.interp(fine, squares, coarse)).astype(np.float32)
@@ -102,9 +106,10 @@ class IlluminationGain:
 
         Fills `out`, which may be the band, or a new array.
         """
-        if self._grid is not None:
-            light = illumination_band(self._grid, self._window, top, top + band.shape[1])
+        bottom = top + band.shape[1]
+        if self._psf.symmetry == "grid":
+            light = illumination_band(self._psf, self._window, top, bottom)
             return np.asarray(np.divide(band, light, out=out))
-        rows = self._rows[top : top + band.shape[1], None]
+        rows = self._rows[top:bottom, None]
         gain = self._table.take(rows + self._columns, mode="clip")
         return np.asarray(np.multiply(band, gain, out=out))

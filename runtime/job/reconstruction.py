@@ -26,7 +26,7 @@ from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.output.origin import Origin
 from camkit.runtime.plan.decision import DEVELOP, Case, Labels, Work
-from camkit.runtime.plan.estimate import Estimate, estimate_seconds
+from camkit.runtime.plan.estimate import Estimate, estimate_seconds, stage_seconds
 from camkit.runtime.plan.planner import Plan, make_plan, needs_scene
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import without_networks
@@ -243,6 +243,9 @@ class Reconstruction:
         speed = self._setup.speed(made.sizes())
         self.record["decisions"] = [decision.to_json() for decision in made.decisions(speed)]
         window_mp = {role: windows.window_mp() for role, windows in self.windows.items()}
+        taken = stage_seconds(made.case, made.work, speed, window_mp or None)
+        for stage, expected_s in zip(self.record["stages"].values(), taken, strict=True):
+            stage["expected_s"] = round(expected_s, 4)
         estimate = Estimate(
             seconds=estimate_seconds(made.case, made.work, speed, window_mp or None),
             peak_mb=self._walk.needed_bytes() / 1e6,

@@ -53,7 +53,9 @@ class Walk:
         """
         job = self._job
         self.ways = ways_of(self.stages, job.work)
-        job.record["stages"] = dict(zip(self.keys, self.ways, strict=True))
+        job.record["stages"] = {
+            key: {"way": way or "left out"} for key, way in zip(self.keys, self.ways, strict=True)
+        }
         running = [work for work, way in zip(self._works, self.ways, strict=True) if way]
         flexible = [work for work in running if work.fit is not None]
         cap = job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES

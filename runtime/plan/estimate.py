@@ -47,7 +47,15 @@ class Estimate:
 def estimate_seconds(
     case: Case, work: Work, speed: Speed, window_mp: Mapping[str, Mapping[str, float]] | None = None
 ) -> float:
-    """Give the seconds of a piece of work.
+    """Give the seconds of a piece of work; see `stage_seconds`."""
+    files = FILE_SHARE * speed.rest_s_per_mp * case.megapixels
+    return files + sum(stage_seconds(case, work, speed, window_mp))
+
+
+def stage_seconds(
+    case: Case, work: Work, speed: Speed, window_mp: Mapping[str, Mapping[str, float]] | None = None
+) -> tuple[float, ...]:
+    """Give the seconds of every stage of a piece of work, 0 for what is left out.
 
     Args:
         case: The capture.
@@ -56,19 +64,18 @@ def estimate_seconds(
         window_mp: Role -> size -> megapixels that its windows compute, once they are planned.
     """
     stages = case.bundle.manifest.stages
-    total = FILE_SHARE * speed.rest_s_per_mp * case.megapixels
+    taken: list[float] = []
     for stage, way in zip(stages, ways_of(stages, work), strict=True):
-        if way == LEFT_OUT:
-            continue
-        planned = None
+        windows = None
         if isinstance(stage, Network) and window_mp is not None:
-            planned = window_mp.get(stage.role)
-        if planned is None:
-            total += stage_module(stage.type).seconds(stage, case, work, speed)
+            windows = window_mp.get(stage.role)
+        if way == LEFT_OUT:
+            taken.append(0.0)
+        elif isinstance(stage, Network) and windows is not None:
+            taken.append(network_seconds(stage.role, windows, speed))
         else:
-            assert isinstance(stage, Network)
-            total += network_seconds(stage.role, planned, speed)
-    return total
+            taken.append(stage_module(stage.type).seconds(stage, case, work, speed))
+    return tuple(taken)
 
 
 def network_seconds(role: str, window_mp: Mapping[str, float], speed: Speed) -> float:

@@ -22,7 +22,7 @@ from camkit.runtime.network.windows import (
     plan_network,
 )
 from camkit.runtime.plan.decision import Case, Work
-from camkit.runtime.plan.estimate import role_window_mp
+from camkit.runtime.plan.estimate import network_seconds, role_window_mp
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import RowSource, changed_bands
 from camkit.runtime.scene import CELL_PX
@@ -66,10 +66,7 @@ def _falls_back(job: Job) -> bool:
 
 def seconds(entry: Network, case: Case, work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return sum(
-        speed.network_s_per_mp[entry.role, size] * mp
-        for size, mp in role_window_mp(entry.role, case, work).items()
-    )
+    return network_seconds(entry.role, role_window_mp(entry.role, case, work), speed)
 
 
 def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
@@ -113,6 +110,9 @@ class _NetworkStage:
         taken = bundle.manifest.planes[entry.takes[0]]
         self._windows = plan_network(job.grid_px(taken), networks, limits, work.network_labels())
         job.windows[entry.role] = self._windows
+        tiles = {role: windows.to_json() for role, windows in job.windows.items()}
+        one = len(bundle.manifest.networks) == 1
+        job.record["tiles"] = tiles[entry.role] if one else tiles
 
     def planned_bytes(self) -> int:
         """Give the memory of the windows."""

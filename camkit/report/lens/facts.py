@@ -226,7 +226,7 @@ def to_json(facts: LensFacts) -> dict[str, Any]:
         "third_order_transverse_mm": None if sums is None else sums.transverse_mm(),
         "pupil": facts.pupil.definition,
         "pupil_sampling": facts.pupil.sampling,
-        "psf_model": facts.model.kind,
+        "psf_model": facts.model.regime,
         "psf_model_reason": facts.model.reason,
         "fields": [
             _field(facts, i, j)

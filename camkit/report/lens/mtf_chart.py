@@ -38,7 +38,7 @@ _SAMPLES_PER_CUTOFF: Final = 3.0
 
 def draw_mtf(facts: LensFacts) -> "Figure":
     """Draw contrast, by waves or by rays times the diffraction limit, as the lens needs."""
-    cycles, kind, found, limit = trace_mtf(facts)
+    cycles, regime, found, limit = trace_mtf(facts)
     figure = new_figure(9.5, 3.9)
     panel = figure.add_subplot()
     for i in facts.drawn_fields():
@@ -64,7 +64,7 @@ def draw_mtf(facts: LensFacts) -> "Figure":
     panel.set_xlabel("cycles/mm")
     panel.set_ylabel("contrast")
     words = {"wave": "diffraction PSF", "geometric": "rays times diffraction limit"}
-    panel.set_title(f"{words[kind]}, all wavelengths with equal weight", fontsize=9, loc="left")
+    panel.set_title(f"{words[regime]}, all wavelengths with equal weight", fontsize=9, loc="left")
     panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
     panel.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     return figure
@@ -82,7 +82,7 @@ def trace_mtf(facts: LensFacts) -> tuple[Tensor, str, Mtf, Mtf]:
     top = min(MAX_CYCLES_PER_MM, cutoff)
     cycles = torch.linspace(0, top, _FREQUENCIES, dtype=torch.float64)
     limit = diffraction_limit(rim, cycles)
-    if facts.model.kind == "wave" and math.isfinite(cutoff):
+    if facts.model.regime == "wave" and math.isfinite(cutoff):
         try:
             return cycles, "wave", _wave_mtf(facts, cycles, cutoff), limit
         except ContractError:

@@ -43,7 +43,7 @@ def draw_yield(result: ToleranceResult) -> "Figure":
     figure = new_figure(11, 3.9)
     left, middle, right = figure.subplots(1, 3)
     _draw_share(left, result)
-    rms_um = _overall_um(result.samples)
+    rms_um = _overall_um(result.copies)
     order = np.sort(rms_um)
     middle.step(order, np.arange(1, len(order) + 1) / len(order) * 100, where="post")
     middle.axvline(_overall_um(result.nominal)[0], color="black", linewidth=0.8, linestyle="--")
@@ -57,7 +57,7 @@ def draw_yield(result: ToleranceResult) -> "Figure":
 
 
 def _draw_share(panel: "Panel", result: ToleranceResult) -> None:
-    order = np.sort(result.samples.mean_db)
+    order = np.sort(result.copies.mean_db)
     share = 100 * (1 - np.arange(len(order)) / len(order))
     panel.step([*order, order[-1]], [*share, 0], where="pre", color=field_color(0))
     nominal = result.nominal.mean_db[0]
@@ -71,7 +71,10 @@ def _draw_share(panel: "Panel", result: ToleranceResult) -> None:
 
 def _draw_classes(panel: "Panel", result: ToleranceResult) -> None:
     classes = result.classes[::-1]
-    names = [f"{c.kind.replace('_', ' ')} {in_file_units(c.kind, c.half_width)}" for c in classes]
+    names = [
+        f"{c.error_class.replace('_', ' ')} {in_file_units(c.error_class, c.half_width)}"
+        for c in classes
+    ]
     mean = [float(c.loss_db.mean()) for c in classes]
     panel.barh(names, mean, color=field_color(0))
     for place, found in enumerate(classes):
@@ -87,19 +90,19 @@ def _overall_um(measured: Measured) -> "np.ndarray[Any, np.dtype[np.float64]]":
 
 def to_json(result: ToleranceResult) -> dict[str, Any]:
     """Give the object that `camkit lens tolerance --json` prints."""
-    nominal, samples, run = result.nominal, result.samples, result.run
+    nominal, copies, run = result.nominal, result.copies, result.run
     nominal_db = float(nominal.mean_db[0])
     return {
         "name": result.lens.name,
-        "samples": run.samples,
+        "samples": run.copies,
         "seed": run.seed,
         "compensator": result.tolerances.compensator,
         "pixel_pitch_um": run.pitch_um,
         "noise": run.noise,
         "kernel_px": result.kernel_px,
-        "energy_kept": min(nominal.energy_kept, samples.energy_kept),
+        "energy_kept": min(nominal.energy_kept, copies.energy_kept),
         "nominal_psnr_db": nominal_db,
-        "psnr_db": sorted(samples.mean_db.tolist()),
+        "psnr_db": sorted(copies.mean_db.tolist()),
         "percentiles_db": {f"p{p}": result.percentile_db(p) for p in PERCENTS},
         "yield": [
             {
@@ -110,16 +113,16 @@ def to_json(result: ToleranceResult) -> dict[str, Any]:
             for loss in LOSSES_DB
         ],
         "nominal_spot_rms_mm": float(_overall_um(nominal)[0] / UM_PER_MM),
-        "spot_rms_mm": sorted((_overall_um(samples) / UM_PER_MM).tolist()),
+        "spot_rms_mm": sorted((_overall_um(copies) / UM_PER_MM).tolist()),
         "refocus_mm": {
-            "min": float(samples.refocus_mm.min()),
-            "max": float(samples.refocus_mm.max()),
+            "min": float(copies.refocus_mm.min()),
+            "max": float(copies.refocus_mm.max()),
         },
         "fields": [_field(result, i) for i in range(len(result.fields))],
         "sensitivity": [
             {
-                "class": c.kind,
-                "half_width": in_file_units(c.kind, c.half_width),
+                "class": c.error_class,
+                "half_width": in_file_units(c.error_class, c.half_width),
                 "loss_db": float(c.loss_db.mean()),
                 "worst_loss_db": float(c.loss_db.max()),
                 "spot_growth_mm": c.spot_growth_mm,
@@ -133,7 +136,7 @@ def to_json(result: ToleranceResult) -> dict[str, Any]:
 def _field(result: ToleranceResult, number: int) -> dict[str, Any]:
     share, azimuth_deg = result.fields[number]
     far = np.tan(max(result.lens.field_angles_rad, default=0.0))
-    psnr, spot = result.samples.psnr_db[:, number], result.samples.spot_rms_mm[:, number]
+    psnr, spot = result.copies.psnr_db[:, number], result.copies.spot_rms_mm[:, number]
     return {
         "field_angle_deg": round(to_degrees(float(np.arctan(share * far))), 9),
         "azimuth_deg": azimuth_deg,
@@ -147,9 +150,9 @@ def _field(result: ToleranceResult, number: int) -> dict[str, Any]:
 def _offender(found: Offender) -> dict[str, Any]:
     single = found.single
     return {
-        "class": single.kind,
+        "class": single.error_class,
         "part": single.part,
-        "error": in_file_units(single.kind, single.value),
+        "error": in_file_units(single.error_class, single.value),
         "spot_growth_mm": found.spot_growth_mm,
     }
 
@@ -157,14 +160,14 @@ def _offender(found: Offender) -> dict[str, Any]:
 def to_text(result: ToleranceResult) -> str:
     """Give the table for the terminal."""
     nominal = float(result.nominal.mean_db[0])
-    spots = _overall_um(result.samples)
+    spots = _overall_um(result.copies)
     low, middle, high = (result.percentile_db(p) for p in PERCENTS)
     yields = ", ".join(
         f"{100 * result.share_at_least(nominal - loss):.0f} % within {loss:g} dB"
         for loss in LOSSES_DB
     )
     lines = [
-        f"{result.lens.name}: {result.run.samples} fabricated copies, refocused at assembly: "
+        f"{result.lens.name}: {result.run.copies} fabricated copies, refocused at assembly: "
         f"{result.tolerances.compensator}",
         f"PSNR after recovery: {nominal:.2f} dB as designed; of the copies 10 % are below "
         f"{low:.2f}, half below {middle:.2f}, 90 % below {high:.2f} dB",
@@ -175,8 +178,8 @@ def to_text(result: ToleranceResult) -> str:
     if result.classes:
         lines += ["", f"{'alone, at its limit':<19} {'half-width':>12} {'loss dB':>8} {'worst':>7}"]
     lines += [
-        f"{c.kind:<19} {in_file_units(c.kind, c.half_width):>12} {c.loss_db.mean():8.2f} "
-        f"{c.loss_db.max():7.2f}"
+        f"{c.error_class:<19} {in_file_units(c.error_class, c.half_width):>12} "
+        f"{c.loss_db.mean():8.2f} {c.loss_db.max():7.2f}"
         for c in result.classes
     ]
     if result.offenders:
@@ -184,6 +187,6 @@ def to_text(result: ToleranceResult) -> str:
     for found in result.offenders[:_WORST]:
         single, growth = found.single, found.spot_growth_mm * UM_PER_MM
         part = "-" if single.part is None else str(single.part)
-        error = in_file_units(single.kind, single.value)
-        lines.append(f"{single.kind:<19} {part:>4} {error:>10} {growth:+12.3f}")
+        error = in_file_units(single.error_class, single.value)
+        lines.append(f"{single.error_class:<19} {part:>4} {error:>10} {growth:+12.3f}")
     return "\n".join(lines)

@@ -15,7 +15,7 @@ from camkit.models_def.optics.psf import TracedPsf, trace_psf
 from camkit.models_def.optics.spot import chief_heights
 from camkit.units import UM_PER_MM
 
-PsfKind = Literal["geometric", "wave"]
+PsfRegime = Literal["geometric", "wave"]
 
 WAVE_BELOW: Final = 5.0
 """RMS blur over Airy radius below which diffraction shows in a PSF; see docs/results/lens.md."""
@@ -27,13 +27,13 @@ class PsfModel:
     """Which model a lens needs, and why.
 
     Attributes:
-        kind: The cheaper one that is right for every field and wavelength.
+        regime: The cheaper one that is right for every field and wavelength.
         blur_mm: (field, wavelength), RMS radius of the geometric spot; NaN without rays.
         airy_mm: (wavelength,), radius of the Airy disc on the axis.
         reason: One sentence with the numbers that decide.
     """
 
-    kind: PsfKind
+    regime: PsfRegime
     blur_mm: Tensor
     airy_mm: Tensor
     reason: str
@@ -53,17 +53,17 @@ def psf_model(lens: Lens, slopes: Tensor, wavelengths_um: Tensor) -> PsfModel:
     ratio = torch.nan_to_num(blur / airy, nan=torch.inf)
     least = int(ratio.argmin())
     field, wave = divmod(least, len(wavelengths_um))
-    kind: PsfKind = "wave" if float(ratio.min()) < WAVE_BELOW else "geometric"
-    side = "less" if kind == "wave" else "no less"
+    regime: PsfRegime = "wave" if float(ratio.min()) < WAVE_BELOW else "geometric"
+    side = "less" if regime == "wave" else "no less"
     reason = (
-        f"{kind}: the sharpest spot (field {field + 1}, {float(wavelengths_um[wave]):g} um) has an "
-        f"RMS radius of {float(blur[field, wave]) * UM_PER_MM:.2f} um, "
+        f"{regime}: the sharpest spot (field {field + 1}, {float(wavelengths_um[wave]):g} um) has "
+        f"an RMS radius of {float(blur[field, wave]) * UM_PER_MM:.2f} um, "
         f"{float(ratio[field, wave]):.2g} times the Airy radius of "
         f"{float(airy[wave]) * UM_PER_MM:.2f} um, {side} than {WAVE_BELOW:g} times"
     )
     if not bool(torch.isfinite(ratio).any()):
         reason = "geometric: no ray arrives at any field, so there is nothing to compare"
-    return PsfModel(kind=kind, blur_mm=blur, airy_mm=airy, reason=reason)
+    return PsfModel(regime=regime, blur_mm=blur, airy_mm=airy, reason=reason)
 
 
 def lens_psf(
@@ -84,6 +84,6 @@ def lens_psf(
     Raises:
         ContractError: If a chief ray is lost, or no light falls into a kernel.
     """
-    if psf_model(lens, slopes, wavelengths_um).kind == "wave":
+    if psf_model(lens, slopes, wavelengths_um).regime == "wave":
         return trace_wave_psf(lens, slopes, wavelengths_um, size_px, pitch_um)
     return trace_psf(lens, chief_heights(lens, slopes), wavelengths_um, size_px, pitch_um)

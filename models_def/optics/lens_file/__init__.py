@@ -5,7 +5,7 @@ In the order in which data flows:
 - `zmx_records`: the lines of a .zmx file, sorted into system and surfaces
 - `zmx_glass`: glasses named as .zmx files name them
 - `zmx_surface`: one surface of a .zmx file
-- `zmx_field`: fields of any kind as field angles
+- `zmx_field`: fields of any type as field angles
 - `zmx_reader`: a .zmx file as a `Lens`, with notes on what was left out
 - `zmx_writer`: a `Lens` as a .zmx file
 - `lens_file`: read or write a lens by the suffix of its file

@@ -19,7 +19,7 @@ from camkit.models_def.optics.trace import surface_tensors
 from camkit.units import to_radians
 
 
-class FieldKind(IntEnum):
+class FieldType(IntEnum):
     """The first number of the FTYP line."""
 
     ANGLE = 0
@@ -37,7 +37,7 @@ def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
         mm_per_unit: Length unit of the file.
 
     Raises:
-        UnsupportedError: If the fields are of a kind that camkit does not convert, or chief rays
+        UnsupportedError: If the fields are of a type that camkit does not convert, or chief rays
             are not to go through the stop.
     """
     record = last(system, "FTYP")
@@ -46,21 +46,21 @@ def with_fields(lens: Lens, system: Records, mm_per_unit: float) -> Lens:
             f"line {record.line}: the object space is telecentric; camkit sends chief rays "
             "through the stop"
         )
-    kind = int(record.number(0, 0.0)) if record else FieldKind.ANGLE
-    if kind not in list(FieldKind):
+    number = int(record.number(0, 0.0)) if record else FieldType.ANGLE
+    if number not in list(FieldType):
         line = f"line {record.line}: " if record else ""
         raise UnsupportedError(
-            f"{line}fields are of kind {kind}; camkit reads angles (0), object heights (1), "
+            f"{line}fields are of kind {number}; camkit reads angles (0), object heights (1), "
             "paraxial (2) and real image heights (3)"
         )
     points = _points(system)
-    if kind == FieldKind.ANGLE and math.isinf(lens.object_distance_mm):
+    if number == FieldType.ANGLE and math.isinf(lens.object_distance_mm):
         angles = {math.fabs(to_radians(y)) if x == 0 else _skew_angle(x, y) for x, y in points}
-    elif kind == FieldKind.ANGLE:
+    elif number == FieldType.ANGLE:
         angles = {_angle_from_vertex(lens, _skew_angle(x, y)) for x, y in points}
     else:
         heights = sorted({math.hypot(x, y) * mm_per_unit for x, y in points})
-        angles = set(_angles_of_heights(lens, FieldKind(kind), heights))
+        angles = set(_angles_of_heights(lens, FieldType(number), heights))
     return replace(lens, field_angles_rad=tuple(sorted(angles)))
 
 
@@ -88,12 +88,12 @@ def _angle_from_vertex(lens: Lens, angle_rad: float) -> float:
     return math.atan(math.tan(angle_rad) * (distance_mm + pupil_mm) / distance_mm)
 
 
-def _angles_of_heights(lens: Lens, kind: FieldKind, heights_mm: list[float]) -> list[float]:
+def _angles_of_heights(lens: Lens, field_type: FieldType, heights_mm: list[float]) -> list[float]:
     near = math.isfinite(lens.object_distance_mm)
-    if kind == FieldKind.REAL_IMAGE_HEIGHT:
+    if field_type == FieldType.REAL_IMAGE_HEIGHT:
         slopes = slopes_for_heights(lens, torch.tensor(heights_mm, dtype=torch.float64))
         return [math.atan(abs(slope)) for slope in slopes.tolist()]
-    if kind == FieldKind.OBJECT_HEIGHT:
+    if field_type == FieldType.OBJECT_HEIGHT:
         if not near:
             raise UnsupportedError("object heights need an object at a finite distance")
         return [math.atan(height / lens.object_distance_mm) for height in heights_mm]

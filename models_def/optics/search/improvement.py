@@ -13,7 +13,7 @@ from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import VARY, Lens, Surface, Vary
 from camkit.models_def.optics.search.least_squares import Residuals, descend
 from camkit.models_def.optics.search.problem import Problem, residuals
-from camkit.models_def.optics.search.variables import FreeLens, Kind, Variable
+from camkit.models_def.optics.search.variables import FreeLens, Parameter, Variable
 
 CONIC_REACH: Final = 5.0
 FOCUS_REACH_MM: Final = 2.0
@@ -118,8 +118,8 @@ def _asphere_variables(lens: Lens, surface: Surface, i: int) -> list[Variable]:
     return made
 
 
-def _around(kind: Kind, i: int, value: float, reach: float) -> Variable:
-    return Variable(kind=kind, surface=i, low=value - reach, high=value + reach)
+def _around(parameter: Parameter, i: int, value: float, reach: float) -> Variable:
+    return Variable(kind=parameter, surface=i, low=value - reach, high=value + reach)
 
 
 def improve(

@@ -17,8 +17,8 @@ from camkit.models_def.optics.paraxial import image_distance, trace_paraxial
 from camkit.models_def.optics.prescription import Lens, Surface
 from camkit.models_def.optics.trace import SurfaceTensors, surface_tensors
 
-Kind = Literal["curvature", "conic", "thickness", "even_asphere", "defocus"]
-KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+Parameter = Literal["curvature", "conic", "thickness", "even_asphere", "defocus"]
+PARAMETERS: Final[tuple[Parameter, ...]] = get_args(Parameter)
 _ROUNDING: Final = 1e-9
 
 
@@ -35,15 +35,15 @@ class Variable:
         high: Upper bound; equal to `low` holds the number there.
     """
 
-    kind: Kind
+    kind: Parameter
     surface: int = 0
     term: int = 0
     low: float
     high: float
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ContractError(f"a variable is one of {', '.join(KINDS)}; got {self.kind!r}")
+        if self.kind not in PARAMETERS:
+            raise ContractError(f"a variable is one of {', '.join(PARAMETERS)}; got {self.kind!r}")
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
             raise ContractError(f"a variable needs bounds low <= high; got {self}")
 

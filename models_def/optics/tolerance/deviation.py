@@ -9,9 +9,9 @@ import numpy as np
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.tolerance.elements import glass_elements
-from camkit.models_def.optics.tolerance.errors import Array, ErrorKind, ErrorWidth, Tolerances
+from camkit.models_def.optics.tolerance.errors import Array, ErrorClass, ErrorWidth, Tolerances
 
-FIELDS: Final[dict[ErrorKind, str]] = {
+FIELDS: Final[dict[ErrorClass, str]] = {
     "radius": "radius",
     "thickness": "thickness_mm",
     "index": "index",
@@ -149,12 +149,12 @@ class Single:
     """One error of one part.
 
     Attributes:
-        kind: Its class.
+        error_class: Its class.
         part: Number of the surface or of the piece of glass, from 0; None for the focus.
         value: The error.
     """
 
-    kind: ErrorKind
+    error_class: ErrorClass
     part: int | None
     value: float
 
@@ -167,21 +167,25 @@ def single_deviations(lens: Lens, tolerances: Tolerances) -> tuple[tuple[Single,
     # at its limits every number that an error can reach is not 0
     reach = draw_deviations(lens, tolerances, range(1), 0, at_limits=True)
     singles: list[Single] = []
-    for kind in tolerances.active():
-        touched = getattr(reach, FIELDS[kind])[0]
+    for error_class in tolerances.active():
+        touched = getattr(reach, FIELDS[error_class])[0]
         parts = (
-            [None] if kind == "focus" else np.flatnonzero(touched.reshape(len(touched), -1)[:, 0])
+            [None]
+            if error_class == "focus"
+            else np.flatnonzero(touched.reshape(len(touched), -1)[:, 0])
         )
         for part in parts:
             number = None if part is None else int(part)
-            width = tolerances.of(kind).half_width
-            singles += [Single(kind=kind, part=number, value=v) for v in (width, -width)]
+            width = tolerances.of(error_class).half_width
+            singles += [
+                Single(error_class=error_class, part=number, value=v) for v in (width, -width)
+            ]
     arrays = {name: np.zeros((len(singles), *value.shape[1:])) for name, value in _arrays(reach)}
     for copy, single in enumerate(singles):
         place: tuple[int, ...] = (copy,) if single.part is None else (copy, single.part)
-        if "decentre" in single.kind:
+        if "decentre" in single.error_class:
             place = (*place, 1)
-        elif "tilt" in single.kind:
+        elif "tilt" in single.error_class:
             place = (*place, 0)
-        arrays[FIELDS[single.kind]][place] = single.value
+        arrays[FIELDS[single.error_class]][place] = single.value
     return tuple(singles), Deviations(**arrays)

@@ -7,13 +7,18 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.tolerance.errors import ERROR_KINDS, ErrorKind, ErrorWidth, Tolerances
+from camkit.models_def.optics.tolerance.errors import (
+    ERROR_CLASSES,
+    ErrorClass,
+    ErrorWidth,
+    Tolerances,
+)
 from camkit.units import to_radians
 
 TABLE: Final = "tolerance"
 _ARCMIN: Final = to_radians(1 / 60)
 # key of a file: class, and the class's unit in that of the key
-KEYS: Final[dict[str, tuple[ErrorKind, float]]] = {
+KEYS: Final[dict[str, tuple[ErrorClass, float]]] = {
     "radius_percent": ("radius", 0.01),
     "thickness_mm": ("thickness", 1.0),
     "index": ("index", 1.0),
@@ -59,14 +64,14 @@ def parse_tolerances(table: object) -> Tolerances:
         known = ", ".join((*KEYS, *sorted(_SETTINGS)))
         raise ContractError(f"[{TABLE}]: unknown keys {unknown}; known are {known}")
     common = table.get("distribution", "uniform")
-    widths: dict[str, Any] = dict.fromkeys(ERROR_KINDS, ErrorWidth(half_width=0.0))
+    widths: dict[str, Any] = dict.fromkeys(ERROR_CLASSES, ErrorWidth(half_width=0.0))
     named: set[str] = set()
     for key in (key for key in table if key in KEYS):
-        kind, unit = KEYS[key]
-        if kind in named:
-            raise ContractError(f"[{TABLE}]: {key} names {kind} again; keep one of the two")
-        named.add(kind)
-        widths[kind] = _width(key, table[key], unit, common)
+        error_class, unit = KEYS[key]
+        if error_class in named:
+            raise ContractError(f"[{TABLE}]: {key} names {error_class} again; keep one of the two")
+        named.add(error_class)
+        widths[error_class] = _width(key, table[key], unit, common)
     return Tolerances(**widths, compensator=table.get("compensator", "paraxial"))
 
 
@@ -84,7 +89,7 @@ def _width(key: str, value: object, unit: float, common: Any) -> ErrorWidth:
     return ErrorWidth(half_width=number * unit, distribution=entry.get("distribution", common))
 
 
-def in_file_units(kind: ErrorKind, value: float) -> str:
+def in_file_units(error_class: ErrorClass, value: float) -> str:
     """Give an error as people write it, such as `0.2 %`."""
     texts = {
         "radius": (0.01, " %"),
@@ -96,5 +101,5 @@ def in_file_units(kind: ErrorKind, value: float) -> str:
         "surface_tilt": (_ARCMIN, "'"),
         "element_tilt": (_ARCMIN, "'"),
     }
-    unit, name = texts.get(kind, (1.0, ""))
+    unit, name = texts.get(error_class, (1.0, ""))
     return f"{value / unit:.4g}{name}"

@@ -14,7 +14,7 @@ from camkit.units import to_radians
 
 Distribution = Literal["uniform", "normal"]
 Compensator = Literal["paraxial", "spot", "none"]
-ErrorKind = Literal[
+ErrorClass = Literal[
     "radius",
     "thickness",
     "index",
@@ -28,7 +28,7 @@ ErrorKind = Literal[
 ]
 DISTRIBUTIONS: Final[tuple[Distribution, ...]] = get_args(Distribution)
 COMPENSATORS: Final[tuple[Compensator, ...]] = get_args(Compensator)
-ERROR_KINDS: Final[tuple[ErrorKind, ...]] = get_args(ErrorKind)
+ERROR_CLASSES: Final[tuple[ErrorClass, ...]] = get_args(ErrorClass)
 
 NORMAL_SIGMAS: Final = 2.0  # a normal error is cut off at its half-width, at so many sigma
 MAX_TILT_RAD: Final = 0.5
@@ -125,16 +125,18 @@ class Tolerances:
         if max(self.surface_tilt.half_width, self.element_tilt.half_width) > MAX_TILT_RAD:
             raise ContractError(f"tilts must be at most {MAX_TILT_RAD} rad; got {self}")
 
-    def of(self, kind: ErrorKind) -> ErrorWidth:
+    def of(self, error_class: ErrorClass) -> ErrorWidth:
         """Give the width of a class."""
-        width: ErrorWidth = getattr(self, kind)
+        width: ErrorWidth = getattr(self, error_class)
         return width
 
-    def active(self) -> tuple[ErrorKind, ...]:
+    def active(self) -> tuple[ErrorClass, ...]:
         """Give the classes that are not 0."""
-        return tuple(kind for kind in ERROR_KINDS if self.of(kind).half_width > 0)
+        return tuple(
+            error_class for error_class in ERROR_CLASSES if self.of(error_class).half_width > 0
+        )
 
-    def only(self, kind: ErrorKind) -> Self:
+    def only(self, error_class: ErrorClass) -> Self:
         """Give the same with every other class 0."""
-        others: dict[str, Any] = dict.fromkeys(ERROR_KINDS, _NOTHING)
-        return replace(self, **{**others, kind: self.of(kind)})
+        others: dict[str, Any] = dict.fromkeys(ERROR_CLASSES, _NOTHING)
+        return replace(self, **{**others, error_class: self.of(error_class)})

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.tracing.kernel import Kept, Numbers, Plan, State, rest
+from camkit.models_def.optics.tracing.kernel import Kept, Numbers, State, TraceSettings, rest
 from camkit.models_def.optics.tracing.profile import TINY, polynomial
 
 
@@ -81,7 +81,7 @@ class _Bent(NamedTuple):
 
 
 def pull_back(
-    plan: Plan,
+    settings: TraceSettings,
     wanted: Wanted,
     lens: Sequence[Numbers],
     launched: State,
@@ -92,7 +92,7 @@ def pull_back(
     """Give the gradients of a trace.
 
     Args:
-        plan: As the trace had it.
+        settings: As the trace had it.
         wanted: What to compute.
         lens: As the trace had it.
         launched: As the trace had them (lost ones at rest).
@@ -101,19 +101,19 @@ def pull_back(
         gather: Sums a per-ray derivative to the shape of the number it belongs to.
     """
     total = Gradients(launched, [], [], [], [], [torch.zeros_like(lens[-1].after)])
-    g = rest(slopes.end, kept.fate, adaptive=plan.adaptive, n=0.0)
+    g = rest(slopes.end, kept.fate, adaptive=settings.adaptive, n=0.0)
     path = None if slopes.path is None else torch.where(kept.fate == 0, slopes.path, 0.0)
     g = _leave_plane(wanted, lens[-1], kept.seen[-1], g, path, total, gather)
     for i in reversed(range(len(lens))):
         p, hit, extra = lens[i], kept.seen[i], slopes.seen[i]
         if extra is not None:
-            extra = rest(extra, kept.fates[i], adaptive=plan.adaptive, n=0.0)
+            extra = rest(extra, kept.fates[i], adaptive=settings.adaptive, n=0.0)
             g = State(*(a + b for a, b in zip(g, extra, strict=True)))
         before = launched
         if i:
             last = kept.seen[i - 1]
             before = last._replace(z=last.z - lens[i - 1].gap)
-        shape = _shape(p, hit, aspheric=plan.aspheric[i])
+        shape = _shape(p, hit, aspheric=settings.aspheric[i])
         bent = _refraction(p, shape, before, hit, g, with_ratio=wanted.index)
         way = (hit.z - before.z) / before.n
         push = torch.addcmul(bent.x * before.l, bent.y, before.m)
@@ -121,7 +121,7 @@ def pull_back(
         push = push if path is None else push + path * p.before
         push = push / bent.facing
         shape, bent, push, g = _tamed(shape, bent, push, g)
-        aspheric = plan.aspheric[i]
+        aspheric = settings.aspheric[i]
         _collect(p, wanted, shape, bent, push, total, gather, aspheric=aspheric)
         if wanted.index:
             _collect_index(p, bent, None if path is None else path * way, total, gather)

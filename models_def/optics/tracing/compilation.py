@@ -23,9 +23,9 @@ from camkit.models_def.optics.tracing.kernel import (
     NOT_CONVERGED,
     Kept,
     LensTensors,
-    Plan,
     Result,
     State,
+    TraceSettings,
     numbers,
     rest,
     run,
@@ -68,9 +68,9 @@ class Fused:
         """Give large blocks: rays stay in registers; a backward loop writes a column a number."""
         return _BACKWARD_RAYS if gradient else _FORWARD_RAYS
 
-    def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
+    def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block; the plain way if three Newton steps are not enough for some ray."""
-        loop = _forward(replace(plan, adaptive=False))
+        loop = _forward(replace(settings, adaptive=False))
         parts = []
         rows = [*_rows(lens, fate.shape)]
         for row in rows:
@@ -78,16 +78,16 @@ class Fused:
             with _patience():
                 parts.append(loop(row.lens, State(*values[:6]), values[6]))
         end = [_joined(column, rows, fate.shape) for column in zip(*parts, strict=True)]
-        if any(plan.aspheric) and bool((end[6] == NOT_CONVERGED).any()):
-            return Eager().run(plan, lens, rays, fate)
-        return Result(State(*end[:6]), end[7] if plan.path else None, Kept(end[6], [], []))
+        if any(settings.aspheric) and bool((end[6] == NOT_CONVERGED).any()):
+            return Eager().run(settings, lens, rays, fate)
+        return Result(State(*end[:6]), end[7] if settings.path else None, Kept(end[6], [], []))
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
         """Give the gradients of a block, traced again in the same loop."""
         if task.kept is not None:
             return Eager().pull(task, lens, rays, fate)
         wanted, path = task.wanted, task.slopes.path
-        loop = _backward(replace(task.plan, adaptive=False), wanted)
+        loop = _backward(replace(task.settings, adaptive=False), wanted)
         given = (*rays, fate, *task.slopes.end, *([] if path is None else [path]))
         of_rays = [torch.empty_like(rays.x, memory_format=torch.contiguous_format) for _ in rays]
         of_lens = LensTensors(*(torch.zeros_like(v) for v in lens))
@@ -161,9 +161,9 @@ def _flags(wanted: Wanted) -> tuple[bool, ...]:
 
 
 @functools.cache
-def _forward(plan: Plan) -> Loop:
+def _forward(settings: TraceSettings) -> Loop:
     def fused(lens: LensTensors, rays: State, fate: Tensor) -> tuple[Tensor, ...]:
-        result = run(plan, numbers(lens), rays, fate)
+        result = run(settings, numbers(lens), rays, fate)
         path = () if result.path is None else (result.path,)
         return (*result.end, result.kept.fate, *path)
 
@@ -171,16 +171,16 @@ def _forward(plan: Plan) -> Loop:
 
 
 @functools.cache
-def _backward(plan: Plan, wanted: Wanted) -> Loop:
+def _backward(settings: TraceSettings, wanted: Wanted) -> Loop:
     def fused(
         lens: LensTensors, rays: State, fate: Tensor, end: State, path: Tensor | None = None
     ) -> tuple[Tensor, ...]:
         surfaces = numbers(lens)
-        kept = run(plan, surfaces, rays, fate).kept
+        kept = run(settings, surfaces, rays, fate).kept
         slopes = Slopes(end, path, [None] * len(surfaces))
         still = rest(rays, fate, adaptive=False)
         # sums are left to the caller: a reduction would end the loop
-        found = pull_back(plan, wanted, surfaces, still, kept, slopes, lambda value, _: value)
+        found = pull_back(settings, wanted, surfaces, still, kept, slopes, lambda value, _: value)
         even = [term for row in found.even_asphere for term in row]
         lists = [found.curvature, found.conic, even, found.thickness, found.indices]
         chosen = [v for v, flag in zip(lists, _flags(wanted), strict=True) if flag]

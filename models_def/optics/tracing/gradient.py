@@ -16,9 +16,9 @@ from camkit.models_def.optics.tracing.adjoint import Gradients, Slopes, Wanted, 
 from camkit.models_def.optics.tracing.kernel import (
     Kept,
     LensTensors,
-    Plan,
     Result,
     State,
+    TraceSettings,
     numbers,
     rest,
     run,
@@ -31,7 +31,7 @@ KEEP_BYTES: Final = 2**28
 class Task(NamedTuple):
     """The backward half of a block; `kept` is None if it must be traced again."""
 
-    plan: Plan
+    settings: TraceSettings
     wanted: Wanted
     kept: Kept | None
     slopes: Slopes
@@ -44,7 +44,7 @@ class Engine(Protocol):
         """Give how many rays a block has at most; `gradient` if it will be pulled back."""
         ...
 
-    def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
+    def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block; an empty `kept.seen` means that it need not be kept."""
         ...
 
@@ -60,18 +60,18 @@ class Eager:
         """Give what fits the cache: every operation writes its result."""
         return BLOCK_RAYS
 
-    def run(self, plan: Plan, lens: LensTensors, rays: State, fate: Tensor) -> Result:
+    def run(self, settings: TraceSettings, lens: LensTensors, rays: State, fate: Tensor) -> Result:
         """Trace a block."""
-        return run(plan, numbers(lens), rays, fate)
+        return run(settings, numbers(lens), rays, fate)
 
     def pull(self, task: Task, lens: LensTensors, rays: State, fate: Tensor) -> Gradients:
         """Give the gradients of a block."""
         surfaces = numbers(lens)
         kept = task.kept
         if kept is None:
-            kept = run(task.plan, surfaces, rays, fate).kept
-        rays = rest(rays, fate, adaptive=task.plan.adaptive)
-        return pull_back(task.plan, task.wanted, surfaces, rays, kept, task.slopes, _sum_to)
+            kept = run(task.settings, surfaces, rays, fate).kept
+        rays = rest(rays, fate, adaptive=task.settings.adaptive)
+        return pull_back(task.settings, task.wanted, surfaces, rays, kept, task.slopes, _sum_to)
 
 
 def _sum_to(value: Tensor, like: Tensor) -> Tensor:
@@ -110,15 +110,15 @@ def _blocks(shape: torch.Size, device: torch.device, limit: int) -> list[_Block]
 
 
 class _Spec(NamedTuple):
-    """What is not a tensor: the plan, the engine, whether rays on each surface are given out."""
+    """What is no tensor: the settings, the engine, whether rays on each surface are given out."""
 
-    plan: Plan
+    settings: TraceSettings
     engine: Engine
     with_seen: bool
 
 
 def trace_tensors(
-    plan: Plan,
+    settings: TraceSettings,
     engine: Engine,
     lens: LensTensors,
     rays: State,
@@ -129,19 +129,19 @@ def trace_tensors(
     """Trace rays, differentiable by rays and lens (not twice, not in forward mode).
 
     Args:
-        plan: What is static.
+        settings: What is static.
         engine: What computes.
         lens: Tensors of one type and device, broadcasting against the rays.
         rays: Of the same type and device.
         fate: int8.
         with_seen: Whether `kept.seen` and `kept.fates` of the result are filled.
     """
-    spec = _Spec(plan, engine, with_seen)
+    spec = _Spec(settings, engine, with_seen)
     flat: tuple[Tensor, ...] = _Trace.apply(spec, fate, *rays, *lens)  # type: ignore[no-untyped-call]
-    head = 7 + plan.path
+    head = 7 + settings.path
     return Result(
         State(*flat[:6]),
-        flat[7] if plan.path else None,
+        flat[7] if settings.path else None,
         Kept(flat[6], *_unflatten(flat[head:])),
     )
 
@@ -176,7 +176,7 @@ class _Trace(torch.autograd.Function):
         shapes = [fate.shape, *(v.shape for v in rays), *batches]
         shape: torch.Size = torch.broadcast_shapes(*shapes)  # type: ignore[no-untyped-call]
         rays, fate = State(*(v.expand(shape) for v in rays)), fate.expand(shape)
-        size = shape.numel() * len(spec.plan.aspheric) * 6 * rays.x.element_size()
+        size = shape.numel() * len(spec.settings.aspheric) * 6 * rays.x.element_size()
         gradient = any(ctx.needs_input_grad)
         keep = gradient and size <= KEEP_BYTES
         blocks = _blocks(shape, fate.device, spec.engine.block_rays(gradient=gradient))
@@ -185,7 +185,7 @@ class _Trace(torch.autograd.Function):
         counts: list[int] = []
         whole: list[_Block | None] = [None]
         for block in blocks or whole:
-            result = spec.engine.run(spec.plan, *_part(block, lens, rays, fate))
+            result = spec.engine.run(spec.settings, *_part(block, lens, rays, fate))
             flat = _flatten(result.kept)
             counts.append(len(flat) + 1 if keep and flat else 0)
             saved += [result.kept.fate, *flat][: counts[-1]]
@@ -223,7 +223,7 @@ class _Trace(torch.autograd.Function):
             kept = Kept(here[0], *_unflatten(here[1:])) if here else None
             cut = [v if v is None or block is None else block.of(v) for v in slopes]
             part = _part(block, lens, rays, fate)
-            task = Task(ctx.spec.plan, wanted, kept, _slopes(ctx.spec.plan, cut, part[1].x))
+            task = Task(ctx.spec.settings, wanted, kept, _slopes(ctx.spec.settings, cut, part[1].x))
             found = ctx.spec.engine.pull(task, *part)
             parts.append(found.rays)
             _add(sums, found, block)
@@ -238,17 +238,17 @@ def _join(parts: tuple[Tensor, ...], blocks: list[_Block]) -> Tensor:
     return torch.cat(parts, blocks[0].dim) if blocks else parts[0]
 
 
-def _slopes(plan: Plan, flat: Sequence[Tensor | None], like: Tensor) -> Slopes:
+def _slopes(settings: TraceSettings, flat: Sequence[Tensor | None], like: Tensor) -> Slopes:
     zero = torch.zeros((), dtype=like.dtype, device=like.device).expand_as(like)
 
     def state(values: Sequence[Tensor | None]) -> State:
         return State(*(zero if v is None else v for v in values))
 
-    head = 7 + plan.path
+    head = 7 + settings.path
     rows = [flat[i : i + 6] for i in range(head, len(flat), 7)]
     seen = [None if all(v is None for v in row) else state(row) for row in rows]
-    seen = seen or [None] * len(plan.aspheric)
-    return Slopes(state(flat[:6]), flat[7] if plan.path else None, seen)
+    seen = seen or [None] * len(settings.aspheric)
+    return Slopes(state(flat[:6]), flat[7] if settings.path else None, seen)
 
 
 def _add(sums: Sequence[Tensor | None], found: Gradients, block: _Block | None) -> None:

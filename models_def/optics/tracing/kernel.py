@@ -2,7 +2,7 @@
 
 Positions are relative to the vertex of the surface at hand. Nothing here branches on a ray, so
 that `torch.compile` can fuse a whole lens into one loop; only the number of Newton steps follows
-the data, and only where it may (`Plan.adaptive`).
+the data, and only where it may (`TraceSettings.adaptive`).
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class TraceSettings:
     """What is static about a trace.
 
     Attributes:
@@ -124,23 +124,23 @@ class Result(NamedTuple):
     kept: Kept
 
 
-def run(plan: Plan, lens: Sequence[Numbers], rays: State, fate: Tensor) -> Result:
+def run(settings: TraceSettings, lens: Sequence[Numbers], rays: State, fate: Tensor) -> Result:
     """Trace rays; positions relative to the vertex of the first surface.
 
     Args:
-        plan: What is static.
+        settings: What is static.
         lens: The surfaces.
         rays: At any z.
         fate: int8, 0 where a ray lives.
     """
-    state = rest(rays, fate, adaptive=plan.adaptive)
+    state = rest(rays, fate, adaptive=settings.adaptive)
     # counted in the type of the rays: loops over bytes do not vectorise
     code, fate = fate, fate.to(state.x.dtype)
-    path: Tensor | None = torch.zeros_like(state.x) if plan.path else None
+    path: Tensor | None = torch.zeros_like(state.x) if settings.path else None
     seen: list[State] = []
     fates: list[Tensor] = []
-    for p, aspheric in zip(lens, plan.aspheric, strict=True):
-        state, way, now = cross(p, state, fate, aspheric=aspheric, adaptive=plan.adaptive)
+    for p, aspheric in zip(lens, settings.aspheric, strict=True):
+        state, way, now = cross(p, state, fate, aspheric=aspheric, adaptive=settings.adaptive)
         code, fate = code if now is fate else now.to(torch.int8), now
         path = None if path is None else path + p.before * way
         seen.append(state)

@@ -18,7 +18,7 @@ from camkit.models_def.optics.tolerance.errors import ErrorWidth, Tolerances
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions"
 DUET = read_lens(PRESCRIPTIONS / "duet.toml")
-QUICK = ToleranceRun(samples=3, limit_copies=1, patch_px=32, patches=1, rays=128)
+QUICK = ToleranceRun(copies=3, limit_copies=1, patch_px=32, patches=1, rays=128)
 NOTHING = Tolerances().only("conic")  # which is 0 by default
 
 
@@ -30,7 +30,7 @@ def found() -> ToleranceResult:
 def test_copies_without_errors_are_as_good_as_the_design() -> None:
     result = run_tolerance(DUET, NOTHING, QUICK)
     np.testing.assert_array_equal(
-        result.samples.psnr_db, np.repeat(result.nominal.psnr_db, 3, axis=0)
+        result.copies.psnr_db, np.repeat(result.nominal.psnr_db, 3, axis=0)
     )
     assert result.classes == ()
     assert result.offenders == ()
@@ -40,7 +40,7 @@ def test_copies_without_errors_are_as_good_as_the_design() -> None:
 def test_a_run_repeats_itself_and_another_seed_does_not(found: ToleranceResult) -> None:
     one = Tolerances().only("element_tilt")
     first, again = (run_tolerance(DUET, one, QUICK) for _ in range(2))
-    np.testing.assert_array_equal(again.samples.psnr_db, first.samples.psnr_db)
+    np.testing.assert_array_equal(again.copies.psnr_db, first.copies.psnr_db)
     other = run_tolerance(DUET, NOTHING, replace(QUICK, seed=2))
     assert not np.array_equal(other.nominal.psnr_db, found.nominal.psnr_db)
 
@@ -50,19 +50,19 @@ def test_wider_errors_lose_more(found: ToleranceResult) -> None:
         surface_decentre=ErrorWidth(half_width=0.2), radius=ErrorWidth(half_width=0.01)
     )
     worse = run_tolerance(DUET, wide, QUICK)
-    assert worse.samples.mean_db.mean() < found.samples.mean_db.mean() - 1
-    assert worse.samples.spot_rms_mm.mean() > found.samples.spot_rms_mm.mean()
+    assert worse.copies.mean_db.mean() < found.copies.mean_db.mean() - 1
+    assert worse.copies.spot_rms_mm.mean() > found.copies.spot_rms_mm.mean()
 
 
 def test_every_field_and_class_is_judged_and_sorted(found: ToleranceResult) -> None:
     assert found.nominal.psnr_db.shape == (1, len(FIELDS))
-    assert found.samples.spot_rms_mm.shape == (3, len(FIELDS))
-    assert {c.kind for c in found.classes} == set(Tolerances().active())
+    assert found.copies.spot_rms_mm.shape == (3, len(FIELDS))
+    assert {c.error_class for c in found.classes} == set(Tolerances().active())
     losses = [float(c.loss_db.mean()) for c in found.classes]
     assert losses == sorted(losses, reverse=True)
     growths = [o.spot_growth_mm for o in found.offenders]
     assert growths == sorted(growths, reverse=True)
-    assert found.samples.energy_kept > 0.95
+    assert found.copies.energy_kept > 0.95
 
 
 def test_fields_of_the_round_design_differ_only_by_their_patches(found: ToleranceResult) -> None:
@@ -81,7 +81,7 @@ def test_watch_is_told_every_batch() -> None:
 def test_a_lens_with_the_axis_alone_has_one_field() -> None:
     lens: Lens = replace(DUET, field_angles_rad=(0.0,), wavelengths_um=(1.0,))
     result = run_tolerance(lens, Tolerances().only("focus"), QUICK)
-    assert result.samples.psnr_db.shape == (3, 1)
+    assert result.copies.psnr_db.shape == (3, 1)
 
 
 def test_yield_and_percentiles_are_those_of_the_copies(found: ToleranceResult) -> None:
@@ -92,13 +92,13 @@ def test_yield_and_percentiles_are_those_of_the_copies(found: ToleranceResult) -
         refocus_mm=psnr[:, 0],
         energy_kept=1.0,
     )
-    result = replace(found, samples=made)
+    result = replace(found, copies=made)
     assert result.share_at_least(8.0) == 0.3
     assert result.share_at_least(11.0) == 0
     assert result.percentile_db(50) == 5.5
 
 
 def test_senseless_runs_are_refused() -> None:
-    for wrong in ({"samples": 0}, {"seed": -1}, {"rays": 1}, {"pitch_um": 0.0}):
+    for wrong in ({"copies": 0}, {"seed": -1}, {"rays": 1}, {"pitch_um": 0.0}):
         with pytest.raises(ContractError):
             ToleranceRun(**wrong)

@@ -62,7 +62,7 @@ def tolerance(
     for note in notes:
         typer.echo(f"{file.name}: {note}", err=True)
     run = ToleranceRun(
-        samples=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
+        copies=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
     )
     result = run_tolerance(lens, _tolerances(file, errors), run, _progress)
     written = () if folder is None else write_tolerance(result, folder, file.stem)

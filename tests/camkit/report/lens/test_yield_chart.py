@@ -36,18 +36,23 @@ def result() -> ToleranceResult:
     return ToleranceResult(
         lens=read_lens(PRESCRIPTIONS / "duet.toml"),
         tolerances=Tolerances(),
-        run=ToleranceRun(samples=4),
+        run=ToleranceRun(copies=4),
         fields=FIELDS,
         kernel_px=65,
         nominal=measured([20.0]),
-        samples=measured([19.9, 19.6, 18.5, 16.0]),
+        copies=measured([19.9, 19.6, 18.5, 16.0]),
         classes=(
             ClassLoss(
-                kind="radius", half_width=0.002, loss_db=np.array([1.0, 2.0]), spot_growth_mm=1e-3
+                error_class="radius",
+                half_width=0.002,
+                loss_db=np.array([1.0, 2.0]),
+                spot_growth_mm=1e-3,
             ),
         ),
         offenders=(
-            Offender(single=Single(kind="focus", part=None, value=-0.02), spot_growth_mm=2e-3),
+            Offender(
+                single=Single(error_class="focus", part=None, value=-0.02), spot_growth_mm=2e-3
+            ),
         ),
     )
 

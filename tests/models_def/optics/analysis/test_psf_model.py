@@ -19,7 +19,7 @@ def test_lens_with_wide_blur_is_traced_by_rays() -> None:
     slopes = field_slopes(lens)[[0, 4, 8]]
     waves = torch.tensor([0.54], dtype=torch.float64)
     found = psf_model(lens, slopes, waves)
-    assert found.kind == "geometric"
+    assert found.regime == "geometric"
     assert "times the Airy radius" in found.reason
     assert float((found.blur_mm / found.airy_mm).min()) > 5
     psf = lens_psf(lens, slopes[:1], waves, 31, 6.0)
@@ -33,7 +33,7 @@ def test_sharp_lens_is_summed_from_waves_and_its_kernel_is_wider_than_its_rays()
     slopes = torch.zeros(1, dtype=torch.float64)
     waves = torch.tensor([0.78], dtype=torch.float64)
     found = psf_model(lens, slopes, waves)
-    assert found.kind == "wave"
+    assert found.regime == "wave"
     # 1.22 wavelength / (2 sin u) with sin u = 11.5 / f for a lens without coma
     assert float(found.airy_mm) == pytest.approx(1.21967 * 0.78e-3 * 50.0016 / 23, rel=0.05)
     kernel = lens_psf(lens, slopes, waves, 9, 1.0).kernels[0, 0]
@@ -48,5 +48,5 @@ def test_lens_without_light_is_told_so() -> None:
     blocked = replace(lens, surfaces=(lens.surfaces[0], pinhole))
     far = torch.tensor([1.0], dtype=torch.float64)
     found = psf_model(blocked, far, torch.tensor([0.78], dtype=torch.float64))
-    assert found.kind == "geometric"
+    assert found.regime == "geometric"
     assert "no ray" in found.reason

@@ -71,10 +71,12 @@ def test_single_errors_are_alone_in_their_copy() -> None:
     )
     assert len(singles) == drawn.copies
     assert (per_copy == 1).all()
-    place = next(i for i, s in enumerate(singles) if s.kind == "element_tilt" and s.part == 1)
+    place = next(
+        i for i, s in enumerate(singles) if s.error_class == "element_tilt" and s.part == 1
+    )
     assert drawn.element_tilt_rad[place, 1, 0] == singles[place].value
-    assert {s.part for s in singles if s.kind == "index"} == {1, 3}
-    assert {s.part for s in singles if s.kind == "focus"} == {None}
+    assert {s.part for s in singles if s.error_class == "index"} == {1, 3}
+    assert {s.part for s in singles if s.error_class == "focus"} == {None}
 
 
 def test_negative_seed_is_refused() -> None:

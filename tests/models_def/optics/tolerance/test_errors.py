@@ -3,7 +3,7 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import FabricationErrors
-from camkit.models_def.optics.tolerance.errors import ERROR_KINDS, ErrorWidth, Tolerances
+from camkit.models_def.optics.tolerance.errors import ERROR_CLASSES, ErrorWidth, Tolerances
 
 DRAWS = (np.arange(200_000) + 0.5) / 200_000
 
@@ -16,7 +16,7 @@ def test_defaults_are_those_of_training_plus_decentre_and_tilt() -> None:
     assert given.focus.half_width == base.focus_mm
     assert given.element_decentre.half_width == given.surface_decentre.half_width == 0.02
     assert np.rad2deg(given.element_tilt.half_width) == pytest.approx(1 / 60)
-    assert set(ERROR_KINDS) - set(given.active()) == {"abbe", "conic"}
+    assert set(ERROR_CLASSES) - set(given.active()) == {"abbe", "conic"}
 
 
 def test_uniform_errors_fill_their_range_evenly() -> None:
