@@ -58,7 +58,9 @@ def test_changed_kernels_keep_all_light() -> None:
 def test_a_moved_axis_takes_its_kernels_along() -> None:
     lens = lens_of(make_psf(SENSOR), SENSOR)
     moved = with_axis_moved(lens, 0.1, -0.05)
-    np.testing.assert_array_equal(moved.kernels_at(0.3, 0.1), lens.kernels_at(0.3 - 0.1, 0.1 + 0.05))
+    np.testing.assert_array_equal(
+        moved.kernels_at(0.3, 0.1), lens.kernels_at(0.3 - 0.1, 0.1 + 0.05)
+    )
 
 
 @pytest.mark.parametrize("scale", [1, 2])

@@ -9,7 +9,7 @@ import pytest
 from camkit.bundle.facts import HaloError
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, UnsupportedError
-from camkit.report.bench.line_up import make_trials, metrics_of
+from camkit.report.bench.line_up import make_trials
 from camkit.report.bench.metric import registered_metrics
 from camkit.report.bench.row_maker import row_makers
 from camkit.report.bench.trial import Axes, Entrant, Ground
