@@ -142,4 +142,4 @@ class BayerTraining:
         )
 
 
-TRAINING: Final = BayerTraining()
+PART: Final = BayerTraining()
