@@ -44,7 +44,7 @@ def fabricated_psf(
     """
     text = lens_text(bundle, prescription)
     shape = bundle.psf.kernels.shape
-    content = [text, bundle.manifest.camera.model_dump_json(), repr((shape[:3], seed))]
+    content = [text, bundle.manifest.sensor.model_dump_json(), repr((shape[:3], seed))]
     content.append(repr((_max_side_px(bundle.psf), ENERGY, [bundle.reference_depth_mm])))
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"psf-{seed}-{name}.safetensors"
@@ -89,4 +89,4 @@ def _trace(bundle: Bundle, text: str, seed: int) -> FrozenPsf:
         least_energy=LEAST_ENERGY,
     )
     _, copy = focused_copies(parse_prescription(text), 2, seed)
-    return freeze(copy, bundle.manifest.camera, dense_grid(frozen_grid)).psf
+    return freeze(copy, bundle.manifest.sensor, dense_grid(frozen_grid)).psf

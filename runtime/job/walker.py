@@ -5,20 +5,20 @@
 Nothing is computed before the first row is asked for.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
-from camkit.bundle.chain import CAPTURE, capture_plane
+from camkit.bundle.chain import CAPTURE
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
-from camkit.bundle.stages import Stage
 from camkit.errors import ContractError
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
 from camkit.runtime.plan.ways import LEFT_OUT, stand_in, ways_of
-from camkit.runtime.rows import Rows, RowSource
+from camkit.runtime.rows import ArrayRows, Rows, RowSource
 from camkit.runtime.stage_finder import stage_keys, stage_module
 
 FIXED_BYTES: Final = 260_000_000
@@ -89,51 +89,73 @@ class Walk:
             ContractError: If a stage is left out that no plane stands in for.
         """
         job = self._job
+        alias = self._alias()
+        last = alias.get(wanted, wanted)
+        on_the_way = self._on_the_way(alias, last)
+        takers = self._takers(on_the_way, alias, last)
+        ready: dict[str, list[Stream]] = {}
+        self._offer(ready, takers, CAPTURE, _capture_stream(job, self._planes()[CAPTURE]))
+        for name, known in job.known.items():
+            self._offer(ready, takers, name, known)
+        for number in on_the_way:
+            stage, work, key = self.stages[number], self._works[number], self.keys[number]
+            taken = [ready[alias.get(name, name)].pop() for name in stage.takes]
+            for name, given in zip(stage.gives, work.run(taken), strict=True):
+                if name not in job.known:
+                    self._offer(ready, takers, name, given.timed(job.clock, key))
+        if last not in ready:
+            names = ", ".join(name for stage in self.stages for name in stage.gives)
+            raise ContractError(f"no stage gives the plane {wanted!r}; there are {names}")
+        return ready[last].pop()
+
+    def keep(self, wanted: str) -> Stream:
+        """Read a plane whole; from now on it is known, and what gives it does not run again."""
+        stream = self.stream(wanted)
+        rows = stream.rows()
+        whole = ArrayRows(rows.read(0, rows.shape[1]))
+        kept = replace(stream, source=whole, made=None, owned=False)
+        self._job.known[self._alias().get(wanted, wanted)] = kept
+        return kept
+
+    def _alias(self) -> dict[str, str]:
+        """Give the planes that stages which are left out would give -> those that stand for them.
+
+        Raises:
+            ContractError: If no plane stands in for what a stage gives.
+        """
         planes = self._planes()
         alias: dict[str, str] = {}
         for stage, way in zip(self.stages, self.ways, strict=True):
             if way == LEFT_OUT:
                 instead = stand_in(stage, planes)
                 alias[stage.gives[0]] = alias.get(instead, instead)
-        takers = self._takers(alias, alias.get(wanted, wanted))
-        ready: dict[str, list[Stream]] = {}
-        self._offer(ready, takers, CAPTURE, _capture_stream(job, planes[CAPTURE]))
-        last = alias.get(wanted, wanted)
-        parts = zip(self.stages, self._works, self.ways, self.keys, strict=True)
-        for stage, work, way, key in parts:
-            if last in ready:
-                break
-            if way == LEFT_OUT:
-                continue
-            taken = [ready[alias.get(name, name)].pop() for name in stage.takes]
-            for name, given in zip(stage.gives, work.run(taken), strict=True):
-                self._offer(ready, takers, name, given.timed(job.clock, key))
-        if last not in ready:
-            raise ContractError(
-                f"no stage gives the plane {wanted!r}; there are {', '.join(ready)}"
-            )
-        return ready[last].pop()
+        return alias
+
+    def _on_the_way(self, alias: Mapping[str, str], wanted: str) -> list[int]:
+        """Number the stages, in order, whose planes the wanted one is made of and are not known."""
+        needed, found = {wanted}, []
+        for number in reversed(range(len(self.stages))):
+            stage = self.stages[number]
+            made = needed.intersection(stage.gives) - self._job.known.keys()
+            if made and self.ways[number] != LEFT_OUT:
+                found.append(number)
+                needed |= {alias.get(name, name) for name in stage.takes}
+        return found[::-1]
 
     def taken_by(self, number: int) -> list[Stream]:
         """Give the streams that a stage takes; every call walks anew."""
         return [self.stream(name) for name in self.stages[number].takes]
 
-    def _takers(self, alias: Mapping[str, str], wanted: str) -> dict[str, int]:
+    def _takers(
+        self, on_the_way: Sequence[int], alias: Mapping[str, str], wanted: str
+    ) -> dict[str, int]:
         """Count who takes each plane, on the way to the wanted one."""
         takers = {wanted: 1}
-        for stage, way in zip(self.stages, self.ways, strict=True):
-            if wanted in stage.gives and way != LEFT_OUT:
-                self._count(stage, alias, takers)
-                break
-            if way != LEFT_OUT:
-                self._count(stage, alias, takers)
+        for number in on_the_way:
+            for name in self.stages[number].takes:
+                taken = alias.get(name, name)
+                takers[taken] = takers.get(taken, 0) + 1
         return takers
-
-    @staticmethod
-    def _count(stage: Stage, alias: Mapping[str, str], takers: dict[str, int]) -> None:
-        for name in stage.takes:
-            taken = alias.get(name, name)
-            takers[taken] = takers.get(taken, 0) + 1
 
     @staticmethod
     def _offer(
@@ -147,7 +169,7 @@ class Walk:
         bundle = self._job.bundle
         if bundle is None:
             return {CAPTURE: _plain_plane(self._job)}
-        return {CAPTURE: capture_plane(bundle.manifest.sensor), **bundle.manifest.planes}
+        return bundle.manifest.all_planes
 
     def _probe(self, plane: str) -> RowSource:
         """Give rows of a plane that are made for one stage alone, before its first row."""

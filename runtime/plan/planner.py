@@ -175,19 +175,22 @@ def _within_seconds(case: Case, work: Work, model: LossModel | None, speed: Spee
         raise ContractError("a plan within a time needs max_seconds")
     unit = 0.0 if model is None else model.adaptive_db
     most_db = case.options.max_error_db
-    plans = []
+    ladder = []
     for size in _sizes(case):
         for factor in LADDER if model is not None else LADDER[:1]:
             spend = 0.0 if factor == 0 else size_cost_db(case, size) + factor * unit
-            plans.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
-    plans.append(_ruled(case, without_networks(case.bundle.manifest.stages, work)))
+            ladder.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
+    ordered = sorted(ladder, key=lambda plan: plan.cost_db)
     # The bank alone is the last resort: what it costs is not bounded by any prediction.
-    ordered = sorted(plans[:-1], key=lambda plan: plan.cost_db) + plans[-1:]
+    manifest = case.bundle.manifest
+    below = without_networks(manifest.stages, manifest.all_planes, work)
+    if below is not None:
+        ordered.append(_ruled(case, below))
     fitting = (p for p in ordered if estimate_seconds(p.case, p.work, speed) <= limit)
     chosen = next(fitting, ordered[-1])
     note = ""
     if estimate_seconds(chosen.case, chosen.work, speed) > limit:
-        note = f"even the bank alone is expected to take more than {limit:g} s"
+        note = f"even the least work is expected to take more than {limit:g} s"
     elif most_db is not None and model is not None and chosen.cost_db > model.budget_db(most_db):
         note = f"{limit:g} s allow no plan within {most_db:g} dB"
     return replace(chosen, note=note)

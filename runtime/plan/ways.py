@@ -55,12 +55,30 @@ def planned(stages: Sequence[Stage], work: Work) -> Work:
     )
 
 
-def without_networks(stages: Sequence[Stage], work: Work) -> Work:
-    """Give the work by the best method that runs no network."""
-    tried = [
-        planned(stages, replace(work, method=method)) for method in (*methods_of(stages), DEVELOP)
-    ]
-    return next(other for other in tried if not other.networks)
+def without_networks(
+    stages: Sequence[Stage], planes: Mapping[str, Plane], work: Work
+) -> Work | None:
+    """Give the work by the best method that runs no network; None where nothing stands for it."""
+    methods = offered_methods(stages, planes)
+    tried = (planned(stages, replace(work, method=method)) for method in methods)
+    return next((other for other in tried if not other.networks), None)
+
+
+def offered_methods(stages: Sequence[Stage], planes: Mapping[str, Plane]) -> tuple[str, ...]:
+    """Name the methods by which the stages can be walked, the best first.
+
+    Args:
+        stages: In order.
+        planes: By name, that of the sensor among them.
+    """
+    return tuple(
+        method
+        for method in (*methods_of(stages), DEVELOP)
+        if all(
+            way != LEFT_OUT or _stand_ins(stage, planes)
+            for stage, way in zip(stages, ways_of(stages, Work(method=method)), strict=True)
+        )
+    )
 
 
 def _last_with(stages: Sequence[Stage], method: str) -> int:
@@ -87,11 +105,17 @@ def stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str:
     Raises:
         ContractError: If no plane that it takes does.
     """
-    given = planes[stage.gives[0]]
-    for name in reversed(stage.takes):
-        if len(stage.gives) == 1 and planes[name].stands_for(given):
-            return name
+    if found := _stand_ins(stage, planes):
+        return found[0]
     raise ContractError(
         f"the stage {stage.type} cannot be left out: none of {', '.join(stage.takes)} stands for "
         f"{', '.join(stage.gives)}"
     )
+
+
+def _stand_ins(stage: Stage, planes: Mapping[str, Plane]) -> list[str]:
+    """Name the planes that stand for the one that a stage gives, the best known first."""
+    if len(stage.gives) != 1:
+        return []
+    given = planes[stage.gives[0]]
+    return [name for name in reversed(stage.takes) if planes[name].stands_for(given)]

@@ -1,0 +1,70 @@
+"""What a perfect camera would have shown: the truth beside a capture, as a bundle's picture is.
+
+clean planes of the twin -> linear Rec.709, on the grid of the product `image`
+"""
+
+from typing import Any
+
+import numpy as np
+
+from camkit.bundle.golden import IMAGE
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.sensor import RGB, ColorSensor, SpadSensor
+from camkit.colorimetry import apply_matrix, rec709_from_camera
+from camkit.contracts import FloatArray
+from camkit.errors import UnsupportedError
+from camkit.runtime.job.choices import known_options
+
+
+def light_sensor(manifest: Manifest) -> ColorSensor:
+    """Give the sensor of a camera that the twin can photograph with.
+
+    Raises:
+        UnsupportedError: If it counts photons.
+    """
+    if isinstance(manifest.sensor, SpadSensor):
+        raise UnsupportedError(f"bundle {manifest.name} counts photons; this twin sends light")
+    return manifest.sensor
+
+
+def picture_scale(manifest: Manifest) -> int:
+    """Give the samples of a bundle's picture along a side of a pixel of its sensor.
+
+    Raises:
+        UnsupportedError: If it makes no picture, or one whose samples are not whole shares of a
+            pixel.
+    """
+    if IMAGE not in manifest.products:
+        made = ", ".join(manifest.products)
+        raise UnsupportedError(f"bundle {manifest.name} makes {made}, and no product {IMAGE!r}")
+    ratio = manifest.planes[manifest.products[IMAGE]].grid.pitch_ratio
+    scale = max(round(1 / ratio), 1)
+    if scale * ratio != 1:
+        raise UnsupportedError(
+            f"bundle {manifest.name} makes pictures with {ratio:g} pixels from sample to sample; "
+            "the twin knows their truth for whole shares of a pixel only"
+        )
+    return scale
+
+
+def true_picture(clean: FloatArray, sensor: ColorSensor) -> FloatArray:
+    """Give linear Rec.709 (3, h, w) of clean planes of the twin.
+
+    Args:
+        clean: (c, h, w) float32, white-balanced channels of the sensor.
+        sensor: What the channels are.
+
+    Raises:
+        UnsupportedError: If they are neither colours nor grey.
+    """
+    if sensor.color_matrix is not None:
+        matrix = np.array(sensor.color_matrix, dtype=np.float64)
+        return apply_matrix(rec709_from_camera(matrix), clean)
+    if clean.shape[0] not in (1, len(RGB)):
+        raise UnsupportedError(f"{clean.shape[0]} channels without a colour matrix have no colour")
+    return clean if clean.shape[0] == len(RGB) else np.repeat(clean, len(RGB), axis=0)
+
+
+def in_sensor_geometry(manifest: Manifest) -> dict[str, Any]:
+    """Give the options by which a bundle's pictures stay in the geometry of its sensor."""
+    return {"undistort": False} if "undistort" in known_options(manifest.stages) else {}
