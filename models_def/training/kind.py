@@ -7,8 +7,9 @@
 The part of a kind for this floor (`camkit.kinds.Kind.part`) names its object `TRAINING`.
 """
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
@@ -80,6 +81,23 @@ class Judge(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A camera as its bundle will state it, but for what is measured at export.
+
+    Attributes:
+        stages: In order; the last gives the product `image`.
+        products: Further results: name -> plane.
+        object_distance_mm: Distance of focus from the first surface.
+        fails_on: For its card: what it fails on, besides objects at other depths.
+    """
+
+    stages: tuple[Stage, ...]
+    products: Mapping[str, str] = field(default_factory=dict)
+    object_distance_mm: float = math.inf
+    fails_on: tuple[str, ...] = ()
+
+
 class TrainingKind(Protocol[R, M]):
     """A kind of camera as training sees it."""
 
@@ -97,8 +115,8 @@ class TrainingKind(Protocol[R, M]):
         """Check the tables of a recipe; raise ContractError naming the key."""
         ...
 
-    def stages(self, recipe: R) -> tuple[Stage, ...]:
-        """Give the stages of the camera, in order."""
+    def design(self, recipe: R) -> Design:
+        """Give the camera as its bundle will state it."""
         ...
 
     def build_network(self, name: str, **config: Any) -> nn.Module:
