@@ -19,6 +19,7 @@ A file here is a command; a folder holds what commands are made of.
     build_glass         the glass catalogues, from their sources
     coverage_gate       refuses a test run that covers too little
 
+    capture/            simulated captures, for the tools that judge pictures
     comparison/         parts of `quality`
     plan/               parts of `plan_report`
     design/             parts of the tools around a design
