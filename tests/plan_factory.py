@@ -6,20 +6,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.manifest import Wiener
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.stages import Wiener
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import RadialDistortion
 from camkit.runtime.plan.loss import LossModel, plan_entries
 from camkit.runtime.scene import CELL_PX, Scene
 from tests.bundle_factory import (
-    tiny_camera,
     tiny_facts,
     tiny_manifest,
     tiny_members,
     tiny_network,
     tiny_psf,
+    tiny_sensor,
+    tiny_stages,
 )
 
 WIDTH_PX, HEIGHT_PX = 1024, 768
@@ -56,12 +58,11 @@ def made_scene(
 
 def write_planned_bundle(folder: Path, *, model: LossModel | None = MODEL) -> Bundle:
     """Write and open a tiny bundle of 4x3 cells with sizes M and S, calibrated by `model`."""
-    manifest = tiny_manifest()
     stages = tuple(
         stage.model_copy(update={"block_px": 128, "overlap_px": 32})
         if isinstance(stage, Wiener)
         else stage
-        for stage in manifest.stages
+        for stage in tiny_stages()
     )
     networks = {
         "M": tiny_facts().model_copy(update={"mac_per_pixel": 16_000.0}),
@@ -70,9 +71,11 @@ def write_planned_bundle(folder: Path, *, model: LossModel | None = MODEL) -> Bu
     plan = None
     if model is not None:
         plan = plan_entries(model, adaptive_cost_db=0.05, draft_cost_db=0.3)
-    camera = tiny_camera().model_copy(update={"width_px": WIDTH_PX, "height_px": HEIGHT_PX})
-    full = manifest.model_copy(
-        update={"camera": camera, "stages": stages, "networks": networks, "plan": plan}
+    full = tiny_manifest(
+        sensor=tiny_sensor(WIDTH_PX, HEIGHT_PX),
+        stages=stages,
+        networks={DEFAULT_ROLE: networks},
+        plan=plan,
     )
     path = folder / "planned.camkit"
     psf = replace(

@@ -11,6 +11,7 @@ from camkit.contracts import (
     grid_heights_mm,
 )
 from camkit.runtime.bank.blocks import LocalPsf, to_otf
+from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
 QUIET = NoiseModel(shot=(1e-9,) * 3, read_variance=(1e-12,) * 3)
@@ -127,7 +128,8 @@ def local_psf(kernels: FloatArray, heights_mm: np.ndarray, size_px: tuple[int, i
     )
     if kernels.ndim == 3:
         kernels, heights_mm = kernels[None], np.zeros(1)
-    return LocalPsf(kernels=kernels, field_heights_mm=heights_mm, window=window)
+    fields = FieldKernels(kernels=kernels, field_heights_mm=heights_mm)
+    return LocalPsf(kernels=fields, window=window)
 
 
 def texture(h: int, w: int, seed: int = 0) -> FloatArray:

@@ -1,6 +1,10 @@
 """The work on one capture.
 
 setup           what all captures of a pipeline share
-preparation     what is decided before the first row is computed
-reconstruction  the stages joined, rows pulled through them
+choices         options held against what a camera can do with them
+job             what is known of the capture, found when asked
+stage_work      a stage made ready
+stream          a plane on its way from one stage to the next
+walker          the stages joined, given their share of memory, rows pulled through them
+reconstruction  planned, then walked: bands of a product
 """

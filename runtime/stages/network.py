@@ -110,6 +110,9 @@ class _NetworkStage:
         taken = bundle.manifest.planes[entry.takes[0]]
         self._windows = plan_network(job.grid_px(taken), networks, limits, work.network_labels())
         job.windows[entry.role] = self._windows
+        tiles = {role: windows.to_json() for role, windows in job.windows.items()}
+        one = len(bundle.manifest.networks) == 1
+        job.record["tiles"] = tiles[entry.role] if one else tiles
 
     def planned_bytes(self) -> int:
         """Give the memory of the windows."""

@@ -41,7 +41,8 @@ def prepare(entry: Repair, job: Job) -> StageWork:
         return tuple(given[: len(entry.gives)])
 
     def warnings() -> tuple[str, ...]:
-        count = sum(sound.repaired for sound in made)
+        # every product walks anew, over the same samples
+        count = max((sound.repaired for sound in made), default=0)
         return (f"{count} dead or invalid pixels were repaired",) if count else ()
 
     return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width, warnings=warnings)

@@ -4,13 +4,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
-from camkit.runtime.bank.psf import color_kernels, kernel_at, wavelength_weights
+from camkit.contracts import FrozenPsf
+from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from tests.deep_bundle import deep_psf
 from tests.psf_factory import coma_kernels, frozen_psf
 
 KERNELS, HEIGHTS_MM = coma_kernels()
 FLAT = np.ones((3, 2))
 PSF_UM = np.array([0.45, 0.55, 0.65])
+ROUND = FieldKernels(kernels=KERNELS, field_heights_mm=HEIGHTS_MM)
 
 
 def centroid(kernel):
@@ -64,7 +66,7 @@ def test_a_response_that_does_not_fit_is_refused(response):
 
 def test_a_colour_that_sees_one_wavelength_gets_its_kernel():
     psf = frozen_psf(KERNELS, HEIGHTS_MM, [0.45, 0.55, 0.65])
-    mixed = color_kernels(psf, np.array([0.55]), np.ones((3, 1)))
+    mixed = color_kernels(psf, np.array([0.55]), np.ones((3, 1))).kernels
     assert mixed.dtype == np.float32
     np.testing.assert_allclose(mixed, np.repeat(KERNELS[:, 1:2], 3, axis=1), atol=1e-7)
 
@@ -72,7 +74,7 @@ def test_a_colour_that_sees_one_wavelength_gets_its_kernel():
 def test_colour_kernels_are_normalised_and_symmetric_about_the_meridian():
     lopsided = np.roll(KERNELS, 1, axis=-1)
     psf = frozen_psf(lopsided, HEIGHTS_MM, [0.45, 0.55, 0.65])
-    mixed = color_kernels(psf, np.array([0.4, 0.7]), FLAT)
+    mixed = color_kernels(psf, np.array([0.4, 0.7]), FLAT).kernels
     np.testing.assert_allclose(mixed.sum(axis=(-2, -1)), 1, atol=1e-6)
     np.testing.assert_array_equal(mixed, mixed[..., ::-1])
 
@@ -85,50 +87,54 @@ def test_a_depth_that_the_psf_does_not_reach_is_refused():
 
 def test_without_a_depth_the_kernel_is_the_mean_of_all():
     psf, response = deep_psf(), (np.array([0.4, 0.7]), FLAT)
-    each = [color_kernels(psf, *response, depth_mm=depth) for depth in psf.depths_mm]
-    np.testing.assert_allclose(color_kernels(psf, *response), np.mean(each, axis=0), atol=1e-7)
+    each = [color_kernels(psf, *response, depth_mm=depth).kernels for depth in psf.depths_mm]
+    mean = color_kernels(psf, *response).kernels
+    np.testing.assert_allclose(mean, np.mean(each, axis=0), atol=1e-7)
     assert np.abs(each[0] - each[1]).max() > 0.1
 
 
 def test_between_depths_kernels_are_linear_in_the_vergence():
     psf, response = deep_psf(), (np.array([0.4, 0.7]), FLAT)
-    near, far = (color_kernels(psf, *response, depth_mm=depth) for depth in (500.0, 1000.0))
-    between = color_kernels(psf, *response, depth_mm=1 / (0.75 / 500 + 0.25 / 1000))
+    near, far, between = (
+        color_kernels(psf, *response, depth_mm=depth_mm).kernels
+        for depth_mm in (500.0, 1000.0, 1 / (0.75 / 500 + 0.25 / 1000))
+    )
     np.testing.assert_allclose(between, 0.75 * near + 0.25 * far, atol=1e-7)
 
 
 def test_on_the_axis_nothing_is_turned():
-    np.testing.assert_allclose(kernel_at(KERNELS, HEIGHTS_MM, 0.0, 0.0), KERNELS[0], atol=1e-7)
+    np.testing.assert_allclose(ROUND.at(0.0, 0.0), KERNELS[0], atol=1e-7)
 
 
 def test_straight_down_the_stored_kernels_come_back():
     for kernel, height_mm in zip(KERNELS, HEIGHTS_MM, strict=True):
         np.testing.assert_allclose(
-            kernel_at(KERNELS, HEIGHTS_MM, 0.0, height_mm), kernel, atol=1e-7
+            ROUND.at(0.0, height_mm), kernel, atol=1e-7
         )
 
 
 def test_between_heights_kernels_are_interpolated():
     middle_mm = (HEIGHTS_MM[2] + HEIGHTS_MM[3]) / 2
     np.testing.assert_allclose(
-        kernel_at(KERNELS, HEIGHTS_MM, 0.0, middle_mm), (KERNELS[2] + KERNELS[3]) / 2, atol=1e-7
+        ROUND.at(0.0, middle_mm), (KERNELS[2] + KERNELS[3]) / 2, atol=1e-7
     )
 
 
 def test_beyond_the_last_height_its_kernel_holds():
-    np.testing.assert_allclose(kernel_at(KERNELS, HEIGHTS_MM, 0.0, 99.0), KERNELS[-1], atol=1e-7)
+    np.testing.assert_allclose(ROUND.at(0.0, 99.0), KERNELS[-1], atol=1e-7)
 
 
 @pytest.mark.parametrize("place_mm", [(0.0, 1.0), (-1.0, 0.5), (0.3, -1.0), (-1.0, -1.0)])
 def test_one_field_serves_every_place_as_it_is(place_mm):
     single = KERNELS[-1:]
     assert np.abs(single[0] - single[0, :, ::-1]).max() > 1e-3
-    np.testing.assert_allclose(kernel_at(single, np.zeros(1), *place_mm), single[0], atol=1e-7)
+    fields = FieldKernels(kernels=single, field_heights_mm=np.zeros(1))
+    np.testing.assert_allclose(fields.at(*place_mm), single[0], atol=1e-7)
 
 
 def test_a_quarter_turn_is_a_transposition():
-    down = kernel_at(KERNELS, HEIGHTS_MM, 0.0, 1.5)
-    right = kernel_at(KERNELS, HEIGHTS_MM, 1.5, 0.0)
+    down = ROUND.at(0.0, 1.5)
+    right = ROUND.at(1.5, 0.0)
     np.testing.assert_allclose(right, np.swapaxes(down, 1, 2), atol=1e-7)
 
 
@@ -136,8 +142,8 @@ def test_a_quarter_turn_is_a_transposition():
 @settings(deadline=None, max_examples=40)
 def test_the_tail_points_outward_at_every_azimuth(azimuth, height_mm):
     x_mm, y_mm = height_mm * np.cos(azimuth), height_mm * np.sin(azimuth)
-    turned = centroid(kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm))
-    length = np.hypot(*centroid(kernel_at(KERNELS, HEIGHTS_MM, 0.0, height_mm)))
+    turned = centroid(ROUND.at(x_mm, y_mm))
+    length = np.hypot(*centroid(ROUND.at(0.0, height_mm)))
     np.testing.assert_allclose(
         turned, (length * np.cos(azimuth), length * np.sin(azimuth)), atol=0.03
     )
@@ -148,7 +154,7 @@ def test_light_of_a_point_falls_outward_on_the_sensor():
     canvas = np.zeros((60, 60))
     row, col, centre = 20, 14, 29.5
     x_mm, y_mm = (col - centre) * 0.04, (row - centre) * 0.04
-    kernel = kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm)[1]
+    kernel = ROUND.at(x_mm, y_mm)[1]
     half = kernel.shape[0] // 2
     for dy in range(-half, half + 1):
         for dx in range(-half, half + 1):
@@ -164,9 +170,9 @@ def test_light_of_a_point_falls_outward_on_the_sensor():
 @given(st.floats(0.01, 2), st.floats(0.01, 2))
 @settings(deadline=None, max_examples=20)
 def test_mirrored_places_have_mirrored_bits(x_mm, y_mm):
-    kernel = kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm)
-    left = kernel_at(KERNELS, HEIGHTS_MM, -x_mm, y_mm)
-    both = kernel_at(KERNELS, HEIGHTS_MM, -x_mm, -y_mm)
+    kernel = ROUND.at(x_mm, y_mm)
+    left = ROUND.at(-x_mm, y_mm)
+    both = ROUND.at(-x_mm, -y_mm)
     np.testing.assert_array_equal(left, kernel[:, :, ::-1])
     np.testing.assert_array_equal(both, kernel[:, ::-1, ::-1])
 
@@ -174,11 +180,39 @@ def test_mirrored_places_have_mirrored_bits(x_mm, y_mm):
 @given(st.floats(-2, 2), st.floats(-2, 2))
 @settings(deadline=None, max_examples=30)
 def test_kernels_are_never_negative_and_sum_to_one(x_mm, y_mm):
-    kernel = kernel_at(KERNELS, HEIGHTS_MM, x_mm, y_mm)
+    kernel = ROUND.at(x_mm, y_mm)
     assert (kernel >= 0).all()
     np.testing.assert_allclose(kernel.sum(axis=(-2, -1)), 1, atol=1e-5)
 
 
 def test_kernels_without_their_heights_are_refused():
     with pytest.raises(ContractError, match="fields"):
-        kernel_at(KERNELS, HEIGHTS_MM[:-1], 0.0, 1.0)
+        FieldKernels(kernels=KERNELS, field_heights_mm=HEIGHTS_MM[:-1])
+
+
+def _gaussian(side: int, sigma: float) -> FieldKernels:
+    at = np.arange(side) - side // 2
+    line = np.exp(-(at**2) / (2 * sigma**2))
+    kernel = (np.outer(line, line) / line.sum() ** 2).astype(np.float32)
+    kernels = kernel[None, None].repeat(3, axis=1)
+    return FieldKernels(kernels=kernels, field_heights_mm=np.zeros(1))
+
+
+@pytest.mark.parametrize("ratio", [0.5, 0.8, 1.7])
+def test_scaled_kernels_have_scaled_width_and_unit_sum(ratio: float) -> None:
+    scaled = _gaussian(33, 4.0).scaled(ratio).kernels
+    at = np.arange(scaled.shape[-1]) - scaled.shape[-1] // 2
+    width = np.sqrt((scaled[0, 0].sum(axis=0) * at**2).sum())
+    assert scaled.shape[-1] % 2 == 1
+    np.testing.assert_allclose(scaled.sum(axis=(-2, -1)), 1, atol=1e-5)
+    assert width == pytest.approx(4.0 * ratio, rel=0.1)
+
+
+def test_a_ratio_of_one_changes_nothing() -> None:
+    kernels = _gaussian(9, 1.0)
+    assert kernels.scaled(1.0) is kernels
+
+
+def test_a_ratio_of_zero_is_refused() -> None:
+    with pytest.raises(ContractError, match="> 0"):
+        _gaussian(9, 1.0).scaled(0.0)

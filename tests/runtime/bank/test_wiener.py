@@ -8,7 +8,6 @@ from camkit.bundle.stages import Wiener
 from camkit.contracts import NoiseModel
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import Block, BlockBank, plan_spans, taper_edges, to_otf
-from camkit.runtime.bank.psf import kernel_at
 from camkit.runtime.bank.richardson_lucy import apply_transfer
 from camkit.runtime.bank.wiener import CORNER_FREQUENCY, KERNEL_ERROR, wiener_filter
 from tests.psf_factory import (
@@ -67,8 +66,7 @@ def reference(planes, psf, noise):
     rise = (f[:, None] ** 2 + f**2 + CORNER_FREQUENCY**2) ** (SMALL.prior_exponent / 2)
     for row in plan_spans(h, 64, 24):
         for col in plan_spans(w, 64, 24):
-            x_mm, y_mm = psf.position_mm(col.centre, row.centre)
-            kernel = kernel_at(psf.kernels, psf.field_heights_mm, x_mm, y_mm)
+            kernel = psf.kernels.at(*psf.position_mm(col.centre, row.centre))
             half = kernel.shape[-1] // 2
             for c in range(3):
                 spread = np.zeros((64, 64))
@@ -104,12 +102,12 @@ def test_bank_equals_a_slow_obvious_twin(size):
 
 def blur_by_scattering(scene, psf):
     """Let every pixel scatter its own kernel, one after the other."""
-    size, reach = scene.shape[1], psf.kernels.shape[-1] // 2
+    size, reach = scene.shape[1], psf.kernels.kernels.shape[-1] // 2
     canvas = np.zeros((3, size + 2 * reach, size + 2 * reach))
     weight = np.zeros_like(canvas)
     for row in range(size):
         for col in range(size):
-            kernel = kernel_at(psf.kernels, psf.field_heights_mm, *psf.position_mm(col, row))
+            kernel = psf.kernels.at(*psf.position_mm(col, row))
             at = np.s_[:, row : row + 2 * reach + 1, col : col + 2 * reach + 1]
             canvas[at] += scene[:, row, col, None, None] * kernel
             weight[at] += kernel

@@ -6,7 +6,7 @@ from camkit.runtime.geometry.illumination import (
     illumination_band,
 )
 from camkit.runtime.geometry.sensor_window import SensorWindow
-from tests.camera_factory import PITCH_UM, make_camera, make_psf, whole_window
+from tests.camera_factory import PITCH_UM, make_sensor, make_psf, whole_window
 
 LOOKUP_ERROR = 2e-5
 
@@ -24,17 +24,17 @@ def slow_twin(window: SensorWindow, psf: object) -> np.ndarray:
 
 
 def test_lookup_agrees_with_interpolation_at_every_pixel() -> None:
-    camera = make_camera()
-    psf, window = make_psf(camera), whole_window(camera)
+    sensor = make_sensor()
+    psf, window = make_psf(sensor), whole_window(sensor)
     found = illumination_band(psf, window, 0, 64)
     np.testing.assert_allclose(found, slow_twin(window, psf), atol=LOOKUP_ERROR)
 
 
 def test_bands_and_crops_are_parts_of_the_whole() -> None:
-    camera = make_camera()
-    psf = make_psf(camera)
-    whole = illumination_band(psf, whole_window(camera), 0, 64)
-    band = illumination_band(psf, whole_window(camera), 20, 33)
+    sensor = make_sensor()
+    psf = make_psf(sensor)
+    whole = illumination_band(psf, whole_window(sensor), 0, 64)
+    band = illumination_band(psf, whole_window(sensor), 20, 33)
     np.testing.assert_array_equal(band, whole[20:33])
     crop = SensorWindow(
         size_px=(30, 10), origin_px=(50, 40), sensor_size_px=(96, 64), pitch_um=PITCH_UM
@@ -45,8 +45,8 @@ def test_bands_and_crops_are_parts_of_the_whole() -> None:
 
 
 def test_division_undoes_the_multiplication() -> None:
-    camera = make_camera()
-    psf, window = make_psf(camera), whole_window(camera)
+    sensor = make_sensor()
+    psf, window = make_psf(sensor), whole_window(sensor)
     picture = np.random.default_rng(0).random((3, 64, 96), dtype=np.float32)
     shaded = picture * illumination_band(psf, window, 0, 64)
     np.testing.assert_allclose(
@@ -55,14 +55,14 @@ def test_division_undoes_the_multiplication() -> None:
 
 
 def test_single_pixel_on_the_axis_has_full_light() -> None:
-    camera = make_camera(1, 1)
-    psf = make_psf(make_camera())
-    assert illumination_band(psf, whole_window(camera), 0, 1) == 1.0
+    sensor = make_sensor(1, 1)
+    psf = make_psf(make_sensor())
+    assert illumination_band(psf, whole_window(sensor), 0, 1) == 1.0
 
 
 def test_the_gain_is_one_over_the_illumination_wherever_a_band_begins() -> None:
-    camera = make_camera()
-    psf, window = make_psf(camera), whole_window(camera)
+    sensor = make_sensor()
+    psf, window = make_psf(sensor), whole_window(sensor)
     light = illumination_band(psf, window, 0, 64)
     gain = IlluminationGain(psf, window)
     ones = np.ones((3, 64, 96), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Networks on lattice cells: the bits of the untiled run there, the Wiener planes elsewhere."""
+"""Networks on lattice cells: the bits of the untiled run there, the planes that stand in elsewhere."""
 
 import threading
 
@@ -16,7 +16,7 @@ from camkit.runtime.network.cell_windows import (
     plan_cells,
 )
 from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.network.tiling import Cancelled
+from camkit.runtime.network.tiling import Cancelled, PixelCost
 from camkit.runtime.rows import ArrayRows
 from tests.small_network import HALO_PX, STRIDE_PX, small_network
 
@@ -24,11 +24,14 @@ CELL = 128
 ENGINES = {n: NetworkEngine(small_network(), threads=n) for n in (1, 2)}
 LABELS = np.array([[1, 1, 0, 0], [1, 1, 1, 0], [0, 1, 1, 1]])
 SIZE = (3 * CELL - 30, 4 * CELL - 7)
+COST = PixelCost(arena_bytes=100.0)
+RESTORED = slice(3, 6)
+"""Channels of the input that stand in where no network runs."""
 
 
 def _network(threads: int = 1, **changes: object) -> CellNetwork:
     values = {"run": ENGINES[threads].run, "stride_px": STRIDE_PX, "halo_px": HALO_PX}
-    return CellNetwork(bytes_per_px=100.0, **(values | changes))  # type: ignore[arg-type]
+    return CellNetwork(cost=COST, **(values | changes))  # type: ignore[arg-type]
 
 
 def _limits(max_bytes: int = 2**32, tile_px: int | None = None) -> CellLimits:
@@ -48,7 +51,8 @@ def _whole(picture: FloatArray) -> FloatArray:
 
 
 def _infer(networks: list[CellNetwork], picture: FloatArray, plan: CellPlan) -> FloatArray:
-    return np.concatenate(list(infer_cells(networks, ArrayRows(picture), plan)), axis=1)
+    bands = infer_cells(networks, ArrayRows(picture), plan, stand_in=RESTORED)
+    return np.concatenate(list(bands), axis=1)
 
 
 def _slices(i: int, j: int, inset: int = 0) -> tuple[slice, slice]:
@@ -70,7 +74,7 @@ def test_chosen_cells_have_the_bits_of_the_untiled_network() -> None:
         np.testing.assert_array_equal(got[:, rows, columns], whole[:, rows, columns])
 
 
-def test_other_cells_keep_their_wiener_planes() -> None:
+def test_other_cells_keep_the_planes_that_stand_in() -> None:
     picture = _picture()
     network = _network()
     got = _infer([network], picture, plan_cells(SIZE, LABELS, [network], _limits()))
@@ -79,13 +83,13 @@ def test_other_cells_keep_their_wiener_planes() -> None:
         np.testing.assert_array_equal(got[:, rows, columns], picture[3:, rows, columns])
 
 
-def test_ramp_passes_from_wiener_to_network_inside_the_cell() -> None:
+def test_ramp_passes_from_the_stand_in_to_the_network_inside_the_cell() -> None:
     picture = np.zeros((6, 2 * CELL, 2 * CELL), np.float32)
     network = CellNetwork(
         run=lambda window: np.ones((1, 3, *window.shape[2:]), np.float32),
         stride_px=1,
         halo_px=0,
-        bytes_per_px=100.0,
+        cost=COST,
     )
     labels = np.array([[0, 1], [0, 1]])
     got = _infer([network], picture, plan_cells((2 * CELL, 2 * CELL), labels, [network], _limits()))
@@ -154,7 +158,7 @@ def test_needed_bytes_hold_rows_and_the_largest_window() -> None:
     plan = plan_cells(SIZE, LABELS, [network], _limits())
     largest = max(w.area_px for windows in plan.strips for w in windows)
     rows = 24 * plan.buffer_rows * plan.padded_px[1]
-    assert plan.needed_bytes([100.0]) >= rows + 100 * largest
+    assert plan.needed_bytes([COST]) >= rows + 100 * largest
 
 
 def test_not_finite_output_names_its_window() -> None:
@@ -173,7 +177,14 @@ def test_cancel_stops_before_the_next_window() -> None:
         seen.append((done, total))
         flag.set()
 
-    bands = infer_cells([network], ArrayRows(_picture()), plan, progress=progress, cancel=flag)
+    bands = infer_cells(
+        [network],
+        ArrayRows(_picture()),
+        plan,
+        progress=progress,
+        cancel=flag,
+        stand_in=RESTORED,
+    )
     with pytest.raises(Cancelled, match="after 1 of"):
         list(bands)
     assert seen == [(1, plan.window_count)]

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
+from camkit.bundle.facts import Port
 from camkit.errors import BundleError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import check_graph, inspect_graph, parse_graph, with_node_outputs
@@ -385,8 +386,9 @@ def test_grids_that_do_not_meet_are_refused() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"input_channels": 5}, "input channels"),
-        ({"output_channels": 4}, "output channels"),
+        ({"inputs": (Port(name="planes", channels=5),)}, "input channels"),
+        ({"outputs": (Port(name="clean", channels=4),)}, "output channels"),
+        ({"outputs": (Port(name="clean", channels=3, scale=2),)}, "output scale"),
         ({"input_name": "x"}, "input name"),
         ({"output_name": "y"}, "output name"),
         ({"stride_px": 4}, "stride"),

@@ -1,4 +1,4 @@
-"""No bad tile reaches a picture: it is named, and refused or replaced by its Wiener planes."""
+"""No bad tile reaches a picture: it is named, and refused or replaced by what stands in."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,8 @@ from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
 from camkit.runtime.rows import ArrayRows
 
 RNG = np.random.default_rng
+RESTORED = slice(3, 6)
+"""Channels of the input that stand in for a bad tile."""
 
 
 def _planes(height: int = 32, width: int = 32) -> np.ndarray:
@@ -30,14 +32,14 @@ def _bands(planes: np.ndarray, spoil: float, guard: TileGuard | None) -> np.ndar
 
 
 def test_sound_tiles_pass_untouched() -> None:
-    planes, guard = _planes(), TileGuard(fallback=True)
+    planes, guard = _planes(), TileGuard(fallback=True, stand_in=RESTORED)
     np.testing.assert_array_equal(_bands(planes, np.nan, guard), planes[:3])
     assert guard.replaced == []
 
 
 @pytest.mark.parametrize("spoil", [np.nan, np.inf, -np.inf, 1e4])
-def test_a_bad_tile_takes_its_wiener_planes_and_only_it(spoil: float) -> None:
-    planes, guard = _planes(), TileGuard(fallback=True)
+def test_a_bad_tile_takes_the_planes_that_stand_in_and_only_it(spoil: float) -> None:
+    planes, guard = _planes(), TileGuard(fallback=True, stand_in=RESTORED)
     planes[1, 20, 5] = 3.0
     got = _bands(planes, spoil, guard)
     expected = planes[:3].copy()
@@ -63,8 +65,8 @@ def test_without_a_guard_nan_is_still_refused_and_large_values_pass() -> None:
     assert _bands(planes, 1e4, None).max() == np.float32(1e4)
 
 
-def test_wiener_planes_that_are_not_finite_cannot_stand_in() -> None:
-    planes, guard = _planes(), TileGuard(fallback=True)
+def test_planes_that_are_not_finite_cannot_stand_in() -> None:
+    planes, guard = _planes(), TileGuard(fallback=True, stand_in=RESTORED)
     planes[0, 3, 30], planes[4, 0, 31] = 3.0, np.nan
     with pytest.raises(ContractError, match="not finite either"):
         _bands(planes, np.nan, guard)

@@ -9,6 +9,8 @@ from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.probe import halo_error_curve, perturbation_reach
 from tests.small_network import HALO_PX, STRIDE_PX, small_network
 
+RNG = np.random.default_rng
+
 
 @pytest.fixture(scope="module")
 def engine() -> NetworkEngine:
@@ -25,12 +27,12 @@ def _box(radius: int) -> object:
 
 
 def test_reach_of_a_known_filter_is_found_to_the_pixel() -> None:
-    reach = perturbation_reach(_box(7), 64, np.random.default_rng(0), stride_px=1)
+    reach = perturbation_reach(_box(7), 64, RNG(0), stride_px=1, channels=6)
     assert (reach.radius_px, reach.halo_px) == (7, 7)
 
 
 def test_halo_on_the_lattice_is_never_more_than_the_radius(engine: NetworkEngine) -> None:
-    reach = perturbation_reach(engine.run, 64, np.random.default_rng(0), stride_px=STRIDE_PX)
+    reach = perturbation_reach(engine.run, 64, RNG(0), stride_px=STRIDE_PX, channels=6)
     assert HALO_PX - STRIDE_PX < reach.halo_px <= HALO_PX
     assert reach.halo_px <= reach.radius_px <= reach.halo_px + STRIDE_PX
 
@@ -40,12 +42,12 @@ def test_network_that_sees_the_whole_window_is_refused() -> None:
         return window[:, 3:] - window[:, 3:].mean(axis=(2, 3), keepdims=True)
 
     with pytest.raises(ContractError, match="global operator"):
-        perturbation_reach(global_mean, 64, np.random.default_rng(0), stride_px=4)
+        perturbation_reach(global_mean, 64, RNG(0), stride_px=4, channels=6)
 
 
 def test_size_off_the_stride_is_refused(engine: NetworkEngine) -> None:
     with pytest.raises(ContractError, match="multiple of 4"):
-        perturbation_reach(engine.run, 66, np.random.default_rng(0), stride_px=STRIDE_PX)
+        perturbation_reach(engine.run, 66, RNG(0), stride_px=STRIDE_PX, channels=6)
 
 
 def test_error_falls_with_the_halo_and_is_nothing_at_the_reach(engine: NetworkEngine) -> None:

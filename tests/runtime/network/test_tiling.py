@@ -14,6 +14,7 @@ from camkit.errors import CamkitError, ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.tiling import (
     Cancelled,
+    PixelCost,
     Span,
     TileLimits,
     TilePlan,
@@ -85,7 +86,7 @@ def test_plan_keeps_every_pixel_once_with_its_halo_within_memory(
         return
     _assert_sound(plan)
     assert plan.halo_px >= halo
-    assert plan.needed_bytes(limits.bytes_per_px) <= limits.max_bytes
+    assert plan.needed_bytes(limits.cost) <= limits.max_bytes
 
 
 @given(height=sides, width=sides, halo=st.integers(0, 140), tile=st.integers(1, 2000))
@@ -96,10 +97,11 @@ def test_forced_tiles_keep_every_pixel_once(height: int, width: int, halo: int, 
 
 
 def test_plan_of_24_megapixels_wastes_less_than_half() -> None:
-    limits = TileLimits(stride_px=16, halo_px=94, bytes_per_px=183, max_bytes=560 * 10**6)
+    cost = PixelCost(arena_bytes=183)
+    limits = TileLimits(stride_px=16, halo_px=94, cost=cost, max_bytes=560 * 10**6)
     plan = plan_windows(4000, 6000, limits)
     assert plan.work_ratio < 1.45
-    assert plan.needed_bytes(183) <= 560 * 10**6
+    assert plan.needed_bytes(cost) <= 560 * 10**6
 
 
 def test_more_memory_never_means_more_work() -> None:
@@ -129,7 +131,7 @@ def test_cap_too_small_names_what_is_needed() -> None:
 
 @pytest.mark.parametrize(
     "changes",
-    [{"stride_px": 0}, {"halo_px": -1}, {"bytes_per_px": 0.0}, {"tile_px": 0}],
+    [{"stride_px": 0}, {"halo_px": -1}, {"cost": PixelCost(arena_bytes=0.0)}, {"tile_px": 0}],
 )
 def test_limits_out_of_range_are_refused(changes: dict[str, object]) -> None:
     with pytest.raises(ContractError, match="must be >"):

@@ -1,17 +1,17 @@
-"""The network stage: its halo by mode, its memory, its windows in numbers, and its picture."""
+"""The windows of networks: their halo by mode, their memory, their numbers, and their picture."""
 
 import numpy as np
 import pytest
 
-from camkit.bundle.manifest import HaloError
+from camkit.bundle.facts import HaloError
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.network.stage import (
-    NetworkStage,
+from camkit.runtime.network.windows import (
+    NetworkWindows,
     SizedNetwork,
-    StageLimits,
+    WindowLimits,
     fast_halo_px,
-    plan_stage,
+    plan_network,
 )
 from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import tiny_facts, tiny_forward
@@ -34,17 +34,18 @@ def _network(size: str = "M", bytes_per_pixel: float = 48.0) -> SizedNetwork:
     return SizedNetwork(size=size, run=_run, facts=facts)
 
 
-def _limits(**changes: object) -> StageLimits:
+def _limits(**changes: object) -> WindowLimits:
     values = {"cap_bytes": 10**9, "spent_bytes": 10**8, "mode": "exact", "cell_px": 32}
-    return StageLimits(**(values | changes))  # type: ignore[arg-type]
+    return WindowLimits(**(values | changes))  # type: ignore[arg-type]
 
 
 def _picture() -> FloatArray:
     return np.random.default_rng(1).random((6, *SIZE_PX), dtype=np.float32)
 
 
-def _result(stage: NetworkStage) -> FloatArray:
-    return np.concatenate(list(stage.bands(ArrayRows(_picture()))), axis=1)
+def _result(windows: NetworkWindows) -> FloatArray:
+    bands = windows.bands(ArrayRows(_picture()), stand_in=slice(3, 6))
+    return np.concatenate(list(bands), axis=1)
 
 
 def test_fast_takes_the_smallest_halo_that_keeps_80_db() -> None:
@@ -61,12 +62,12 @@ def test_fast_without_a_curve_is_refused() -> None:
 
 def test_a_cap_below_what_is_spent_names_both() -> None:
     with pytest.raises(ContractError, match=r"cap of 500 MB .* takes 600 MB"):
-        plan_stage(SIZE_PX, [_network()], _limits(cap_bytes=5 * 10**8, spent_bytes=6 * 10**8))
+        plan_network(SIZE_PX, [_network()], _limits(cap_bytes=5 * 10**8, spent_bytes=6 * 10**8))
 
 
 def test_whole_is_one_window_and_exact_windows_overlap_by_the_halo() -> None:
-    whole = plan_stage(SIZE_PX, [_network()], _limits(mode="whole"))
-    tiled = plan_stage(SIZE_PX, [_network()], _limits(tile_px=32))
+    whole = plan_network(SIZE_PX, [_network()], _limits(mode="whole"))
+    tiled = plan_network(SIZE_PX, [_network()], _limits(tile_px=32))
     pixels_mp = SIZE_PX[0] * SIZE_PX[1] / 1e6
     assert whole.to_json() == {"mode": "whole", "halo_px": 4, "windows": 1, "work_ratio": 1.0}
     assert whole.window_mp() == {"M": pytest.approx(pixels_mp)}
@@ -78,38 +79,38 @@ def test_whole_is_one_window_and_exact_windows_overlap_by_the_halo() -> None:
 
 
 def test_tiles_and_cells_of_one_network_give_the_whole_picture() -> None:
-    whole = _result(plan_stage(SIZE_PX, [_network()], _limits(mode="whole")))
+    whole = _result(plan_network(SIZE_PX, [_network()], _limits(mode="whole")))
     np.testing.assert_allclose(whole, tiny_forward(_picture()), rtol=1e-6)
-    tiled = plan_stage(SIZE_PX, [_network()], _limits(tile_px=32))
+    tiled = plan_network(SIZE_PX, [_network()], _limits(tile_px=32))
     np.testing.assert_allclose(_result(tiled), whole, rtol=1e-6)
     everywhere = np.ones((2, 3), np.int64)
-    cells = plan_stage(SIZE_PX, [_network()], _limits(), everywhere)
+    cells = plan_network(SIZE_PX, [_network()], _limits(), everywhere)
     assert cells.tiles is None
     np.testing.assert_allclose(_result(cells), whole, rtol=1e-6)
 
 
-def test_labels_say_where_which_network_runs_and_zero_leaves_the_wiener_planes() -> None:
+def test_labels_say_where_which_network_runs_and_zero_leaves_the_planes_that_stand_in() -> None:
     labels = np.array([[0, 0, 1], [0, 0, 2]])
     networks = [_network("M"), _network("S", bytes_per_pixel=12.0)]
-    stage = plan_stage(SIZE_PX, networks, _limits(), labels)
-    np.testing.assert_array_equal(_result(stage)[:, :, :32], _picture()[3:, :, :32])
-    facts = stage.to_json()
+    windows = plan_network(SIZE_PX, networks, _limits(), labels)
+    np.testing.assert_array_equal(_result(windows)[:, :, :32], _picture()[3:, :, :32])
+    facts = windows.to_json()
     assert facts["windows"] == 2
     share = facts["work_ratio"]
     assert share["M"] == share["S"], "one cell each, mirrored"
     assert 1 / 6 < share["M"] < 1
-    assert stage.halo_px == 3
+    assert windows.halo_px == 3
 
 
 def test_whole_mode_ignores_labels() -> None:
     labels = np.zeros((2, 3), np.int64)
-    stage = plan_stage(SIZE_PX, [_network()], _limits(mode="whole"), labels)
-    assert stage.cells is None
-    assert stage.to_json()["windows"] == 1
+    windows = plan_network(SIZE_PX, [_network()], _limits(mode="whole"), labels)
+    assert windows.cells is None
+    assert windows.to_json()["windows"] == 1
 
 
-def test_a_stage_without_windows_is_refused_when_it_should_run() -> None:
-    empty = NetworkStage(networks=(_network(),), tiles=None, cells=None, mode="exact")
+def test_no_windows_at_all_are_refused_when_they_should_run() -> None:
+    empty = NetworkWindows(networks=(_network(),), tiles=None, cells=None, mode="exact")
     assert (empty.window_mp(), empty.needed_bytes(), empty.to_json()) == ({}, 0, {})
     with pytest.raises(ContractError, match="tiles or cells"):
         empty.bands(ArrayRows(_picture()))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.contracts import FloatArray
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
@@ -18,7 +19,12 @@ from camkit.runtime.plan.planner import Plan, default_size, make_plan, needs_sce
 from camkit.runtime.plan.speed import Speed
 from tests.plan_factory import MODEL, half_textured_mosaic, write_planned_bundle
 
-SPEED = Speed(network_s_per_mp={"M": 2.0, "S": 1.0}, block_s=0.005, rest_s_per_mp=0.1, threads=1)
+SPEED = Speed(
+    network_s_per_mp={(DEFAULT_ROLE, "M"): 2.0, (DEFAULT_ROLE, "S"): 1.0},
+    block_s=0.005,
+    rest_s_per_mp=0.1,
+    threads=1,
+)
 
 
 @pytest.fixture(scope="module")
@@ -30,10 +36,9 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 @pytest.fixture(scope="module")
 def plan_with(bundle: Bundle) -> Callable[..., Plan]:
     """Give a function from options to the plan of the half textured capture."""
-    work = _start(bundle, quality="adaptive")
-    decided = work.prepared.decided
-    assert decided is not None
-    case = decided.case
+    made = _start(bundle, quality="adaptive").plan
+    assert made is not None
+    case = made.case
 
     def plan(**choices: object) -> Plan:
         options = Options(**choices)  # type: ignore[arg-type]
@@ -132,7 +137,7 @@ def test_without_calibration_nothing_is_skipped(tmp_path: Path) -> None:
     bare = write_planned_bundle(tmp_path, model=None)
     work = _start(bare, quality="adaptive")
     assert work.size == "M"
-    assert "calibrated" in work.plan["decisions"][1]["reason"]
+    assert "calibrated" in work.record["decisions"][1]["reason"]
 
 
 def test_only_choices_that_depend_on_the_capture_measure_it() -> None:
@@ -165,8 +170,8 @@ def test_estimate_comes_with_the_decisions(bundle: Bundle) -> None:
     assert estimate is not None
     assert estimate.seconds > 0
     assert 260 < estimate.peak_mb < 1200
-    assert work.plan["estimate"] == estimate.to_json()
-    assert all(d["saving_s"] is not None for d in work.plan["decisions"])
+    assert work.record["estimate"] == estimate.to_json()
+    assert all(d["saving_s"] is not None for d in work.record["decisions"])
     compared = estimate.compare(2 * estimate.seconds, estimate.peak_mb)
     assert compared["seconds_ratio"] == pytest.approx(2.0, abs=0.01)
     assert compared["peak_ratio"] == pytest.approx(1.0, abs=0.01)

@@ -26,10 +26,8 @@ class _Clock:
 class _Network:
     """Takes the seconds it is told to, run by run."""
 
-    channels = 6
-
-    def __init__(self, clock: _Clock, *seconds: float) -> None:
-        self.clock, self.seconds = clock, list(seconds)
+    def __init__(self, clock: _Clock, *seconds: float, channels: int = 6) -> None:
+        self.clock, self.seconds, self.channels = clock, list(seconds), channels
         self.shapes: list[tuple[int, ...]] = []
 
     def run(self, window: FloatArray) -> FloatArray:
@@ -43,19 +41,23 @@ def test_a_window_counts_with_its_best_round_per_megapixel(
 ) -> None:
     clock = _Clock()
     monkeypatch.setattr("camkit.runtime.plan.speed.time", clock)
-    engines = {"M": _Network(clock, 0.9, 0.6, 0.7), "S": _Network(clock, 0.2, 0.3, 0.4)}
+    engines = {
+        ("split", "M"): _Network(clock, 0.9, 0.6, 0.7),
+        ("fuse", "M"): _Network(clock, 0.2, 0.3, 0.4, channels=4),
+    }
     speed = measure_speed(engines, STAGE, threads=2)  # type: ignore[arg-type]
     megapixels = WINDOW_PX**2 / 1e6
-    assert speed.network_s_per_mp["M"] == pytest.approx(0.6 / megapixels)
-    assert speed.network_s_per_mp["S"] == pytest.approx(0.2 / megapixels)
-    assert engines["M"].shapes == [(1, 6, WINDOW_PX, WINDOW_PX)] * ROUNDS
+    assert speed.network_s_per_mp["split", "M"] == pytest.approx(0.6 / megapixels)
+    assert speed.network_s_per_mp["fuse", "M"] == pytest.approx(0.2 / megapixels)
+    assert engines["split", "M"].shapes == [(1, 6, WINDOW_PX, WINDOW_PX)] * ROUNDS
+    assert engines["fuse", "M"].shapes == [(1, 4, WINDOW_PX, WINDOW_PX)] * ROUNDS
     assert speed.threads == 2
 
 
 def test_a_real_network_and_the_default_block_are_timed() -> None:
     engine = NetworkEngine(tiny_network(), threads=1)
-    speed = measure_speed({"M": engine}, None, threads=1)
-    assert speed.network_s_per_mp["M"] > 0
+    speed = measure_speed({("restore", "M"): engine}, None, threads=1)
+    assert speed.network_s_per_mp["restore", "M"] > 0
     assert speed.block_s > 1e-5
 
 
@@ -69,9 +71,9 @@ def test_the_rest_is_given_in_blocks_of_one_size_whatever_the_bank_has() -> None
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"block_s": 0.0}, {"rest_s_per_mp": -1.0}, {"threads": 0}, {"network_s_per_mp": {"M": 0.0}}],
+    [{"block_s": 0.0}, {"rest_s_per_mp": -1.0}, {"threads": 0}, {"network_s_per_mp": {("restore", "M"): 0.0}}],
 )
 def test_a_speed_without_time_or_threads_is_refused(wrong: dict[str, object]) -> None:
-    sound = Speed(network_s_per_mp={"M": 1.0}, block_s=0.01, rest_s_per_mp=0.1, threads=1)
+    sound = Speed(network_s_per_mp={}, block_s=0.01, rest_s_per_mp=0.1, threads=1)
     with pytest.raises(ContractError, match="seconds > 0"):
         replace(sound, **wrong)  # type: ignore[arg-type]

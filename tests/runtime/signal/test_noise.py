@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.signal.noise import (
-    FALLBACK_NOISE,
     REPAIR_MARGIN_PX,
+    fallback_noise,
     measure_noise,
     repair_mosaic,
     repair_planes,
@@ -59,7 +59,7 @@ def test_a_clipped_half_does_not_bias_the_measurement():
 
 
 def test_a_picture_too_small_to_measure_gets_the_stated_default():
-    assert measure_noise(capture_of(np.full((16, 16), 0.5))) == FALLBACK_NOISE
+    assert measure_noise(capture_of(np.full((16, 16), 0.5))) == fallback_noise()
 
 
 def test_invalid_samples_are_replaced_by_their_own_colour():

@@ -4,7 +4,7 @@ import pytest
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.rows import ArrayRows
-from camkit.runtime.signal.stabilise import NetworkRows, stabilise, unstabilise
+from camkit.runtime.signal.stabilise import StackedRows, stabilise, unstabilise
 from tests.psf_factory import with_noise
 
 NOISE = NoiseModel(shot=(4e-5, 2e-5, 3e-5), read_variance=(4e-8, 1e-8, 2e-8))
@@ -51,23 +51,19 @@ def test_noise_without_shot_and_other_shapes_are_refused():
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
-def test_network_rows_are_both_sources_stabilised_one_below_the_other(threads):
+def test_stacked_rows_are_their_sources_stabilised_one_below_the_other(threads):
     rng = np.random.default_rng(2)
     planes, restored = (rng.random((3, 70, 9000), dtype=np.float32) for _ in range(2))
-    rows = NetworkRows(ArrayRows(planes), ArrayRows(restored), NOISE, scale=32.0, threads=threads)
+    sources = [ArrayRows(planes), ArrayRows(restored)]
+    rows = StackedRows(sources, [NOISE, NOISE], scale=32.0, threads=threads)
     assert rows.shape == (6, 70, 9000)
     expected = [stabilise(part[:, 3:67], NOISE, scale=32.0) for part in (planes, restored)]
     np.testing.assert_array_equal(rows.read(3, 67), np.concatenate(expected))
 
 
-def test_network_rows_need_sources_of_one_size():
+def test_stacked_rows_need_sources_of_one_size():
     with pytest.raises(ContractError, match="one size"):
-        NetworkRows(
-            ArrayRows(np.zeros((3, 4, 4), np.float32)),
-            ArrayRows(np.zeros((3, 4, 5), np.float32)),
-            NOISE,
-            scale=64.0,
-        )
+        StackedRows([ArrayRows(np.zeros((3, 4, w), np.float32)) for w in (4, 5)], [NOISE, NOISE])
 
 
 def test_undoing_in_place_gives_the_bits_of_a_new_array():

@@ -27,7 +27,7 @@ def _case(bundle: Bundle, side_px: int) -> Case:
         np.zeros((side_px, side_px), np.uint16), iso=100, white_balance=None, origin_px=origin
     )
     cells = side_px // 256
-    placement = place(capture, bundle.manifest.camera, None)
+    placement = place(capture, bundle.manifest.sensor.extent, None)
     return Case(
         bundle=bundle,
         options=Options(quality="adaptive"),
@@ -49,13 +49,13 @@ def test_a_small_crop_in_the_middle_is_not_warped(bundle: Bundle) -> None:
     small, large = _case(bundle, 256), _case(bundle, 768)
     assert largest_shift_px(small) < 0.5 < largest_shift_px(large)
     work, decision = decide(small, Work())
-    assert not work.undistort
+    assert work.left_out == {"undistort"}
     assert decision is not None
     assert decision.choice == "skipped"
-    assert decide(large, Work())[0].undistort
+    assert not decide(large, Work())[0].left_out
 
 
 def test_exact_skips_nothing_and_no_undistortion_stays_none(bundle: Bundle) -> None:
     small = _case(bundle, 256)
-    assert decide(replace(small, scene=None), Work())[0].undistort
-    assert decide(small, Work(undistort=False))[1] is None
+    assert not decide(replace(small, scene=None), Work())[0].left_out
+    assert decide(small, Work(left_out=frozenset({"undistort"})))[1] is None

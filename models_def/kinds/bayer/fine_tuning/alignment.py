@@ -1,0 +1,189 @@
+"""A real pair aligned: where each pixel of a capture lies in its reference, and in which colours.
+
+    capture -> distortion out -> homography of the reference -> colours of the plane fitted
+
+The reference is warped and the capture left alone, since networks work in sensor geometry.
+References: Sun 2021, sections 6.2.1 and 6.3.1.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.sensor import BayerSensor
+from camkit.colorimetry import apply_matrix, encode_srgb
+from camkit.contracts import FloatArray, RadialDistortion
+from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.fine_tuning.homography import (
+    WORK_SIDE_PX,
+    Homography,
+    find_homography,
+    map_points,
+    refine_homography,
+    warp_to,
+)
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.units import to_mm
+
+Points = NDArray[np.float64]
+
+CLIPPED_ABOVE: Final = 0.999
+COLOUR_STEP_PX: Final = 8
+LEAST_COLOUR_POINTS: Final = 64
+RADII: Final = 2048
+RANGE_MARGIN: Final = 1.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignedPair:
+    """An aligned pair.
+
+    Attributes:
+        capture: (3, h, w) linear, 1.0 = white level.
+        reference: (3, m, n) linear light of the plane, in camera colours as captured.
+        to_reference: (n, 2) pixels x, y of the capture -> pixels of the reference.
+        homography: From the reference to the capture as it would be without distortion.
+    """
+
+    capture: FloatArray
+    reference: FloatArray
+    to_reference: Callable[[Points], Points]
+    homography: Homography
+
+
+class Aligner:
+    """Aligns pairs of one camera; pixels x, y of a capture that covers the whole sensor."""
+
+    def __init__(
+        self, sensor: BayerSensor, bank: PsfBank, distortion: RadialDistortion | None
+    ) -> None:
+        """Take the sensor; without a distortion the lens is taken to have none."""
+        self._sensor, self._bank, self._distortion = sensor, bank, distortion
+        self._centre = np.array([sensor.width_px - 1, sensor.height_px - 1]) / 2
+        self._pitch_mm = to_mm(sensor.pixel_pitch_um)
+
+    def align(self, capture: FloatArray, shown: FloatArray) -> AlignedPair:
+        """Align a pair.
+
+        Args:
+            capture: (3, h, w) linear camera colours, 1.0 = white level.
+            shown: (3, m, n) linear Rec.709 of the reference.
+
+        Raises:
+            ContractError: If the capture has not the size of the sensor, or the two cannot be
+                aligned.
+        """
+        sensor = self._sensor
+        if capture.shape[1:] != (sensor.height_px, sensor.width_px):
+            raise ContractError(
+                f"a capture must cover the sensor, {sensor.width_px}x{sensor.height_px} px; got "
+                f"{capture.shape[2]}x{capture.shape[1]}"
+            )
+        # One step of the lattice is a pixel of the picture that is matched.
+        step = -(-max(capture.shape[1:]) // WORK_SIDE_PX)
+        seen = self._ideal_grey(capture, step)
+        found = find_homography(_encoded(shown.mean(0)), _encoded(seen))
+        pair = self._pair(capture, shown, found, step)
+        light = apply_matrix(self._fit_colours(pair), shown)
+        # In the capture's own colours and in linear light, blur and noise are all that differs.
+        found = refine_homography(found, light.mean(0), seen)
+        return self._pair(capture, light, found, step)
+
+    def _pair(
+        self, capture: FloatArray, reference: FloatArray, found: Homography, step: int
+    ) -> AlignedPair:
+        """Make a pair of a homography to every step-th pixel."""
+        matrix = np.diag([step, step, 1.0]) @ found.matrix
+        matrix = matrix / matrix[2, 2]
+        back = np.linalg.inv(matrix)
+
+        def to_reference(points_px: Points) -> Points:
+            return map_points(back, self._undistorted(points_px))
+
+        full = replace(found, matrix=matrix, residual_px=step * found.residual_px)
+        return AlignedPair(
+            capture=capture, reference=reference, to_reference=to_reference, homography=full
+        )
+
+    def to_sensor_mm(self, points_px: Points) -> Points:
+        """Give (n, 2) positions from the axis."""
+        return (points_px - self._centre) * self._pitch_mm
+
+    def illumination(self, points_px: Points) -> NDArray[np.float64]:
+        """Give the (n,) relative illumination."""
+        heights_mm = np.hypot(*self.to_sensor_mm(points_px).T)
+        bank = self._bank
+        light = np.interp(heights_mm, bank.frozen_heights_mm, bank.relative_illumination)
+        return np.asarray(light, dtype=np.float64)
+
+    def _ideal_grey(self, capture: FloatArray, step: int) -> FloatArray:
+        """Give every step-th pixel of the capture without distortion and vignetting, grey."""
+        height, width = capture.shape[1:]
+        grid = np.mgrid[0:height:step, 0:width:step][::-1].reshape(2, -1).T.astype(np.float64)
+        points = self._distorted(grid)
+        at = points.reshape(-(-height // step), -(-width // step), 2)
+        seen, _ = warp_to(_smooth(capture, step), at[..., 0], at[..., 1])
+        light = self.illumination(points).reshape(at.shape[:2])
+        return np.asarray(seen.mean(0) / light, dtype=np.float32)
+
+    def _distorted(self, points_px: Points) -> Points:
+        """Give where ideal positions fall on the sensor, both in pixels of the capture."""
+        if self._distortion is None:
+            return points_px
+        offset = points_px - self._centre
+        radius = np.hypot(*offset.T) * self._pitch_mm / self._distortion.radius_mm
+        return self._centre + offset * _growth(self._distortion, radius)[:, None]
+
+    def _undistorted(self, points_px: Points) -> Points:
+        """Undo `_distorted`, by a table of radii."""
+        if self._distortion is None:
+            return points_px
+        offset = points_px - self._centre
+        radius = np.hypot(*offset.T) * self._pitch_mm / self._distortion.radius_mm
+        ideal = np.linspace(0, RANGE_MARGIN * max(1.0, float(radius.max())), RADII)
+        growth = _growth(self._distortion, ideal)
+        share = np.interp(radius, ideal * growth, 1 / growth)
+        return np.asarray(self._centre + offset * share[:, None], dtype=np.float64)
+
+    def _fit_colours(self, pair: AlignedPair) -> NDArray[np.float64]:
+        """Fit the (3, 3) matrix from the reference's Rec.709 to camera colours as captured."""
+        step = COLOUR_STEP_PX
+        height, width = (side // step * step for side in pair.capture.shape[1:])
+        taken = pair.capture[:, :height, :width]
+        coarse = taken.reshape(3, height // step, step, width // step, step).mean((2, 4))
+        clipped = taken.max(0).reshape(height // step, step, width // step, step).max((1, 3))
+        rows, columns = np.mgrid[0 : height // step, 0 : width // step]
+        points = np.stack([columns, rows], -1).reshape(-1, 2) * step + (step - 1) / 2.0
+        at = pair.to_reference(points).reshape(*rows.shape, 2)
+        # The reference is smoothed as far as one step of the capture reaches in it.
+        reach = max(1, round(float(np.linalg.norm(at[0, 1] - at[0, 0]))))
+        shown, inside = warp_to(_smooth(pair.reference, reach), at[..., 0], at[..., 1])
+        # A step at the edge of the plane also holds what lies beside it.
+        whole = cv2.erode(inside.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        good = whole & (clipped < CLIPPED_ABOVE)
+        if good.sum() < LEAST_COLOUR_POINTS:
+            raise ContractError("the reference covers too little of the capture, or all is clipped")
+        light = self.illumination(points).reshape(rows.shape)[good]
+        solution, *_ = np.linalg.lstsq((shown[:, good] * light).T, coarse[:, good].T, rcond=None)
+        return np.asarray(solution.T, dtype=np.float64)
+
+
+def _smooth(picture: FloatArray, side: int) -> FloatArray:
+    """Average (3, h, w) over squares of at least `side`, odd: an even one would shift by half."""
+    return np.stack([cv2.blur(plane, (side | 1, side | 1)) for plane in picture])
+
+
+def _growth(distortion: RadialDistortion, radius: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give r_d / r of eq. (6.10) for the green colour."""
+    square = radius * radius
+    c0, c1, c2, c3 = distortion.coefficients[1]
+    return np.asarray(c0 + square * (c1 + square * (c2 + square * c3)))
+
+
+def _encoded(grey: FloatArray) -> FloatArray:
+    """Give (h, w) with the curve of a display, stretched to the brightest light."""
+    return encode_srgb(grey / max(float(np.percentile(grey, 99.5)), 1e-6))

@@ -1,0 +1,179 @@
+"""One step of fine-tuning: both discriminators learn, then the generator.
+
+batch (+ real pairs) -> generator -> views -+-> discriminators, scores of output and truth
+                                            +-> content loss       |
+                  weights of the generator <- total loss, eq. (6.14)
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from camkit.models_def.kinds.bayer.fine_tuning.adversarial import discriminator_loss, generator_loss
+from camkit.models_def.kinds.bayer.fine_tuning.content import (
+    Views,
+    make_views,
+    perceptual_loss,
+    pixel_loss,
+)
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
+from camkit.models_def.kinds.bayer.fine_tuning.vgg import VggFeatures
+from camkit.models_def.kinds.bayer.recipe import FineTuningRecipe
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
+from camkit.models_def.training.checkpoint import State
+from camkit.models_def.training.first_weights import FirstWeights
+from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.sample import Batch
+from camkit.models_def.training.schedule import learning_rate
+
+OPPONENT_SEED: Final = 2
+BETAS: Final = (0.9, 0.999)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FineTuningParts:
+    """What fine-tuning is given besides its recipe.
+
+    Attributes:
+        first: Weights that the generator starts from.
+        to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
+        features: VGG-19, or None.
+        pairs: Samples of real pairs, or None.
+        device: cpu or cuda.
+    """
+
+    first: FirstWeights
+    to_rec709: Tensor
+    features: VggFeatures | None = None
+    pairs: PairSamples | None = None
+    device: str = "cpu"
+
+
+class FineTuningFitter:
+    """Fits a generator against a global and a local discriminator. References: eq. (6.14)."""
+
+    def __init__(
+        self, entry: NetworkRecipe, recipe: FineTuningRecipe, parts: FineTuningParts
+    ) -> None:
+        self.recipe, self.schedule, self._pairs = recipe, entry.schedule, parts.pairs
+        self.generator = Fitter(entry, build_network, parts.device, parts.first)
+        device = self.generator.device
+        self._to_rec709 = parts.to_rec709.float().to(device)
+        self._features = None if parts.features is None else parts.features.to(device)
+        torch.manual_seed(entry.schedule.seed + OPPONENT_SEED)
+        self.opponents = nn.ModuleDict(
+            {
+                name: Discriminator(
+                    DiscriminatorConfig(layers=layers, width=recipe.discriminator_width)
+                )
+                for name, layers in (
+                    ("global", recipe.global_layers),
+                    ("local", recipe.local_layers),
+                )
+            }
+        ).to(device)
+        self._shares = {"global": recipe.global_weight, "local": recipe.local_weight}
+        self._optimizer = torch.optim.Adam(
+            self.opponents.parameters(), lr=recipe.discriminator_rate, betas=BETAS
+        )
+        self._notes: dict[str, list[float]] = {}
+
+    def fit(self, batch: Batch, step: int, progress: float) -> float:
+        """Make one step of all three networks and give the generator's loss."""
+        if self._pairs is not None:
+            batch = self._mixed(batch, self._pairs, step)
+        device = self.generator.device
+        output = self.generator.run(batch.planes, progress)
+        views = make_views(
+            output, batch.target.to(device), batch.weight.to(device), self._to_rec709
+        )
+        self._teach_opponents(views, step, progress)
+        loss = self._total(views)
+        self.generator.descend(loss, step, progress)
+        return float(loss.detach())
+
+    def _mixed(self, batch: Batch, pairs: PairSamples, step: int) -> Batch:
+        """Replace the first patches of a batch by patches of real pairs."""
+        count, _, patch_px, _ = batch.target.shape
+        real = round(self.recipe.pair_share * count)
+        if real == 0:
+            return batch
+        # Drawn by the step alone, so that a resumed run draws the same.
+        drawn = pairs.draw_batch(
+            np.random.default_rng((self.schedule.seed, 3, step)), real, patch_px
+        )
+        return Batch(
+            inputs={
+                name: torch.cat([planes, batch.inputs[name][real:]])
+                for name, planes in drawn.inputs.items()
+            },
+            target=torch.cat([drawn.target, batch.target[real:]]),
+            weight=torch.cat([drawn.weight, batch.weight[real:]]),
+        )
+
+    def _teach_opponents(self, views: Views, step: int, progress: float) -> None:
+        decay = learning_rate(self.schedule, step, progress) / self.schedule.learning_rate
+        for group in self._optimizer.param_groups:
+            group["lr"] = self.recipe.discriminator_rate * decay
+        self.opponents.requires_grad_(requires_grad=True)
+        losses = {
+            name: discriminator_loss(judge(views.real), judge(views.seen.detach()))
+            for name, judge in self.opponents.items()
+        }
+        self._optimizer.zero_grad(set_to_none=True)
+        torch.stack([*losses.values()]).sum().backward()  # type: ignore[no-untyped-call]
+        self._optimizer.step()
+        for name, loss in losses.items():
+            self._note(f"discriminator_{name}", loss)
+
+    def _total(self, views: Views) -> Tensor:
+        self.opponents.requires_grad_(requires_grad=False)
+        pixel, perceptual = pixel_loss(views), perceptual_loss(views, self._features)
+        self._note("pixel", pixel)
+        self._note("perceptual", perceptual)
+        total = self.recipe.perceptual_weight * perceptual + self.recipe.pixel_weight * pixel
+        for name, judge in self.opponents.items():
+            adversarial = generator_loss(judge(views.real), judge(views.seen))
+            self._note(f"adversarial_{name}", adversarial)
+            total = total + self._shares[name] * adversarial
+        return total
+
+    def _note(self, name: str, value: Tensor) -> None:
+        self._notes.setdefault(name, []).append(float(value.detach()))
+
+    def notes(self) -> dict[str, float]:
+        """Give the mean of each term since the last call."""
+        means = {name: sum(values) / len(values) for name, values in self._notes.items()}
+        self._notes.clear()
+        return means
+
+    def restore(self, planes: Tensor) -> Tensor:
+        """Run the averaged generator on (1, 6, h, w) planes; float32 on the CPU comes back."""
+        return self.generator.restore(planes)
+
+    def weights(self) -> State:
+        """Give the generator's weights being trained."""
+        return self.generator.weights()
+
+    def average(self) -> State:
+        """Give the generator's averaged weights."""
+        return self.generator.average()
+
+    def optimizer_state(self) -> dict[str, Any]:
+        """Give both optimisers and the discriminators: tensors and plain numbers."""
+        return {
+            "generator": self.generator.optimizer_state(),
+            "opponents": self._optimizer.state_dict(),
+            "opponent_weights": dict(self.opponents.state_dict()),
+        }
+
+    def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
+        """Go back to a saved state."""
+        self.generator.load(weights, average, optimizer["generator"])
+        self._optimizer.load_state_dict(optimizer["opponents"])
+        self.opponents.load_state_dict(optimizer["opponent_weights"])

@@ -1,0 +1,98 @@
+"""Fine-tuning as the ordinary trainer runs it: files read, credits written, fitter made."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+
+from camkit.colorimetry import rec709_from_camera
+from camkit.contracts import RadialDistortion
+from camkit.models_def.kinds.bayer.fine_tuning.fitter import FineTuningFitter, FineTuningParts
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples, read_pairs
+from camkit.models_def.kinds.bayer.fine_tuning.vgg import file_digest, read_vgg
+from camkit.models_def.kinds.bayer.material import BayerMaterial
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import corner_height_mm
+from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.training.first_weights import read_first_weights
+from camkit.models_def.training.fitter import Fits
+from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.refinement import FineTuningOptions, Refinement
+
+NAME: Final = "fine_tuned"
+Distort = Callable[[BayerRecipe, Path], RadialDistortion | None]
+
+
+def trace_recipe_distortion(recipe: BayerRecipe, folder: Path) -> RadialDistortion:
+    """Give the distortion of a recipe's lens; the recipe lies in `folder`."""
+    lens = find_lens(recipe.lens.prescription, folder)
+    return trace_distortion(lens, corner_height_mm(recipe))
+
+
+def make_refinement(
+    recipe: BayerRecipe, options: FineTuningOptions, *, distort: Distort = trace_recipe_distortion
+) -> Refinement:
+    """Prepare the fine-tuning of a recipe.
+
+    Args:
+        recipe: Its table `fine_tuning`.
+        options: Files.
+        distort: Gives the distortion that real pairs are aligned through; None for none.
+
+    Raises:
+        ContractError: If a file is not what it should be.
+    """
+    first = read_first_weights(options.start, options.size)
+    features = None if options.vgg is None else read_vgg(options.vgg)
+    matrix = rec709_from_camera(np.array(recipe.sensor.color_matrix))
+
+    def make_fitter(entry: NetworkRecipe, material: BayerMaterial) -> Fits:
+        pairs: PairSamples | None = None
+        if options.pairs is not None:
+            pairs = read_pairs(
+                options.pairs,
+                recipe,
+                material.bank,
+                distort(recipe, options.recipe_folder),
+                seed=entry.schedule.seed,
+            )
+        parts = FineTuningParts(
+            first=first,
+            to_rec709=torch.from_numpy(matrix),
+            features=features,
+            pairs=pairs,
+            device=options.device,
+        )
+        return FineTuningFitter(entry, recipe.fine_tuning, parts)
+
+    return Refinement(
+        name=NAME,
+        schedule=recipe.fine_tuning.schedule,
+        make_fitter=make_fitter,
+        first=first,
+        credit=_credit(options),
+    )
+
+
+def _credit(options: FineTuningOptions) -> str:
+    """Say what else the weights learned from, for the card."""
+    features = "without VGG-19"
+    if options.vgg is not None:
+        digest = file_digest(options.vgg)[:16]
+        features = f"with VGG-19 features of {options.vgg.name} (sha256 {digest}...)"
+    pairs = "" if options.pairs is None else f" and real pairs of {options.pairs.name}"
+    return f"; fine-tuned against two discriminators, {features}{pairs}"
+
+
+class BayerRefining:
+    """Fine-tuning as `camkit.models_def.training.refinement` asks for it."""
+
+    def refinement(self, recipe: BayerRecipe, options: FineTuningOptions) -> Refinement:
+        """Prepare the fine-tuning of a recipe; see `make_refinement`."""
+        return make_refinement(recipe, options)
+
+
+REFINING: Final = BayerRefining()

@@ -1,0 +1,100 @@
+"""The kernels of a recipe's lens: fabricated copies traced densely, the design beside them."""
+
+import hashlib
+import json
+from itertools import product
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import corner_height_mm
+from camkit.models_def.optics.analysis.illumination import relative_illumination_at
+from camkit.models_def.optics.kernel_bank import (
+    ChannelResponse,
+    colour_kernels,
+    focused_copies,
+)
+from camkit.models_def.optics.prescription import Lens, format_prescription
+from camkit.models_def.optics.psf import with_object_distance
+
+WAVELENGTHS: Final = 27
+LEAST_ENERGY: Final = 0.97
+TRACING: Final = 2
+"""Counts how kernels and light have been traced so far: what was kept before is traced again."""
+
+
+def build_lens_bank(recipe: BayerRecipe, lens: Lens, cache_folder: Path | None = None) -> PsfBank:
+    """Trace the lens of a recipe, or read what an earlier call traced.
+
+    Args:
+        recipe: Its `lens` says how many copies and fields.
+        lens: The lens that it names (`find_lens`).
+        cache_folder: Where traced banks are kept; None keeps none.
+
+    Raises:
+        ContractError: If the light of the lens does not fit the kernels.
+    """
+    if cache_folder is None:
+        return _trace(recipe, lens)
+    content = [format_prescription(lens), json.dumps(recipe.lens.to_json())]
+    content += [recipe.sensor.model_dump_json(), str(TRACING)]
+    content += ["depths apart"] if recipe.data.known_depth_share else []
+    name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
+    cached = cache_folder / f"bank-{name}.npz"
+    if not cached.exists():
+        cache_folder.mkdir(parents=True, exist_ok=True)
+        write_bank(cached, _trace(recipe, lens))
+    return read_bank(cached)
+
+
+def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
+    choices = recipe.lens
+    heights = np.linspace(0.0, corner_height_mm(recipe), choices.fields)
+    response = _response(recipe)
+    depths_mm = choices.depths_mm or (lens.object_distance_mm,)
+    kernels = []
+    for copy, depth_mm in product(
+        focused_copies(lens, choices.copies + 2, choices.seed), depths_mm
+    ):
+        traced, kept = colour_kernels(
+            with_object_distance(copy, depth_mm),
+            response,
+            heights,
+            size_px=choices.kernel_px,
+            pitch_um=recipe.sensor.pixel_pitch_um,
+            rays=choices.rays,
+        )
+        if kept < LEAST_ENERGY:
+            raise ContractError(
+                f"kernels of {choices.kernel_px} px hold {kept:.3f} of the light, less than "
+                f"{LEAST_ENERGY}; raise lens.kernel_px"
+            )
+        kernels.append(traced)
+    depths = len(depths_mm)
+    nominal = kernels[0] if depths == 1 else np.mean(kernels[:depths], axis=0)
+    return PsfBank(
+        copies=np.stack(kernels[depths:]),
+        copy_heights_mm=heights,
+        frozen=nominal,
+        frozen_heights_mm=heights,
+        relative_illumination=relative_illumination_at(lens, torch.from_numpy(heights)).numpy(),
+        depths=depths,
+        frozen_depths=np.stack(kernels[:depths]) if recipe.data.known_depth_share else None,
+    )
+
+
+def _response(recipe: BayerRecipe) -> ChannelResponse:
+    """Resample the sensor's response so finely that lateral colour leaves no steps."""
+    wavelengths_um, response = recipe.sensor.response_arrays()
+    dense = np.linspace(wavelengths_um[0], wavelengths_um[-1], WAVELENGTHS)
+    sampled = np.stack([np.interp(dense, wavelengths_um, row) for row in response])
+    return ChannelResponse(
+        wavelengths_um=dense,
+        response=sampled / sampled.sum(axis=1, keepdims=True),
+        source="the sensor of the recipe",
+    )

@@ -1,0 +1,138 @@
+"""The PSFs that training samples are made with: fabricated copies, and the frozen one beside them.
+
+A capture is blurred by the kernels of a copy, as a lens from the line would; the Wiener filter in
+front of the network knows the frozen kernels only. Where a camera sees several depths, every copy
+is there once per depth: whoever draws a copy draws its depth, and the frozen kernels are the mean
+over the depths.
+"""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.models_def.sensors.psf import FieldKernels
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PsfBank:
+    """Kernels of the colours for image points along +y; others by turning.
+
+    Attributes:
+        copies: (copy * depth, field, 3, h, w) float32, each sums to 1; the depths of a copy lie
+            side by side, the last copy is for validation.
+        copy_heights_mm: (field,) float64, increasing from 0.
+        frozen: (field, 3, h, w) float32, what the bundle will hold.
+        frozen_heights_mm: (field,) float64, increasing from 0.
+        relative_illumination: (field,) float64 at `frozen_heights_mm`.
+        depths: Of every copy.
+        frozen_depths: (depth, field, 3, h, w) float32, what `frozen` is the mean of; None for one
+            depth, or where nobody asks for them.
+    """
+
+    copies: FloatArray
+    copy_heights_mm: NDArray[np.float64]
+    frozen: FloatArray
+    frozen_heights_mm: NDArray[np.float64]
+    relative_illumination: NDArray[np.float64]
+    depths: int = 1
+    frozen_depths: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        count = self.copies.shape[0] if self.copies.ndim == 5 else 0
+        if self.depths < 1 or count % self.depths or count < 2 * self.depths:
+            raise ContractError(
+                "copies must be (copy >= 2 times depth, field, 3, h, w), the last copy for "
+                f"validation; got {self.copies.shape} with {self.depths} depth(s)"
+            )
+        if self.frozen.ndim != 4 or self.copies.shape[2] != 3 or self.frozen.shape[1] != 3:
+            raise ContractError(
+                f"kernels need 3 colours; got {self.copies.shape}, {self.frozen.shape}"
+            )
+
+    @property
+    def radius_px(self) -> int:
+        """How far the kernels of the copies reach."""
+        return int(max(self.copies.shape[-2:])) // 2
+
+    @property
+    def training_copies(self) -> int:
+        """How many copies may be trained on, each depth of a copy counted."""
+        return int(self.copies.shape[0]) - self.depths
+
+    def blur_kernels(self, copy: int, x_mm: float, y_mm: float) -> Tensor:
+        """Give the (1, 3, h, w) kernels of one copy at a sensor position."""
+        return _at(self.copies[copy], self.copy_heights_mm, x_mm, y_mm)
+
+    def frozen_kernels(self, x_mm: float, y_mm: float, depth: int | None = None) -> Tensor:
+        """Give the (1, 3, h, w) frozen kernels at a sensor position.
+
+        Args:
+            x_mm: Position.
+            y_mm: Likewise.
+            depth: Number of the depth; None for the mean kernel.
+
+        Raises:
+            ContractError: If the bank does not hold the depths apart.
+        """
+        if depth is not None and self.frozen_depths is None:
+            raise ContractError("this bank does not hold the frozen kernels of its depths apart")
+        frozen = self.frozen
+        if depth is not None and self.frozen_depths is not None:
+            frozen = self.frozen_depths[depth]
+        return _at(frozen, self.frozen_heights_mm, x_mm, y_mm)
+
+    def illumination_at(self, height_mm: float) -> float:
+        """Give the relative illumination at a field height."""
+        return float(np.interp(height_mm, self.frozen_heights_mm, self.relative_illumination))
+
+    def digest(self) -> str:
+        """Give the sha256 of all kernels and positions."""
+        total = hashlib.sha256(b"" if self.depths == 1 else str(self.depths).encode())
+        for name in _ARRAYS:
+            total.update(np.ascontiguousarray(getattr(self, name)).tobytes())
+        if self.frozen_depths is not None:
+            total.update(np.ascontiguousarray(self.frozen_depths).tobytes())
+        return total.hexdigest()
+
+
+_ARRAYS = (
+    "copies",
+    "copy_heights_mm",
+    "frozen",
+    "frozen_heights_mm",
+    "relative_illumination",
+)
+
+
+def write_bank(path: Path, bank: PsfBank) -> None:
+    """Write a bank for another process."""
+    arrays = {name: getattr(bank, name) for name in _ARRAYS}
+    if bank.depths > 1:
+        arrays["depths"] = np.array(bank.depths)
+    if bank.frozen_depths is not None:
+        arrays["frozen_depths"] = bank.frozen_depths
+    np.savez(path, **arrays)
+
+
+def read_bank(path: Path) -> PsfBank:
+    """Read what `write_bank` wrote."""
+    with np.load(path, allow_pickle=False) as arrays:
+        depths = int(arrays["depths"]) if "depths" in arrays else 1
+        apart = arrays.get("frozen_depths")
+        kept = {name: arrays[name] for name in _ARRAYS}
+        return PsfBank(**kept, depths=depths, frozen_depths=apart)
+
+
+def _at(kernels: FloatArray, heights_mm: NDArray[np.float64], x_mm: float, y_mm: float) -> Tensor:
+    place = (torch.tensor([x_mm], dtype=torch.float64), torch.tensor([y_mm], dtype=torch.float64))
+    fields = FieldKernels(
+        kernels=torch.from_numpy(kernels), field_heights_mm=torch.from_numpy(heights_mm)
+    )
+    return fields.at(*place)

@@ -1,0 +1,329 @@
+"""One training sample: a sharp crop photographed by a copy of the camera, and what it should be.
+
+    sharp crop -> exposure, camera space -> blur of a copy -> illumination -> CFA -> noise -> clip,
+    quantise -> white balance -> demosaic -> Wiener (frozen kernel of a block) -> stabilise -> Shot
+
+A sample is one place on the sensor with one blur. It is simulated with surroundings of
+`margin_px`, so that the Wiener filter sees true context, and cut to `sample_px` afterwards.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.bundle.facts import Port
+from camkit.colorimetry import camera_from_rec709
+from camkit.contracts import FloatArray, NoiseModel
+from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.sensors.demosaic import demosaic
+from camkit.models_def.sensors.demosaic import mosaic as sample_cfa
+from camkit.models_def.sensors.stabilise import stabilise
+from camkit.models_def.sensors.wiener import to_otf, wiener_restore
+from camkit.models_def.training.sample import Sample, SampleLayout
+
+CLIPPED_REACH_PX: Final = 4
+UNKNOWN_ABOVE: Final = 0.9
+NOT_JUDGED: Final = -1.0
+HEIGHT_POWER: Final = 0.75
+LIGHT_TINT: Final = 0.08
+LAYOUT: Final = SampleLayout(
+    inputs=(Port(name="capture", channels=3), Port(name="wiener", channels=3)),
+    outputs=(Port(name="clean", channels=3),),
+)
+"""What the networks take and give. A lens of revolution blurs every way, so samples may turn."""
+
+Generator = np.random.Generator
+Sides = tuple[bool, bool, bool, bool]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exposure:
+    """Where, how and with which copy of the camera a sample is taken.
+
+    Attributes:
+        x_mm: Position on the sensor, to the right of the axis.
+        y_mm: Position down the rows.
+        block_x_mm: Centre of the Wiener block that the place belongs to.
+        block_y_mm: Likewise.
+        copy: Index of the fabricated copy.
+        iso: Sensitivity.
+        factor: Exposure, 1 for the picture as it is.
+        borders: Whether the picture ends at the (top, bottom, left, right) of the sample.
+        drift: (size, turn in radians) of the copy's kernels against the traced ones.
+        depth_known: Whether the Wiener filter has the kernel of the copy's depth.
+    """
+
+    x_mm: float
+    y_mm: float
+    block_x_mm: float
+    block_y_mm: float
+    copy: int
+    iso: float
+    factor: float = 1.0
+    borders: Sides = (False, False, False, False)
+    drift: tuple[float, float] = (1.0, 0.0)
+    depth_known: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """A finished sample and what its front end knew.
+
+    Attributes:
+        sample: Stabilised capture, Wiener planes and sharp planes, (3, s, s) each.
+        noise: Noise after white balance.
+        illumination: Relative illumination, contained in the planes and the target.
+    """
+
+    sample: Sample
+    noise: NoiseModel
+    illumination: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circumstances:
+    """What the front end knows of a sample.
+
+    Attributes:
+        noise: After white balance.
+        gains: White balance (R, G, B).
+        frozen: (1, 3, kh, kw) kernels of the block that the place belongs to.
+        illumination: Relative illumination of the place.
+    """
+
+    noise: NoiseModel
+    gains: tuple[float, float, float]
+    frozen: Tensor
+    illumination: float
+
+
+def scene_side_px(recipe: BayerRecipe, bank: PsfBank) -> int:
+    """Give the side of the sharp crop that a sample needs."""
+    return recipe.data.sample_px + 2 * (recipe.data.margin_px + bank.radius_px)
+
+
+def corner_height_mm(recipe: BayerRecipe) -> float:
+    """Give the field height of the sensor's corner."""
+    sensor = recipe.sensor
+    sides = (sensor.width_px - 1, sensor.height_px - 1)
+    return float(np.hypot(*sides)) / 2 * sensor.pixel_pitch_um / 1000
+
+
+def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposure:
+    """Draw the conditions of a training sample."""
+    data = recipe.data
+    height = corner_height_mm(recipe) * rng.random() ** HEIGHT_POWER
+    azimuth = rng.uniform(0, 2 * np.pi)
+    x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
+    jitter = rng.uniform(-1, 1, 2) * data.block_jitter_px * recipe.sensor.pixel_pitch_um / 1000
+    at_border = rng.random() < data.border_share
+    borders = rng.random(4) < 0.4 if at_border else np.zeros(4, dtype=bool)
+    least, most = data.exposure_min_ev, data.exposure_max_ev
+    stops = rng.triangular(least, min(max(0.0, least), most), most) if most > least else most
+    return Exposure(
+        x_mm=float(x_mm),
+        y_mm=float(y_mm),
+        block_x_mm=float(x_mm + jitter[0]),
+        block_y_mm=float(y_mm + jitter[1]),
+        copy=_draw_copy(rng, data.depth_shares, bank),
+        iso=float(np.exp(rng.uniform(np.log(data.iso_min), np.log(data.iso_max)))),
+        factor=float(2.0**stops),
+        borders=(bool(borders[0]), bool(borders[1]), bool(borders[2]), bool(borders[3])),
+        drift=_draw_drift(rng, recipe),
+        # drawn last, and only where asked for: other recipes keep their samples
+        depth_known=data.known_depth_share > 0 and rng.random() < data.known_depth_share,
+    )
+
+
+def _draw_copy(rng: Generator, shares: tuple[float, ...], bank: PsfBank) -> int:
+    """Draw a copy to train on, at one of its depths."""
+    if not shares:
+        return int(rng.integers(bank.training_copies))
+    copy = int(rng.integers(bank.training_copies // bank.depths))
+    odds = np.array(shares) / np.sum(shares)
+    return copy * bank.depths + int(rng.choice(bank.depths, p=odds))
+
+
+def _draw_drift(rng: Generator, recipe: BayerRecipe) -> tuple[float, float]:
+    """Draw how far the lens has drifted; most have not."""
+    data = recipe.data
+    if rng.random() >= data.drift_share:
+        return 1.0, 0.0
+    size, turn = rng.uniform(-1, 1, 2) * (data.drift_scale, np.deg2rad(data.drift_turn_deg))
+    return float(1 + size), float(turn)
+
+
+def tint_crop(rng: Generator, crop: FloatArray) -> FloatArray:
+    """Vary the colour of the light a little, since pictures are graded."""
+    tint = np.exp(rng.normal(0, LIGHT_TINT, 3)).astype(np.float32)
+    return crop * tint[:, None, None]
+
+
+def make_shot(
+    crop: FloatArray, exposure: Exposure, recipe: BayerRecipe, bank: PsfBank, rng: Generator
+) -> Shot:
+    """Photograph a sharp crop and run the front end of the runtime on it.
+
+    Args:
+        crop: (3, side, side) linear Rec.709 with side = `scene_side_px`.
+        exposure: The conditions.
+        recipe: Camera and sample sizes.
+        bank: PSFs of the copies and the frozen one.
+        rng: Source of the noise.
+
+    Raises:
+        ContractError: If the crop has another size.
+    """
+    side = scene_side_px(recipe, bank)
+    if crop.shape != (3, side, side):
+        raise ContractError(f"a crop must be (3, {side}, {side}); got {crop.shape}")
+    sensor, data = recipe.sensor, recipe.data
+    matrix, gains = camera_from_rec709(np.array(sensor.color_matrix))
+    illumination = bank.illumination_at(float(np.hypot(exposure.x_mm, exposure.y_mm)))
+    to_camera = torch.from_numpy(matrix * exposure.factor).float()
+    flat = to_camera @ torch.from_numpy(crop).reshape(3, -1)
+    sharp = flat.reshape(1, 3, side, side).clamp_(min=0)
+    kernels = _drifted(
+        bank.blur_kernels(exposure.copy, exposure.x_mm, exposure.y_mm), *exposure.drift
+    )
+    blurred = _blur(sharp, kernels, bank.radius_px) * illumination
+    capture, saturated = _expose(blurred, gains, recipe, exposure.iso, rng)
+    noise = sensor.noise_at(exposure.iso).with_gains(gains)
+    planes, unknown = _develop(capture, saturated, gains, recipe, exposure.borders)
+    return finish_shot(
+        planes,
+        unknown,
+        _cut(sharp, data.sample_px) * illumination,
+        Circumstances(
+            noise=noise,
+            gains=gains,
+            frozen=bank.frozen_kernels(
+                exposure.block_x_mm,
+                exposure.block_y_mm,
+                exposure.copy % bank.depths if exposure.depth_known else None,
+            ),
+            illumination=illumination,
+        ),
+        recipe,
+    )
+
+
+def finish_shot(
+    planes: Tensor, unknown: Tensor, true: Tensor, given: Circumstances, recipe: BayerRecipe
+) -> Shot:
+    """Filter and stabilise developed planes, as the runtime does.
+
+    Args:
+        planes: (1, 3, S, S) linear, white balanced, with surroundings of `margin_px`.
+        unknown: (1, 1, S, S) bool, where the sensor clipped.
+        true: (1, 3, s, s) sharp light of the middle, illumination contained.
+        given: Noise, gains, kernels and light.
+        recipe: Camera and sample sizes.
+    """
+    data, noise = recipe.data, given.noise
+    shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
+    restored = wiener_restore(planes, given.frozen, shot, read, recipe.wiener, unknown)
+    stable = [
+        stabilise(_cut(x, data.sample_px), shot, read, scale=recipe.scale)
+        for x in (planes, restored)
+    ]
+    target = stabilise(true.clamp(max=data.target_max), shot, read, scale=recipe.scale)
+    lost = _lost(true, _cut(unknown, data.sample_px), given.gains)
+    return Shot(
+        sample=Sample(
+            inputs={port.name: x[0] for port, x in zip(LAYOUT.inputs, stable, strict=True)},
+            target=torch.where(lost, torch.tensor(NOT_JUDGED), target)[0],
+            weight=recipe.scale * shot.sqrt(),
+        ),
+        noise=noise,
+        illumination=given.illumination,
+    )
+
+
+def _drifted(kernels: Tensor, size: float, turn: float) -> Tensor:
+    """Scale and turn (1, 3, h, w) kernels about their centre; each keeps its light."""
+    if (size, turn) == (1.0, 0.0):
+        return kernels
+    cos, sin = math.cos(turn) / size, math.sin(turn) / size
+    matrix = torch.tensor([[[cos, sin, 0.0], [-sin, cos, 0.0]]], dtype=kernels.dtype)
+    shape = list(kernels.shape)
+    grid = torch.nn.functional.affine_grid(matrix, shape, align_corners=True)
+    moved = torch.nn.functional.grid_sample(kernels, grid, align_corners=True)
+    return moved / moved.sum((-2, -1), keepdim=True)
+
+
+def _lost(true: Tensor, unknown: Tensor, gains: tuple[float, float, float]) -> Tensor:
+    """Mark (1, 1, s, s) highlights that clipped: nobody can tell how bright they were."""
+    if not bool(unknown.any()):
+        return unknown
+    raw_peak = (true / torch.tensor(gains).reshape(1, 3, 1, 1)).amax(1, keepdim=True)
+    side = 2 * CLIPPED_REACH_PX + 1
+    near = torch.nn.functional.max_pool2d(unknown.float(), side, 1, CLIPPED_REACH_PX)
+    return (near > 0) & (raw_peak > UNKNOWN_ABOVE)
+
+
+def _blur(sharp: Tensor, kernels: Tensor, radius_px: int) -> Tensor:
+    """Spread each pixel with its colour's kernel; keep what the crop fully determines."""
+    size = (sharp.shape[-2], sharp.shape[-1])
+    spread = torch.fft.irfft2(torch.fft.rfft2(sharp) * to_otf(kernels, size), s=size)
+    r = radius_px
+    inner: Tensor = spread[..., r : size[0] - r, r : size[1] - r]
+    return inner.clamp(min=0)
+
+
+def _expose(
+    light: Tensor,
+    gains: tuple[float, float, float],
+    recipe: BayerRecipe,
+    iso: float,
+    rng: Generator,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Record (1, 3, h, w) white-balanced light as a mosaic (h, w) and where it clipped."""
+    sensor = recipe.sensor
+    noise = sensor.noise_at(iso)
+    raw = light / torch.tensor(gains).reshape(1, 3, 1, 1)
+    signal = sample_cfa(raw, sensor.cfa)[0].numpy().astype(np.float64)
+    recorded = rng.poisson(signal / noise.shot[0]) * noise.shot[0]
+    recorded += rng.standard_normal(signal.shape, dtype=np.float32) * noise.read_variance[0] ** 0.5
+    levels = sensor.white_level - sensor.black_level
+    dn = np.clip(np.rint(recorded * levels), -sensor.black_level, levels)
+    return (dn / levels).astype(np.float32), dn >= levels
+
+
+def _develop(
+    capture: FloatArray,
+    saturated: NDArray[np.bool_],
+    gains: tuple[float, float, float],
+    recipe: BayerRecipe,
+    borders: Sides,
+) -> tuple[Tensor, Tensor]:
+    """White-balance and demosaic; give (1, 3, h, w) planes and (1, 1, h, w) clipped pixels.
+
+    Where the picture ends, what lies beyond is cut before the demosaic and mirrored afterwards.
+    """
+    cfa = recipe.sensor.cfa
+    top, bottom, left, right = (recipe.data.margin_px if side else 0 for side in borders)
+    height, width = capture.shape
+    inside = np.s_[top : height - bottom, left : width - right]
+    mosaic = torch.from_numpy(np.ascontiguousarray(capture[inside]))[None]
+    gain_map = torch.tensor(gains).reshape(1, 3, 1, 1).expand(1, 3, *mosaic.shape[1:])
+    planes = demosaic(mosaic * sample_cfa(gain_map, cfa), cfa)
+    unknown = torch.from_numpy(np.ascontiguousarray(saturated[inside]))[None, None].float()
+    if any(borders):
+        outside = (left, right, top, bottom)
+        planes = torch.nn.functional.pad(planes, outside, mode="reflect")
+        unknown = torch.nn.functional.pad(unknown, outside, mode="reflect")
+    return planes, unknown > 0
+
+
+def _cut(planes: Tensor, side_px: int) -> Tensor:
+    """Cut the middle square."""
+    top, left = ((n - side_px) // 2 for n in planes.shape[-2:])
+    return planes[..., top : top + side_px, left : left + side_px]

@@ -1,0 +1,168 @@
+"""Validation: fixed captures of pictures that are never trained on, judged on sRGB values."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
+from camkit.contracts import FloatArray
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import (
+    LAYOUT,
+    Exposure,
+    Shot,
+    corner_height_mm,
+    make_shot,
+    scene_side_px,
+)
+from camkit.models_def.sensors.stabilise import unstabilise
+from camkit.models_def.training.kind import Restorer, Score
+from camkit.models_def.training.pictures import SCENE_SEED, list_pictures, read_picture, to_linear
+from camkit.scenes import procedural_scene
+
+FIELD_SHARES: Final = (0.0, 0.3, 0.55, 0.8, 0.98)
+ISOS: Final = (100.0, 1600.0)
+GOLDEN_ANGLE_RAD: Final = 2.399963
+BLOCK_OFFSET_PX: Final = 90.0
+PROCEDURAL_PICTURES: Final = 8
+SEED: Final = 424242
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValidationCapture:
+    """One capture: its shot, the (3, s, s) sharp sRGB picture, and where it was taken."""
+
+    shot: Shot
+    sharp: FloatArray
+    field_share: float
+    iso: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BayerJudge:
+    """Judges by fixed captures.
+
+    Attributes:
+        captures: From `make_validation_captures`.
+        recipe: Camera and scale.
+    """
+
+    captures: Sequence[ValidationCapture]
+    recipe: BayerRecipe
+
+    def baselines(self) -> Mapping[str, float]:
+        """Give the mean dB of the capture as it is, and of the Wiener bank alone."""
+        return {
+            "capture": self.score(lambda planes: planes[:, :3]).mean_db,
+            "wiener": self.score(lambda planes: planes[:, 3:]).mean_db,
+        }
+
+    def score(self, restore: Restorer) -> Score:
+        """Judge a restoration by its mean PSNR in dB on sRGB values, by ISO and field height."""
+        return score(self.captures, self.recipe, restore)
+
+
+def make_validation_captures(
+    recipe: BayerRecipe, bank: PsfBank, pictures: Path | None
+) -> list[ValidationCapture]:
+    """Photograph the middle of each picture at five field heights, two ISOs, the depths in turn.
+
+    The lens is the copy that is not trained on; each Wiener block lies off its place as a block
+    of the bank does. Without a folder, procedural scenes are photographed.
+    """
+    side = scene_side_px(recipe, bank)
+    captures = []
+    for number, crop in enumerate(_crops(pictures, side)):
+        for spot, share in enumerate(FIELD_SHARES):
+            for iso in ISOS:
+                rng = np.random.default_rng((SEED, number, spot, int(iso)))
+                exposure = _exposure(recipe, bank, share, iso, number * len(FIELD_SHARES) + spot)
+                shot = make_shot(crop, exposure, recipe, bank, rng)
+                inner = (side - recipe.data.sample_px) // 2
+                sharp = encode_srgb(crop[:, inner : side - inner, inner : side - inner])
+                captures.append(
+                    ValidationCapture(shot=shot, sharp=sharp, field_share=share, iso=iso)
+                )
+    return captures
+
+
+def _crops(pictures: Path | None, side: int) -> list[FloatArray]:
+    if pictures is None:
+        seeds = range(SCENE_SEED - PROCEDURAL_PICTURES, SCENE_SEED)
+        return [procedural_scene(seed, side, side) for seed in seeds]
+    return [to_linear(_middle(read_picture(p), side)) for p in list_pictures(pictures)]
+
+
+def _middle(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
+    height, width, _ = picture.shape
+    missing = (max(0, side - height), max(0, side - width), 0)
+    picture = np.pad(picture, [(m // 2, m - m // 2) for m in missing], mode="symmetric")
+    top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
+    return picture[top : top + side, left : left + side]
+
+
+def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn: int) -> Exposure:
+    height = share * corner_height_mm(recipe)
+    depth = sum(divmod(turn, len(FIELD_SHARES))) % bank.depths
+    azimuth = turn * GOLDEN_ANGLE_RAD
+    x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
+    offset = BLOCK_OFFSET_PX * recipe.sensor.pixel_pitch_um / 1000
+    return Exposure(
+        x_mm=float(x_mm),
+        y_mm=float(y_mm),
+        block_x_mm=float(x_mm + offset * np.cos(3 * azimuth)),
+        block_y_mm=float(y_mm + offset * np.sin(3 * azimuth)),
+        copy=bank.training_copies + depth,
+        iso=iso,
+    )
+
+
+def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: Restorer) -> Score:
+    """Judge a restoration.
+
+    Args:
+        captures: From `make_validation_captures`.
+        recipe: Camera and scale.
+        restore: (1, 6, s, s) stabilised planes -> (1, 3, s, s) stabilised.
+
+    Returns:
+        Mean PSNR on sRGB values; by ISO, and by field height as a share of the corner's.
+    """
+    with torch.no_grad():
+        values = [
+            _psnr(capture, recipe, restore(capture.shot.sample.stacked(LAYOUT)[None])[0])
+            for capture in captures
+        ]
+    by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in captures]) for iso in ISOS}
+    by_field = {
+        f"{f:g}": _mean(values, [c.field_share == f for c in captures]) for f in FIELD_SHARES
+    }
+    parts = {"by_iso": by_iso, "by_field": by_field}
+    return Score(mean_db=float(np.mean(values)), parts=parts)
+
+
+def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> FloatArray:
+    """Take stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
+    noise = capture.shot.noise
+    shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
+    linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
+    matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+    even: FloatArray = (linear / capture.shot.illumination).numpy()
+    to_rec709 = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    return encode_srgb(apply_matrix(to_rec709, even))
+
+
+def _psnr(capture: ValidationCapture, recipe: BayerRecipe, stable: Tensor) -> float:
+    gap = to_srgb(stable, capture, recipe) - capture.sharp
+    return float(-10 * np.log10(np.mean(np.square(gap, dtype=np.float64)) + 1e-12))
+
+
+def _mean(values: list[float], chosen: list[bool]) -> float:
+    return float(np.mean([v for v, c in zip(values, chosen, strict=True) if c]))
