@@ -4,7 +4,8 @@
                                             -> maker     sample i of a role
                                             -> judge     fixed captures to choose by
 
-The part of a kind for this floor (`camkit.kinds.Kind.part`) names its object `TRAINING`.
+A kind's part of the design side (`camkit.models_def.kinds.NAME`, or the `models_def` of its own
+package) defines `PART`, which fulfils `TrainingKind`.
 """
 
 import math
@@ -16,7 +17,7 @@ from typing import Any, Protocol, TypeVar, cast
 from torch import Tensor, nn
 
 from camkit.bundle.stages import Stage
-from camkit.errors import UnsupportedError
+from camkit.errors import ContractError
 from camkit.kinds import find_kind
 from camkit.models_def.toml_table import read_table, typed
 from camkit.models_def.training.recipe import DEFAULT_KIND, Recipe, with_new_names
@@ -155,11 +156,12 @@ def training_kind(name: str) -> TrainingKind[Any, Any]:
 
     Raises:
         UnsupportedError: If there is no such kind, or it cannot be trained.
+        ContractError: If its part defines no PART.
     """
     part = find_kind(name).part("models_def")
-    if not hasattr(part, "TRAINING"):
-        raise UnsupportedError(f"cameras of the kind {name!r} cannot be trained: no TRAINING")
-    return cast("TrainingKind[Any, Any]", part.TRAINING)
+    if not hasattr(part, "PART"):
+        raise ContractError(f"{part.__name__} must define PART as a TrainingKind")
+    return cast("TrainingKind[Any, Any]", part.PART)
 
 
 def read_recipe(path: Path) -> Recipe:

@@ -153,4 +153,4 @@ class BayerTraining:
         )
 
 
-TRAINING: Final = BayerTraining()
+PART: Final = BayerTraining()
