@@ -8,8 +8,9 @@ A kind's part of the design side (`camkit.models_def.kinds.NAME`, or the `models
 package) defines `PART`, which fulfils `TrainingKind`.
 """
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
@@ -81,6 +82,23 @@ class Judge(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A camera as its bundle will state it, but for what is measured at export.
+
+    Attributes:
+        stages: In order; the last gives the product `image`.
+        products: Further results: name -> plane.
+        object_distance_mm: Distance of focus from the first surface.
+        fails_on: For its card: what it fails on, besides objects at other depths.
+    """
+
+    stages: tuple[Stage, ...]
+    products: Mapping[str, str] = field(default_factory=dict)
+    object_distance_mm: float = math.inf
+    fails_on: tuple[str, ...] = ()
+
+
 class TrainingKind(Protocol[R, M]):
     """A kind of camera as training sees it."""
 
@@ -98,8 +116,8 @@ class TrainingKind(Protocol[R, M]):
         """Check the tables of a recipe; raise ContractError naming the key."""
         ...
 
-    def stages(self, recipe: R) -> tuple[Stage, ...]:
-        """Give the stages of the camera, in order."""
+    def design(self, recipe: R) -> Design:
+        """Give the camera as its bundle will state it."""
         ...
 
     def build_network(self, name: str, **config: Any) -> nn.Module:

@@ -31,8 +31,8 @@ from camkit.report.quality import (
     list_set,
     read_picture,
 )
-from camkit.report.truth import picture_scale
 from camkit.runtime.twin.light import stated_balance
+from camkit.runtime.twin.truth import picture_scale
 
 ISOS: Final = (100.0, 1600.0)
 MOST_PX: Final = 1024

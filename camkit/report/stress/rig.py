@@ -18,7 +18,6 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.shot import NOISE_SEED, Shot
-from camkit.report.truth import in_sensor_geometry, light_sensor
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.capture import Capture
 from camkit.runtime.job.stream import Stream
@@ -39,6 +38,7 @@ from camkit.runtime.twin.light import (
     scene_window,
     stated_balance,
 )
+from camkit.runtime.twin.truth import in_sensor_geometry, light_sensor
 
 INPUT: Final = "input"
 BEFORE: Final = "before"

@@ -10,7 +10,7 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import FIELD_SHARES, QUADRANTS, crop_origin, list_set, read_picture
-from camkit.report.truth import picture_scale
+from camkit.runtime.twin.truth import picture_scale
 from camkit.scenes import procedural_scene
 
 SCENE_SEED: Final = 9_000_000

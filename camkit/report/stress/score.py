@@ -25,8 +25,8 @@ from camkit.report.stress.rig import INPUT, Restored, Rig
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.shot import NOMINAL_ISO, Shot
 from camkit.report.stress.verdict import Outcome, Verdict
-from camkit.report.truth import true_picture
 from camkit.runtime.envelope import observe
+from camkit.runtime.twin.truth import true_picture
 
 BEST_DB: Final = 120.0
 """Equal pictures would be infinitely good, which no mean survives."""

@@ -11,9 +11,9 @@ from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
-from camkit.report.truth import light_sensor
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.twin.light import Lens
+from camkit.runtime.twin.truth import light_sensor
 from camkit.units import MM_PER_M, to_mm
 
 FOCUS_WITHIN_PER_M = 0.01

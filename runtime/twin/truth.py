@@ -1,6 +1,6 @@
 """What a perfect camera would have shown: the truth beside a capture, as a bundle's picture is.
 
-clean planes of the twin -> linear Rec.709, on the grid of the product `image`
+clean planes of the twin -> ideal geometry, if the picture has it -> linear Rec.709
 """
 
 from typing import Any
@@ -9,11 +9,15 @@ import numpy as np
 
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.manifest import Manifest
+from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import RGB, ColorSensor, SpadSensor
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
+from camkit.runtime.geometry.warp import undistort_bands
 from camkit.runtime.job.choices import known_options
+from camkit.runtime.rows import ArrayRows
+from camkit.runtime.simulate import Simulation
 
 
 def light_sensor(manifest: Manifest) -> ColorSensor:
@@ -63,6 +67,30 @@ def true_picture(clean: FloatArray, sensor: ColorSensor) -> FloatArray:
     if clean.shape[0] not in (1, len(RGB)):
         raise UnsupportedError(f"{clean.shape[0]} channels without a colour matrix have no colour")
     return clean if clean.shape[0] == len(RGB) else np.repeat(clean, len(RGB), axis=0)
+
+
+def ideal_picture(simulation: Simulation, bundle: Bundle) -> FloatArray:
+    """Give what the product `image` would show of a scene if nothing were lost.
+
+    Args:
+        simulation: Photographed with `picture_scale` samples of the scene along a side of a pixel.
+        bundle: Of the camera.
+
+    Returns:
+        (3, h, w) float32 linear Rec.709 in the geometry of the picture.
+
+    Raises:
+        UnsupportedError: As `light_sensor` and `true_picture`.
+    """
+    manifest, clean = bundle.manifest, simulation.clean
+    plane = manifest.planes[manifest.products[IMAGE]]
+    if not plane.grid.warped:
+        window = simulation.window.resampled(
+            plane.grid.pitch_ratio, (clean.shape[2], clean.shape[1])
+        )
+        bands = undistort_bands(ArrayRows(clean), bundle.psf.distortion, window)
+        clean = np.concatenate(list(bands), axis=1)
+    return true_picture(clean, light_sensor(manifest))
 
 
 def in_sensor_geometry(manifest: Manifest) -> dict[str, Any]:
