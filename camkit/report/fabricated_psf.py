@@ -13,7 +13,7 @@ from camkit.bundle.psf_file import read_psf, write_psf
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
-from camkit.report.truth import light_sensor
+from camkit.runtime.twin.truth import light_sensor
 
 PRESCRIPTION: Final = "prescription.toml"
 MAX_SIDE_PX: Final = 161
