@@ -1,6 +1,6 @@
 """The toy camera at use time: a 16-bit TIFF whose description says what the numbers are, the twin.
 
-    file.tif    (h, w) DN; ImageDescription: {"toy": {bundle, iso, black, white, origin_px, ...}}
+file.tif    (h, w) DN; ImageDescription: {"toy": {bundle, iso, black, white, origin_px, ...}}
 """
 
 import json

@@ -156,7 +156,9 @@ def test_with_nothing_simpler_to_beat_no_range_is_stored(
 ) -> None:
     copy = tmp_path / "toy.camkit"
     copy.write_bytes(toy.read_bytes())
-    outcome = camkit_command("stress", copy, "--scenarios", "stuck_rows", "--scenes", "1", "--write")
+    outcome = camkit_command(
+        "stress", copy, "--scenarios", "stuck_rows", "--scenes", "1", "--write"
+    )
     assert outcome.code == ExitCode.USAGE
     assert "no range was measured" in outcome.err
 
