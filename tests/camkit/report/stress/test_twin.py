@@ -17,7 +17,7 @@ from camkit.report.stress.twin import (
     with_axis_moved,
     with_kernels,
 )
-from camkit.runtime.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from tests.psf_factory import coma_kernels, gaussian_kernel
 
 

@@ -12,7 +12,7 @@ from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.geometry.warp import Warp
 from camkit.runtime.raw import read_capture
-from camkit.runtime.simulate import (
+from camkit.runtime.twin.simulate import (
     Simulation,
     SimulationOptions,
     expose,
