@@ -251,7 +251,12 @@ class Reconstruction:
             return None
         options = job.options
         if job.falls_back:
-            below = without_networks(self._setup.stages, Work())
+            below = without_networks(bundle.manifest, Work())
+            if below is None:
+                raise ContractError(
+                    f"bundle {bundle.manifest.name} has nothing to fall back to: its networks "
+                    "cannot be left out; say --on-unsafe warn"
+                )
             options = replace(options, method=below.method)
         case = Case(
             bundle=bundle,

@@ -5,19 +5,18 @@
 Nothing is computed before the first row is asked for.
 """
 
-from collections.abc import Mapping
+from collections import Counter
 from typing import Final
 
-from camkit.bundle.chain import CAPTURE, capture_plane
+from camkit.bundle.chain import CAPTURE
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
-from camkit.bundle.stages import Stage
 from camkit.errors import ContractError
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
-from camkit.runtime.plan.ways import LEFT_OUT, stand_in, ways_of
+from camkit.runtime.plan.ways import LEFT_OUT, known_planes, stand_ins, ways_of
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.stage_finder import stage_keys, stage_module
 
@@ -34,12 +33,21 @@ class Walk:
         ways: The way each takes; set by `settle`.
     """
 
-    def __init__(self, job: Job) -> None:
-        """Make every stage ready; what was not planned yet is done by `settle`."""
+    def __init__(self, job: Job, *, before: int | None = None) -> None:
+        """Make every stage ready; what was not planned yet is done by `settle`.
+
+        Args:
+            job: The capture.
+            before: Number of a stage; planes that it and those behind it give cannot be asked for
+                beforehand. None for all planes.
+        """
         self._job = job
         self.stages = job.setup.stages
         self.keys = stage_keys(self.stages)
         self.ways: tuple[str, ...] = ()
+        self._before = len(self.stages) if before is None else before
+        self._instead: dict[str, str] = {}
+        self._planes = _planes_of(job)
         job.probe = self._probe
         self._works: list[StageWork] = [
             stage_module(stage.type).prepare(stage, job) for stage in self.stages
@@ -49,10 +57,12 @@ class Walk:
         """Choose the ways by the job's plan, and share the memory among the stages that run.
 
         Raises:
-            ContractError: If the memory does not do.
+            ContractError: If the memory does not do, or a stage is left out that no plane stands in
+                for.
         """
         job = self._job
         self.ways = ways_of(self.stages, job.work)
+        self._instead = stand_ins(self.stages, self.ways, self._planes)
         job.record["stages"] = {
             key: {"way": way or "left out"} for key, way in zip(self.keys, self.ways, strict=True)
         }
@@ -86,82 +96,77 @@ class Walk:
             wanted: Name of the plane.
 
         Raises:
-            ContractError: If a stage is left out that no plane stands in for.
+            ContractError: If no stage gives it.
         """
-        job = self._job
-        planes = self._planes()
-        alias: dict[str, str] = {}
-        for stage, way in zip(self.stages, self.ways, strict=True):
-            if way == LEFT_OUT:
-                instead = stand_in(stage, planes)
-                alias[stage.gives[0]] = alias.get(instead, instead)
-        takers = self._takers(alias, alias.get(wanted, wanted))
-        ready: dict[str, list[Stream]] = {}
-        self._offer(ready, takers, CAPTURE, _capture_stream(job, planes[CAPTURE]))
-        last = alias.get(wanted, wanted)
-        parts = zip(self.stages, self._works, self.ways, self.keys, strict=True)
-        for stage, work, way, key in parts:
-            if last in ready:
-                break
-            if way == LEFT_OUT:
-                continue
-            taken = [ready[alias.get(name, name)].pop() for name in stage.takes]
-            for name, given in zip(stage.gives, work.run(taken), strict=True):
-                self._offer(ready, takers, name, given.timed(job.clock, key))
-        if last not in ready:
-            raise ContractError(
-                f"no stage gives the plane {wanted!r}; there are {', '.join(ready)}"
-            )
+        self._giver_of(wanted)
+        job, last = self._job, self._instead.get(wanted, wanted)
+        needed = self._needed(last)
+        takers = Counter([last, *(name for number in needed for name in self._taken(number))])
+        ready = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]).shared(takers[CAPTURE])}
+        for number in needed:
+            taken = [ready[name].pop() for name in self._taken(number)]
+            made = self._works[number].run(taken)
+            for name, given in zip(self.stages[number].gives, made, strict=True):
+                ready[name] = given.timed(job.clock, self.keys[number]).shared(takers[name])
         return ready[last].pop()
 
     def taken_by(self, number: int) -> list[Stream]:
         """Give the streams that a stage takes; every call walks anew."""
         return [self.stream(name) for name in self.stages[number].takes]
 
-    def _takers(self, alias: Mapping[str, str], wanted: str) -> dict[str, int]:
-        """Count who takes each plane, on the way to the wanted one."""
-        takers = {wanted: 1}
-        for stage, way in zip(self.stages, self.ways, strict=True):
-            if wanted in stage.gives and way != LEFT_OUT:
-                self._count(stage, alias, takers)
-                break
-            if way != LEFT_OUT:
-                self._count(stage, alias, takers)
-        return takers
+    def _needed(self, wanted: str) -> list[int]:
+        """Give the stages on the way to a plane, in order."""
+        planes, needed = {wanted}, []
+        for number in range(len(self.stages) - 1, -1, -1):
+            if self.ways[number] != LEFT_OUT and planes.intersection(self.stages[number].gives):
+                planes.update(self._taken(number))
+                needed.append(number)
+        return needed[::-1]
 
-    @staticmethod
-    def _count(stage: Stage, alias: Mapping[str, str], takers: dict[str, int]) -> None:
-        for name in stage.takes:
-            taken = alias.get(name, name)
-            takers[taken] = takers.get(taken, 0) + 1
+    def _taken(self, number: int) -> tuple[str, ...]:
+        """Name the planes that a stage takes; those that stand in for what is left out."""
+        return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
 
-    @staticmethod
-    def _offer(
-        ready: dict[str, list[Stream]], takers: Mapping[str, int], name: str, stream: Stream
-    ) -> None:
-        count = takers.get(name, 0)
-        if count:
-            ready[name] = stream.shared(count)
+    def _giver_of(self, plane: str) -> int:
+        """Give the number of the stage that gives a plane; -1 for the sensor.
 
-    def _planes(self) -> dict[str, Plane]:
-        bundle = self._job.bundle
-        if bundle is None:
-            return {CAPTURE: _plain_plane(self._job)}
-        return {CAPTURE: capture_plane(bundle.manifest.sensor), **bundle.manifest.planes}
+        Raises:
+            ContractError: If none does.
+        """
+        if plane == CAPTURE:
+            return -1
+        for number, stage in enumerate(self.stages):
+            if plane in stage.gives:
+                return number
+        there = ", ".join([CAPTURE, *(name for stage in self.stages for name in stage.gives)])
+        raise ContractError(f"no stage gives the plane {plane!r}; there are {there}")
 
     def _probe(self, plane: str) -> RowSource:
-        """Give rows of a plane that are made for one stage alone, before its first row."""
-        job = Job(self._job.setup, self._job.capture, cancel=self._job.cancel)
-        job.work = self._job.work
-        walk = Walk(job)
+        """Give rows of a plane that are made for one stage alone, before its first row.
+
+        Raises:
+            ContractError: If the ways are not settled yet, or the plane does not lie before the
+                stage that asks.
+        """
+        if not self.ways:
+            raise ContractError(
+                f"the plane {plane!r} is asked for too early: stages look at planes when their "
+                "first row is asked for, not while they are made ready"
+            )
+        number = self._giver_of(plane)
+        if number >= self._before:
+            raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
+        walk = Walk(self._job.unheard(), before=number)
         walk.settle()
         return walk.stream(plane).rows()
 
 
-def _plain_plane(job: Job) -> Plane:
-    """Give the plane of a capture without a bundle."""
+def _planes_of(job: Job) -> dict[str, Plane]:
+    """Give the planes that are stated; without a bundle that of the capture alone."""
+    if job.bundle is not None:
+        return known_planes(job.bundle.manifest)
     channels = MOSAIC if job.capture.cfa is not None else RGB
-    return Plane(type="uint16", channels=channels, domain="dn")
+    return {CAPTURE: Plane(type="uint16", channels=channels, domain="dn")}
 
 
 def _capture_stream(job: Job, plane: Plane) -> Stream:

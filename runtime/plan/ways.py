@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
+from camkit.bundle.chain import CAPTURE, capture_plane
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.plane import Plane
 from camkit.bundle.stages import Network, Stage
 from camkit.errors import ContractError
@@ -55,12 +57,15 @@ def planned(stages: Sequence[Stage], work: Work) -> Work:
     )
 
 
-def without_networks(stages: Sequence[Stage], work: Work) -> Work:
-    """Give the work by the best method that runs no network."""
-    tried = [
-        planned(stages, replace(work, method=method)) for method in (*methods_of(stages), DEVELOP)
-    ]
-    return next(other for other in tried if not other.networks)
+def without_networks(manifest: Manifest, work: Work) -> Work | None:
+    """Give the work by the best method that runs no network; None if they cannot be left out."""
+    stages, planes = manifest.stages, known_planes(manifest)
+    for method in (*methods_of(stages), DEVELOP):
+        other = planned(stages, replace(work, method=method))
+        left_out = [s for s, way in zip(stages, ways_of(stages, other), strict=True) if not way]
+        if not other.networks and all(known_stand_in(stage, planes) for stage in left_out):
+            return other
+    return None
 
 
 def _last_with(stages: Sequence[Stage], method: str) -> int:
@@ -77,21 +82,56 @@ def _last_with(stages: Sequence[Stage], method: str) -> int:
     )
 
 
+def known_planes(manifest: Manifest) -> dict[str, Plane]:
+    """Give all planes of a manifest by name, that of the sensor among them."""
+    return {CAPTURE: capture_plane(manifest.sensor), **manifest.planes}
+
+
+def stand_ins(
+    stages: Sequence[Stage], ways: Sequence[str], planes: Mapping[str, Plane]
+) -> dict[str, str]:
+    """Give what the stages that are left out would give -> the plane that stands for it.
+
+    Args:
+        stages: In order.
+        ways: Of each.
+        planes: By name, that of the sensor among them.
+
+    Raises:
+        ContractError: If nothing stands for it.
+    """
+    instead: dict[str, str] = {}
+    for stage, way in zip(stages, ways, strict=True):
+        if way == LEFT_OUT:
+            name = stand_in(stage, planes)
+            instead[stage.gives[0]] = instead.get(name, name)
+    return instead
+
+
 def stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str:
     """Name the plane that stands for what a stage gives where it is left out.
 
     Args:
-        stage: Gives one plane.
+        stage: Any.
         planes: By name, that of the sensor among them.
 
     Raises:
         ContractError: If no plane that it takes does.
     """
-    given = planes[stage.gives[0]]
-    for name in reversed(stage.takes):
-        if len(stage.gives) == 1 and planes[name].stands_for(given):
-            return name
+    name = known_stand_in(stage, planes)
+    if name is not None:
+        return name
     raise ContractError(
         f"the stage {stage.type} cannot be left out: none of {', '.join(stage.takes)} stands for "
         f"{', '.join(stage.gives)}"
     )
+
+
+def known_stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str | None:
+    """Name the plane that stands for what a stage gives; None if none does."""
+    given = planes[stage.gives[0]]
+    if len(stage.gives) == 1:
+        for name in reversed(stage.takes):
+            if planes[name].stands_for(given):
+                return name
+    return None
