@@ -34,8 +34,9 @@ QUANTITIES: Final = {
 
 
 def grey_noise(noise: NoiseModel) -> float:
-    """Give the standard deviation of a green sample at mid grey, before white balance."""
-    return float(np.sqrt(noise.shot[1] * GREY + noise.read_variance[1]))
+    """Give the standard deviation at mid grey, before white balance; green's of three colours."""
+    middle = len(noise.shot) // 2
+    return float(np.sqrt(noise.shot[middle] * GREY + noise.read_variance[middle]))
 
 
 def observe(capture: Capture, noise: NoiseModel) -> dict[str, float]:

@@ -37,6 +37,8 @@ OPTIONS: Final = (
 
 def prepare(entry: Network, job: Job) -> StageWork:
     """Hold the capture against the envelope; the windows are planned when the memory is known."""
+    if entry.transform == "stabilise":
+        _ = job.noise  # known to the plan before any row
     if "envelope" not in job.record:  # one network has looked already
         job.falls_back = _falls_back(job)
     stage = _NetworkStage(entry, job)
@@ -145,7 +147,9 @@ class _NetworkStage:
             bands = self._linear(bands, taken[-1], len(facts.outputs))
         return self._split(bands, taken[-1], [port.channels for port in facts.outputs])
 
-    def _linear(self, bands: Iterator[FloatArray], last: Stream, ports: int) -> Iterator[FloatArray]:
+    def _linear(
+        self, bands: Iterator[FloatArray], last: Stream, ports: int
+    ) -> Iterator[FloatArray]:
         """Take stabilised bands back to light, in place; every port by the noise of `last`."""
         one, scale = self._job.noise.with_gains(last.gains), self._entry.scale
         noise = NoiseModel(shot=one.shot * ports, read_variance=one.read_variance * ports)

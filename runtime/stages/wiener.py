@@ -28,8 +28,8 @@ BYTES_PER_BLOCK_ROW: Final = 80
 
 
 def prepare(entry: Wiener, job: Job) -> StageWork:
-    """Say which kernels are taken, where there is a choice."""
-    bundle, depth_mm = job.known_bundle, job.options.depth_mm
+    """Say which kernels are taken, where there is a choice, and what the noise is."""
+    bundle, depth_mm, _ = job.known_bundle, job.options.depth_mm, job.noise
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
         known = ", ".join(map(depth_name, depths_mm))

@@ -4,7 +4,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
-from camkit.contracts import FrozenPsf
 from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from tests.deep_bundle import deep_psf
 from tests.psf_factory import coma_kernels, frozen_psf
@@ -108,16 +107,12 @@ def test_on_the_axis_nothing_is_turned():
 
 def test_straight_down_the_stored_kernels_come_back():
     for kernel, height_mm in zip(KERNELS, HEIGHTS_MM, strict=True):
-        np.testing.assert_allclose(
-            ROUND.at(0.0, height_mm), kernel, atol=1e-7
-        )
+        np.testing.assert_allclose(ROUND.at(0.0, height_mm), kernel, atol=1e-7)
 
 
 def test_between_heights_kernels_are_interpolated():
     middle_mm = (HEIGHTS_MM[2] + HEIGHTS_MM[3]) / 2
-    np.testing.assert_allclose(
-        ROUND.at(0.0, middle_mm), (KERNELS[2] + KERNELS[3]) / 2, atol=1e-7
-    )
+    np.testing.assert_allclose(ROUND.at(0.0, middle_mm), (KERNELS[2] + KERNELS[3]) / 2, atol=1e-7)
 
 
 def test_beyond_the_last_height_its_kernel_holds():

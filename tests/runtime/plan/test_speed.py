@@ -71,7 +71,12 @@ def test_the_rest_is_given_in_blocks_of_one_size_whatever_the_bank_has() -> None
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"block_s": 0.0}, {"rest_s_per_mp": -1.0}, {"threads": 0}, {"network_s_per_mp": {("restore", "M"): 0.0}}],
+    [
+        {"block_s": 0.0},
+        {"rest_s_per_mp": -1.0},
+        {"threads": 0},
+        {"network_s_per_mp": {("restore", "M"): 0.0}},
+    ],
 )
 def test_a_speed_without_time_or_threads_is_refused(wrong: dict[str, object]) -> None:
     sound = Speed(network_s_per_mp={}, block_s=0.01, rest_s_per_mp=0.1, threads=1)

@@ -69,7 +69,9 @@ def test_bands_on_any_number_of_threads_are_the_whole(
     samples = np.random.default_rng(0).integers(64, 1000, (70, 64)).astype(np.uint16)
     capture = made_mosaic(samples=samples, cfa="GBRG")
     whole = read_all(_developed(capture, method, 1).rows())
-    np.testing.assert_array_equal(read_all(_developed(capture, method, threads).rows(), step), whole)
+    np.testing.assert_array_equal(
+        read_all(_developed(capture, method, threads).rows(), step), whole
+    )
 
 
 def test_planes_pass_through_untouched() -> None:
@@ -78,7 +80,9 @@ def test_planes_pass_through_untouched() -> None:
     assert run_stage(Demosaic(), made_job(capture), taken) == (taken,)
 
 
-@pytest.mark.parametrize(("asked", "stated", "used"), [(None, "quality", "quality"), ("fast", "quality", "fast")])
+@pytest.mark.parametrize(
+    ("asked", "stated", "used"), [(None, "quality", "quality"), ("fast", "quality", "fast")]
+)
 def test_the_callers_method_wins_over_the_bundles(
     asked: DemosaicMethod | None, stated: DemosaicMethod, used: DemosaicMethod
 ) -> None:

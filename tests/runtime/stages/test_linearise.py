@@ -59,7 +59,5 @@ def test_the_mask_alone_counts_nothing() -> None:
 
 def test_without_a_name_for_the_mask_none_is_given() -> None:
     capture = _clipping_mosaic()
-    given = run_stage(
-        Linearise(gives=("light",)), made_job(capture), captured(capture)
-    )
+    given = run_stage(Linearise(gives=("light",)), made_job(capture), captured(capture))
     assert len(given) == 1

@@ -9,7 +9,15 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.rows import RollingRows, Rows
 from camkit.runtime.signal.noise import repair_mosaic, repair_planes
 from camkit.runtime.stages.repair import SoundRows
-from tests.job_factory import captured, made_job, made_mosaic, made_planes, read_all, run_stage, stream_of
+from tests.job_factory import (
+    captured,
+    made_job,
+    made_mosaic,
+    made_planes,
+    read_all,
+    run_stage,
+    stream_of,
+)
 
 HEIGHT = 70
 

@@ -96,5 +96,6 @@ def test_bands_that_roll_are_not_changed_for_whoever_reads_them_again() -> None:
     (balanced,) = run_stage(WhiteBalance(), made_job(made_mosaic()), made)
     rows = balanced.rows()
     for top in (0, 2, 4):
-        np.testing.assert_array_equal(rows.read(top, top + 6)[:, :, 0], [[g] * 6 for g in (2, 1, 1.5)])
-
+        np.testing.assert_array_equal(
+            rows.read(top, top + 6)[:, :, 0], [[g] * 6 for g in (2, 1, 1.5)]
+        )
