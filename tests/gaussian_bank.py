@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camkit.models_def.training.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 
 
 def gaussian_bank(*, sensor_height_mm: float, axis_px: float, corner_px: float) -> PsfBank:

@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 
 import camkit
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
+from camkit.bundle.sensor import BayerSensor
+from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.contracts import FloatArray
 from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.signal.demosaic import demosaic
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate, write_capture
 from camkit.scenes import procedural_scene
+from tools.capture.simulated import rec709_of
 
 CROP_PX = 512
 BORDER_PX = 32
@@ -45,13 +47,13 @@ def main() -> None:
     out_dir.mkdir(parents=True, exist_ok=True)
 
     bundle = open_bundle(find_bundle(arguments.bundle))
-    camera = bundle.manifest.camera
+    sensor = _mosaic_sensor(bundle)
     print("photographing a 24-megapixel scene (about a minute) ...", flush=True)
     began = time.perf_counter()
-    scene = procedural_scene(arguments.seed, camera.height_px, camera.width_px)
+    scene = procedural_scene(arguments.seed, sensor.height_px, sensor.width_px)
     simulation = simulate(
         scene,
-        camera,
+        sensor,
         bundle.psf,
         SimulationOptions(
             iso=arguments.iso,
@@ -62,7 +64,7 @@ def main() -> None:
     )
     del scene
     capture = out_dir / "demo.dng"
-    write_capture(capture, simulation, camera, bundle.manifest.name)
+    write_capture(capture, simulation, sensor, bundle.manifest.name)
     print(f"{capture}: photographed in {time.perf_counter() - began:.1f} s")
 
     plan = ("plan", str(capture), "--bundle", arguments.bundle)
@@ -70,6 +72,13 @@ def main() -> None:
     for suffix in ("exr", "png"):
         _process(capture, arguments.bundle, out_dir, suffix)
     _show_quality(simulation, arguments.bundle, arguments.iso, out_dir / "before_after.png")
+
+
+def _mosaic_sensor(bundle: Bundle) -> BayerSensor:
+    sensor = bundle.manifest.sensor
+    if not isinstance(sensor, BayerSensor):
+        raise SystemExit(f"{bundle.manifest.name} has no mosaic; the demo shows cameras with one")
+    return sensor
 
 
 def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
@@ -93,12 +102,13 @@ def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
 def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) -> None:
     """Compare crops from axis to corner with the sharp scene, in sensor geometry."""
     bundle = open_bundle(find_bundle(name))
-    matrix = rec709_from_camera(np.array(bundle.manifest.camera.color_matrix))
+    matrix = rec709_of(_mosaic_sensor(bundle))
     methods = {
         "wiener": camkit.load(name, method="wiener", undistort=False),
         "net M": camkit.load(name, undistort=False),
     }
-    height, width = simulation.mosaic.shape
+    height, width = simulation.samples.shape
+    red, green, blue = simulation.white_balance
     rows = []
     print("\nPSNR in dB on sRGB values, sensor geometry, 512-px crops from axis to corner")
     print("field   " + "".join(f"{label:>10}" for label in ("input", *methods)))
@@ -108,11 +118,11 @@ def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) 
         x, y = min(x, width - CROP_PX) // 2 * 2, min(y, height - CROP_PX) // 2 * 2
         cut = np.s_[..., y : y + CROP_PX, x : x + CROP_PX]
         sharp = encode_srgb(apply_matrix(matrix, simulation.clean[cut]))
-        mosaic = np.ascontiguousarray(simulation.mosaic[cut])
+        mosaic = np.ascontiguousarray(simulation.samples[cut])
         tiles = [encode_srgb(_seen(mosaic, simulation, bundle, x, y))]
         for pipeline in methods.values():
             image = pipeline.process_array(
-                mosaic, iso=iso, white_balance=simulation.white_balance, origin_px=(x, y)
+                mosaic, iso=iso, white_balance=(red, green, blue), origin_px=(x, y)
             )
             tiles.append(encode_srgb(image))
         print(f"{field:5.2f}   " + "".join(f"{_psnr(t, sharp):10.2f}" for t in tiles))
@@ -126,14 +136,14 @@ def _seen(
     mosaic: NDArray[np.uint16], simulation: Simulation, bundle: Bundle, x: int, y: int
 ) -> FloatArray:
     """Give a crop demosaicked, white-balanced and without vignetting: what the lens saw."""
-    camera = bundle.manifest.camera
+    sensor = _mosaic_sensor(bundle)
     window = replace(simulation.window, size_px=(CROP_PX, CROP_PX), origin_px=(float(x), float(y)))
-    signal = mosaic.astype(np.float32) - np.float32(camera.black_level)
-    signal /= np.float32(camera.white_level - camera.black_level)
-    planes = demosaic(signal, camera.cfa or "RGGB")
+    signal = mosaic.astype(np.float32) - np.float32(sensor.black_level)
+    signal /= np.float32(sensor.white_level - sensor.black_level)
+    planes = demosaic(signal, sensor.cfa)
     planes *= np.array(simulation.white_balance, np.float32)[:, None, None]
     planes = divide_illumination(planes, 0, bundle.psf, window)
-    return apply_matrix(rec709_from_camera(np.array(camera.color_matrix)), planes)
+    return apply_matrix(rec709_of(sensor), planes)
 
 
 def _psnr(image: FloatArray, sharp: FloatArray) -> float:

@@ -22,12 +22,13 @@ import torch
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.colorimetry import apply_matrix, rec709_from_camera
+from camkit.colorimetry import apply_matrix
 from camkit.contracts import depth_name
 from camkit.report.quality import FIELD_SHARES, crop_origin
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.simulate import SimulationOptions, simulate
+from tools.capture.simulated import captured, color_sensor, rec709_of
 from tools.design.edge import (
     ACROSS,
     LEVELS,
@@ -133,7 +134,7 @@ def main() -> None:
 def measure(bundle: Bundle, shots: Shots) -> list[Row]:
     """Measure every method of a bundle at every distance."""
     pipelines = {"wiener": Pipeline(bundle, Options(method="wiener", undistort=False))}
-    for size in bundle.manifest.networks:
+    for size in bundle.manifest.sizes:
         pipelines[size] = Pipeline(bundle, Options(size=size, undistort=False))
     rows = []
     for depth_mm in bundle.psf.depths_mm.tolist():
@@ -149,27 +150,22 @@ def _edges(
     bundle: Bundle, pipelines: dict[str, Pipeline], across: Across, depth_mm: float, shots: Shots
 ) -> dict[str, EdgeContrast]:
     """Give the contrast (place, frequency) that each method leaves."""
-    camera = bundle.manifest.camera
+    sensor = color_sensor(bundle)
     scene = slanted_edge(SIDE_PX, across, shots.levels).float().numpy()
-    matrix = rec709_from_camera(np.array(camera.color_matrix, dtype=np.float64))
+    matrix = rec709_of(sensor)
     truth = scene[1]
     shown: dict[str, list[Plane]] = {method: [] for method in pipelines}
     for share in FIELD_SHARES:
-        origin = crop_origin((SIDE_PX, SIDE_PX), (camera.width_px, camera.height_px), share, CORNER)
+        origin = crop_origin((SIDE_PX, SIDE_PX), (sensor.width_px, sensor.height_px), share, CORNER)
         sums = {method: np.zeros((SIDE_PX, SIDE_PX)) for method in pipelines}
         for seed in range(shots.draws):
             taken = SimulationOptions(
                 iso=ISO, seed=seed, origin_px=origin, depth_mm=depth_mm, distort=False
             )
-            simulation = simulate(scene, camera, bundle.psf, taken)
+            simulation = simulate(scene, sensor, bundle.psf, taken)
             truth = apply_matrix(matrix, simulation.clean)[1]
             for method, pipeline in pipelines.items():
-                restored = pipeline.process_array(
-                    simulation.mosaic,
-                    iso=ISO,
-                    white_balance=simulation.white_balance,
-                    origin_px=origin,
-                )
+                restored = pipeline.start(captured(pipeline, simulation)).fill()
                 sums[method] += restored[1] / shots.draws
         for method, picture in sums.items():
             shown[method].append(_middle(picture))

@@ -21,6 +21,7 @@ from camkit.bundle.reader import built_in_bundles, find_bundle, open_bundle
 from camkit.cli.judge.doctor import examine
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.network.windows import SizedNetwork
 from camkit.runtime.rows import ArrayRows
 
 NOKIA = ("--mosaic", "GRBG", "--black-level", "25", "--white-level", "1023")
@@ -82,33 +83,38 @@ def measure_speed(arguments: argparse.Namespace) -> None:
 def measure_tiling(arguments: argparse.Namespace) -> None:
     """Compare the planned tiling with one window, for every network of the bundles."""
     names = [arguments.bundle] if arguments.bundle else sorted(built_in_bundles())
-    print("| bundle | size | picture | windows | largest difference |\n|---|---|---|---|---|")
+    picture = f"{arguments.width}x{arguments.height}"
+    print("| bundle | network | picture | windows | largest difference |\n|---|---|---|---|---|")
     for name in names:
         bundle = open_bundle(find_bundle(name))
-        for size, facts in bundle.manifest.networks.items():
-            engine = NetworkEngine(bundle.network_bytes(size), threads=available_threads(None))
-            shape = (facts.input_channels, arguments.height, arguments.width)
-            planes = np.random.default_rng(0).uniform(0, 3, shape).astype(np.float32)
-            limits = TileLimits(
-                stride_px=facts.stride_px,
-                halo_px=facts.reach_px,
-                bytes_per_px=facts.bytes_per_pixel,
-            )
-            plan = plan_windows(arguments.height, arguments.width, limits)
-            whole = TileLimits(
-                stride_px=facts.stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True
-            )
-            (one,) = infer_bands(
-                engine.run,
-                ArrayRows(planes),
-                plan_windows(arguments.height, arguments.width, whole),
-            )
-            worst, top = 0.0, 0
-            for band in infer_bands(engine.run, ArrayRows(planes), plan):
-                difference = np.abs(band - one[:, top : top + band.shape[1]])
-                worst, top = max(worst, float(difference.max())), top + band.shape[1]
-            picture = f"{arguments.width}x{arguments.height}"
-            print(f"| {name} | {size} | {picture} | {plan.window_count} | {worst:g} |")
+        for role, sizes in bundle.manifest.networks.items():
+            for size, facts in sizes.items():
+                engine = NetworkEngine(
+                    bundle.network_bytes(role, size),
+                    threads=available_threads(None),
+                    scale=facts.output_scale,
+                )
+                network = SizedNetwork(size=size, run=engine.run, facts=facts)
+                count, worst = _tiling_error(network, arguments.height, arguments.width)
+                label = size if len(bundle.manifest.networks) == 1 else f"{role} {size}"
+                print(f"| {name} | {label} | {picture} | {count} | {worst:g} |")
+
+
+def _tiling_error(network: SizedNetwork, height: int, width: int) -> tuple[int, float]:
+    """Give the number of windows, and the largest difference from one window."""
+    facts = network.facts
+    shape = (facts.input_channels, height, width)
+    planes = ArrayRows(np.random.default_rng(0).uniform(0, 3, shape).astype(np.float32))
+    limits = TileLimits(stride_px=facts.stride_px, halo_px=facts.reach_px, cost=network.cost)
+    plan = plan_windows(height, width, limits)
+    whole = TileLimits(stride_px=facts.stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True)
+    one_plan, scale = plan_windows(height, width, whole), facts.output_scale
+    (one,) = infer_bands(network.run, planes, one_plan, scale=scale)
+    worst, top = 0.0, 0
+    for band in infer_bands(network.run, planes, plan, scale=scale):
+        difference = np.abs(band - one[:, top : top + band.shape[1]])
+        worst, top = max(worst, float(difference.max())), top + band.shape[1]
+    return plan.window_count, worst
 
 
 def measure_raws(arguments: argparse.Namespace) -> None:

@@ -25,6 +25,7 @@ from camkit.bundle.manifest import Threshold
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
+from camkit.errors import ContractError
 from camkit.report.quality import list_set, read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -126,18 +127,22 @@ def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
 
 def _work(bundle: Bundle) -> tuple[TierWork, str | None]:
     """Give what the tiers cost in this bundle, and its smallest size below the reference."""
-    networks = bundle.manifest.networks
-    full = bundle.network_facts(REFERENCE)
-    below = [s for s in networks if networks[s].mac_per_pixel < full.mac_per_pixel]
-    small = min(below, key=lambda name: networks[name].mac_per_pixel, default=None)
-    facts = None if small is None else bundle.network_facts(small)
+    roles = tuple(bundle.manifest.networks)
+    if len(roles) != 1:
+        raise ContractError(
+            f"cells are shared among the sizes of one network; {bundle.manifest.name} has "
+            f"{', '.join(roles) or 'none'}"
+        )
+    full = bundle.network_facts(roles[0], REFERENCE)
+    small = next(iter(bundle.manifest.sizes))
+    facts = None if small == REFERENCE else bundle.network_facts(roles[0], small)
     work = TierWork(
         full_mac=full.mac_per_pixel,
         full_halo_px=full.reach_px,
         small_mac=None if facts is None else facts.mac_per_pixel,
         small_halo_px=0 if facts is None else facts.reach_px,
     )
-    return work, small
+    return work, None if facts is None else small
 
 
 def _store(path: Path, entries: dict[str, Threshold]) -> None:

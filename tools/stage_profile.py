@@ -17,17 +17,23 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
-from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.reader import STRESS_PSF, Bundle, find_bundle, open_bundle
+from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.writer import write_bundle
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.runtime.clock import StageClock
+from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.output.band_queue import BandQueue
@@ -35,7 +41,7 @@ from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.output.picture_writer import PictureFormat
 from camkit.runtime.output.writer import open_writer
 from camkit.runtime.pipeline import load
-from camkit.runtime.raw import file_sha256, read_capture
+from camkit.runtime.raw import file_sha256
 
 TRANSFORMS = ("wiener", "network")
 WATCH_S = 0.02
@@ -148,47 +154,15 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     start_s = time.perf_counter() - began
     wall, cpu = {}, {}
     began, began_cpu = time.perf_counter(), _cpu_s()
-    capture = read_capture(arguments.capture)
+    capture = pipeline.read(arguments.capture)
     wall["decode"] = time.perf_counter() - began
     cpu["decode"] = _cpu_s() - began_cpu
     work = pipeline.start(capture)
-    seen, ended = ThreadWatch(work.clock), threading.Event()
-
-    def watch() -> None:
-        while not ended.wait(WATCH_S):
-            seen.take()
-
-    watcher = threading.Thread(target=watch, name="profile")
-    watcher.start()
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / f"picture.{arguments.format}"
-        picture = PictureFormat(
-            width=capture.width,
-            height=capture.height,
-            color=work.color,
-            orientation=capture.orientation,
-        )
-        with atomic_output(target) as part:
-            waited = 0.0
-            with open_writer(part, arguments.format, picture) as writer:
-                with BandQueue(writer) as queue:
-                    for band in work.bands():
-                        before = time.perf_counter()
-                        queue.write(band)
-                        waited += time.perf_counter() - before
-                    before = time.perf_counter()
-                waited += time.perf_counter() - before
-            wall |= {**work.seconds, "write": waited}
-            before = time.perf_counter()
-            file_sha256(part)
-            wall["hash"] = time.perf_counter() - before
-            before = time.perf_counter()
-        wall["sync"] = time.perf_counter() - before
-    all_s = time.perf_counter() - began
-    ended.set()
-    watcher.join()
+    with _watched(work.clock) as seen:
+        wall |= _written(work, arguments.format)
+        all_s = time.perf_counter() - began
     cpu |= work.clock.cpu_seconds
-    rest = all_s - sum(wall.get(name, 0.0) for name in TRANSFORMS)
+    rest = all_s - sum(spent for name, spent in wall.items() if name.split()[0] in TRANSFORMS)
     total = {"all": all_s, "neither network nor FFT": rest, "start": start_s}
     total["peak MB"] = max(peak_rss_mb(), capture.decoder_peak_mb)
     return {
@@ -200,6 +174,50 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+@contextmanager
+def _watched(clock: StageClock) -> Iterator[ThreadWatch]:
+    """Look at the work of the block from a thread beside it."""
+    seen, ended = ThreadWatch(clock), threading.Event()
+
+    def watch() -> None:
+        while not ended.wait(WATCH_S):
+            seen.take()
+
+    watcher = threading.Thread(target=watch, name="profile")
+    watcher.start()
+    try:
+        yield seen
+    finally:
+        ended.set()
+        watcher.join()
+
+
+def _written(work: Reconstruction, format_: str) -> dict[str, float]:
+    """Write the picture of a capture and throw it away; give the wall seconds of every stage."""
+    _, height, width = work.shape
+    picture = PictureFormat(
+        width=width, height=height, color=work.color, orientation=work.capture.orientation
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        with atomic_output(Path(folder) / f"picture.{format_}") as part:
+            waited = 0.0
+            with open_writer(part, format_, picture) as writer:
+                with BandQueue(writer) as queue:
+                    for band in work.bands():
+                        before = time.perf_counter()
+                        queue.write(band)
+                        waited += time.perf_counter() - before
+                    before = time.perf_counter()
+                waited += time.perf_counter() - before
+            wall = {**work.seconds, "write": waited}
+            before = time.perf_counter()
+            file_sha256(part)
+            wall["hash"] = time.perf_counter() - before
+            before = time.perf_counter()
+        wall["sync"] = time.perf_counter() - before
+    return wall
+
+
 def _cpu_s() -> float:
     """Give the processor time of this process and of the children that have ended."""
     spent = os.times()
@@ -207,28 +225,55 @@ def _cpu_s() -> float:
 
 
 def profile_layers(arguments: argparse.Namespace) -> None:
+    """Profile the networks of every role."""
+    bundle = open_bundle(find_bundle(arguments.bundle))
+    for role in bundle.manifest.networks:
+        _profile_network(arguments, bundle, role)
+
+
+def _profile_network(arguments: argparse.Namespace, bundle: Bundle, role: str) -> None:
     """Time every node of a network on one window and compare it with the matrix product."""
-    import onnx
+    threads = available_threads(arguments.threads)
+    facts = bundle.network_facts(role, arguments.size)
+    data = bundle.network_bytes(role, arguments.size)
+    times, operators = _node_seconds(data, facts, threads)
+    all_macs, macs = _count_macs(data, SIDE_PX)
+    peak = gemm_peak_gmac_per_s(threads)
+    total = sum(times.values())
+    print(
+        f"{arguments.bundle} {role} {arguments.size}, {SIDE_PX}x{SIDE_PX}, {threads} thread(s); "
+        f"matrix product {peak:.0f} GMAC/s, nodes {total * 1e3:.0f} ms"
+    )
+    print(
+        "| node | kind | ms | share | GMAC/s | of the matrix product |\n|---|---|---|---|---|---|"
+    )
+    for name, seconds in sorted(times.items(), key=lambda item: -item[1]):
+        mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
+        speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
+        shown = f"{seconds * 1e3:.1f} | {seconds / total:.1%}"
+        print(f"| {name} | {operators[name]} | {shown} | {speed} |")
+    done = all_macs / total / 1e9
+    print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
+
+
+def _node_seconds(
+    data: bytes, facts: NetworkFacts, threads: int
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Give the seconds of every node on a square window, the median, and its operator."""
     import onnxruntime as ort
 
-    threads = available_threads(arguments.threads)
-    data = open_bundle(find_bundle(arguments.bundle)).network_bytes(arguments.size)
-    side = SIDE_PX
-    all_macs, macs = _count_macs(data, side)
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.enable_mem_pattern = False
     options.enable_profiling = True
     options.log_severity_level = 4
+    shape = (1, facts.input_channels, SIDE_PX, SIDE_PX)
+    window = np.random.default_rng(0).random(shape, dtype=np.float32)
     with tempfile.TemporaryDirectory() as folder:
         options.profile_file_prefix = str(Path(folder) / "ort")
         session = ort.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-        channels = onnx.load_from_string(data).graph.input[0].type.tensor_type.shape.dim[1]
-        window = np.random.default_rng(0).random(
-            (1, channels.dim_value, side, side), dtype=np.float32
-        )
         for _ in range(8):
-            session.run(None, {"input": window})
+            session.run(None, {facts.input_name: window})
         events = json.loads(Path(session.end_profiling()).read_text(encoding="utf-8"))
     times: dict[str, list[float]] = defaultdict(list)
     operators: dict[str, str] = {}
@@ -237,21 +282,7 @@ def profile_layers(arguments: argparse.Namespace) -> None:
             name = event["name"].removesuffix("_kernel_time")
             times[name].append(event["dur"] / 1e6)
             operators[name] = event["args"].get("op_name", "")
-    peak = gemm_peak_gmac_per_s(threads)
-    medians = {name: statistics.median(spent[2:] or spent) for name, spent in times.items()}
-    total = sum(medians.values())
-    print(f"{arguments.bundle} {arguments.size}, {side}x{side}, {threads} thread(s); ", end="")
-    print(f"matrix product {peak:.0f} GMAC/s, nodes {total * 1e3:.0f} ms")
-    print(
-        "| node | kind | ms | share | GMAC/s | of the matrix product |\n|---|---|---|---|---|---|"
-    )
-    for name, seconds in sorted(medians.items(), key=lambda item: -item[1]):
-        mac = next((macs[key] for key in _keys(name) if key in macs), 0.0)
-        speed = f"{mac / seconds / 1e9:.0f} | {mac / seconds / 1e9 / peak:.0%}" if mac else " | "
-        shown = f"{seconds * 1e3:.1f} | {seconds / total:.1%}"
-        print(f"| {name} | {operators[name]} | {shown} | {speed} |")
-    done = all_macs / total / 1e9
-    print(f"| all | | {total * 1e3:.1f} | | {done:.0f} | {done / peak:.0%} |")
+    return {name: statistics.median(t[2:] or t) for name, t in times.items()}, operators
 
 
 def _keys(name: str) -> tuple[str, ...]:
@@ -325,6 +356,9 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
     import tifffile
 
     bundle = open_bundle(find_bundle(arguments.bundle))
+    sensor = bundle.manifest.sensor
+    if not isinstance(sensor, BayerSensor):
+        raise SystemExit(f"{bundle.manifest.name} has no mosaic, and this profile makes mosaics")
     print("| megapixels | picture | s | s per megapixel | peak MB |\n|---|---|---|---|---|")
     for megapixels in (float(n) for n in arguments.megapixels.split(",")):
         height = round((megapixels * 1e6 / 1.5) ** 0.5 / 16) * 16
@@ -332,10 +366,9 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
         with tempfile.TemporaryDirectory() as folder:
             large, mosaic = Path(folder) / "large.camkit", Path(folder) / "mosaic.tif"
             _write_stretched(bundle, large, width, height)
-            camera = bundle.manifest.camera
             samples = tifffile.memmap(mosaic, shape=(height, width), dtype=np.uint16)
             rng = np.random.default_rng(0)
-            middle = (camera.black_level + camera.white_level) / 3
+            middle = (sensor.black_level + sensor.white_level) / 3
             for top in range(0, height, 256):
                 shape = samples[top : top + 256].shape
                 samples[top : top + 256] = rng.normal(middle, 20, shape).astype(np.uint16)
@@ -344,8 +377,8 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
             command = [sys.executable, "-m", "camkit", "process", str(mosaic), "--json"]
             command += ["--bundle", str(large), "--size", arguments.size, "--format", "tiff"]
             command += ["--out-dir", str(Path(folder) / "out"), "--max-mem", arguments.max_mem]
-            command += ["--mosaic", str(camera.cfa), "--black-level", f"{camera.black_level:g}"]
-            command += ["--white-level", f"{camera.white_level:g}"]
+            command += ["--mosaic", sensor.cfa, "--black-level", f"{sensor.black_level:g}"]
+            command += ["--white-level", f"{sensor.white_level:g}"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             result: dict[str, Any] = {"error": done.stderr}
             if done.stdout.strip():
@@ -362,16 +395,29 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
 
 def _write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:
     """Write a bundle whose sensor has as many pixels over the same width in millimetres."""
-    camera = bundle.manifest.camera
-    pitch_um = camera.pixel_pitch_um * camera.width_px / width
+    manifest = bundle.manifest
+    extent = manifest.sensor.known_extent
+    ratio = width / extent.width_px
+    pitch_um = extent.pixel_pitch_um / ratio
+    centre = extent.optical_centre_px
+    stretched = extent.model_copy(
+        update={
+            "width_px": width,
+            "height_px": height,
+            "pixel_pitch_um": pitch_um,
+            "optical_centre_px": centre and (centre[0] * ratio, centre[1] * ratio),
+        }
+    )
+    changes: dict[str, Any] = {
+        "sensor": manifest.sensor.model_copy(update={"extent": stretched}),
+    }
+    if manifest.optics is not None:
+        changes["optics"] = manifest.optics.model_copy(update={"pixel_pitch_um": pitch_um})
     members = {name: bundle.member(name) for name in bundle.names}
-    for name in members.keys() & {"psf.safetensors", "stress_psf.safetensors"}:
+    for name in members.keys() & {PSF, STRESS_PSF}:
         psf = psf_from_bytes(members[name])
         members[name] = psf_to_bytes(replace(psf, pixel_pitch_um=pitch_um))
-    stretched = camera.model_copy(
-        update={"width_px": width, "height_px": height, "pixel_pitch_um": pitch_um}
-    )
-    write_bundle(path, bundle.manifest.model_copy(update={"camera": stretched}), members)
+    write_bundle(path, manifest.model_copy(update=changes), members)
 
 
 if __name__ == "__main__":

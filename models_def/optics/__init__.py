@@ -1,4 +1,4 @@
-"""Lenses: from a prescription to the frozen PSF of a camera.
+"""Optics: from a prescription, or a PSF that was measured, to the frozen PSF of a camera.
 
 In the order in which data flows:
 
@@ -16,6 +16,8 @@ In the order in which data flows:
 - `distortion`: the radial polynomial of eq. (6.10)
 - `psf`: rays splatted into kernels
 - `kernel_bank`: kernels per colour of the nominal lens and of fabricated copies, for training
+- `optics`: what freezing knows of any optics; `lens_optics` and `measured` fulfil it,
+  `optics_file` reads either
 - `frozen`: a `FrozenPsf` on a grid of fields, depths and wavelengths
 - `sampling`: what coarse samples and blocks cost, in dB
 - `freeze`: the least samples within a stated loss; the file and its report

@@ -47,17 +47,18 @@ def ideal_heights(lens: Lens, heights_mm: NDArray[np.float64]) -> NDArray[np.flo
     return paraxial_data(lens).efl_mm * slopes.numpy()
 
 
-def trace_distortion(lens: Lens, radius_mm: float) -> RadialDistortion:
+def trace_distortion(lens: Lens, radius_mm: float, *, channels: int = 3) -> RadialDistortion:
     """Fit the distortion of the reference wavelength over the whole sensor.
 
-    All three rows are equal: lateral colour lies in the kernels, which are centred on the chief
+    All rows are equal: lateral colour lies in the kernels, which are centred on the chief
     ray of the reference wavelength.
 
     Args:
         lens: The prescription.
         radius_mm: Half the diagonal of the sensor.
+        channels: Of the sensor.
     """
     heights_mm = np.linspace(radius_mm / FIT_POINTS, radius_mm, FIT_POINTS)
     ideal_mm = ideal_heights(lens, heights_mm)
     row = fit_distortion(ideal_mm / radius_mm, heights_mm / radius_mm)
-    return RadialDistortion(coefficients=np.tile(row, (3, 1)), radius_mm=radius_mm)
+    return RadialDistortion(coefficients=np.tile(row, (channels, 1)), radius_mm=radius_mm)

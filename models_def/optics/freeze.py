@@ -1,4 +1,4 @@
-"""Freezing a prescription: as few PSF samples and as large blocks as the stated loss allows.
+"""Freezing optics: as few PSF samples and as large blocks as the stated loss allows.
 
 candidates -> frozen_loss (dB of the Wiener filter alone) -> FrozenPsf -> psf.safetensors,
 FrozenPsf -> block_loss of block grids -> FreezeReport
@@ -8,26 +8,28 @@ loss allows, with the depth known to the filter (interpolated kernels) and unkno
 kernel).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from camkit.bundle.camera import Camera
+import numpy as np
+
+from camkit.bundle.psf_file import write_psf
+from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
     Frozen,
+    corner_height_mm,
     freeze,
     freeze_at,
     freeze_stress,
 )
-from camkit.models_def.optics.lens_file.lens_file import read_lens
-from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.optics import Optics
 from camkit.models_def.optics.sampling import (
     Bench,
     Loss,
@@ -46,7 +48,7 @@ __all__ = [
     "choose_grid",
     "freeze",
     "freeze_at",
-    "freeze_prescription",
+    "freeze_optics",
     "freeze_stress",
 ]
 
@@ -69,7 +71,7 @@ class FreezeReport:
     """What freezing kept and what it cost; every value goes into the manifest.
 
     Attributes:
-        fields: Field heights kept.
+        fields: Places of the field kept.
         wavelengths: Wavelengths kept.
         side_px: Kernel side.
         energy_kept: Least share of a colour's light inside a kernel.
@@ -79,8 +81,8 @@ class FreezeReport:
         block_px: Chosen block of the Wiener bank.
         overlap_px: Its overlap.
         block_loss_db: Mean loss of one kernel per block.
-        efl_mm: Of the lens.
-        corner_illumination: Relative illumination at the corner.
+        of_optics: What else the optics say of themselves, such as efl_mm.
+        corner_illumination: Relative illumination at the place farthest from the axis.
         depths_mm: Depths kept; one unless several were asked for.
         between_loss_db: Mean loss of interpolated kernels half-way (in 1 / distance) between
             the depths kept, against those traced there; 0 with one depth. Not limited: it says
@@ -97,14 +99,16 @@ class FreezeReport:
     block_px: int
     overlap_px: int
     block_loss_db: float
-    efl_mm: float
+    of_optics: Mapping[str, float]
     corner_illumination: float
     depths_mm: tuple[float, ...] = ()
     between_loss_db: float = 0.0
 
     def to_json(self) -> dict[str, int | float | str]:
         """Give the report as a flat mapping; that of one depth does not speak of depths."""
-        facts = asdict(self)
+        facts: dict[str, Any] = {}
+        for name, value in asdict(self).items():
+            facts |= value if name == "of_optics" else {name: value}
         depths_mm = facts.pop("depths_mm")
         if len(depths_mm) > 1:
             facts["depths_mm"] = ", ".join(f"{depth_mm:g}" for depth_mm in depths_mm)
@@ -114,8 +118,8 @@ class FreezeReport:
 
 
 def choose_grid(
-    lens: Lens,
-    camera: Camera,
+    optics: Optics,
+    sensor: ColorSensor,
     bench: Bench,
     *,
     limit_db: float = LOSS_LIMIT_DB,
@@ -125,14 +129,14 @@ def choose_grid(
     """Freeze with the least wavelengths, then depths, then fields, whose mean loss is allowed.
 
     Wavelengths are chosen with the most fields and half of the allowance, depths with three
-    quarters of it.
+    quarters of it. There is nothing to choose where optics are known at samples of their own.
 
     Args:
-        lens: Nominal.
-        camera: Response, size and noise.
-        bench: The lens where it is judged, at the depths that may be kept.
+        optics: Nominal.
+        sensor: Response, size and noise.
+        bench: The optics where they are judged, at the depths that may be kept.
         limit_db: Mean loss allowed.
-        grid: Rays, energy and largest side; the rest is chosen here.
+        grid: Energy and largest side; the rest is chosen here.
         tell: Takes a line for everything that was tried.
 
     Raises:
@@ -142,25 +146,37 @@ def choose_grid(
     fields = FIELD_COUNTS[-1]
     waves = WAVELENGTH_COUNTS[-1]
     for count in WAVELENGTH_COUNTS:
-        frozen = freeze(lens, camera, replace(base, fields=fields, wavelengths=count))
+        frozen = freeze(optics, sensor, replace(base, fields=fields, wavelengths=count))
         lost_db = frozen_loss(frozen.psf, bench).mean_db
-        tell(f"{count} wavelengths, {fields} fields: {lost_db:.3f} dB")
-        if lost_db <= limit_db / 2:
+        tell(f"{_samples(frozen)}: {lost_db:.3f} dB")
+        if lost_db <= limit_db / 2 or optics.wavelengths_um is not None:
             waves = count
             break
     kept_mm = choose_depths(frozen.psf, bench, limit_db=DEPTH_SHARE * limit_db)
     base = replace(base, depths_mm=kept_mm)
     loss = Loss(mean_db=0.0, worst_db=0.0)
-    for count in FIELD_COUNTS:
-        frozen = freeze(lens, camera, replace(base, fields=count, wavelengths=waves))
+    for count in _field_counts(optics, sensor):
+        frozen = freeze(optics, sensor, replace(base, fields=count, wavelengths=waves))
         loss = frozen_loss(frozen.psf, bench)
-        tell(f"{waves} wavelengths, {count} fields: {loss.mean_db:.3f} dB")
+        tell(f"{_samples(frozen)}: {loss.mean_db:.3f} dB")
         if loss.mean_db <= limit_db:
             return frozen, loss
     raise ContractError(
-        f"{fields} fields and {waves} wavelengths lose {loss.mean_db:.3f} dB, more than the "
-        f"allowed {limit_db}; allow more or use a smoother lens"
+        f"{_samples(frozen)} lose {loss.mean_db:.3f} dB, more than the allowed {limit_db}; allow "
+        "more or use smoother optics"
     )
+
+
+def _field_counts(optics: Optics, sensor: ColorSensor) -> tuple[int, ...]:
+    """Give the numbers of fields to try: one where they make no difference."""
+    corner_mm = corner_height_mm(sensor)
+    few, many = (optics.layout(corner_mm, FIELD_COUNTS[i]).count for i in (0, -1))
+    return FIELD_COUNTS if few != many or len(FIELD_COUNTS) == 1 else FIELD_COUNTS[-1:]
+
+
+def _samples(frozen: Frozen) -> str:
+    fields, _, wavelengths = frozen.psf.kernels.shape[:3]
+    return f"{wavelengths} wavelengths, {fields} fields"
 
 
 def choose_depths(psf: FrozenPsf, bench: Bench, *, limit_db: float) -> tuple[float, ...]:
@@ -168,7 +184,7 @@ def choose_depths(psf: FrozenPsf, bench: Bench, *, limit_db: float) -> tuple[flo
 
     Args:
         psf: With all depths of the bench.
-        bench: The lens at its depths.
+        bench: The optics at their depths.
         limit_db: Mean loss allowed, both of interpolated kernels and of the mean kernel.
     """
     count = len(bench.depths_mm)
@@ -214,47 +230,45 @@ def choose_blocks(
     return next(pair for pair in tried if pair[1].mean_db <= allowed_db)
 
 
-def freeze_prescription(
-    path: Path,
+def freeze_optics(
+    optics: Optics,
     out_path: Path,
     *,
-    camera: Camera,
+    sensor: ColorSensor,
     settings: Wiener | None = None,
     limit_db: float = LOSS_LIMIT_DB,
     grid: FreezeGrid | None = None,
     tell: Tell = _silent,
 ) -> FreezeReport:
-    """Freeze the PSF of a prescription and write it.
+    """Freeze the PSF of optics and write it.
 
     Args:
-        path: The lens (TOML).
+        optics: A lens, or a PSF that was measured; see `read_optics`.
         out_path: Receives the frozen PSF (safetensors).
-        camera: Sensor size, pitch, response and noise.
+        sensor: Size, pitch, response and noise.
         settings: Of the Wiener filter that measures the loss.
         limit_db: Mean loss allowed for the samples, and for the blocks.
-        grid: Rays, energy, largest side and depths; fields, wavelengths and which of the depths
-            are kept are chosen here.
+        grid: Energy, largest side and depths; fields, wavelengths and which of the depths are kept
+            are chosen here.
         tell: Takes a line for everything that was tried.
 
     Raises:
-        ContractError: If the prescription is wrong or no grid keeps the loss.
+        ContractError: If the optics are wrong or no grid keeps the loss.
     """
-    from camkit.bundle.psf_file import write_psf
-
-    lens = read_lens(path)
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     wanted = grid or FreezeGrid()
-    tell(f"tracing {lens.name} and its copies")
-    bench = make_bench(lens, camera, chosen, grid=wanted)
-    frozen, loss = choose_grid(lens, camera, bench, limit_db=limit_db, grid=grid, tell=tell)
+    tell(f"tracing {optics.name} and its copies")
+    bench = make_bench(optics, sensor, chosen, grid=wanted)
+    frozen, loss = choose_grid(optics, sensor, bench, limit_db=limit_db, grid=grid, tell=tell)
     blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db, tell=tell)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
     kept_mm = tuple(frozen.psf.depths_mm.tolist())
     between_db = 0.0
     if between := between_mm(kept_mm):
-        there = make_bench(lens, camera, chosen, grid=replace(wanted, depths_mm=between))
+        there = make_bench(optics, sensor, chosen, grid=replace(wanted, depths_mm=between))
         between_db = frozen_loss(frozen.psf, there).mean_db
+    farthest = int(np.argmax(frozen.psf.field_heights_mm))
     return FreezeReport(
         fields=fields,
         wavelengths=wavelengths,
@@ -266,8 +280,8 @@ def freeze_prescription(
         block_px=blocks.block_px,
         overlap_px=blocks.overlap_px,
         block_loss_db=blocked.mean_db,
-        efl_mm=paraxial_data(lens).efl_mm,
-        corner_illumination=float(frozen.psf.relative_illumination[-1]),
+        of_optics=optics.facts,
+        corner_illumination=float(frozen.psf.relative_illumination[farthest]),
         depths_mm=kept_mm,
         between_loss_db=between_db,
     )

@@ -1,12 +1,13 @@
-"""A lens in front of a camera becomes a `FrozenPsf` on a given grid.
+"""Optics in front of a sensor become a `FrozenPsf` on a given grid.
 
-    trace finely -> choose the kernel side -> average over wavelength bands
+    kernels at fine wavelengths -> choose the kernel side -> average over wavelength bands
     -> match the camera's colours -> FrozenPsf
 
 A kernel of the frozen PSF is the average over the triangle of wavelengths that the lookup gives
 to its sample (flat spectrum), not the kernel at one wavelength: lateral colour then smears as in
 the lens and does not fall apart into separate images. What is still wrong in the colours of the
-camera it is frozen for is taken out by Richardson-Lucy steps, so few wavelengths suffice.
+camera it is frozen for is taken out by Richardson-Lucy steps, so few wavelengths suffice. Optics
+that are known at wavelengths of their own keep those.
 """
 
 import math
@@ -19,17 +20,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from camkit.bundle.camera import Camera
+from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
-from camkit.models_def.optics.analysis.illumination import relative_illumination_at
-from camkit.models_def.optics.distortion import trace_distortion
-from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
+from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
+from camkit.models_def.optics.psf import TracedPsf
 from camkit.models_def.sensors.psf import wavelength_weights
 from camkit.units import MM_PER_M, UM_PER_MM
-
-FloatGrid = NDArray[np.float64]
 
 STRESS_OFFSETS_PER_M: Final = (0.02, 0.05, 0.1, 0.2)
 """How far off the nearest and the farthest design distance, in 1 / m."""
@@ -48,15 +45,14 @@ class FreezeGrid:
     """Where a PSF is sampled.
 
     Attributes:
-        fields: Heights from the axis to the corner, evenly spaced.
-        wavelengths: Evenly spaced over the camera's response.
-        depths_mm: Object distances, increasing; the sensor stays where the lens has it. Empty
-            for that of the lens.
+        fields: Samples from the axis to the corner, see `Optics.layout`.
+        wavelengths: Evenly spaced over the response of the sensor.
+        depths_mm: Object distances, increasing; the sensor stays where it is. Empty for those of
+            the optics.
         energy: Least share of the light of every colour that the kernels must hold.
         max_side_px: Largest odd kernel side.
         least_energy: What kernels of that side must hold where they do not hold `energy`; None:
             `energy`.
-        rays: In half the pupil, per wavelength traced.
     """
 
     fields: int = 13
@@ -65,7 +61,6 @@ class FreezeGrid:
     energy: float = 0.995
     max_side_px: int = 151
     least_energy: float | None = None
-    rays: int = 4096
 
     def __post_init__(self) -> None:
         if self.fields < 2 or self.wavelengths < 1:
@@ -91,63 +86,78 @@ class Frozen:
     energy_kept: float
 
 
-def corner_height_mm(camera: Camera) -> float:
+def corner_height_mm(sensor: ColorSensor) -> float:
     """Give half the diagonal of the sensor, by its outermost pixel edges."""
-    diagonal_px = math.hypot(camera.width_px, camera.height_px)
-    return diagonal_px / 2 * camera.pixel_pitch_um / UM_PER_MM
+    diagonal_px = math.hypot(sensor.width_px, sensor.height_px)
+    return diagonal_px / 2 * sensor.pixel_pitch_um / UM_PER_MM
 
 
-def freeze(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) -> Frozen:
-    """Trace the PSF of a lens on a grid of fields, depths and wavelengths.
-
-    Distortion and illumination are those at the lens's own object distance.
+def freeze(optics: Optics, sensor: ColorSensor, grid: FreezeGrid | None = None) -> Frozen:
+    """Freeze the PSF of optics on a grid of fields, depths and wavelengths.
 
     Args:
-        lens: The prescription.
-        camera: Sensor size, pitch and colour response.
-        grid: 13 fields, 7 wavelengths, the distance of the lens by default.
+        optics: What stands in front of the sensor.
+        sensor: Size, pitch and colour response.
+        grid: 13 fields, 7 wavelengths, the depths of the optics by default.
 
     Raises:
         ContractError: If the largest side does not hold the wanted light.
     """
     chosen = grid or FreezeGrid()
-    heights_mm = np.linspace(0.0, corner_height_mm(camera), chosen.fields)
-    return freeze_at(lens, camera, chosen, heights_mm)
+    layout = optics.layout(corner_height_mm(sensor), chosen.fields)
+    return freeze_at(optics, sensor, chosen, layout)
 
 
-def freeze_at(lens: Lens, camera: Camera, grid: FreezeGrid, heights_mm: FloatGrid) -> Frozen:
-    """Trace the PSF at given sensor heights (`grid.fields` is not used)."""
-    response_um, response = camera.channel_response.to_arrays()
-    waves_um = np.linspace(response_um[0], response_um[-1], grid.wavelengths)
-    if grid.wavelengths == 1:
-        waves_um = np.array([lens.reference_wavelength_um])
-    fine_um, bands = _bands(waves_um)
-    depths_mm = grid.depths_mm or (lens.object_distance_mm,)
+def freeze_at(optics: Optics, sensor: ColorSensor, grid: FreezeGrid, fields: FieldLayout) -> Frozen:
+    """Freeze the PSF at given places (`grid.fields` is not used)."""
+    response_um, response = sensor.response_arrays()
+    waves_um, fine_um, bands = _wavelengths(optics, grid, response_um)
+    depths_mm = grid.depths_mm or optics.depths_mm
     traced = [
-        _trace(with_object_distance(lens, depth), camera, grid, (heights_mm, fine_um))
-        for depth in depths_mm
+        optics.kernels(
+            fields,
+            fine_um,
+            depth_mm=depth_mm,
+            side_px=grid.max_side_px,
+            pitch_um=sensor.pixel_pitch_um,
+        )
+        for depth_mm in depths_mm
     ]
     weights = torch.from_numpy(wavelength_weights(fine_um, response_um, response))
     side_px, kept = _smallest_side(traced, weights, grid)
-    share = torch.from_numpy(wavelength_weights(waves_um, response_um, response))
-    kernels = torch.stack(
-        [
-            _match_colours(_average(t, bands, side_px), _average(t, weights, side_px), share)
-            for t in traced
-        ],
-        dim=1,
-    )
-    light = relative_illumination_at(lens, torch.from_numpy(heights_mm))
+    averaged = [_average(t, bands, side_px) for t in traced]
+    if optics.wavelengths_um is None:
+        share = torch.from_numpy(wavelength_weights(waves_um, response_um, response))
+        averaged = [
+            _match_colours(kernels, _average(t, weights, side_px), share)
+            for kernels, t in zip(averaged, traced, strict=True)
+        ]
     psf = FrozenPsf(
-        kernels=_rounded(kernels.to(torch.float32).numpy()),
-        field_heights_mm=heights_mm,
+        kernels=_rounded(torch.stack(averaged, dim=1).to(torch.float32).numpy()),
+        field_heights_mm=fields.heights_mm,
         depths_mm=np.array(depths_mm, dtype=np.float64),
         wavelengths_um=waves_um,
-        pixel_pitch_um=camera.pixel_pitch_um,
-        distortion=trace_distortion(lens, corner_height_mm(camera)),
-        relative_illumination=light.numpy() / float(light[0]),
+        pixel_pitch_um=sensor.pixel_pitch_um,
+        distortion=optics.distortion(corner_height_mm(sensor), len(sensor.channels)),
+        relative_illumination=optics.illumination(fields),
+        symmetry=fields.symmetry,
+        grid_x_mm=fields.grid_x_mm,
+        grid_y_mm=fields.grid_y_mm,
     )
     return Frozen(psf=psf, energy_kept=kept)
+
+
+def _wavelengths(
+    optics: Optics, grid: FreezeGrid, response_um: FloatGrid
+) -> tuple[FloatGrid, FloatGrid, Tensor]:
+    """Give the wavelengths to keep, those to ask for, and (kept, asked) weights between them."""
+    own_um = optics.wavelengths_um
+    if own_um is not None:
+        return own_um, own_um, torch.eye(own_um.size, dtype=torch.float64)
+    waves_um = np.linspace(response_um[0], response_um[-1], grid.wavelengths)
+    if grid.wavelengths == 1:
+        waves_um = np.array([optics.reference_wavelength_um])
+    return waves_um, *_bands(waves_um)
 
 
 def _rounded(kernels: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -183,20 +193,26 @@ def stress_depths_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(sorted({*found, *depths_mm}))
 
 
-def freeze_stress(lens: Lens, camera: Camera, grid: FreezeGrid | None = None) -> Frozen:
-    """Trace kernels off the design point: object distances at three fields.
+def freeze_stress(optics: Optics, sensor: ColorSensor, grid: FreezeGrid | None = None) -> Frozen:
+    """Freeze kernels off the design point: object distances, at three fields of radial optics.
 
     The sensor stays where it is, so an offset in 1 / distance moves the image by EFL^2 times it.
+
+    Raises:
+        ContractError: If the optics are not known off their depths.
     """
     base = grid or FreezeGrid()
     stress = replace(
         base,
-        depths_mm=stress_depths_mm(base.depths_mm or (lens.object_distance_mm,)),
+        depths_mm=stress_depths_mm(base.depths_mm or optics.depths_mm),
         wavelengths=STRESS_WAVELENGTHS,
         energy=max(1 - STRESS_LOSS * (1 - base.energy), base.energy / 2),
     )
-    heights_mm = np.array(STRESS_FIELDS) * corner_height_mm(camera)
-    return freeze_at(lens, camera, stress, heights_mm)
+    corner_mm = corner_height_mm(sensor)
+    layout = optics.layout(corner_mm, len(STRESS_FIELDS))
+    if layout.symmetry == "radial":
+        layout = radial_layout(np.array(STRESS_FIELDS) * corner_mm)
+    return freeze_at(optics, sensor, stress, layout)
 
 
 def _bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
@@ -207,16 +223,6 @@ def _bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
     fine_um = np.linspace(waves_um[0], waves_um[-1], count if waves_um.size > 1 else 1)
     triangles = np.stack([np.interp(fine_um, waves_um, unit) for unit in np.eye(waves_um.size)])
     return fine_um, torch.from_numpy(triangles / triangles.sum(axis=1, keepdims=True))
-
-
-def _trace(
-    lens: Lens, camera: Camera, grid: FreezeGrid, at: tuple[FloatGrid, FloatGrid]
-) -> TracedPsf:
-    heights_mm, waves_um = (torch.from_numpy(values) for values in at)
-    with torch.no_grad():
-        return trace_psf(
-            lens, heights_mm, waves_um, grid.max_side_px, camera.pixel_pitch_um, rays=grid.rays
-        )
 
 
 def _smallest_side(traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid) -> tuple[int, float]:
@@ -249,8 +255,8 @@ def _match_colours(kernels: Tensor, colours: Tensor, share: Tensor) -> Tensor:
 
     Args:
         kernels: (field, wavelength, h, w), start.
-        colours: (field, 3, h, w), wanted.
-        share: (3, wavelength), what the lookup will weight them with.
+        colours: (field, c, h, w), wanted.
+        share: (c, wavelength), what the lookup will weight them with.
     """
     total = share.sum(0)
     used = (total > 1e-6)[:, None, None]

@@ -29,7 +29,7 @@ class ChannelResponse:
 
     Attributes:
         wavelengths_um: (wavelength,), increasing.
-        response: (3, wavelength), rows R, G, B, each sums to 1.
+        response: (c, wavelength), a row for each channel, each sums to 1.
         source: Where it comes from.
     """
 
@@ -38,12 +38,12 @@ class ChannelResponse:
     source: str
 
     def __post_init__(self) -> None:
-        if self.response.shape != (3, self.wavelengths_um.size):
+        if self.response.ndim != 2 or self.response.shape[1] != self.wavelengths_um.size:
             raise ContractError(
-                f"response must be (3, {self.wavelengths_um.size}); got {self.response.shape}"
+                f"response must be (c, {self.wavelengths_um.size}); got {self.response.shape}"
             )
         if (self.response < 0).any() or np.abs(self.response.sum(1) - 1).max() > 1e-6:
-            raise ContractError("each colour's response must be >= 0 and sum to 1")
+            raise ContractError("each channel's response must be >= 0 and sum to 1")
 
 
 def gaussian_response(
@@ -110,7 +110,7 @@ def colour_kernels(
     pitch_um: float,
     rays: int,
 ) -> tuple[FloatArray, float]:
-    """Give kernels (field, 3, size, size) float32 and the least energy kept of a colour."""
+    """Give kernels (field, c, size, size) float32 and the least energy kept of a colour."""
     with torch.no_grad():
         traced = trace_psf(
             lens,

@@ -1,14 +1,14 @@
-"""Training, in the order in which data pass through it.
+"""Training, in the order in which data pass through it; common to all kinds of cameras.
 
     recipe                         what a person edits, checked
-    lens_bank, psf_bank            kernels of fabricated copies and of the frozen PSF
-    pictures, samples              scenes photographed, filtered and stabilised
+    kind                           what a kind of camera brings: scenes, samples, judging
+    pictures                       where sharp scenes come from
+    sample                         what a network is given, and what it should make of it
     pool, pool_worker              finished samples on disk, made beside the training
     losses, schedule, fitter       one step
-    validation                     what a run is chosen by
     trainer, progress, log         the run, its bar and its log
     checkpoint, credits            what is kept, and what it was trained on
-    fine_tuning/                   afterwards: discriminators, features, real pairs
+    first_weights, refinement      what was trained before goes on
 
 A run that is interrupted goes on with the same bits.
 """

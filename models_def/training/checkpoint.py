@@ -5,6 +5,7 @@ is complete or absent (written beside, then renamed).
 """
 
 import pickle
+import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
@@ -12,8 +13,10 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import ContractError
-from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.training.kind import to_recipe, training_kind
+from camkit.models_def.training.recipe import Recipe
 
 FORMAT: Final = 1
 
@@ -26,11 +29,12 @@ class Checkpoint:
 
     Attributes:
         recipe_toml: The recipe as text.
-        lens_toml: Its lens as text; empty in checkpoints of before.
-        size: Which of its networks.
-        network: Name of the network in the catalogue.
+        lens_toml: Its lens as text; empty where there is none, and in checkpoints of before.
+        role: Which of its networks.
+        size: In which size.
+        network: Name by which its kind builds it.
         config: What of its config differs from the defaults.
-        bank_digest: sha256 of the kernels trained with.
+        bank_digest: sha256 of the material trained with: kernels, say.
         training_data: What the weights were trained on, for the card.
         step: Steps done.
         elapsed_s: Wall time so far.
@@ -55,6 +59,7 @@ class Checkpoint:
     average: State
     optimizer: dict[str, Any]
     lens_toml: str = ""
+    role: str = DEFAULT_ROLE
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
@@ -97,7 +102,7 @@ def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
     Raises:
         ContractError: If it is of another format.
     """
-    entries = {"lens_toml": ""} | table
+    entries = {"lens_toml": "", "role": DEFAULT_ROLE} | table
     if entries.pop("format", None) != FORMAT:
         raise ContractError(f"{path} is no checkpoint of format {FORMAT}; train again")
     missing = {f.name for f in fields(Checkpoint)} ^ set(entries)
@@ -106,13 +111,19 @@ def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
     return Checkpoint(**entries)
 
 
+def recipe_of(checkpoint: Checkpoint) -> Recipe:
+    """Give the recipe that a checkpoint carries; raises as `read_recipe` does."""
+    return to_recipe(tomllib.loads(checkpoint.recipe_toml))
+
+
 def load_network(checkpoint: Checkpoint) -> nn.Module:
     """Build the network with the averaged weights, ready to export.
 
     Raises:
         ContractError: If the weights do not fit the network.
     """
-    network = build_network(checkpoint.network, **checkpoint.config)
+    kind = training_kind(recipe_of(checkpoint).kind)
+    network = kind.build_network(checkpoint.network, **checkpoint.config)
     try:
         network.load_state_dict(checkpoint.average)
     except RuntimeError as error:

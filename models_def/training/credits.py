@@ -5,23 +5,23 @@ from collections import Counter
 from pathlib import Path
 
 from camkit.models_def.training.pictures import list_pictures
-from camkit.models_def.training.recipe import Recipe
+from camkit.models_def.training.recipe import DataRecipe
 
 ROW = re.compile(r"^\| `(?P<file>[^`]+)` \|(?P<rest>.*)\|$")
 LICENCE_COLUMN = 2
 
 
-def describe_data(recipe: Recipe, pictures: Path | None) -> str:
+def describe_data(data: DataRecipe, pictures: Path | None) -> str:
     """Name the training data: folder, number and licences of pictures, procedural share.
 
     Licences are read from the table of the folder's README.md (columns file, title, author,
     licence), where there is one.
     """
-    scenes = f"{recipe.data.procedural_scenes} procedural scenes (camkit.scenes)"
+    scenes = f"{data.procedural_scenes} procedural scenes (camkit.scenes)"
     if pictures is None:
         return f"{scenes} only; no photographs"
     files = list_pictures(pictures)
-    share = 100 * recipe.data.picture_share
+    share = 100 * data.picture_share
     licences = _licences(pictures / "README.md", {p.name for p in files})
     stated = ", ".join(f"{name}: {count}" for name, count in sorted(licences.items()))
     return (

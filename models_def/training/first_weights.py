@@ -5,7 +5,6 @@ trained further.
 """
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +16,10 @@ from onnx import numpy_helper
 from torch import Tensor, nn
 
 from camkit.bundle.reader import SUFFIX, Bundle, find_bundle, open_bundle
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import BundleError, ContractError
 from camkit.models_def.networks.full_unet import FullUnet, start_from_trimmed
-from camkit.models_def.training.checkpoint import State, read_table, to_checkpoint
-from camkit.models_def.training.recipe import to_recipe
+from camkit.models_def.training.checkpoint import State, read_table, recipe_of, to_checkpoint
 
 # what an export computed beforehand; no weight
 _CONSTANT: Final = re.compile(r"c\d+")
@@ -50,27 +49,27 @@ class FirstWeights:
         return f"; first weights: {self.whose}, trained on {before}"
 
 
-def read_first_weights(source: Path, size: str) -> FirstWeights:
+def read_first_weights(source: Path, size: str, role: str = DEFAULT_ROLE) -> FirstWeights:
     """Read first weights.
 
     Args:
         source: A checkpoint of `camkit train` or `camkit design`, a bundle, or the name of a
             built-in one.
         size: The network that will be trained; of a bundle with several, the one of that name.
+        role: Its role.
 
     Raises:
         ContractError: If it is none of these, or holds no such network.
     """
     if source.suffix == SUFFIX or not (source.suffix or source.is_file()):
-        return _of_bundle(open_bundle(find_bundle(source)), size)
+        return _of_bundle(open_bundle(find_bundle(source)), role, size)
     table = read_table(source)
     if "digest" in table:
         return _of_design(source, table)
     saved = to_checkpoint(source, table)
-    camera = to_recipe(tomllib.loads(saved.recipe_toml)).name
     return FirstWeights(
         source=str(source),
-        whose=f"{camera} {saved.size}",
+        whose=f"{recipe_of(saved).name} {saved.size}",
         training_data=saved.training_data,
         state=saved.average,
     )
@@ -117,12 +116,12 @@ def _of_design(source: Path, table: Mapping[str, Any]) -> FirstWeights:
     )
 
 
-def _of_bundle(bundle: Bundle, size: str) -> FirstWeights:
-    sizes = tuple(bundle.manifest.networks)
+def _of_bundle(bundle: Bundle, role: str, size: str) -> FirstWeights:
+    sizes = tuple(bundle.manifest.networks.get(role, ()))
     if len(sizes) == 1:
         (size,) = sizes
     try:
-        model = bundle.network_bytes(size)
+        model = bundle.network_bytes(role, size)
     except BundleError as error:
         raise ContractError(str(error)) from error
     return FirstWeights(

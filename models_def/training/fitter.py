@@ -1,17 +1,20 @@
 """What changes during training: weights, their average, the optimiser; one step at a time."""
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import torch
 from torch import Tensor, nn
 
-from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights, take_first_weights
 from camkit.models_def.training.losses import patch_errors, training_loss
-from camkit.models_def.training.pool import Batch
 from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
+
+NetworkBuilder = Callable[..., nn.Module]
+"""Of a kind: name and configuration -> an untrained network."""
 
 
 class Fits(Protocol):
@@ -22,7 +25,7 @@ class Fits(Protocol):
         ...
 
     def restore(self, planes: Tensor) -> Tensor:
-        """Run the averaged network on (1, 6, h, w) planes."""
+        """Run the averaged network on the (1, c, h, w) planes of all inputs."""
         ...
 
     def weights(self) -> State:
@@ -50,15 +53,19 @@ class Fitter:
     """Fits one network to batches; holds no clock, no file and no random state."""
 
     def __init__(
-        self, entry: NetworkRecipe, device: str, first: FirstWeights | None = None
+        self,
+        entry: NetworkRecipe,
+        build: NetworkBuilder,
+        device: str,
+        first: FirstWeights | None = None,
     ) -> None:
         """Build the network with random weights, or with the first ones given."""
         self.schedule, self.device = entry.schedule, torch.device(device)
         torch.manual_seed(entry.schedule.seed)
-        self.network = _to_device(build_network(entry.network, **entry.config), self.device)
+        self.network = _to_device(build(entry.network, **entry.config), self.device)
         if first is not None:
             take_first_weights(self.network, first)
-        self.averaged = _to_device(build_network(entry.network, **entry.config), self.device)
+        self.averaged = _to_device(build(entry.network, **entry.config), self.device)
         self.averaged.load_state_dict(self.network.state_dict())
         self._average = [p.detach() for p in self.averaged.parameters()]
         self._optimizer = torch.optim.AdamW(
@@ -107,7 +114,7 @@ class Fitter:
         return {}
 
     def restore(self, planes: Tensor) -> Tensor:
-        """Run the averaged network on (1, 6, h, w) planes; float32 on the CPU comes back."""
+        """Run the averaged network on (1, c, h, w) planes; float32 on the CPU comes back."""
         with torch.no_grad():
             return torch.as_tensor(self.averaged(planes.to(self.device))).cpu()
 

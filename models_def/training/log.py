@@ -1,6 +1,7 @@
 """The log of a training run: one JSON object per line, and its chart."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -69,9 +70,9 @@ def plot_logs(logs: dict[str, Path], chart: Path) -> None:
             left.plot(*zip(*losses, strict=True), label=name, linewidth=0.8)
         if scores:
             right.plot(*zip(*scores, strict=True), label=name, marker=".")
-        floors |= {round(e["wiener_db"], 2) for e in entries if "wiener_db" in e}
+        floors |= {round(max(known), 2) for e in entries if (known := _baselines(e))}
     for number, floor in enumerate(sorted(floors)):
-        label = "_" if number else "Wiener alone"
+        label = "_" if number else "without a network"
         right.axhline(floor, color="grey", linestyle=":", label=label)
     left.set(xlabel="CPU minutes", ylabel="training loss")
     right.set(xlabel="CPU minutes", ylabel="validation PSNR, sRGB (dB)")
@@ -80,3 +81,8 @@ def plot_logs(logs: dict[str, Path], chart: Path) -> None:
         if axis.lines:
             axis.legend()
     figure.savefig(chart, dpi=120)
+
+
+def _baselines(entry: Mapping[str, Any]) -> list[float]:
+    """Give what stands in an entry beside the network's own dB."""
+    return [v for k, v in entry.items() if k.endswith("_db") and k != "valid_db"]

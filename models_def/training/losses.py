@@ -21,9 +21,9 @@ def patch_errors(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
     """Give the mean squared error per patch in the square-root domain.
 
     Args:
-        output: (b, 3, h, w) stabilised.
-        target: (b, 3, h, w) stabilised; negative marks a pixel that is not to be judged.
-        weight: (b, 3) scale * sqrt(shot) per colour.
+        output: (b, c, h, w) stabilised.
+        target: (b, c, h, w) stabilised; negative marks a pixel that is not to be judged.
+        weight: (b, c) scale * sqrt(shot) per channel.
 
     Returns:
         (b,) errors.

@@ -1,14 +1,15 @@
 """The pool: finished samples on disk, made beside the training and drawn from by step number.
 
-Sample i is a pure function of the recipe, the seed and i; it lies in slot i modulo the size of
-the pool. Which samples a step may draw from, and which patches it draws, follows from the step
-number alone. So a run that is interrupted and resumed sees the same patches, whatever the worker
-had made ahead, and no state of a random generator needs to be kept.
+Sample i is a pure function of the recipe, the material, the seed and i; it lies in slot i modulo
+the size of the pool. Which samples a step may draw from, and which patches it draws, follows from
+the step number alone. So a run that is interrupted and resumed sees the same patches, whatever the
+worker had made ahead, and no state of a random generator needs to be kept.
 
     step t:  [ ........ may be drawn ........ )[ made ahead )
              low(t)                           end(t)        end(t) + AHEAD
 """
 
+import hashlib
 import json
 import subprocess
 import sys
@@ -21,68 +22,43 @@ from typing import Any, Final
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
-from camkit.models_def.training.recipe import Recipe, read_recipe, samples_digest
-from camkit.models_def.training.samples import (
-    draw_exposure,
-    make_sample,
-    scene_side_px,
-    tint_crop,
-)
+from camkit.models_def.training.kind import Material, SampleMaker, read_recipe, training_kind
+from camkit.models_def.training.recipe import Recipe
+from camkit.models_def.training.sample import Batch, Sample, SampleLayout
 
 AHEAD: Final = 32
 MAX_WORKERS: Final = 16
-PLANES: Final = 9
 POLL_S: Final = 0.02
+RECIPE: Final = "recipe.toml"
+JOB: Final = "job.json"
 WORKER_MODULE: Final = "camkit.models_def.training.pool_worker"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Batch:
-    """Patches of one step: planes (b, 6, p, p), target (b, 3, p, p), weight (b, 3)."""
-
-    planes: Tensor
-    target: Tensor
-    weight: Tensor
-
-
 def cut_patch(
-    rng: np.random.Generator, planes: NDArray[np.float16], patch_px: int
-) -> NDArray[np.float16]:
-    """Cut a (9, p, p) patch from the (9, s, s) planes of a sample: random place, turn and flip."""
+    rng: np.random.Generator,
+    planes: NDArray[np.float16],
+    target: NDArray[np.float16],
+    patch_px: int,
+    layout: SampleLayout,
+) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
+    """Cut one patch from the (c, s, s) inputs and the (c, scale s, scale s) target of a sample.
+
+    At a random place; turned and mirrored at random where the layout allows it.
+    """
     room = planes.shape[-1] - patch_px
     y, x = (2 * int(v) for v in rng.integers(0, room // 2 + 1, 2))
-    patch = planes[:, y : y + patch_px, x : x + patch_px]
-    turned = np.rot90(patch, int(rng.integers(4)), axes=(1, 2))
-    return turned[:, :, ::-1] if rng.random() < 0.5 else turned
+    turns, mirrored = 0, False
+    if layout.turned:
+        turns, mirrored = int(rng.integers(4)), rng.random() < 0.5
 
+    def cut(whole: NDArray[np.float16], scale: int) -> NDArray[np.float16]:
+        rows, columns = (slice(scale * v, scale * (v + patch_px)) for v in (y, x))
+        turned = np.rot90(whole[:, rows, columns], turns, axes=(1, 2))
+        return turned[:, :, ::-1] if mirrored else turned
 
-class SampleMaker:
-    """Makes sample i of a recipe; a worker process holds one."""
-
-    def __init__(self, recipe: Recipe, bank: PsfBank, pictures: Path | None, seed: int) -> None:
-        self._recipe, self._bank, self._seed = recipe, bank, seed
-        data = recipe.data
-        self._source: SceneSource = open_source(
-            pictures,
-            picture_share=data.picture_share,
-            scenes=data.procedural_scenes,
-            scene_px=data.scene_px,
-        )
-
-    def make(self, index: int) -> tuple[NDArray[np.float16], NDArray[np.float32]]:
-        """Give the (9, s, s) planes (capture, Wiener, target) and the (3,) weight of sample i."""
-        rng = np.random.default_rng((self._seed, index))
-        exposure = draw_exposure(rng, self._recipe, self._bank)
-        crop = self._source.draw_crop(rng, scene_side_px(self._recipe, self._bank))
-        crop = tint_crop(rng, crop)
-        sample = make_sample(crop, exposure, self._recipe, self._bank, rng)
-        planes = torch.cat([sample.planes, sample.target]).numpy()
-        return planes.astype(np.float16), sample.weight.numpy()
+    return cut(planes, 1), cut(target, layout.scale)
 
 
 class PoolFiles:
@@ -93,11 +69,14 @@ class PoolFiles:
     `slots[k]` is 1 + the number of the sample in slot k, 0 while there is none.
     """
 
-    def __init__(self, folder: Path, size: int, side_px: int) -> None:
-        self.size, self.side_px = size, side_px
-        shape = (size, PLANES, side_px, side_px)
+    def __init__(self, folder: Path, size: int, side_px: int, layout: SampleLayout) -> None:
+        self.size, self.layout = size, layout
+        given, wanted = layout.input_channels, layout.output_channels
+        shape, fine = (size, given, side_px, side_px), layout.scale * side_px
         self.planes: NDArray[np.float16] = _map(folder / "planes.f16", np.float16, shape)
-        self.weights: NDArray[np.float32] = _map(folder / "weights.f32", np.float32, (size, 3))
+        shape = (size, wanted, fine, fine)
+        self.targets: NDArray[np.float16] = _map(folder / "targets.f16", np.float16, shape)
+        self.weights: NDArray[np.float32] = _map(folder / "weights.f32", np.float32, shape[:2])
         self.slots: NDArray[np.int64] = _map(folder / "slots.i64", np.int64, (size,))
         self.goal: NDArray[np.int64] = _map(folder / "goal.i64", np.int64, (1,))
         self.cpu_s: NDArray[np.float64] = _map(folder / "cpu.f64", np.float64, (MAX_WORKERS,))
@@ -115,22 +94,56 @@ class PoolFiles:
         indices = np.arange(low, end)
         return bool((self.slots[indices % self.size] == indices + 1).all())
 
-    def store(self, index: int, planes: NDArray[np.float16], weight: NDArray[np.float32]) -> None:
-        """Write a sample; its slot counts as empty while it is being written."""
-        slot = index % self.size
+    def store(self, index: int, sample: Sample) -> None:
+        """Write a sample; its slot counts as empty while it is being written.
+
+        Raises:
+            ContractError: If it is not of the layout of the pool.
+        """
+        slot, planes = index % self.size, sample.stacked(self.layout)
         self.slots[slot] = 0
-        self.planes[slot] = planes
-        self.weights[slot] = weight
+        self.planes[slot] = planes.numpy().astype(np.float16)
+        self.targets[slot] = sample.target.numpy().astype(np.float16)
+        self.weights[slot] = sample.weight.numpy()
         self.slots[slot] = index + 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoolJob:
+    """What the samples of a pool are.
+
+    Attributes:
+        folder: Where the pool lies.
+        recipe: Of any kind.
+        role: Whose samples.
+        material: What they are made with.
+        pictures: Folder of pictures, None for procedural scenes alone.
+        seed: Of the samples.
+    """
+
+    folder: Path
+    recipe: Recipe
+    role: str
+    material: Material
+    pictures: Path | None
+    seed: int
+
+    def open(self) -> tuple[PoolFiles, SampleMaker]:
+        """Open the files, and what fills them."""
+        kind, recipe = training_kind(self.recipe.kind), self.recipe
+        layout = kind.layout(recipe, self.role)
+        maker = kind.maker(recipe, self.role, self.material, self.pictures, self.seed)
+        return PoolFiles(
+            self.folder, recipe.data.pool_samples, recipe.data.sample_px, layout
+        ), maker
 
 
 class SamplePool:
     """Samples for training; a context manager, since it owns worker processes."""
 
-    def __init__(self, folder: Path, recipe: Recipe, seed: int, maker: SampleMaker) -> None:
-        self._folder, self._recipe, self._seed = folder, recipe, seed
-        self._files = PoolFiles(folder, recipe.data.pool_samples, recipe.data.sample_px)
-        self._maker = maker
+    def __init__(self, job: PoolJob, files: PoolFiles, maker: SampleMaker) -> None:
+        self._folder, self._recipe, self._seed = job.folder, job.recipe, job.seed
+        self._files, self._maker = files, maker
         self._workers: list[subprocess.Popen[bytes]] = []
         self.waited_s = 0.0
 
@@ -188,14 +201,26 @@ class SamplePool:
         low, end = self.span(step)
         self._ensure(low, end)
         rng = np.random.default_rng((self._seed, 1, step))
-        stack = np.empty((batch, PLANES, patch_px, patch_px), dtype=np.float32)
-        weights = np.empty((batch, 3), dtype=np.float32)
+        files, layout = self._files, self._files.layout
+        fine_px, given, wanted = (
+            layout.scale * patch_px,
+            layout.input_channels,
+            layout.output_channels,
+        )
+        planes = np.empty((batch, given, patch_px, patch_px), dtype=np.float32)
+        targets = np.empty((batch, wanted, fine_px, fine_px), dtype=np.float32)
+        weights = np.empty((batch, wanted), dtype=np.float32)
         for k in range(batch):
-            slot = int(rng.integers(low, end)) % self._files.size
-            stack[k] = cut_patch(rng, self._files.planes[slot], patch_px)
-            weights[k] = self._files.weights[slot]
-        planes = torch.from_numpy(stack)
-        return Batch(planes=planes[:, :6], target=planes[:, 6:], weight=torch.from_numpy(weights))
+            slot = int(rng.integers(low, end)) % files.size
+            planes[k], targets[k] = cut_patch(
+                rng, files.planes[slot], files.targets[slot], patch_px, layout
+            )
+            weights[k] = files.weights[slot]
+        return Batch(
+            inputs=layout.named(torch.from_numpy(planes)),
+            target=torch.from_numpy(targets),
+            weight=torch.from_numpy(weights),
+        )
 
     def _ensure(self, low: int, end: int) -> None:
         """Have the samples made, and allow the worker to work ahead."""
@@ -215,53 +240,78 @@ class SamplePool:
     def _make_missing(self) -> None:
         index = self._files.next_missing()
         if index is not None:
-            self._files.store(index, *self._maker.make(index))
+            self._files.store(index, self._maker.make(index))
 
 
 def open_pool(
-    folder: Path, recipe_path: Path, bank: PsfBank, pictures: Path | None, *, seed: int
+    folder: Path,
+    recipe_path: Path,
+    material: Material,
+    pictures: Path | None,
+    *,
+    seed: int,
+    role: str | None = None,
 ) -> SamplePool:
     """Open the pool of a recipe below a folder, with what it already holds.
 
     Args:
-        folder: Pools of different recipes, kernels or pictures lie in it under different names.
+        folder: Pools of different recipes, material or pictures lie in it under different names.
         recipe_path: The recipe.
-        bank: Kernels to simulate with.
+        material: Kernels, say, to simulate with.
         pictures: Folder of pictures, None for procedural scenes alone.
         seed: Seed of the samples.
+        role: Whose samples; None for a recipe of one role.
     """
     recipe = read_recipe(recipe_path)
-    maker = SampleMaker(recipe, bank, pictures, seed)
-    home = pool_folder(folder, recipe, bank, pictures, seed=seed)
-    home.mkdir(parents=True, exist_ok=True)
-    write_bank(home / "bank.npz", bank)
-    (home / "recipe.toml").write_text(recipe_path.read_text(encoding="utf-8"), encoding="utf-8")
-    job: dict[str, Any] = {"pictures": None if pictures is None else str(pictures), "seed": seed}
-    (home / "job.json").write_text(json.dumps(job), encoding="utf-8")
-    return SamplePool(home, recipe, seed, maker)
+    chosen = recipe.role(role)
+    job = PoolJob(
+        folder=pool_folder(folder, recipe, chosen, material, pictures, seed=seed),
+        recipe=recipe,
+        role=chosen,
+        material=material,
+        pictures=pictures,
+        seed=seed,
+    )
+    job.folder.mkdir(parents=True, exist_ok=True)
+    files, maker = job.open()
+    material.write(job.folder)
+    text = recipe_path.read_text(encoding="utf-8")
+    (job.folder / RECIPE).write_text(text, encoding="utf-8")
+    given = {"pictures": None if pictures is None else str(pictures), "seed": seed, "role": chosen}
+    (job.folder / JOB).write_text(json.dumps(given), encoding="utf-8")
+    return SamplePool(job, files, maker)
 
 
 def pool_folder(
-    folder: Path, recipe: Recipe, bank: PsfBank, pictures: Path | None, *, seed: int
+    folder: Path,
+    recipe: Recipe,
+    role: str,
+    material: Material,
+    pictures: Path | None,
+    *,
+    seed: int,
 ) -> Path:
     """Give where the pool of these samples lies."""
     names = "" if pictures is None else ",".join(sorted(p.name for p in pictures.iterdir()))
-    parts = (samples_digest(recipe, seed), bank.digest(), names)
-    return folder / f"pool-{_short_hash(''.join(parts))}"
+    digest = training_kind(recipe.kind).samples_digest(recipe, role, seed)
+    return folder / f"pool-{_short_hash(''.join((digest, material.digest(), names)))}"
 
 
-def open_job(folder: Path) -> tuple[PoolFiles, SampleMaker]:
-    """Open what a worker needs from a pool's folder."""
-    recipe = read_recipe(folder / "recipe.toml")
-    job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
-    pictures = None if job["pictures"] is None else Path(job["pictures"])
-    maker = SampleMaker(recipe, read_bank(folder / "bank.npz"), pictures, int(job["seed"]))
-    return PoolFiles(folder, recipe.data.pool_samples, recipe.data.sample_px), maker
+def read_job(folder: Path) -> PoolJob:
+    """Read what a worker needs from a pool's folder."""
+    recipe = read_recipe(folder / RECIPE)
+    given = json.loads((folder / JOB).read_text(encoding="utf-8"))
+    return PoolJob(
+        folder=folder,
+        recipe=recipe,
+        role=given["role"],
+        material=training_kind(recipe.kind).read_material(folder),
+        pictures=None if given["pictures"] is None else Path(given["pictures"]),
+        seed=int(given["seed"]),
+    )
 
 
 def _short_hash(text: str) -> str:
-    import hashlib
-
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import torch
 
-from camkit.models_def.training.pool import POLL_S, open_job
+from camkit.models_def.training.pool import POLL_S, read_job
 
 
 def work(folder: Path, share: tuple[int, int]) -> None:
     """Make samples up to the goal until the trainer says stop or is gone."""
     torch.set_num_threads(1)
-    files, maker = open_job(folder)
+    files, maker = read_job(folder).open()
     while files.goal[0] >= 0 and not _parent_is_gone():
         index = files.next_missing(share)
         if index is None:
             time.sleep(POLL_S)
         else:
-            files.store(index, *maker.make(index))
+            files.store(index, maker.make(index))
             files.cpu_s[share[0]] = time.process_time()
 
 

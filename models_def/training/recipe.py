@@ -1,73 +1,48 @@
 """Recipes: what a person edits to train the networks of a camera, read from TOML.
 
-Keys are strict: an unknown or missing key, a wrong type or a value out of range is an error that
-names the key.
+    name, kind, [sensor], [data], [schedule], [networks]   common to all kinds: here
+    [lens], [wiener], ...                                  of one kind: in its own recipe module
+
+`[networks.SIZE]` is a size of the one network of a kind; a kind with several names their roles,
+`[networks.ROLE.SIZE]`. Keys are strict: an unknown or missing key, a wrong type or a value out of
+range is an error that names the key.
 """
 
-import hashlib
-import json
-import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import pairwise
-from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from camkit.bundle.camera import Camera
-from camkit.bundle.stages import Wiener
+from camkit.bundle.sensor import Sensor, nested_sensor
 from camkit.errors import ContractError
-from camkit.models_def.toml_table import check_keys, read_table, section, typed
+from camkit.models_def.toml_table import check_keys, section, typed
 
 LOSSES = ("log_mse", "mse")
 PRECISIONS = ("float32", "bfloat16")
+COMMON: Final = frozenset({"name", "kind", "sensor", "data", "schedule", "networks"})
+DEFAULT_KIND: Final = "bayer"
+
+_SENSOR: Final[TypeAdapter[Sensor]] = TypeAdapter(Sensor)
+_FLAT: Final = ("bayer", "planes", "spad", "extent")
+"""Parts of the place of an error that a recipe does not spell out."""
 
 M = TypeVar("M", bound=BaseModel)
 
 
-def _check_share(where: str, value: float) -> None:
+def check_share(where: str, value: float) -> None:
+    """Refuse a share outside 0..1.
+
+    Raises:
+        ContractError: Naming the key.
+    """
     if not 0 <= value <= 1:
         raise ContractError(f"{where} must lie in 0..1; got {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LensRecipe:
-    """The lens and how far its copies vary.
-
-    Attributes:
-        prescription: Name of a built-in lens, or path of a file (.toml, .zmx) relative to the
-            recipe.
-        copies: Fabricated copies whose PSFs are trained on; one more is kept for validation.
-        fields: Field heights of the kernel bank.
-        kernel_px: Side of its kernels, odd.
-        rays: Rays in half the pupil.
-        seed: Seed of the fabrication errors.
-        depths_mm: Object distances, increasing, with the sensor where the prescription has it; a
-            sample is taken at one of them by chance, the Wiener filter has their mean kernel.
-            Empty for the distance of the prescription.
-    """
-
-    prescription: str
-    copies: int = 8
-    fields: int = 25
-    kernel_px: int = 129
-    rays: int = 4096
-    seed: int = 101
-    depths_mm: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
-            raise ContractError(f"lens.depths_mm must increase from above 0; got {self.depths_mm}")
-
-    def to_json(self) -> dict[str, Any]:
-        """Give what decides the kernels, to name files by; depths only where there are any."""
-        return {name: value for name, value in asdict(self).items() if value != ()}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DataRecipe:
-    """How training samples are made.
+    """Where samples come from and how many are held; a kind may add keys of its own.
 
     Attributes:
         picture_share: Share of samples cut from pictures, the rest is procedural; without a
@@ -75,67 +50,25 @@ class DataRecipe:
         procedural_scenes: Different procedural scenes of `scene_px` a side.
         scene_px: Side of a procedural scene.
         sample_px: Side of a finished sample; training patches are cut from it.
-        margin_px: Simulated surroundings of a sample that the Wiener filter sees.
         pool_samples: Samples held on disk at one time.
         first_samples: Samples that must exist before the first step.
         steps_per_sample: Training steps after which one more sample replaces the oldest.
-        iso_min: Lowest ISO, drawn log-uniformly.
-        iso_max: Highest ISO.
-        exposure_min_ev: Least exposure relative to the picture as it is.
-        exposure_max_ev: Greatest exposure; above 0 highlights clip.
-        block_jitter_px: How far the block centre whose kernel filters a patch may lie from it.
-        border_share: Share of samples that lie at one or more picture borders.
-        drift_share: Share of samples whose lens has drifted since it was measured: its kernels
-            are scaled and turned, each uniformly within the two limits below.
-        drift_scale: Largest relative change of the kernels' size, by heat or refocusing.
-        drift_turn_deg: Largest turn of the kernels, by a lens turned in its mount.
-        target_max: Targets are clipped at this multiple of the white level.
-        depth_shares: How often each of `lens.depths_mm` is drawn, relative to the others; empty
-            for equally often.
-        known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
-            `camkit process --depth-m` gives it; the others' has the mean kernel.
     """
 
     picture_share: float = 0.8
     procedural_scenes: int = 48
     scene_px: int = 1024
     sample_px: int = 256
-    margin_px: int = 72
     pool_samples: int = 1600
     first_samples: int = 400
     steps_per_sample: int = 8
-    iso_min: float = 80.0
-    iso_max: float = 6400.0
-    exposure_min_ev: float = -3.0
-    exposure_max_ev: float = 1.0
-    block_jitter_px: float = 176.0
-    border_share: float = 0.2
-    drift_share: float = 0.0
-    drift_scale: float = 0.05
-    drift_turn_deg: float = 5.0
-    target_max: float = 4.0
-    depth_shares: tuple[float, ...] = ()
-    known_depth_share: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_share("data.known_depth_share", self.known_depth_share)
-        _check_share("data.picture_share", self.picture_share)
-        _check_share("data.border_share", self.border_share)
-        _check_share("data.drift_share", self.drift_share)
-        if not 0 <= self.drift_scale < 0.5:
-            raise ContractError(f"data.drift_scale must be in [0, 0.5); got {self.drift_scale}")
-        if not 0 < self.iso_min <= self.iso_max:
-            raise ContractError(f"data.iso_min must be in (0, iso_max]; got {self.iso_min}")
-        if self.exposure_min_ev > self.exposure_max_ev:
-            raise ContractError("data.exposure_min_ev must not exceed exposure_max_ev")
+        check_share("data.picture_share", self.picture_share)
         if not 0 < self.first_samples < self.pool_samples:
             raise ContractError("data.first_samples must lie between 0 and pool_samples")
         if min(self.sample_px, self.scene_px, self.procedural_scenes, self.steps_per_sample) < 1:
             raise ContractError("sizes and counts of data must be positive")
-        if any(not 0 < share < math.inf for share in self.depth_shares):
-            raise ContractError(
-                f"data.depth_shares must be positive and finite; got {self.depth_shares}"
-            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,8 +112,8 @@ class ScheduleRecipe:
             raise ContractError(
                 f"schedule.precision must be one of {PRECISIONS}; got {self.precision!r}"
             )
-        _check_share("schedule.float32_share", self.float32_share)
-        _check_share("schedule.ema_decay", self.ema_decay)
+        check_share("schedule.float32_share", self.float32_share)
+        check_share("schedule.ema_decay", self.ema_decay)
         if min(self.steps, self.batch, self.patch_px) < 1 or self.learning_rate <= 0:
             raise ContractError("schedule needs positive steps, batch, patch_px, learning_rate")
 
@@ -190,7 +123,7 @@ class NetworkRecipe:
     """One size of network.
 
     Attributes:
-        network: Name in the catalogue of networks.
+        network: Name by which its kind builds it.
         config: Fields of its config that differ from the defaults.
         schedule: The schedule, with what this network changes of it.
     """
@@ -200,184 +133,176 @@ class NetworkRecipe:
     schedule: ScheduleRecipe = field(default_factory=ScheduleRecipe)
 
 
-FINE_TUNING_SCHEDULE: Final = ScheduleRecipe(
-    steps=20_000, batch=4, patch_px=256, learning_rate=1e-4, final_rate=0.0, precision="float32"
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FineTuningRecipe:
-    """Fine-tuning: a trained network against two discriminators (Sun 2021, section 6.2.2).
-
-    Attributes:
-        schedule: Of the fine-tuning.
-        perceptual_weight: nu1 of eq. (6.12), on the features.
-        pixel_weight: nu2, on the pixels. The thesis prints 0.5 and 0.006 for the two; these
-            defaults are the order of the source it cites (Kupyn et al. 2019).
-        global_weight: sigma_g of eq. (6.14), on the global discriminator.
-        local_weight: sigma_l, on the local one.
-        global_layers: Strided layers of the global discriminator.
-        local_layers: Of the local one.
-        discriminator_width: Channels of their first layer.
-        discriminator_rate: Learning rate of both, with the decay of the schedule.
-        pair_share: Share of a batch drawn from real pairs, where there are any.
-        pair_samples: Samples cut from each real pair.
-    """
-
-    schedule: ScheduleRecipe = FINE_TUNING_SCHEDULE
-    perceptual_weight: float = 0.006
-    pixel_weight: float = 0.5
-    global_weight: float = 0.01
-    local_weight: float = 0.01
-    global_layers: int = 5
-    local_layers: int = 3
-    discriminator_width: int = 64
-    discriminator_rate: float = 1e-4
-    pair_share: float = 0.5
-    pair_samples: int = 32
-
-    def __post_init__(self) -> None:
-        weights = self.perceptual_weight, self.pixel_weight, self.global_weight, self.local_weight
-        if min(weights) < 0 or self.pixel_weight + self.perceptual_weight == 0:
-            raise ContractError(
-                "fine_tuning needs weights >= 0, and one of perceptual and pixel > 0"
-            )
-        counts = self.global_layers, self.local_layers, self.discriminator_width, self.pair_samples
-        if min(counts) < 1 or self.discriminator_rate <= 0:
-            raise ContractError(
-                "fine_tuning needs layers, width, pair_samples, discriminator_rate > 0"
-            )
-        _check_share("fine_tuning.pair_share", self.pair_share)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
-    """A camera and how its networks are trained.
+    """A camera and how its networks are trained: what all kinds have in common.
 
     Attributes:
         name: Name of the camera and its bundle.
-        object_distance_mm: Distance the lens is focused on; inf is allowed.
-        scale: Divisor of the stabilised planes, see the manifest.
-        wiener: Prior and blocks of the Wiener bank in front of the networks.
+        kind: Kind of camera.
+        sensor: As the bundle will state it.
+        data: Where samples come from.
+        networks: Role -> size -> network.
     """
 
     name: str
-    object_distance_mm: float
-    scale: float
-    camera: Camera
-    wiener: Wiener
-    lens: LensRecipe
+    kind: str
+    sensor: Sensor
     data: DataRecipe
-    networks: Mapping[str, NetworkRecipe]
-    fine_tuning: FineTuningRecipe = field(default_factory=FineTuningRecipe)
+    networks: Mapping[str, Mapping[str, NetworkRecipe]]
 
-    def __post_init__(self) -> None:
-        shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
-        if shares and shares != depths:
-            raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
-        if self.data.known_depth_share and depths < 2:
-            raise ContractError("data.known_depth_share needs two or more lens.depths_mm")
+    def role(self, name: str | None) -> str:
+        """Give a role by its name, or the only one.
 
-    def network(self, size: str) -> NetworkRecipe:
+        Raises:
+            ContractError: If there is no such role, or several to choose from.
+        """
+        have = ", ".join(self.networks)
+        if name is None and len(self.networks) == 1:
+            return next(iter(self.networks))
+        if name is None:
+            raise ContractError(f"recipe {self.name} has networks of the roles {have}; say which")
+        if name not in self.networks:
+            raise ContractError(f"recipe {self.name} has networks of the role {have}; not {name!r}")
+        return name
+
+    def network(self, size: str, role: str | None = None) -> NetworkRecipe:
         """Give the network of a size, or raise ContractError naming the sizes there are."""
-        if size not in self.networks:
+        sizes = self.networks[self.role(role)]
+        if size not in sizes:
             raise ContractError(
-                f"recipe {self.name} has the sizes {', '.join(self.networks)}; got {size!r}"
+                f"recipe {self.name} has the sizes {', '.join(sizes)}; got {size!r}"
             )
-        return self.networks[size]
+        return sizes[size]
 
 
-def read_recipe(path: Path) -> Recipe:
-    """Read and check a recipe.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommonTables:
+    """The common tables of a recipe but [data], which may hold keys of a kind; see `Recipe`."""
+
+    name: str
+    kind: str
+    sensor: Sensor
+    networks: Mapping[str, Mapping[str, NetworkRecipe]]
+
+
+def common_tables(
+    table: Mapping[str, Any], *, own: Iterable[str], roles: Sequence[str]
+) -> CommonTables:
+    """Check the common tables of a recipe.
+
+    Args:
+        table: The whole recipe.
+        own: Keys of its kind.
+        roles: Of the networks of its kind.
 
     Raises:
-        ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
+        ContractError: If a key is unknown, missing or wrong.
     """
-    return to_recipe(read_table(path, "recipe"))
-
-
-def to_recipe(table: Mapping[str, Any]) -> Recipe:
-    """Turn a parsed TOML table into a recipe; raises ContractError as `read_recipe` does."""
-    table = _renamed(table)
-    known = {"name", "object_distance_mm", "scale", "camera", "wiener", "lens"}
-    check_keys("recipe", table, known | {"data", "schedule", "networks", "fine_tuning"})
+    check_keys("recipe", table, {*COMMON, *own})
     schedule = section("schedule", ScheduleRecipe, table.get("schedule", {}))
-    networks = table.get("networks")
-    if not isinstance(networks, Mapping) or not networks:
-        raise ContractError("a recipe needs at least one table [networks.SIZE]")
-    return Recipe(
+    return CommonTables(
         name=typed("name", table.get("name"), str),
-        object_distance_mm=typed("object_distance_mm", table.get("object_distance_mm"), float),
-        scale=typed("scale", table.get("scale", 64.0), float),
-        camera=_model("camera", Camera, table),
-        wiener=_model("wiener", Wiener, table),
-        lens=section("lens", LensRecipe, table.get("lens", {})),
-        data=section("data", DataRecipe, table.get("data", {})),
-        networks={size: _network(size, entry, schedule) for size, entry in networks.items()},
-        fine_tuning=_fine_tuning(table.get("fine_tuning", {})),
+        kind=typed("kind", table.get("kind", DEFAULT_KIND), str),
+        sensor=_sensor(table.get("sensor", {})),
+        networks=_networks(table.get("networks"), schedule, roles),
     )
 
 
-def _renamed(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Give the table of today's names: what is `fine_tuning` was `final` in older recipes.
+def with_new_names(table: Mapping[str, Any], older: Mapping[str, str]) -> Mapping[str, Any]:
+    """Give the table of today's names, from one that may hold older ones.
 
-    Checkpoints carry their recipe as text, so the older name is read for ever.
+    Checkpoints carry their recipe as text, so older names are read for ever.
+
+    Args:
+        table: A recipe.
+        older: Older name -> today's.
+
+    Raises:
+        ContractError: If a table is there under both names.
     """
-    if "final" not in table:
-        return table
-    if "fine_tuning" in table:
-        raise ContractError("final is the older name of fine_tuning; a recipe holds one of them")
-    others = {key: value for key, value in table.items() if key != "final"}
-    return others | {"fine_tuning": table["final"]}
+    for old, new in older.items():
+        if {old, new} <= table.keys():
+            raise ContractError(f"{old} is the older name of {new}; a recipe holds one of them")
+    return {older.get(key, key): value for key, value in table.items()}
 
 
-def _network(size: str, entry: Mapping[str, Any], schedule: ScheduleRecipe) -> NetworkRecipe:
-    where = f"networks.{size}"
-    check_keys(where, entry, {"network", "config", "schedule"})
-    changed = asdict(schedule) | dict(entry.get("schedule", {}))
-    return NetworkRecipe(
-        network=typed(f"{where}.network", entry.get("network"), str),
-        config=dict(entry.get("config", {})),
-        schedule=section(f"{where}.schedule", ScheduleRecipe, changed),
-    )
-
-
-def _fine_tuning(table: Any) -> FineTuningRecipe:
-    if not isinstance(table, Mapping):
-        raise ContractError(f"fine_tuning must be a table; got {table!r}")
-    changed = asdict(FINE_TUNING_SCHEDULE) | dict(table.get("schedule", {}))
-    schedule = section("fine_tuning.schedule", ScheduleRecipe, changed)
-    return section("fine_tuning", FineTuningRecipe, {**table, "schedule": schedule})
-
-
-def differing_camera(one: Recipe, other: Recipe) -> str | None:
+def differing_part(one: Recipe, other: Recipe, parts: Iterable[str]) -> str | None:
     """Name the first part by which two recipes describe different cameras, None if none does.
 
     How networks are trained, and on which samples, may differ from size to size.
     """
-    parts = ("name", "object_distance_mm", "scale", "camera", "wiener", "lens")
     return next((part for part in parts if getattr(one, part) != getattr(other, part)), None)
 
 
-def samples_digest(recipe: Recipe, seed: int) -> str:
-    """Give a hash of all that decides the training samples, to name their pool by."""
-    content = {
-        "camera": recipe.camera.model_dump(mode="json"),
-        "wiener": recipe.wiener.model_dump(mode="json"),
-        "lens": recipe.lens.to_json(),
-        "data": asdict(recipe.data),
-        "scale": recipe.scale,
-        "object_distance_mm": str(recipe.object_distance_mm),
-        "seed": seed,
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+def own_schedule(where: str, table: Any, base: ScheduleRecipe) -> ScheduleRecipe:
+    """Give a schedule with what a table changes of it.
+
+    Raises:
+        ContractError: If a key is unknown or wrong.
+    """
+    if not isinstance(table, Mapping):
+        raise ContractError(f"{where} must be a table; got {table!r}")
+    return section(where, ScheduleRecipe, asdict(base) | dict(table))
 
 
-def _model(where: str, kind: type[M], table: Mapping[str, Any]) -> M:
-    """Check a table that is part of the manifest too."""
+def model(where: str, kind: type[M], table: Mapping[str, Any]) -> M:
+    """Check a table that is part of the manifest too.
+
+    Raises:
+        ContractError: Naming the key.
+    """
     try:
         return kind.model_validate(table.get(where, {}))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join([where, *(str(part) for part in first["loc"])])
-        raise ContractError(f"{place}: {first['msg']}") from error
+        raise _refusal(where, error) from error
+
+
+def _sensor(table: Any) -> Sensor:
+    if not isinstance(table, Mapping):
+        raise ContractError(f"sensor must be a table; got {table!r}")
+    try:
+        return _SENSOR.validate_python(nested_sensor(table))
+    except ValidationError as error:
+        raise _refusal("sensor", error) from error
+
+
+def _refusal(where: str, error: ValidationError) -> ContractError:
+    first = error.errors()[0]
+    parts = (str(part) for part in first["loc"] if part not in _FLAT)
+    return ContractError(f"{'.'.join([where, *parts])}: {first['msg']}")
+
+
+def _networks(
+    table: Any, schedule: ScheduleRecipe, roles: Sequence[str]
+) -> dict[str, dict[str, NetworkRecipe]]:
+    if not isinstance(table, Mapping) or not table:
+        raise ContractError("a recipe needs at least one table [networks.SIZE]")
+    found: dict[str, dict[str, NetworkRecipe]] = {}
+    for name, entry in table.items():
+        if not isinstance(entry, Mapping):
+            raise ContractError(f"networks.{name} must be a table; got {entry!r}")
+        if name in roles and not isinstance(entry.get("network"), str):
+            for size, one in entry.items():
+                found.setdefault(name, {})[size] = _network(
+                    f"networks.{name}.{size}", one, schedule
+                )
+            continue
+        if len(roles) != 1:
+            raise ContractError(
+                f"networks.{name} is of no role; write [networks.ROLE.{name}] with one of the "
+                f"roles {', '.join(roles)}"
+            )
+        found.setdefault(roles[0], {})[name] = _network(f"networks.{name}", entry, schedule)
+    return found
+
+
+def _network(where: str, entry: Any, schedule: ScheduleRecipe) -> NetworkRecipe:
+    if not isinstance(entry, Mapping):
+        raise ContractError(f"{where} must be a table; got {entry!r}")
+    check_keys(where, entry, {"network", "config", "schedule"})
+    return NetworkRecipe(
+        network=typed(f"{where}.network", entry.get("network"), str),
+        config=dict(entry.get("config", {})),
+        schedule=own_schedule(f"{where}.schedule", entry.get("schedule", {}), schedule),
+    )

@@ -5,17 +5,17 @@ pool of samples -> patches of a step -> network -> loss in the square-root domai
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import torch
+from torch import nn
 
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import ContractError
-from camkit.models_def.networks.catalog import build_network, check_patch
-from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.optics.prescription import Lens, format_prescription
+from camkit.models_def.networks.catalog import check_patch
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
     read_checkpoint,
@@ -28,26 +28,22 @@ from camkit.models_def.training.first_weights import (
     take_first_weights,
 )
 from camkit.models_def.training.fitter import Fits, Fitter
-from camkit.models_def.training.lens_bank import build_lens_bank
+from camkit.models_def.training.kind import (
+    Judge,
+    Material,
+    Score,
+    TrainingKind,
+    build_role,
+    read_recipe,
+    training_kind,
+)
 from camkit.models_def.training.log import RunLog
 from camkit.models_def.training.pool import SamplePool, open_pool
 from camkit.models_def.training.progress import TrainingBar
-from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.recipe import (
-    NetworkRecipe,
-    Recipe,
-    ScheduleRecipe,
-    read_recipe,
-)
+from camkit.models_def.training.recipe import Recipe
+from camkit.models_def.training.refinement import Refinement
+from camkit.models_def.training.sample import SampleLayout
 from camkit.models_def.training.schedule import progress_of
-from camkit.models_def.training.validation import (
-    Score,
-    ValidationCapture,
-    make_validation_captures,
-    score,
-    score_capture,
-    score_wiener,
-)
 
 LOG_STEPS: Final = 50
 
@@ -59,6 +55,7 @@ class TrainOptions:
     Attributes:
         out_dir: Checkpoint, log and sample pool are kept here.
         size: Which network of the recipe.
+        role: Of which role; None for a recipe of one.
         data_folder: Pictures to train on; None for procedural scenes alone.
         valid_folder: Pictures to choose by; None for procedural scenes.
         steps: Steps of the whole schedule; None for the recipe's.
@@ -77,6 +74,7 @@ class TrainOptions:
 
     out_dir: Path
     size: str = "M"
+    role: str | None = None
     data_folder: Path | None = None
     valid_folder: Path | None = None
     steps: int | None = None
@@ -118,8 +116,7 @@ class TrainResult:
         steps: Steps done, earlier runs included.
         elapsed_s: Wall time, earlier runs included.
         cpu_s: CPU time, workers and earlier runs included.
-        capture_db: Validation PSNR of the captures.
-        wiener_db: Of the Wiener bank alone.
+        baselines: What the network must beat: name -> validation dB.
         valid_db: Of the network.
     """
 
@@ -128,39 +125,28 @@ class TrainResult:
     steps: int
     elapsed_s: float
     cpu_s: float
-    capture_db: float
-    wiener_db: float
+    baselines: Mapping[str, float]
     valid_db: float
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Refinement:
-    """Later training of a trained network, with its own files, schedule and fitter.
-
-    Attributes:
-        name: Behind the size in the names of its files.
-        schedule: Used instead of the network's.
-        make_fitter: From the network's entry, with that schedule, and the kernels.
-        first: Weights that the fitter starts from.
-        credit: What it adds to the training data, for the card.
-    """
-
-    name: str
-    schedule: ScheduleRecipe
-    make_fitter: Callable[[NetworkRecipe, PsfBank], Fits]
-    first: FirstWeights | None = None
-    credit: str = ""
-
-
-Stage = Refinement
-"""As `training.final` calls it."""
+    def to_json(self) -> dict[str, Any]:
+        """Give the result as a flat mapping of plain values."""
+        flat = {f"{name}_db": db for name, db in self.baselines.items()}
+        return {
+            "checkpoint": str(self.checkpoint),
+            "log": str(self.log),
+            "steps": self.steps,
+            "elapsed_s": self.elapsed_s,
+            "cpu_s": self.cpu_s,
+            **flat,
+            "valid_db": self.valid_db,
+        }
 
 
 def train(
     recipe_path: Path,
     options: TrainOptions,
     *,
-    bank: PsfBank | None = None,
+    material: Material | None = None,
     refinement: Refinement | None = None,
 ) -> TrainResult:
     """Train one network of a recipe.
@@ -168,50 +154,82 @@ def train(
     Args:
         recipe_path: TOML recipe.
         options: Where, how long and with what.
-        bank: Kernels to train with; None traces the recipe's lens (about a minute, kept in
-            `out_dir`).
+        material: What samples are made with; None has the kind prepare it (kernels of a lens take
+            about a minute, and are kept in `out_dir`).
         refinement: Later training; None fits a new network to the recipe's loss.
 
     Raises:
         ContractError: If recipe, options or the checkpoint to resume do not fit.
+        UnsupportedError: If cameras of this kind cannot be trained.
     """
     torch.set_num_threads(options.threads)
     recipe = read_recipe(recipe_path)
-    entry = recipe.network(options.size)
+    kind, role = training_kind(recipe.kind), recipe.role(options.role)
+    entry = recipe.network(options.size, role)
     schedule = entry.schedule if refinement is None else refinement.schedule
     # before anything is traced
-    network = build_network(entry.network, **entry.config)
+    network, layout = build_role(kind, recipe, role, options.size)
     check_patch(entry.network, network, schedule.patch_px)
+    check_layout(entry.network, network, layout)
     first = None if refinement is None else refinement.first
     if options.start is not None:
         if refinement is not None:
             raise ContractError("a refinement has its own start; leave start away")
-        first = read_first_weights(options.start, options.size)
+        first = read_first_weights(options.start, options.size, role)
     if first is not None:
         take_first_weights(network, first)
     path = checkpoint_path(recipe, options, refinement)
     if path.exists() and not (options.resume or options.overwrite):
         raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
     options.out_dir.mkdir(parents=True, exist_ok=True)
-    seed = entry.schedule.seed
-    lens = find_lens(recipe.lens.prescription, recipe_path.parent)
-    if bank is None:
-        bank = build_lens_bank(recipe, lens, options.out_dir)
+    if material is None:
+        material = kind.prepare(recipe, recipe_path.parent, options.out_dir)
     # A pool of its own: another size may be trained beside this one.
-    samples = options.out_dir / f"samples_{options.size}"
-    pool = open_pool(samples, recipe_path, bank, options.data_folder, seed=seed)
-    with pool, TrainingBar(f"{recipe.name} {options.size}") as bar:
+    samples = options.out_dir / f"samples_{_label(role, options.size)}"
+    seed = entry.schedule.seed
+    pool = open_pool(samples, recipe_path, material, options.data_folder, seed=seed, role=role)
+    with pool, TrainingBar(f"{recipe.name} {_label(role, options.size)}") as bar:
         pool.start_workers(options.workers)
-        captures = make_validation_captures(recipe, bank, options.valid_folder)
-        run = _Run(recipe_path, lens, bank, captures, options, refinement, first)
+        run = _Run(recipe_path, kind, material, options, refinement, first)
         run.loop(pool, bar)
         return run.result()
 
 
+def check_layout(name: str, network: nn.Module, layout: SampleLayout) -> None:
+    """Refuse a network that does not map the samples of its role to their targets.
+
+    Raises:
+        ContractError: Naming what it takes and gives.
+    """
+    stride_px: Any = network.stride_px
+    side_px = 4 * stride_px
+    given = torch.zeros(1, layout.input_channels, side_px, side_px)
+    wanted = (1, layout.output_channels, layout.scale * side_px, layout.scale * side_px)
+    was_training = network.training
+    network.eval()
+    try:
+        with torch.no_grad():
+            got = tuple(torch.as_tensor(network(given)).shape)
+    except RuntimeError as error:
+        raise ContractError(
+            f"{name} does not take the {layout.input_channels} channels of its role "
+            f"({', '.join(port.name for port in layout.inputs)}): {error}"
+        ) from error
+    finally:
+        network.train(was_training)
+    if got != wanted:
+        raise ContractError(f"{name} must make {wanted} of {tuple(given.shape)}; it makes {got}")
+
+
 def checkpoint_path(recipe: Recipe, options: TrainOptions, refinement: Refinement | None) -> Path:
     """Give the file that a run writes its checkpoints to."""
-    name = f"{recipe.name}_{options.size}" + ("" if refinement is None else f"_{refinement.name}")
+    label = _label(recipe.role(options.role), options.size)
+    name = f"{recipe.name}_{label}" + ("" if refinement is None else f"_{refinement.name}")
     return options.out_dir / f"{name}.pt"
+
+
+def _label(role: str, size: str) -> str:
+    return size if role == DEFAULT_ROLE else f"{role}_{size}"
 
 
 class _Run:
@@ -220,27 +238,27 @@ class _Run:
     def __init__(
         self,
         recipe_path: Path,
-        lens: Lens,
-        bank: PsfBank,
-        captures: list[ValidationCapture],
+        kind: TrainingKind[Any, Any],
+        material: Material,
         options: TrainOptions,
         refinement: Refinement | None,
         first: FirstWeights | None,
     ) -> None:
-        self.options, self.valid_captures = options, captures
-        self.bank_digest = bank.digest()
+        self.options, self.material_digest = options, material.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
-        self.lens_toml = format_prescription(lens)
+        self.lens_toml = material.lens_toml
         self.recipe: Recipe = read_recipe(recipe_path)
-        self.entry = self.recipe.network(options.size)
-        data = describe_data(self.recipe, options.data_folder)
+        self.role = self.recipe.role(options.role)
+        self.entry = self.recipe.network(options.size, self.role)
+        self.judge: Judge = kind.judge(self.recipe, self.role, material, options.valid_folder)
+        data = describe_data(self.recipe.data, options.data_folder)
         self.data = data + ("" if first is None else first.credit(data))
         if refinement is None:
-            self.fitter: Fits = Fitter(self.entry, options.device, first)
+            self.fitter: Fits = Fitter(self.entry, kind.build_network, options.device, first)
         else:
             self.data += refinement.credit
             self.entry = replace(self.entry, schedule=refinement.schedule)
-            self.fitter = refinement.make_fitter(self.entry, bank)
+            self.fitter = refinement.make_fitter(self.entry, material)
         self.steps = options.steps or self.entry.schedule.steps
         self.path = checkpoint_path(self.recipe, options, refinement)
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
@@ -249,13 +267,12 @@ class _Run:
             self._restore(read_checkpoint(self.path))
         until = self.step if options.resume else None
         self.log = RunLog(self.path.with_suffix(".jsonl"), keep_until_step=until)
-        self.capture = score_capture(captures, self.recipe)
-        self.wiener = score_wiener(captures, self.recipe)
+        self.baselines = dict(self.judge.baselines())
         self.start_s, self.start_cpu_s = time.perf_counter(), time.process_time()
 
     def _restore(self, saved: Checkpoint) -> None:
-        known = (self.bank_digest, self.entry.network, dict(self.entry.config))
-        if (saved.bank_digest, saved.network, saved.config) != known:
+        known = (self.material_digest, self.role, self.entry.network, dict(self.entry.config))
+        if (saved.bank_digest, saved.role, saved.network, saved.config) != known:
             raise ContractError(
                 f"{self.path} was trained with other kernels or another network; "
                 "start without resume"
@@ -280,7 +297,7 @@ class _Run:
         pool.draw_batch(self.step, 1, schedule.patch_px)
         self.log.write(
             {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
-            | {"capture_db": self.capture.mean_db, "wiener_db": self.wiener.mean_db}
+            | self._baseline_entries()
         )
         saved_s = validated_s = self.elapsed_s()
         losses: list[float] = []
@@ -314,27 +331,28 @@ class _Run:
         self.log.write({"step": self.step, "loss": loss} | self.fitter.notes() | clock | waited)
 
     def _validate(self, pool: SamplePool) -> None:
-        self.valid = score(self.valid_captures, self.recipe, self.fitter.restore)
+        self.valid = self.judge.score(self.fitter.restore)
         entry: dict[str, Any] = {
             "step": self.step,
             "seconds": self.elapsed_s(),
             "cpu_s": self.cpu_s(pool),
             "valid_db": self.valid.mean_db,
-            "valid_by_iso": {f"{iso:g}": db for iso, db in self.valid.by_iso.items()},
-            "valid_by_field": {f"{f:g}": db for f, db in self.valid.by_field.items()},
-            "capture_db": self.capture.mean_db,
-            "wiener_db": self.wiener.mean_db,
         }
-        self.log.write(entry)
+        parts = {f"valid_{name}": dict(part) for name, part in self.valid.parts.items()}
+        self.log.write(entry | parts | self._baseline_entries())
+
+    def _baseline_entries(self) -> dict[str, float]:
+        return {f"{name}_db": db for name, db in self.baselines.items()}
 
     def _save(self, pool: SamplePool) -> None:
         saved = Checkpoint(
             recipe_toml=self.toml,
             lens_toml=self.lens_toml,
+            role=self.role,
             size=self.options.size,
             network=self.entry.network,
             config=dict(self.entry.config),
-            bank_digest=self.bank_digest,
+            bank_digest=self.material_digest,
             training_data=self.data,
             step=self.step,
             elapsed_s=self.elapsed_s(),
@@ -354,7 +372,6 @@ class _Run:
             steps=saved.step,
             elapsed_s=saved.elapsed_s,
             cpu_s=saved.cpu_s,
-            capture_db=self.capture.mean_db,
-            wiener_db=self.wiener.mean_db,
+            baselines=self.baselines,
             valid_db=float(saved.valid_db or 0.0),
         )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.job.reconstruction import Reconstruction
 from tests.plan_factory import write_planned_bundle
 from tests.tiny_design import run_tool
 from tools import edge_contrast
@@ -31,7 +31,7 @@ def test_every_method_is_measured_and_a_step_twice_as_high_has_twice_the_contras
         return list(found["rows"])
 
     rows = measured()
-    assert [row["method"] for row in rows] == ["wiener", *bundle.manifest.networks]
+    assert [row["method"] for row in rows] == ["wiener", *bundle.manifest.sizes]
     table = capsys.readouterr().out.splitlines()
     assert len(table) == 2 + len(rows)
     assert (tmp_path / "contrast.png").stat().st_size > 10_000
@@ -42,6 +42,6 @@ def test_every_method_is_measured_and_a_step_twice_as_high_has_twice_the_contras
     assert rows[0]["largest"] == pytest.approx(bank.max(), abs=1e-4)
     assert f"| {bank.max():.2f} |" in table[2]
 
-    honest = Pipeline.process_array
-    monkeypatch.setattr(Pipeline, "process_array", lambda *a, **k: 2 * honest(*a, **k))
+    honest = Reconstruction.fill
+    monkeypatch.setattr(Reconstruction, "fill", lambda *a, **k: 2 * honest(*a, **k))
     assert curves_of(measured()[0]) == pytest.approx(2 * bank, abs=1e-3)

@@ -11,6 +11,7 @@ from camkit.bundle.reader import Bundle
 from tests.psf_factory import texture
 from tests.tiny_design import run_tool
 from tests.wide_bundle import write_wide_bundle
+from tools.comparison.measurement import CAPTURE_COLUMNS
 
 PEER = "skimage_wiener"
 
@@ -48,7 +49,8 @@ def test_a_tuned_comparison_has_a_row_for_every_method_and_resumes(
     report = json.loads(out.read_text(encoding="utf-8"))
     assert report["methods"] == ["input", PEER, "M", "rival"]
     # five places, two kinds of PSF
-    assert len(report["measurements"]) == 4 * 5 * 2
+    assert len(report["captures"]) == 5 * 2
+    assert all(len(row) == len(CAPTURE_COLUMNS) + 4 for row in report["captures"])
     assert len(table.read_text(encoding="utf-8").splitlines()) == 1 + 4 * 5 * 2
     assert report["tuned"] == tuned
     assert report["commands"][0].startswith("python -m tools.quality --bundle ")
@@ -56,7 +58,7 @@ def test_a_tuned_comparison_has_a_row_for_every_method_and_resumes(
     assert "10 captures, 10 to do" in capsys.readouterr().out
     run_tool(monkeypatch, "quality", *shared, *compare, *methods)
     assert "10 captures, 0 to do" in capsys.readouterr().out
-    assert json.loads(out.read_text("utf-8"))["measurements"] == report["measurements"]
+    assert json.loads(out.read_text("utf-8"))["captures"] == report["captures"]
 
 
 def test_without_tuned_parameters_a_comparison_is_refused(

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from camkit.kinds import BAYER
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.tiny_design import run_tool
@@ -20,14 +21,15 @@ def test_stages_are_told_by_wall_and_processor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bundle = write_tiny_captures(tmp_path, ["a"])
-    monkeypatch.setattr(stage_profile, "SAMPLE_S", 0.001)
+    monkeypatch.setattr(stage_profile, "WATCH_S", 0.001)
     command = ("stages", tmp_path / "a.dng", "--bundle", bundle, "--threads", 1)
     run_tool(monkeypatch, "stage_profile", *command, "--runs", 0)
     once = capsys.readouterr().out
     monkeypatch.setattr(stage_profile, "run_again", lambda _: once)
     run_tool(monkeypatch, "stage_profile", *command, "--runs", 2)
     table = {row[0]: row[1:] for row in rows(capsys.readouterr().out)}
-    assert {"decode", "wiener", "network", "write", "hash", "sync", "all", "peak MB"} <= set(table)
+    assert list(table)[:12] == ["stage", "decode", *BAYER.stages]
+    assert {"write", "hash", "sync", "all", "peak MB"} <= set(table)
     assert float(table["all"][0]) > float(table["network"][0]) >= 0
     assert "main" in table
 

@@ -101,7 +101,7 @@ class Peer:
         """
         if len(setting) != len(self.parameters):
             raise ContractError(f"expected {', '.join(self.parameters)}; got {setting}")
-        part_px, overlap_px = part_sides(capture.psf.kernels.shape[-1])
+        part_px, overlap_px = part_sides(capture.psf.kernels.kernels.shape[-1])
         bank = BlockBank(
             capture.psf,
             self.make_filter(capture.noise, setting),

@@ -12,17 +12,19 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.reader import Bundle
-from camkit.colorimetry import apply_matrix, rec709_from_camera
+from camkit.bundle.stages import Wiener
+from camkit.colorimetry import apply_matrix
 from camkit.contracts import FloatArray, FrozenPsf
+from camkit.errors import ContractError
 from camkit.report.quality import Shot, expose
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.color import recover_highlights
 from camkit.runtime.geometry.illumination import divide_illumination
-from camkit.runtime.options import Method, Options
+from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.signal.front_rows import FrontRows
 from camkit.runtime.simulate import Simulation
+from tools.capture.simulated import captured, color_sensor, rec709_of
 from tools.comparison.peers import LocalCapture
 
 PROTOCOL_VERSION: Final = 1
@@ -68,13 +70,13 @@ def finish_planes(planes: FloatArray, taken: Photograph, bundle: Bundle) -> Floa
 
     These are the last stages of the pipeline, for planes that a foreign method restored.
     """
-    raised = recover_highlights(planes, taken.simulation.white_balance)
+    red, green, blue = taken.simulation.white_balance
+    raised = recover_highlights(planes, (red, green, blue))
     even = divide_illumination(raised, 0, bundle.psf, taken.simulation.window)
-    color_matrix = np.array(bundle.manifest.camera.color_matrix, dtype=np.float64)
-    return apply_matrix(rec709_from_camera(color_matrix), even)
+    return apply_matrix(rec709_of(color_sensor(bundle)), even)
 
 
-def bundle_restorer(bundle: Bundle, *, method: Method = "net", size: str = "M") -> Restorer:
+def bundle_restorer(bundle: Bundle, *, method: str = "net", size: str = "M") -> Restorer:
     """Give a restoration of the bundle's pipeline, in sensor geometry, on one thread.
 
     Args:
@@ -90,36 +92,33 @@ def bundle_restorer(bundle: Bundle, *, method: Method = "net", size: str = "M") 
     )
 
     def restore(taken: Photograph) -> FloatArray:
-        simulation = taken.simulation
-        x, y = (int(v) for v in simulation.window.origin_px)
-        return pipeline.process_array(
-            simulation.mosaic,
-            iso=simulation.iso,
-            white_balance=simulation.white_balance,
-            origin_px=(x, y),
-        )
+        return pipeline.start(captured(pipeline, taken.simulation)).fill()
 
     return restore
 
 
 def _develop(simulation: Simulation, bundle: Bundle) -> LocalCapture:
-    camera = bundle.manifest.camera
-    x, y = (int(v) for v in simulation.window.origin_px)
-    capture = Pipeline(bundle, Options(method="wiener", threads=1)).capture_of(
-        simulation.mosaic,
-        iso=simulation.iso,
-        white_balance=simulation.white_balance,
-        origin_px=(x, y),
-    )
-    front = FrontRows(capture, simulation.white_balance, method="fast", repair=True)
-    saturated = capture.saturated_rows(0, capture.height)
+    """Give what the bundle's own bank is given.
+
+    Raises:
+        ContractError: If the bundle has no bank.
+    """
+    bank, sensor = bundle.manifest.stage(Wiener), color_sensor(bundle)
+    if bank is None:
+        raise ContractError(
+            f"classical methods are compared with a Wiener bank; {bundle.manifest.name} has none"
+        )
+    pipeline = Pipeline(bundle, Options(method="wiener", demosaic="fast", threads=1))
+    work = pipeline.start(captured(pipeline, simulation))
+    planes, *masks = (work.rows_of(name) for name in bank.takes)
+    height = planes.shape[1]
+    saturated = masks[0].read(0, height) if masks else None
     return LocalCapture(
-        planes=front.read(0, capture.height),
+        planes=planes.read(0, height),
         psf=LocalPsf(
-            kernels=color_kernels(bundle.psf, *camera.channel_response.to_arrays()),
-            field_heights_mm=bundle.psf.field_heights_mm,
+            kernels=color_kernels(bundle.psf, *sensor.response_arrays()),
             window=simulation.window,
         ),
-        noise=camera.noise_at(simulation.iso).with_gains(simulation.white_balance),
-        saturated=saturated if saturated.any() else None,
+        noise=sensor.noise_at(simulation.iso).with_gains(simulation.white_balance),
+        saturated=None if saturated is None or not saturated.any() else saturated,
     )

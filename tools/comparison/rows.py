@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from camkit.bundle.manifest import Network, Wiener
-from camkit.bundle.reader import PSF, Bundle
+from camkit.bundle.optics import PSF
+from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Network, Wiener
 from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
 from camkit.report.quality import BORDER_PX, FABRICATION_SEEDS, FIELD_SHARES
+from tools.capture.simulated import color_sensor
 from tools.comparison.measurement import Row, identity_of
 from tools.comparison.peers import PEERS, Setting, part_sides
 from tools.comparison.photograph import (
@@ -39,7 +41,7 @@ class Rival:
     @property
     def size(self) -> str:
         """Give the size that is compared: M, or the only one there is."""
-        sizes = sorted(self.bundle.manifest.networks)
+        sizes = self.bundle.manifest.sizes
         if "M" in sizes or len(sizes) == 1:
             return "M" if "M" in sizes else sizes[0]
         raise ContractError(
@@ -71,13 +73,13 @@ def make_rows(
     """
     base = identity_of(
         PROTOCOL_VERSION,
-        bundle.manifest.camera.model_dump_json(),
+        bundle.manifest.sensor.model_dump_json(),
         bundle.manifest.members[PSF].sha256,
         lens,
     )
     rows = [_row(bundle, name, tuned, isos, base) for name in methods]
     for rival in rivals:
-        if rival.bundle.manifest.camera != bundle.manifest.camera:
+        if rival.bundle.manifest.sensor != bundle.manifest.sensor:
             raise ContractError(
                 f"{rival.bundle.path.name} is another camera than {bundle.path.name}; "
                 "compare bundles of one camera"
@@ -107,19 +109,18 @@ def _row(bundle: Bundle, name: str, tuned: Tuned, isos: Sequence[float], base: s
             identity=identity_of(base, PEER_VERSION, tuned_to_json({name: values})),
         )
     if name in BANK_METHODS:
-        method: Any = BANK_METHODS[name]
         return Row(
             name=name,
-            restore=bundle_restorer(bundle, method=method),
+            restore=bundle_restorer(bundle, method=BANK_METHODS[name]),
             identity=identity_of(base, name, _stage_json(bundle, Wiener)),
         )
-    if name in bundle.manifest.networks:
+    if name in bundle.manifest.sizes:
         return Row(
             name=name,
             restore=bundle_restorer(bundle, size=name),
             identity=identity_of(base, *_network_parts(bundle, name)),
         )
-    known = (*("input", *PEERS, *BANK_METHODS), *bundle.manifest.networks)
+    known = (*("input", *PEERS, *BANK_METHODS), *bundle.manifest.sizes)
     raise ContractError(f"methods are {', '.join(known)}; got {name!r}")
 
 
@@ -142,22 +143,22 @@ def _network_parts(bundle: Bundle, size: str) -> tuple[object, ...]:
     members = bundle.manifest.members
     return (
         members[PSF].sha256,
-        members[bundle.network_facts(size).member].sha256,
+        *(members[sizes[size].member].sha256 for sizes in bundle.manifest.networks.values()),
         _stage_json(bundle, Wiener),
         _stage_json(bundle, Network),
     )
 
 
 def _stage_json(bundle: Bundle, wanted: type[Wiener] | type[Network]) -> str | None:
-    stage = bundle.manifest.stage(wanted)
-    return None if stage is None else stage.model_dump_json()
+    stages = [stage.model_dump_json() for stage in bundle.manifest.stages_of(wanted)]
+    return "\n".join(stages) or None
 
 
 def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
     """Say in sentences how the captures are made and judged."""
-    psf, camera = bundle.psf, bundle.manifest.camera
+    psf, sensor = bundle.psf, color_sensor(bundle)
     fields, waves = psf.field_heights_mm.size, psf.wavelengths_um.size
-    corner_mm = np.hypot(camera.width_px, camera.height_px) / 2 * camera.pixel_pitch_um / 1000
+    corner_mm = np.hypot(sensor.width_px, sensor.height_px) / 2 * sensor.pixel_pitch_um / 1000
     shares = ", ".join(f"{share:g}" for share in FIELD_SHARES)
     seeds = ", ".join(map(str, FABRICATION_SEEDS))
     part_px, overlap_px = part_sides(psf.kernels.shape[-1])
@@ -165,8 +166,8 @@ def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
     depths = [f"{where} of {psf.depths_mm.size} depths."] if psf.depths_mm.size > 1 else []
     return [
         *depths,
-        f"Each picture (sRGB decoded to linear light) is a crop of the {camera.width_px} x "
-        f"{camera.height_px} sensor at {len(FIELD_SHARES)} places: {shares} of the way from "
+        f"Each picture (sRGB decoded to linear light) is a crop of the {sensor.width_px} x "
+        f"{sensor.height_px} sensor at {len(FIELD_SHARES)} places: {shares} of the way from "
         f"centred to touching a corner ({corner_mm:.1f} mm from the axis); picture i of a set "
         "takes corner i mod 4.",
         f"ISO {', '.join(f'{iso:g}' for iso in isos)}; mosaic, shot and read noise, saturation "

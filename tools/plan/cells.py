@@ -13,16 +13,18 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.reader import Bundle
-from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
+from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.quality import BORDER_PX, FIELD_SHARES, QUADRANTS, crop_origin
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.plan.loss import EXACT
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.scene import CELL_PX, CellArray, Scene, lattice_shape, measure_scene
 from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from tools.capture.simulated import captured, color_sensor, rec709_of
 
 PLAIN_TARGET: Final = "plain"
 WIENER_TARGET: Final = "wiener"
@@ -57,11 +59,11 @@ def photograph(
         iso: Sensitivity.
         exposure: Factor on the scene.
     """
-    camera = bundle.manifest.camera
+    sensor = color_sensor(bundle)
     size = (scene.shape[2], scene.shape[1])
-    sensor = (camera.width_px, camera.height_px)
+    whole = (sensor.width_px, sensor.height_px)
     share = FIELD_SHARES[number % len(FIELD_SHARES)]
-    origin = crop_origin(size, sensor, share, QUADRANTS[number % len(QUADRANTS)])
+    origin = crop_origin(size, whole, share, QUADRANTS[number % len(QUADRANTS)])
     depths_mm = bundle.psf.depths_mm
     options = SimulationOptions(
         iso=iso,
@@ -70,25 +72,17 @@ def photograph(
         exposure=exposure,
         depth_mm=float(depths_mm[number % depths_mm.size]),
     )
-    return simulate(scene, camera, bundle.psf, options)
+    return simulate(scene, sensor, bundle.psf, options)
 
 
 def sharp_of(simulation: Simulation, bundle: Bundle) -> FloatArray:
     """Give (3, h, w) sRGB values of the sharp picture in sensor geometry."""
-    matrix = rec709_from_camera(np.array(bundle.manifest.camera.color_matrix, dtype=np.float64))
-    return encode_srgb(apply_matrix(matrix, simulation.clean))
+    return encode_srgb(apply_matrix(rec709_of(color_sensor(bundle)), simulation.clean))
 
 
 def start(pipeline: Pipeline, simulation: Simulation) -> Reconstruction:
     """Plan the reconstruction of a simulated capture."""
-    x, y = (int(v) for v in simulation.window.origin_px)
-    capture = pipeline.capture_of(
-        simulation.mosaic,
-        iso=simulation.iso,
-        white_balance=simulation.white_balance,
-        origin_px=(x, y),
-    )
-    return pipeline.start(capture)
+    return pipeline.start(captured(pipeline, simulation))
 
 
 def cell_sums(squares: FloatArray) -> CellArray:
@@ -112,9 +106,10 @@ def pipelines(bundle: Bundle) -> Mapping[str, Pipeline]:
         EXACT: Pipeline(bundle, Options(size=REFERENCE, undistort=False, threads=1)),
         WIENER_TARGET: Pipeline(bundle, Options(method="wiener", undistort=False, threads=1)),
     }
-    for size in bundle.manifest.networks:
+    for size in bundle.manifest.sizes:
         if size != REFERENCE:
             made[size] = Pipeline(bundle, Options(size=size, undistort=False, threads=1))
+    made[PLAIN_TARGET] = Pipeline(bundle, Options(method=DEVELOP, undistort=False, threads=1))
     return made
 
 
@@ -133,10 +128,9 @@ def measure_cells(
     errors = {}
     for target, pipeline in targets.items():
         errors[target] = cell_errors(start(pipeline, simulation).fill(None), sharp)
-    work = start(targets[WIENER_TARGET], simulation)
-    errors[PLAIN_TARGET] = cell_errors(work.fill_plain(), sharp)
-    noise = bundle.manifest.camera.noise_at(simulation.iso).with_gains(simulation.white_balance)
-    scene = measure_scene(work.capture, noise, simulation.white_balance, simulation.window)
+    noise = color_sensor(bundle).noise_at(simulation.iso).with_gains(simulation.white_balance)
+    capture = captured(targets[PLAIN_TARGET], simulation)
+    scene = measure_scene(capture, noise, simulation.white_balance, simulation.window)
     return CaptureCells(
         name=name,
         scene=scene,

@@ -17,6 +17,7 @@ from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options, Quality
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.blocks import plain_share
+from camkit.runtime.plan.estimate import network_seconds
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.simulate import Simulation
@@ -109,9 +110,9 @@ def _row(
     pixels = (sharp.shape[1] - 64) * (sharp.shape[2] - 64)
     ratios = [(b.seconds / a.seconds, b.cpu_s / a.cpu_s) for a, b in pairs]
     seconds, cpu = np.median(np.array(ratios), axis=0)
-    speed = first.work.measured_speed([*bundle.manifest.networks])
+    speed = first.work.measured_speed(bundle.manifest.sizes)
     works = [_counted_seconds(bundle, run.work, speed) for run in (first, second)]
-    choices = {d["what"]: d["choice"] for d in second.work.plan["decisions"]}
+    choices = {d["what"]: d["choice"] for d in second.work.record["decisions"]}
     return ProofRow(
         kind=scene.subject,
         name=scene.name,
@@ -127,11 +128,10 @@ def _row(
 
 def _counted_seconds(bundle: Bundle, work: Reconstruction, speed: Speed) -> float:
     """Give the seconds of blocks and windows as planned, at the speed of this machine."""
-    stage, run = bundle.manifest.stage(Wiener), work.stage
-    seconds = 0.0
-    if run is not None:
-        window_mp = run.window_mp()
-        seconds += sum(speed.network_s_per_mp[size] * mp for size, mp in window_mp.items())
+    stage = bundle.manifest.stage(Wiener)
+    seconds = sum(
+        network_seconds(role, windows.window_mp(), speed) for role, windows in work.windows.items()
+    )
     if stage is not None:
         rows, columns = (
             plan_spans(side, stage.block_px, stage.overlap_px)
@@ -139,7 +139,8 @@ def _counted_seconds(bundle: Bundle, work: Reconstruction, speed: Speed) -> floa
         )
         share = 0.0
         if work.labels is not None:
-            share = plain_share(work.labels, 0 if run is None else run.halo_px, rows, columns)
+            halo_px = max((windows.halo_px for windows in work.windows.values()), default=0)
+            share = plain_share(work.labels, halo_px, rows, columns)
         seconds += (1 - share) * len(rows) * len(columns) * speed.block_s
     return seconds
 

@@ -1,4 +1,4 @@
-"""`camkit freeze`: a lens prescription to a frozen PSF."""
+"""`camkit freeze`: a lens, or a PSF that was measured, to a frozen PSF."""
 
 import json
 from pathlib import Path
@@ -7,15 +7,20 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 
 
 def freeze(
-    prescription: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).")],
+    optics: Annotated[
+        Path,
+        typer.Argument(
+            help="The lens (.toml or .zmx), or a measured PSF (.safetensors).", metavar="OPTICS"
+        ),
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The frozen PSF (.safetensors).")],
     recipe: Annotated[
         Path | None,
-        typer.Option(help="Recipe (TOML) with the camera and its Wiener bank; default: duet's."),
+        typer.Option(help="Recipe (TOML) with the sensor and its Wiener bank; default: duet's."),
     ] = None,
     depths_mm: Annotated[
         str | None,
@@ -36,35 +41,41 @@ def freeze(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Trace the lens and keep as few PSF samples as the stated loss allows (needs torch)."""
+    """Keep as few PSF samples of a lens as the stated loss allows (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     require_torch("camkit freeze")
     refuse_existing([out, stress_out, report], overwrite=overwrite)
     from camkit.bundle.psf_file import write_psf
-    from camkit.models_def.optics.freeze import FreezeGrid, freeze_prescription, freeze_stress
-    from camkit.models_def.optics.lens_file.lens_file import read_lens
-    from camkit.models_def.training.recipe import read_recipe
+    from camkit.bundle.sensor import ColorSensor
+    from camkit.bundle.stages import Wiener
+    from camkit.models_def.optics.freeze import FreezeGrid, freeze_optics, freeze_stress
+    from camkit.models_def.optics.optics_file import read_optics
+    from camkit.models_def.training.kind import read_recipe, training_kind
 
     plan = read_recipe(_default_recipe() if recipe is None else recipe)
+    stages = training_kind(plan.kind).stages(plan)
+    if not isinstance(plan.sensor, ColorSensor):
+        raise UnsupportedError(f"a {plan.sensor.type} sensor has no response to freeze a PSF for")
+    found = read_optics(optics)
     out.parent.mkdir(parents=True, exist_ok=True)
     grid = FreezeGrid(depths_mm=_depths(depths_mm), energy=energy, max_side_px=max_side_px)
-    found = freeze_prescription(
-        prescription,
+    told = freeze_optics(
+        found,
         out,
-        camera=plan.camera,
-        settings=plan.wiener,
+        sensor=plan.sensor,
+        settings=next((stage for stage in stages if isinstance(stage, Wiener)), None),
         limit_db=limit_db,
         grid=grid,
         tell=lambda line: typer.echo(line, err=True),
     )
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
-        write_psf(stress_out, freeze_stress(read_lens(prescription), plan.camera, grid).psf)
+        write_psf(stress_out, freeze_stress(found, plan.sensor, grid).psf)
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
-        report.write_text(json.dumps(found.to_json(), indent=2) + "\n", encoding="utf-8")
-    print_report(found.to_json(), json_)
+        report.write_text(json.dumps(told.to_json(), indent=2) + "\n", encoding="utf-8")
+    print_report(told.to_json(), json_)
 
 
 def _depths(text: str | None) -> tuple[float, ...]:

@@ -1,6 +1,5 @@
 """`camkit train`: a recipe to a checkpoint."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,13 +8,20 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.errors import ContractError
 
+WITHOUT_VGG = (
+    "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
+)
+
 if TYPE_CHECKING:
-    from camkit.models_def.training.trainer import Refinement
+    from camkit.models_def.training.refinement import Refinement
 
 
 def train(
     recipe: Annotated[Path, typer.Argument(help="The recipe (TOML).")],
     size: Annotated[str, typer.Option(help="Which of the recipe's networks: S, M, ...")] = "M",
+    role: Annotated[
+        str | None, typer.Option(help="Of which role; needed where a recipe has several.")
+    ] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder of pictures; without it procedural scenes only.")
     ] = None,
@@ -54,7 +60,7 @@ def train(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Train one network of a recipe behind the Wiener bank of its lens (needs torch)."""
+    """Train one network of a recipe as its camera will run it (needs torch)."""
     from camkit.cli.design.design_time import print_report, require_torch
 
     require_torch("camkit train")
@@ -71,6 +77,7 @@ def train(
         TrainOptions(
             out_dir=out_dir,
             size=size,
+            role=role,
             data_folder=data,
             valid_folder=valid,
             steps=steps,
@@ -84,19 +91,14 @@ def train(
         ),
         refinement=refinement,
     )
-    plain = {k: str(v) if isinstance(v, Path) else v for k, v in asdict(result).items()}
-    print_report(plain, json_)
+    print_report(result.to_json(), json_)
 
 
 def _fine_tuning(
     recipe: Path, start: Path, size: str, vgg: Path | None, pairs: Path | None, device: str
 ) -> "Refinement":
-    from camkit.models_def.training.fine_tuning.refinement import (
-        WITHOUT_VGG,
-        FineTuningOptions,
-        make_refinement,
-    )
-    from camkit.models_def.training.recipe import read_recipe
+    from camkit.models_def.training.kind import read_recipe
+    from camkit.models_def.training.refinement import FineTuningOptions, refining_kind
 
     if vgg is None:
         typer.echo(f"camkit: {WITHOUT_VGG}", err=True)
@@ -108,4 +110,5 @@ def _fine_tuning(
         device=device,
         recipe_folder=recipe.parent,
     )
-    return make_refinement(read_recipe(recipe), options)
+    plan = read_recipe(recipe)
+    return refining_kind(plan.kind).refinement(plan, options)

@@ -60,7 +60,7 @@ def _planned(
 
     work = pipeline.start(read_capture(task.source, mosaic=headerless))
     work.explain()
-    details = dict(work.plan)
+    details = dict(work.record)
     return {
         "status": "planned",
         "bundle": task.bundle,

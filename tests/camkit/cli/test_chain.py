@@ -11,8 +11,9 @@ from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import open_bundle
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.lens_file.lens_file import write_lens
+from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import read_prescription
-from camkit.models_def.training.recipe import read_recipe
+from camkit.models_def.training.kind import read_recipe
 from tests.models_def.training.conftest import RECIPE
 
 PRESCRIPTION = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
@@ -47,8 +48,9 @@ def test_a_recipe_becomes_a_proved_bundle_that_turns_a_capture_into_a_picture(
     assert trained.code == 0, trained.err
     assert json.loads(trained.out)["steps"] == 4
 
-    grid = FreezeGrid(fields=3, wavelengths=3, rays=512, max_side_px=65, energy=0.97)
-    frozen = freeze(lens, read_recipe(tmp_path / "tiny.toml").camera, grid)
+    grid = FreezeGrid(fields=3, wavelengths=3, max_side_px=65, energy=0.97)
+    optics = LensOptics(lens=lens, rays=512)
+    frozen = freeze(optics, read_recipe(tmp_path / "tiny.toml").sensor, grid)
     write_psf(tmp_path / "runs" / "psf.safetensors", frozen.psf)
     again = camkit_command("train", "tiny.toml", "--size", "S", "--workers", "0")
     assert (again.code, "--resume to go on or --overwrite" in again.err) == (2, True)

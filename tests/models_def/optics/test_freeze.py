@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.bundle.camera import Camera
 from camkit.bundle.psf_file import read_psf
+from camkit.bundle.sensor import BayerSensor, nested_sensor
 from camkit.bundle.stages import Wiener
 from camkit.errors import ContractError
 from camkit.models_def.optics import freeze as freeze_module
 from camkit.models_def.optics import sampling
 from camkit.models_def.optics.freeze import between_mm, choose_depths
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
+from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.optics.sampling import (
     Bench,
@@ -27,8 +28,12 @@ from camkit.models_def.optics.sampling import (
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
 DUET = MODELS / "prescriptions" / "duet.toml"
 SETTINGS = Wiener(prior_scale=3e-4, prior_exponent=2.5)
-SMALL = FreezeGrid(rays=400)
+SMALL = FreezeGrid()
 DEPTHS_MM = (2e4, 3e4, 6e4, math.inf)
+
+
+def duet(rays: int = 400) -> LensOptics:
+    return LensOptics(lens=read_prescription(DUET), rays=rays)
 
 
 def _shrink(patch: pytest.MonkeyPatch) -> None:
@@ -40,27 +45,24 @@ def _shrink(patch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def camera() -> Camera:
+def sensor() -> BayerSensor:
     table = tomllib.loads((MODELS / "recipes" / "duet.toml").read_text())
-    return Camera.model_validate(table["camera"])
+    return BayerSensor.model_validate(nested_sensor(table["sensor"]))
 
 
 @pytest.fixture(scope="module")
-def bench(camera: Camera) -> Bench:
+def bench(sensor: BayerSensor) -> Bench:
     patch = pytest.MonkeyPatch()
     _shrink(patch)
-    made = make_bench(
-        read_prescription(DUET), camera, SETTINGS, copies=1, grid=replace(SMALL, rays=500)
-    )
+    made = make_bench(duet(500), sensor, SETTINGS, copies=1, grid=SMALL)
     patch.undo()
     return made
 
 
-def test_coarse_samples_lose_more_than_dense_ones(camera: Camera, bench: Bench) -> None:
-    lens = read_prescription(DUET)
+def test_coarse_samples_lose_more_than_dense_ones(sensor: BayerSensor, bench: Bench) -> None:
     coarse, dense = (
         frozen_loss(
-            freeze(lens, camera, replace(SMALL, fields=grid[0], wavelengths=grid[1])).psf, bench
+            freeze(duet(), sensor, replace(SMALL, fields=grid[0], wavelengths=grid[1])).psf, bench
         ).mean_db
         for grid in ((3, 3), (17, 7))
     )
@@ -84,7 +86,7 @@ def test_block_losses_are_measured_where_the_block_answers(bench: Bench) -> None
 
 
 def test_freezing_writes_the_psf_and_reports_what_it_cost(
-    camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sensor: BayerSensor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _shrink(monkeypatch)
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (5, 9))
@@ -92,10 +94,10 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
     out = tmp_path / "psf.safetensors"
     said: list[str] = []
-    report = freeze_module.freeze_prescription(
-        DUET,
+    report = freeze_module.freeze_optics(
+        duet(),
         out,
-        camera=camera,
+        sensor=sensor,
         settings=SETTINGS.model_copy(update={"block_px": 384}),
         limit_db=20.0,
         grid=SMALL,
@@ -109,16 +111,17 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
     assert psf.kernels.shape[-1] == report.side_px
     assert report.energy_kept >= 0.995
     assert report.loss_db <= 20.0
-    assert json.loads(json.dumps(report.to_json()))["block_px"] == 384
+    told = json.loads(json.dumps(report.to_json()))
+    assert (told["block_px"], told["efl_mm"]) == (384, pytest.approx(50, abs=0.1))
 
 
 def test_loss_that_no_grid_can_keep_is_an_error(
-    camera: Camera, bench: Bench, monkeypatch: pytest.MonkeyPatch
+    sensor: BayerSensor, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(freeze_module, "FIELD_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     with pytest.raises(ContractError, match="more than the allowed"):
-        freeze_module.choose_grid(read_prescription(DUET), camera, bench, limit_db=1e-4, grid=SMALL)
+        freeze_module.choose_grid(duet(), sensor, bench, limit_db=1e-4, grid=SMALL)
 
 
 @pytest.mark.parametrize(
@@ -145,12 +148,11 @@ def test_cheapest_block_grid_that_loses_little_is_taken(
 
 
 @pytest.fixture(scope="module")
-def deep(camera: Camera) -> Bench:
+def deep(sensor: BayerSensor) -> Bench:
     with pytest.MonkeyPatch.context() as patch:
         _shrink(patch)
-        lens = read_prescription(DUET)
-        grid = FreezeGrid(rays=300, depths_mm=DEPTHS_MM)
-        return make_bench(lens, camera, SETTINGS, copies=1, grid=grid)
+        grid = FreezeGrid(depths_mm=DEPTHS_MM)
+        return make_bench(duet(300), sensor, SETTINGS, copies=1, grid=grid)
 
 
 def test_as_few_depths_between_the_ends_are_kept_as_the_loss_allows(deep: Bench) -> None:
@@ -189,7 +191,7 @@ def test_half_way_is_half_way_in_diopters() -> None:
 
 
 def test_freezing_at_several_depths_reports_those_kept_and_the_loss_between(
-    camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sensor: BayerSensor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _shrink(monkeypatch)
     monkeypatch.setattr(sampling, "PATCH_PX", 192)
@@ -197,12 +199,12 @@ def test_freezing_at_several_depths_reports_those_kept_and_the_loss_between(
     monkeypatch.setattr(freeze_module, "WAVELENGTH_COUNTS", (3,))
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160),))
     out = tmp_path / "psf.safetensors"
-    report = freeze_module.freeze_prescription(
-        DUET,
+    report = freeze_module.freeze_optics(
+        duet(200),
         out,
-        camera=camera,
+        sensor=sensor,
         limit_db=20.0,
-        grid=FreezeGrid(rays=200, depths_mm=(2e4, 4e4, math.inf)),
+        grid=FreezeGrid(depths_mm=(2e4, 4e4, math.inf)),
     )
     psf = read_psf(out)
     assert psf.depths_mm.tolist() == list(report.depths_mm) == [2e4, math.inf]
@@ -212,12 +214,13 @@ def test_freezing_at_several_depths_reports_those_kept_and_the_loss_between(
 
 
 def test_without_depths_a_lens_is_frozen_at_its_own_distance(
-    camera: Camera, monkeypatch: pytest.MonkeyPatch
+    sensor: BayerSensor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    near = replace(read_prescription(DUET), object_distance_mm=3e4)
+    lens = replace(read_prescription(DUET), object_distance_mm=3e4)
+    near = LensOptics(lens=lens, rays=100)
     monkeypatch.setattr(sampling, "PLACES", 1)
     monkeypatch.setattr(sampling, "TRUE_WAVELENGTHS", 1)
-    bench = make_bench(near, camera, SETTINGS, copies=0, grid=FreezeGrid(rays=100))
+    bench = make_bench(near, sensor, SETTINGS, copies=0)
     assert (bench.depths_mm, bench.focus_mm) == ((3e4,), 3e4)
-    grid = FreezeGrid(rays=100, fields=2, wavelengths=1, energy=0.9)
-    assert freeze(near, camera, grid).psf.depths_mm.tolist() == [3e4]
+    grid = FreezeGrid(fields=2, wavelengths=1, energy=0.9)
+    assert freeze(near, sensor, grid).psf.depths_mm.tolist() == [3e4]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.bundle.camera import Camera, ChannelResponse, IsoNoise
 from camkit.bundle.psf_file import read_psf, write_psf
+from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, IsoNoise
 from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
@@ -21,21 +21,25 @@ from camkit.models_def.optics.frozen import (
 )
 from camkit.models_def.optics.kernel_bank import ChannelResponse as ChannelShares
 from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_response
+from camkit.models_def.optics.lens_optics import LensOptics
+from camkit.models_def.optics.optics import grid_layout, radial_layout
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.sensors.psf import color_kernels, wavelength_weights
 
 DUET = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
 WAVES = np.linspace(0.42, 0.68, 14)
-SMALL = FreezeGrid(fields=3, wavelengths=5, rays=400, energy=0.99)
+SMALL = FreezeGrid(fields=3, wavelengths=5, energy=0.99)
+
+
+def duet(rays: int = 400) -> LensOptics:
+    return LensOptics(lens=read_prescription(DUET), rays=rays)
 
 
 @pytest.fixture(scope="module")
-def camera() -> Camera:
+def sensor() -> BayerSensor:
     response = gaussian_response(WAVES).response
-    return Camera(
-        width_px=6000,
-        height_px=4000,
-        pixel_pitch_um=5.96,
+    return BayerSensor(
+        extent=Extent(width_px=6000, height_px=4000, pixel_pitch_um=5.96),
         cfa="RGGB",
         black_level=256,
         white_level=4095,
@@ -43,40 +47,39 @@ def camera() -> Camera:
         noise=(IsoNoise(iso=100, gain_e_per_dn=11.72, read_noise_e=3.0),),
         channel_response=ChannelResponse(
             wavelengths_um=tuple(WAVES),
-            response=tuple(tuple(row) for row in response),  # type: ignore[arg-type]
+            response=tuple(tuple(row) for row in response),
             source="model",
         ),
         color_matrix=((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     )
 
 
-def test_corner_is_half_the_diagonal(camera: Camera) -> None:
-    assert corner_height_mm(camera) == pytest.approx(21.489, abs=1e-3)
+def test_corner_is_half_the_diagonal(sensor: BayerSensor) -> None:
+    assert corner_height_mm(sensor) == pytest.approx(21.489, abs=1e-3)
 
 
-def test_frozen_psf_round_trips_through_its_file(camera: Camera, tmp_path: Path) -> None:
-    frozen = freeze(read_prescription(DUET), camera, SMALL)
+def test_frozen_psf_round_trips_through_its_file(sensor: BayerSensor, tmp_path: Path) -> None:
+    frozen = freeze(duet(), sensor, SMALL)
     write_psf(tmp_path / "psf.safetensors", frozen.psf)
     back = read_psf(tmp_path / "psf.safetensors")
     assert np.array_equal(back.kernels, frozen.psf.kernels)
     assert np.array_equal(back.relative_illumination, frozen.psf.relative_illumination)
-    assert back.field_heights_mm[-1] == corner_height_mm(camera)
+    assert back.field_heights_mm[-1] == corner_height_mm(sensor)
     assert frozen.energy_kept >= SMALL.energy
 
 
-def test_kernel_side_is_the_smallest_that_holds_the_light(camera: Camera) -> None:
-    lens = read_prescription(DUET)
+def test_kernel_side_is_the_smallest_that_holds_the_light(sensor: BayerSensor) -> None:
     sides = [
-        freeze(lens, camera, replace(SMALL, energy=energy)).psf.kernels.shape[-1]
+        freeze(duet(), sensor, replace(SMALL, energy=energy)).psf.kernels.shape[-1]
         for energy in (0.9, 0.99)
     ]
     assert sides[0] < sides[1] < SMALL.max_side_px
     assert all(side % 2 == 1 for side in sides)
 
 
-def test_window_too_small_for_the_light_is_refused(camera: Camera) -> None:
+def test_window_too_small_for_the_light_is_refused(sensor: BayerSensor) -> None:
     with pytest.raises(ContractError, match="hold"):
-        freeze(read_prescription(DUET), camera, replace(SMALL, max_side_px=61))
+        freeze(duet(), sensor, replace(SMALL, max_side_px=61))
 
 
 @pytest.mark.parametrize(
@@ -95,17 +98,17 @@ def test_impossible_grid_is_refused(wrong: dict) -> None:
         FreezeGrid(**wrong)
 
 
-def test_frozen_colours_equal_a_dense_trace(camera: Camera) -> None:
+def test_frozen_colours_equal_a_dense_trace(sensor: BayerSensor) -> None:
     """Five stored wavelengths give the camera's colours as 27 traced ones do."""
-    lens = read_prescription(DUET)
     heights = np.array([0.0, 12.0])
-    psf = freeze_at(lens, camera, replace(SMALL, energy=0.9995), heights).psf
-    found = color_kernels(psf, *camera.channel_response.to_arrays()).numpy()
+    fields = radial_layout(heights)
+    psf = freeze_at(duet(), sensor, replace(SMALL, energy=0.9995), fields).psf
+    found = color_kernels(psf, *sensor.response_arrays()).kernels.numpy()
     waves = np.linspace(0.42, 0.68, 27)
-    weights = wavelength_weights(waves, *camera.channel_response.to_arrays())
+    weights = wavelength_weights(waves, *sensor.response_arrays())
     dense = ChannelShares(wavelengths_um=waves, response=weights, source="camera")
     expected, _ = colour_kernels(
-        lens, dense, heights, size_px=psf.kernels.shape[-1], pitch_um=5.96, rays=400
+        duet().lens, dense, heights, size_px=psf.kernels.shape[-1], pitch_um=5.96, rays=400
     )
     apart = np.abs(found - expected).sum((-2, -1))
     assert apart.max() < 0.05
@@ -120,8 +123,8 @@ def test_kernels_are_rounded_to_what_a_picture_shows() -> None:
     assert not _rounded(np.zeros((1, 1), np.float32)).any()
 
 
-def test_one_wavelength_can_be_frozen(camera: Camera) -> None:
-    psf = freeze(read_prescription(DUET), camera, replace(SMALL, wavelengths=1, energy=0.9)).psf
+def test_one_wavelength_can_be_frozen(sensor: BayerSensor) -> None:
+    psf = freeze(duet(), sensor, replace(SMALL, wavelengths=1, energy=0.9)).psf
     assert psf.wavelengths_um.tolist() == [0.54]
 
 
@@ -130,8 +133,8 @@ def test_dense_grid_doubles_fields_and_triples_wavelengths() -> None:
     assert (dense.fields, dense.wavelengths) == (25, 19)
 
 
-def test_stress_kernels_spread_as_the_object_comes_near(camera: Camera) -> None:
-    stress = freeze_stress(read_prescription(DUET), camera, replace(SMALL, rays=300)).psf
+def test_stress_kernels_spread_as_the_object_comes_near(sensor: BayerSensor) -> None:
+    stress = freeze_stress(duet(300), sensor, SMALL).psf
     assert math.isinf(stress.depths_mm[-1])
     centre = torch.from_numpy(stress.kernels[0, :, 1])
     side = centre.shape[-1]
@@ -150,13 +153,13 @@ def test_stress_distances_lie_around_those_of_the_design() -> None:
 
 
 def test_between_depths_kernels_follow_one_over_distance_better_than_distance(
-    camera: Camera,
+    sensor: BayerSensor,
 ) -> None:
     near_mm, far_mm = 2e4, 4e4
     for share in (0.25, 0.5, 0.75):
         there_mm = 1 / (share / near_mm + (1 - share) / far_mm)
         grid = replace(SMALL, depths_mm=(near_mm, there_mm, far_mm), energy=0.98)
-        traced = freeze(read_prescription(DUET), camera, grid).psf.kernels.astype(float)
+        traced = freeze(duet(), sensor, grid).psf.kernels.astype(float)
         by_distance = (far_mm - there_mm) / (far_mm - near_mm)
         errors = [
             np.square(s * traced[:, 0] + (1 - s) * traced[:, 2] - traced[:, 1]).sum()
@@ -165,3 +168,15 @@ def test_between_depths_kernels_follow_one_over_distance_better_than_distance(
         assert errors[0] < 0.8 * errors[1]
         signal = np.square(traced[:, 1]).sum()
         assert errors[0] < 0.1**2 * signal
+
+
+def test_a_lens_gives_a_row_of_distortion_for_each_channel(sensor: BayerSensor) -> None:
+    one, five = (duet().distortion(corner_height_mm(sensor), n).coefficients for n in (1, 5))
+    assert one.shape == (1, 4)
+    np.testing.assert_array_equal(five, np.tile(one, (5, 1)))
+
+
+def test_a_lens_is_not_traced_off_the_y_axis() -> None:
+    places = grid_layout(np.array([1.0]), np.array([0.0, 1.0]))
+    with pytest.raises(ContractError, match="along \\+y"):
+        duet().kernels(places, WAVES, depth_mm=math.inf, side_px=31, pitch_um=6.0)

@@ -6,7 +6,10 @@ from tests.data_folder import data_path
 
 
 def test_procedural_training_is_said_to_be_that(recipe):
-    assert describe_data(recipe, None) == "2 procedural scenes (camkit.scenes) only; no photographs"
+    assert (
+        describe_data(recipe.data, None)
+        == "2 procedural scenes (camkit.scenes) only; no photographs"
+    )
 
 
 def test_licences_are_counted_from_the_table(recipe, tmp_path):
@@ -19,14 +22,14 @@ def test_licences_are_counted_from_the_table(recipe, tmp_path):
         "| `gone.png` | G | y | CC-BY | s |",
     ]
     (tmp_path / "README.md").write_text("\n".join(rows), encoding="utf-8")
-    text = describe_data(recipe, tmp_path)
+    text = describe_data(recipe.data, tmp_path)
     assert "3 photographs" in text
     assert "CC0-1.0: 2" in text
     assert "CC-BY" not in text
 
 
 def test_every_picture_of_the_training_set_has_a_licence(recipe):
-    text = describe_data(recipe, data_path("train_open"))
+    text = describe_data(recipe.data, data_path("train_open"))
     counts = [
         int(part.rsplit(": ", 1)[1].split(")")[0])
         for part in text.split("licences ")[1].split(", ")

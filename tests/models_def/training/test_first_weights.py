@@ -49,7 +49,7 @@ def test_networks_of_a_built_in_bundle_can_be_trained_further(bundle, size):
     first = read_first_weights(Path(bundle), size)
     network = build_network(f"lean_{size.lower()}", bias=True)
     assert set(take_first_weights(network, first)) == set(network.state_dict())
-    graph = open_bundle(find_bundle(bundle)).network_bytes(size)
+    graph = open_bundle(find_bundle(bundle)).network_bytes("restore", size)
     assert equal(state_of_onnx(graph), network.state_dict())
     assert first.credit("other pictures").startswith(f"; first weights: {bundle} {size}, trained ")
     assert first.credit(first.training_data).endswith("trained on the same")
@@ -58,7 +58,7 @@ def test_networks_of_a_built_in_bundle_can_be_trained_further(bundle, size):
 
 
 def test_bundle_without_the_size_names_those_it_has():
-    with pytest.raises(ContractError, match="no network of size 'full'; it has: S, M"):
+    with pytest.raises(ContractError, match="no network of size 'full' for restore; it has: S, M"):
         read_first_weights(Path("duet-joint"), "full")
     with pytest.raises(BundleError, match="did you mean"):
         read_first_weights(Path("duet-jiont"), "M")

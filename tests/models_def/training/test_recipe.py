@@ -1,146 +1,137 @@
-import tomllib
-from pathlib import Path
+"""The common tables of a recipe; those of a kind are tested beside it."""
 
 import pytest
 
-from camkit.errors import ContractError
-from camkit.models_def.training import recipe as module
+from camkit.bundle.sensor import PlanesSensor
+from camkit.errors import ContractError, UnsupportedError
+from camkit.models_def.training.kind import to_recipe, training_kind
 from camkit.models_def.training.recipe import (
-    differing_camera,
-    read_recipe,
-    samples_digest,
-    to_recipe,
+    DataRecipe,
+    Recipe,
+    common_tables,
+    differing_part,
+    with_new_names,
 )
+from camkit.models_def.training.refinement import refining_kind
 
-SHIPPED = Path(module.__file__).resolve().parents[1] / "recipes" / "duet.toml"
-
-
-def table(recipe_path, **changes):
-    content = tomllib.loads(recipe_path.read_text(encoding="utf-8"))
-    for dotted, value in changes.items():
-        *path, last = dotted.split("__")
-        place = content
-        for part in path:
-            place = place.setdefault(part, {})
-        if value is None:
-            del place[last]
-        else:
-            place[last] = value
-    return content
-
-
-def test_shipped_recipe_has_its_networks_and_the_stated_sensor():
-    recipe = read_recipe(SHIPPED)
-    assert set(recipe.networks) == {"S", "M", "L", "trimmed"}
-    camera = recipe.camera
-    assert (camera.width_px, camera.height_px, camera.pixel_pitch_um) == (6000, 4000, 5.96)
-    levels = camera.white_level - camera.black_level
-    full_well_e = camera.noise[0].gain_e_per_dn * levels
-    assert full_well_e == pytest.approx(camera.full_well_e, rel=1e-3)
+TABLE = {
+    "name": "grey",
+    "kind": "toy",
+    "sensor": {
+        "channels": ["Y"],
+        "black_level": 0.0,
+        "white_level": 255.0,
+        "full_well_e": 1000.0,
+        "noise": [{"iso": 100.0, "gain_e_per_dn": 4.0, "read_noise_e": 1.0}],
+    },
+    "schedule": {"steps": 9},
+    "networks": {"first": {"S": {"network": "a"}}, "second": {"S": {"network": "b"}}},
+}
+ROLES = ("first", "second")
 
 
-def test_network_schedule_overrides_the_common_one(recipe):
-    assert recipe.network("S").schedule.steps == 12
-    assert recipe.network("M").schedule.steps == 60
-    assert recipe.network("M").schedule.batch == 2
+def made(roles=ROLES, **changes):
+    common = common_tables(TABLE | changes, own=(), roles=roles)
+    return Recipe(
+        name=common.name,
+        kind=common.kind,
+        sensor=common.sensor,
+        data=DataRecipe(),
+        networks=common.networks,
+    )
+
+
+def test_networks_are_found_by_role_and_size():
+    recipe = made()
+    assert isinstance(recipe.sensor, PlanesSensor)
+    assert recipe.network("S", "second").network == "b"
+    assert recipe.network("S", "first").schedule.steps == 9
+    with pytest.raises(ContractError, match="roles first, second; say which"):
+        recipe.network("S")
+    with pytest.raises(ContractError, match="of the role first, second; not 'third'"):
+        recipe.network("S", "third")
+    with pytest.raises(ContractError, match="sizes S; got 'M'"):
+        recipe.network("M", "first")
+
+
+def test_a_kind_of_one_role_needs_not_name_it():
+    sizes = {"S": {"network": "a"}, "M": {"network": "b", "schedule": {"steps": 3}}}
+    for networks in (sizes, {"first": sizes}):
+        recipe = made(roles=("first",), networks=networks)
+        assert recipe.network("M").schedule.steps == 3
+        assert recipe.role(None) == "first"
 
 
 @pytest.mark.parametrize(
-    ("change", "value", "named"),
+    ("networks", "message"),
     [
-        ("colour", 1, "recipe: unknown key 'colour'"),
-        ("data__sampel_px", 64, "data: unknown key 'sampel_px'"),
-        ("data__sample_px", 64.5, "data.sample_px must be of type int"),
-        ("data__picture_share", 1.5, "data.picture_share must lie in 0..1"),
-        ("data__drift_share", -0.1, "data.drift_share must lie in 0..1"),
-        ("data__drift_scale", 0.5, "data.drift_scale must be in"),
-        ("schedule__loss", "l3", "schedule.loss must be one of"),
-        ("schedule__precision", "float8", "schedule.precision must be one of"),
-        ("schedule__steps", True, "schedule.steps must be of type int"),
-        ("lens__prescription", None, "lens lacks prescription"),
-        ("camera__width_px", -1, "camera.width_px"),
-        ("camera__shape", 3, "camera.shape"),
-        ("wiener__prior_scale", None, "wiener.prior_scale"),
-        ("networks__S__netwrok", "x", "networks.S: unknown key"),
-        ("networks", {}, "at least one table"),
-        ("name", None, "name must be of type str"),
+        ({"S": {"network": "a"}}, r"networks\.S is of no role; write \[networks\.ROLE\.S\]"),
+        ({"third": {"S": {"network": "a"}}}, r"networks\.third is of no role"),
+        ({"first": {"S": 3}}, r"networks\.first\.S must be a table"),
+        ({"first": {"S": {}}}, r"networks\.first\.S\.network must be of type str"),
+        ({"first": {"S": {"network": "a", "schedule": 3}}}, r"schedule must be a table"),
+        ({"first": 3}, r"networks\.first must be a table"),
+        ([], "at least one table"),
     ],
 )
-def test_wrong_recipes_are_refused_by_naming_the_key(recipe_path, change, value, named):
-    with pytest.raises(ContractError, match=named):
-        to_recipe(table(recipe_path, **{change: value}))
-
-
-def test_recipes_of_old_checkpoints_have_fine_tuning_under_its_older_name(recipe_path):
-    text = recipe_path.read_text(encoding="utf-8")
-    settings = "\npixel_weight = 0.006\nschedule = { steps = 7 }\n"
-    older = to_recipe(tomllib.loads(text + "[final]" + settings))
-    today = to_recipe(tomllib.loads(text + "[fine_tuning]" + settings))
-    assert older == today
-    assert (older.fine_tuning.pixel_weight, older.fine_tuning.schedule.steps) == (0.006, 7)
-
-
-def test_fine_tuning_under_both_names_is_refused(recipe_path):
-    with pytest.raises(ContractError, match="final is the older name of fine_tuning"):
-        to_recipe(table(recipe_path, final={}, fine_tuning={}))
-
-
-def test_unknown_size_is_refused_with_those_there_are(recipe):
-    with pytest.raises(ContractError, match="S, M; got 'XL'"):
-        recipe.network("XL")
-
-
-def test_missing_and_broken_files_are_refused(tmp_path):
-    with pytest.raises(ContractError, match="cannot read recipe"):
-        read_recipe(tmp_path / "none.toml")
-    broken = tmp_path / "broken.toml"
-    broken.write_text("name = ", encoding="utf-8")
-    with pytest.raises(ContractError, match="not valid TOML"):
-        read_recipe(broken)
-
-
-def test_digest_follows_what_decides_the_samples_only(recipe_path, recipe):
-    same = to_recipe(table(recipe_path, schedule__steps=99))
-    other = to_recipe(table(recipe_path, wiener__prior_scale=1e-4))
-    assert samples_digest(same, 1) == samples_digest(recipe, 1)
-    assert samples_digest(other, 1) != samples_digest(recipe, 1)
-    assert samples_digest(recipe, 2) != samples_digest(recipe, 1)
-
-
-def test_training_may_differ_within_a_camera_but_nothing_else(recipe_path):
-    one = to_recipe(table(recipe_path))
-    longer = to_recipe(table(recipe_path, schedule__steps=99, data__iso_max=900.0))
-    assert differing_camera(one, longer) is None
-    assert differing_camera(one, to_recipe(table(recipe_path, scale=32.0))) == "scale"
-    assert differing_camera(one, to_recipe(table(recipe_path, wiener__overlap_px=16))) == "wiener"
-
-
-def test_depths_decide_the_samples_where_there_are_any(recipe_path):
-    deep = to_recipe(table(recipe_path, lens__depths_mm=[500, 1000.0]))
-    plain = to_recipe(table(recipe_path))
-    assert deep.lens.depths_mm == (500.0, 1000.0)
-    assert samples_digest(deep, 1) != samples_digest(plain, 1)
-    assert "depths_mm" not in plain.lens.to_json()
-    assert differing_camera(deep, plain) == "lens"
-
-
-@pytest.mark.parametrize("depths_mm", [[1000.0, 500.0], [0.0, 1.0], [700.0, 700.0]])
-def test_depths_that_do_not_increase_are_refused(recipe_path, depths_mm):
-    with pytest.raises(ContractError, match=r"lens\.depths_mm"):
-        to_recipe(table(recipe_path, lens__depths_mm=depths_mm))
-
-
-def test_only_several_depths_can_be_known(recipe_path):
-    with pytest.raises(ContractError, match="needs two or more"):
-        to_recipe(table(recipe_path, data__known_depth_share=0.5))
-    with pytest.raises(ContractError, match=r"must lie in 0\.\.1"):
-        to_recipe(table(recipe_path, data__known_depth_share=1.5))
+def test_networks_of_no_role_are_refused(networks, message):
+    with pytest.raises(ContractError, match=message):
+        made(networks=networks)
 
 
 @pytest.mark.parametrize(
-    ("shares", "message"),
-    [([1.0], "1 entries"), ([1.0, 0.0], "positive"), ([1.0, float("inf")], "finite")],
+    ("change", "message"),
+    [
+        ({"lens": {}}, "unknown key 'lens'"),
+        ({"sensor": {**TABLE["sensor"], "black_level": 300.0}}, "sensor: .*must lie above"),
+        ({"sensor": {**TABLE["sensor"], "width_px": 0}}, r"sensor\.width_px"),
+        ({"name": 3}, "name must be of type str"),
+    ],
 )
-def test_shares_of_depths_must_fit_the_depths(recipe_path, shares, message):
+def test_wrong_common_tables_are_refused_by_naming_the_key(change, message):
     with pytest.raises(ContractError, match=message):
-        to_recipe(table(recipe_path, lens__depths_mm=[500.0, 900.0], data__depth_shares=shares))
+        made(**change)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"first_samples": 9, "pool_samples": 9}, "between 0 and pool_samples"),
+        ({"picture_share": -0.1}, r"picture_share must lie in 0\.\.1"),
+        ({"scene_px": 0}, "must be positive"),
+    ],
+)
+def test_data_that_cannot_be_is_refused(change, message):
+    with pytest.raises(ContractError, match=message):
+        DataRecipe(**change)
+
+
+def test_older_names_are_taken_and_both_at_once_are_not():
+    assert with_new_names({"camera": 1, "name": 2}, {"camera": "sensor"}) == {
+        "sensor": 1,
+        "name": 2,
+    }
+    with pytest.raises(ContractError, match="camera is the older name of sensor"):
+        with_new_names({"camera": 1, "sensor": 2}, {"camera": "sensor"})
+
+
+def test_the_first_part_that_differs_is_named():
+    one, other = made(), made(name="other")
+    assert differing_part(one, one, ("kind", "name")) is None
+    assert differing_part(one, other, ("kind", "name")) == "name"
+
+
+def test_a_recipe_of_an_unknown_kind_is_refused():
+    with pytest.raises(UnsupportedError, match="no kind of camera 'toy'"):
+        to_recipe(TABLE)
+
+
+def test_what_a_kind_does_not_bring_is_said(monkeypatch):
+    from camkit.models_def.kinds import bayer
+
+    monkeypatch.delattr(bayer, "TRAINING")
+    monkeypatch.delattr(bayer, "REFINING")
+    with pytest.raises(UnsupportedError, match="cannot be trained"):
+        training_kind("bayer")
+    with pytest.raises(UnsupportedError, match="not fine-tuned"):
+        refining_kind("bayer")

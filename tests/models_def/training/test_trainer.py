@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, write_checkpoint
 from camkit.models_def.training.log import plot_logs, read_log
 from camkit.models_def.training.trainer import TrainOptions, train
@@ -17,16 +18,16 @@ def options(folder, **changes):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory, recipe_path, bank):
+def whole(tmp_path_factory, recipe_path, material):
     """Twelve steps in one go."""
-    return train(recipe_path, options(tmp_path_factory.mktemp("whole")), bank=bank)
+    return train(recipe_path, options(tmp_path_factory.mktemp("whole")), material=material)
 
 
 def test_resumed_training_equals_uninterrupted_training_to_the_last_bit(
-    tmp_path, recipe_path, bank, whole
+    tmp_path, recipe_path, material, whole
 ):
-    train(recipe_path, options(tmp_path, stop_at_step=6), bank=bank)
-    resumed = train(recipe_path, options(tmp_path, resume=True), bank=bank)
+    train(recipe_path, options(tmp_path, stop_at_step=6), material=material)
+    resumed = train(recipe_path, options(tmp_path, resume=True), material=material)
     one, two = read_checkpoint(whole.checkpoint), read_checkpoint(resumed.checkpoint)
     assert (one.step, two.step) == (12, 12)
     for part in ("weights", "average"):
@@ -41,15 +42,15 @@ def test_training_changes_the_weights_and_the_average_lags(whole):
     assert any(not torch.equal(saved.weights[n], saved.average[n]) for n in saved.weights)
 
 
-def test_loss_falls_on_a_tiny_run_without_any_picture(tmp_path, recipe_path, bank):
-    result = train(recipe_path, options(tmp_path, size="M"), bank=bank)
+def test_loss_falls_on_a_tiny_run_without_any_picture(tmp_path, recipe_path, material):
+    result = train(recipe_path, options(tmp_path, size="M"), material=material)
     assert result.steps == 60
-    assert result.valid_db > result.wiener_db + 0.05
+    assert result.valid_db > result.baselines["wiener"] + 0.05
     assert "no photographs" in read_checkpoint(result.checkpoint).training_data
 
 
-def test_the_time_budget_ends_a_run_with_its_decay(tmp_path, recipe_path, bank):
-    result = train(recipe_path, options(tmp_path, size="M", max_minutes=1e-4), bank=bank)
+def test_the_time_budget_ends_a_run_with_its_decay(tmp_path, recipe_path, material):
+    result = train(recipe_path, options(tmp_path, size="M", max_minutes=1e-4), material=material)
     assert result.steps < 60
 
 
@@ -62,13 +63,13 @@ def test_log_tells_steps_seconds_and_quality_and_can_be_drawn(whole, tmp_path):
     assert (tmp_path / "chart.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_resumed_log_has_each_step_once(tmp_path, recipe_path, bank):
-    train(recipe_path, options(tmp_path, stop_at_step=6), bank=bank)
+def test_resumed_log_has_each_step_once(tmp_path, recipe_path, material):
+    train(recipe_path, options(tmp_path, stop_at_step=6), material=material)
     saved = tmp_path / "tiny_S.pt"
     early = saved.read_bytes()
-    train(recipe_path, options(tmp_path, resume=True), bank=bank)
+    train(recipe_path, options(tmp_path, resume=True), material=material)
     saved.write_bytes(early)
-    resumed = train(recipe_path, options(tmp_path, resume=True), bank=bank)
+    resumed = train(recipe_path, options(tmp_path, resume=True), material=material)
     steps = [e["step"] for e in read_log(resumed.log) if "valid_by_iso" in e]
     assert steps == [6, 12]
 
@@ -83,30 +84,30 @@ def test_broken_log_is_refused(tmp_path):
         read_log(path)
 
 
-def test_checkpoint_with_other_kernels_is_not_resumed(tmp_path, recipe_path, bank):
-    train(recipe_path, options(tmp_path, stop_at_step=1), bank=bank)
+def test_checkpoint_with_other_kernels_is_not_resumed(tmp_path, recipe_path, material):
+    train(recipe_path, options(tmp_path, stop_at_step=1), material=material)
     other = gaussian_bank(sensor_height_mm=2.0, axis_px=0.9, corner_px=1.7)
     with pytest.raises(ContractError, match="other kernels"):
-        train(recipe_path, options(tmp_path, resume=True), bank=other)
+        train(recipe_path, options(tmp_path, resume=True), material=BayerMaterial(bank=other))
 
 
 def test_weights_of_another_camera_are_the_first_ones_and_the_card_says_so(
-    tmp_path, recipe_path, bank, whole
+    tmp_path, recipe_path, material, whole
 ):
     begun = options(tmp_path, start=whole.checkpoint, stop_at_step=1)
-    train(recipe_path, begun, bank=bank)
+    train(recipe_path, begun, material=material)
     first, saved = read_checkpoint(whole.checkpoint), read_checkpoint(tmp_path / "tiny_S.pt")
     moved = max(float((saved.weights[k] - v).abs().max()) for k, v in first.average.items())
     assert 0 < moved < 1.1e-3  # one step away, of half the rate
     assert saved.step == 1
     assert saved.training_data.endswith("; first weights: tiny S, trained on the same")
-    train(recipe_path, options(tmp_path, resume=True, stop_at_step=2), bank=bank)
+    train(recipe_path, options(tmp_path, resume=True, stop_at_step=2), material=material)
     assert read_checkpoint(tmp_path / "tiny_S.pt").training_data == saved.training_data
 
 
-def test_weights_of_another_network_are_refused(tmp_path, recipe_path, bank, whole):
+def test_weights_of_another_network_are_refused(tmp_path, recipe_path, material, whole):
     with pytest.raises(ContractError, match="holds another network than the recipe's"):
-        train(recipe_path, options(tmp_path, start=whole.checkpoint, size="M"), bank=bank)
+        train(recipe_path, options(tmp_path, start=whole.checkpoint, size="M"), material=material)
     with pytest.raises(ContractError, match="has begun"):
         options(tmp_path, start=whole.checkpoint, resume=True)
 
@@ -151,13 +152,13 @@ def test_interrupted_write_keeps_the_old_checkpoint(tmp_path, whole, monkeypatch
     assert read_checkpoint(path).step == 12
 
 
-def test_a_finished_run_is_not_replaced_unasked(tmp_path, recipe_path, bank, whole):
+def test_a_finished_run_is_not_replaced_unasked(tmp_path, recipe_path, material, whole):
     there = options(whole.checkpoint.parent, stop_at_step=1)
     with pytest.raises(ContractError, match="is there already: give --resume"):
-        train(recipe_path, there, bank=bank)
+        train(recipe_path, there, material=material)
     assert read_checkpoint(whole.checkpoint).step == 12
     for _ in range(2):
-        train(recipe_path, options(tmp_path, stop_at_step=1, overwrite=True), bank=bank)
+        train(recipe_path, options(tmp_path, stop_at_step=1, overwrite=True), material=material)
     with pytest.raises(ContractError, match="say one"):
         options(tmp_path, resume=True, overwrite=True)
 

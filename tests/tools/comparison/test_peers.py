@@ -4,6 +4,7 @@ from skimage import restoration
 
 from camkit.errors import ContractError
 from camkit.runtime.bank.blocks import LocalPsf, to_otf
+from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.bank.richardson_lucy import apply_transfer
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from tests.psf_factory import ISO_100, gaussian_kernel, texture
@@ -20,8 +21,9 @@ GOOD: dict[str, Setting] = {
 def local_psf(kernels: np.ndarray, width: int, height: int, origin_px: tuple[int, int]) -> LocalPsf:
     """The same kernels at both ends of the field of a 1000 x 800 px sensor."""
     return LocalPsf(
-        kernels=np.stack([kernels, kernels]),
-        field_heights_mm=np.array([0.0, 10.0]),
+        kernels=FieldKernels(
+            kernels=np.stack([kernels, kernels]), field_heights_mm=np.array([0.0, 10.0])
+        ),
         window=SensorWindow(
             size_px=(width, height), origin_px=origin_px, sensor_size_px=(1000, 800), pitch_um=6.0
         ),
@@ -78,12 +80,9 @@ def test_a_one_sided_blur_is_undone_in_every_quadrant(name: str, corner: tuple[i
     sign_x, sign_y = corner
     tail = comet if sign_y > 0 else comet[:, ::-1]
     picture = blurred(texture(2 * SIDE, 2 * SIDE), np.ascontiguousarray(tail))
-    window = local_psf(comet, SIDE, SIDE, (452 + 2 * sign_x, 352 + 340 * sign_y)).window
     capture = LocalCapture(
         planes=np.ascontiguousarray(picture[:, 40 : 40 + SIDE, 50 : 50 + SIDE]),
-        psf=LocalPsf(
-            kernels=np.stack([comet, comet]), field_heights_mm=np.array([0.0, 10.0]), window=window
-        ),
+        psf=local_psf(comet, SIDE, SIDE, (452 + 2 * sign_x, 352 + 340 * sign_y)),
         noise=ISO_100,
         saturated=None,
     )
@@ -94,7 +93,7 @@ def test_a_one_sided_blur_is_undone_in_every_quadrant(name: str, corner: tuple[i
 def test_richardson_lucy_is_that_of_scikit_image() -> None:
     capture = blurred_capture()
     restored = PEERS["skimage_rl"].restore(capture, (6.0,))
-    kernel = capture.psf.kernels[0]
+    kernel = capture.psf.kernels.kernels[0]
     padded = np.pad(capture.planes, ((0, 0), (48, 48), (48, 48)), mode="reflect")
     for plane, spread, got in zip(padded, kernel, restored, strict=True):
         expected = restoration.richardson_lucy(np.maximum(plane, 0), spread, num_iter=6, clip=False)
@@ -105,7 +104,7 @@ def test_wiener_is_that_of_scikit_image() -> None:
     capture = blurred_capture()
     restored = PEERS["skimage_wiener"].restore(capture, (0.1,))
     padded = np.pad(capture.planes, ((0, 0), (48, 48), (48, 48)), mode="reflect")
-    for plane, spread, got in zip(padded, capture.psf.kernels[0], restored, strict=True):
+    for plane, spread, got in zip(padded, capture.psf.kernels.kernels[0], restored, strict=True):
         expected = restoration.wiener(plane, spread, 0.1, clip=False)
         np.testing.assert_allclose(got, expected[48:-48, 48:-48], atol=2e-4)
 

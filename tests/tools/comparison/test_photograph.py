@@ -65,5 +65,5 @@ def test_a_camera_of_several_depths_is_judged_at_its_focus(tmp_path: Path) -> No
     taken = photograph(SHOT, scene, deep, deep.psf)
     assert taken.simulation.depth_mm == 1000.0
     expected = deep.psf.kernels.mean(axis=1)[0, 0]
-    np.testing.assert_allclose(taken.local.psf.kernels[0, 1], expected, atol=1e-6)
+    np.testing.assert_allclose(taken.local.psf.kernels.kernels[0, 1], expected, atol=1e-6)
     assert judge(bundle_restorer(deep, method="wiener")(taken), taken.sharp).psnr_db > 15

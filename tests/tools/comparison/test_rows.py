@@ -4,8 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.bundle.manifest import Wiener
 from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.stages import Wiener
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError
 from camkit.report.quality import Shot
@@ -56,7 +57,7 @@ def test_identities_follow_lens_and_parameters(bundle: Bundle) -> None:
 def with_other_network(bundle: Bundle) -> Bundle:
     """The same camera, PSF and stages, with the network M trained anew."""
     manifest = bundle.manifest
-    name = bundle.network_facts("M").member
+    name = bundle.network_facts(DEFAULT_ROLE, "M").member
     member = manifest.members[name].model_copy(update={"sha256": "0" * 64})
     members = manifest.members | {name: member}
     return dataclasses.replace(bundle, manifest=manifest.model_copy(update={"members": members}))
@@ -95,12 +96,13 @@ def test_a_rival_of_another_camera_is_refused(bundle: Bundle, tmp_path: Path) ->
 
 
 def test_a_rival_without_a_clear_size_is_refused(bundle: Bundle) -> None:
-    facts = bundle.manifest.networks["M"]
-    manifest = bundle.manifest.model_copy(update={"networks": {"S": facts, "L": facts}})
+    facts = bundle.network_facts(DEFAULT_ROLE, "M")
+    networks = {DEFAULT_ROLE: {"S": facts, "L": facts}}
+    manifest = bundle.manifest.model_copy(update={"networks": networks})
     two = dataclasses.replace(bundle, manifest=manifest)
     with pytest.raises(ContractError, match="one size only"):
         _ = Rival(bundle=two, label="two").size
-    only = bundle.manifest.model_copy(update={"networks": {"S": facts}})
+    only = bundle.manifest.model_copy(update={"networks": {DEFAULT_ROLE: {"S": facts}}})
     assert Rival(bundle=dataclasses.replace(bundle, manifest=only), label="one").size == "S"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.contracts import FloatArray
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.plan.speed import Speed
@@ -55,7 +56,10 @@ def test_a_flat_half_is_saved_and_texture_everywhere_keeps_every_bit_of_exact(
     bundle: Bundle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     steady = Speed(
-        network_s_per_mp={"S": 0.2, "M": 0.5}, block_s=0.02, rest_s_per_mp=0.1, threads=1
+        network_s_per_mp={(DEFAULT_ROLE, "S"): 0.2, (DEFAULT_ROLE, "M"): 0.5},
+        block_s=0.02,
+        rest_s_per_mp=0.1,
+        threads=1,
     )
     monkeypatch.setattr(Reconstruction, "measured_speed", lambda *_: steady)
     half, textured = prove(bundle, iter([_scene(_half), _scene(_textured)]))

@@ -51,11 +51,12 @@ def test_export_without_a_frozen_psf_says_where_it_looked(
 
 def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> None:
     from camkit.models_def.training import trainer
+    from camkit.models_def.training.refinement import Refinement
 
     seen = []
 
     def fake(
-        recipe: Path, options: trainer.TrainOptions, *, refinement: trainer.Refinement | None
+        recipe: Path, options: trainer.TrainOptions, *, refinement: Refinement | None
     ) -> trainer.TrainResult:
         assert refinement is None
         seen.append((recipe, options))
@@ -65,25 +66,38 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
             steps=3,
             elapsed_s=1.0,
             cpu_s=1.0,
-            capture_db=20.0,
-            wiener_db=22.0,
+            baselines={"capture": 20.0, "wiener": 22.0},
             valid_db=24.0,
         )
 
     monkeypatch.setattr(trainer, "train", fake)
     outcome = camkit_command(
-        *("train", RECIPE, "--size", "S", "--data", "pictures", "--valid", "few", "--resume"),
+        *(
+            "train",
+            RECIPE,
+            "--size",
+            "S",
+            "--role",
+            "restore",
+            "--data",
+            "pictures",
+            "--valid",
+            "few",
+            "--resume",
+        ),
         *("--max-minutes", "2.5", "--out-dir", tmp_path, "--threads", "2", "--workers", "0"),
         "--json",
     )
     assert outcome.code == 0, outcome.err
-    assert json.loads(outcome.out)["valid_db"] == 24.0
+    told = json.loads(outcome.out)
+    assert (told["capture_db"], told["wiener_db"], told["valid_db"]) == (20.0, 22.0, 24.0)
     assert seen == [
         (
             RECIPE,
             trainer.TrainOptions(
                 out_dir=tmp_path,
                 size="S",
+                role="restore",
                 data_folder=Path("pictures"),
                 valid_folder=Path("few"),
                 max_minutes=2.5,
@@ -103,7 +117,7 @@ def test_a_missing_recipe_is_a_usage_error(camkit_command, tmp_path) -> None:
 
 def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monkeypatch) -> None:
     from camkit.models_def.optics import freeze as module
-    from camkit.models_def.optics.lens_file import lens_file
+    from camkit.models_def.optics import optics_file
     from tests.bundle_factory import tiny_psf
 
     report = module.FreezeReport(
@@ -117,21 +131,22 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
         block_px=512,
         overlap_px=160,
         block_loss_db=0.03,
-        efl_mm=50.0,
+        of_optics={"efl_mm": 50.0},
         corner_illumination=0.83,
     )
     seen = {}
 
-    def fake(path: Path, out: Path, **options: object) -> module.FreezeReport:
+    def fake(optics: object, out: Path, **options: object) -> module.FreezeReport:
+        assert optics == Path("lens.toml")
         seen.update(options)
         out.write_bytes(b"psf")
         return report
 
-    monkeypatch.setattr(module, "freeze_prescription", fake)
+    monkeypatch.setattr(module, "freeze_optics", fake)
     monkeypatch.setattr(
         module, "freeze_stress", lambda *_: module.Frozen(psf=tiny_psf(), energy_kept=1.0)
     )
-    monkeypatch.setattr(lens_file, "read_lens", lambda path: path)
+    monkeypatch.setattr(optics_file, "read_optics", lambda path: path)
     folder = tmp_path / "new"
     outcome = camkit_command(
         *("freeze", "lens.toml", "-o", folder / "psf.safetensors"),
@@ -144,7 +159,7 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
     assert json.loads(outcome.out) == json.loads((folder / "freeze.json").read_text())
     assert json.loads(outcome.out)["block_px"] == 512
     assert (folder / "stress.safetensors").stat().st_size > 100
-    assert seen["camera"].width_px == 6000, "the camera of the default recipe"
+    assert seen["sensor"].width_px == 6000, "the camera of the default recipe"
     assert seen["settings"].clip_iterations == 6, "its Wiener bank measures the loss"
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.training.psf_bank import read_bank, write_bank
+from camkit.models_def.kinds.bayer.psf_bank import read_bank, write_bank
 
 
 def test_bank_survives_the_disk(bank, tmp_path):

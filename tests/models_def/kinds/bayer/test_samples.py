@@ -5,15 +5,16 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.sensors.stabilise import unstabilise
-from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.samples import (
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.samples import (
+    LAYOUT,
     Exposure,
     corner_height_mm,
     draw_exposure,
-    make_sample,
+    make_shot,
     scene_side_px,
 )
+from camkit.models_def.sensors.stabilise import unstabilise
 from camkit.scenes import procedural_scene
 
 CENTRE = Exposure(x_mm=0.0, y_mm=0.0, block_x_mm=0.0, block_y_mm=0.0, copy=0, iso=100.0)
@@ -42,20 +43,20 @@ def grey(recipe, bank, value):
 def test_noise_of_stabilised_samples_is_half_over_scale_at_any_iso(recipe, sharp_bank, iso):
     exposure = replace(CENTRE, iso=iso)
     rng = np.random.default_rng(3)
-    sample = make_sample(grey(recipe, sharp_bank, 0.3), exposure, recipe, sharp_bank, rng)
-    noise = (sample.planes[:3] - sample.target).numpy()
+    shot = make_shot(grey(recipe, sharp_bank, 0.3), exposure, recipe, sharp_bank, rng)
+    noise = (shot.sample.inputs["capture"] - shot.sample.target).numpy()
     # The demosaic passes a third to all of the noise of a pixel: look where red was measured.
     assert noise[0, ::2, ::2].std() == pytest.approx(0.5 / recipe.scale, rel=0.08)
     assert abs(noise.mean()) < 0.1 * 0.5 / recipe.scale
 
 
-def with_wells(camera, factor):
-    """Give a camera whose pixels hold so many times the electrons."""
+def with_wells(sensor, factor):
+    """Give a sensor whose pixels hold so many times the electrons."""
     noise = tuple(
         entry.model_copy(update={"gain_e_per_dn": factor * entry.gain_e_per_dn})
-        for entry in camera.noise
+        for entry in sensor.noise
     )
-    return camera.model_copy(update={"noise": noise, "full_well_e": factor * camera.full_well_e})
+    return sensor.model_copy(update={"noise": noise, "full_well_e": factor * sensor.full_well_e})
 
 
 def test_without_blur_and_with_little_noise_the_target_is_the_capture(recipe, sharp_bank):
@@ -63,35 +64,35 @@ def test_without_blur_and_with_little_noise_the_target_is_the_capture(recipe, sh
     side = scene_side_px(recipe, sharp_bank)
     ramp = np.linspace(0.2, 0.6, side, dtype=np.float32)
     crop = np.stack([np.tile(ramp, (side, 1))] * 3)
-    quiet = replace(recipe, camera=with_wells(recipe.camera, 1e5))
-    sample = make_sample(crop, CENTRE, quiet, sharp_bank, np.random.default_rng(0))
-    top = float(sample.target.max())
-    assert float((sample.planes[:3] - sample.target).abs().max()) < 1e-3 * top
+    quiet = replace(recipe, sensor=with_wells(recipe.sensor, 1e5))
+    shot = make_shot(crop, CENTRE, quiet, sharp_bank, np.random.default_rng(0))
+    top = float(shot.sample.target.max())
+    assert float((shot.sample.inputs["capture"] - shot.sample.target).abs().max()) < 1e-3 * top
 
 
 def test_weight_takes_planes_to_the_root_of_the_signal(recipe, sharp_bank):
     rng = np.random.default_rng(0)
-    sample = make_sample(grey(recipe, sharp_bank, 0.25), CENTRE, recipe, sharp_bank, rng)
-    root = (sample.target * sample.weight[:, None, None]).mean((1, 2))
-    floor = torch.tensor(sample.noise.read_variance) / torch.tensor(sample.noise.shot)
+    shot = make_shot(grey(recipe, sharp_bank, 0.25), CENTRE, recipe, sharp_bank, rng)
+    root = (shot.sample.target * shot.sample.weight[:, None, None]).mean((1, 2))
+    floor = torch.tensor(shot.noise.read_variance) / torch.tensor(shot.noise.shot)
     assert torch.allclose(root, torch.sqrt(0.25 + floor), rtol=1e-4)
 
 
 def test_vignetting_is_in_capture_and_target_alike(recipe, sharp_bank):
     exposure = replace(CENTRE, x_mm=1.0, block_x_mm=1.0)
     rng = np.random.default_rng(0)
-    sample = make_sample(grey(recipe, sharp_bank, 0.4), exposure, recipe, sharp_bank, rng)
-    assert sample.illumination == pytest.approx(0.75)
-    gap = (sample.planes[:3] - sample.target).mean()
-    assert abs(float(gap)) < 1e-3 * float(sample.target.mean())
+    shot = make_shot(grey(recipe, sharp_bank, 0.4), exposure, recipe, sharp_bank, rng)
+    assert shot.illumination == pytest.approx(0.75)
+    gap = (shot.sample.inputs["capture"] - shot.sample.target).mean()
+    assert abs(float(gap)) < 1e-3 * float(shot.sample.target.mean())
 
 
 def test_clipped_highlights_are_not_judged(recipe, sharp_bank):
     crop = grey(recipe, sharp_bank, 0.3)
     middle = crop.shape[-1] // 2
     crop[:, middle - 3 : middle + 3, middle - 3 : middle + 3] = 3.0
-    sample = make_sample(crop, CENTRE, recipe, sharp_bank, np.random.default_rng(0))
-    lost = (sample.target < 0).numpy()
+    shot = make_shot(crop, CENTRE, recipe, sharp_bank, np.random.default_rng(0))
+    lost = (shot.sample.target < 0).numpy()
     half = recipe.data.sample_px // 2
     assert lost[:, half - 2 : half + 2, half - 2 : half + 2].all()
     assert lost.mean() < 0.05
@@ -100,30 +101,30 @@ def test_clipped_highlights_are_not_judged(recipe, sharp_bank):
 def test_blurred_samples_are_blurred_and_wiener_brings_them_closer(recipe, bank):
     crop = procedural_scene(8, scene_side_px(recipe, bank), scene_side_px(recipe, bank))
     crop = np.clip(crop, 0, 0.9)
-    sample = make_sample(crop, CENTRE, recipe, bank, np.random.default_rng(0))
-    capture = float((sample.planes[:3] - sample.target).square().mean())
-    wiener = float((sample.planes[3:] - sample.target).square().mean())
+    shot = make_shot(crop, CENTRE, recipe, bank, np.random.default_rng(0))
+    capture = float((shot.sample.inputs["capture"] - shot.sample.target).square().mean())
+    wiener = float((shot.sample.inputs["wiener"] - shot.sample.target).square().mean())
     assert wiener < 0.8 * capture
 
 
 def test_picture_borders_show_mirrored_content_and_leave_the_middle_alone(recipe, bank):
     crop = np.clip(procedural_scene(8, *[scene_side_px(recipe, bank)] * 2), 0, 0.9)
-    inside = make_sample(crop, CENTRE, recipe, bank, np.random.default_rng(0))
+    inside = make_shot(crop, CENTRE, recipe, bank, np.random.default_rng(0))
     border = replace(CENTRE, borders=(True, False, False, False))
-    edge = make_sample(crop, border, recipe, bank, np.random.default_rng(0))
-    assert torch.equal(edge.planes[:3, 4:], inside.planes[:3, 4:])
-    assert torch.equal(edge.target, inside.target)
-    change = (edge.planes[3:] - inside.planes[3:]).abs().mean((0, 2))
+    edge = make_shot(crop, border, recipe, bank, np.random.default_rng(0))
+    assert torch.equal(edge.sample.inputs["capture"][:, 4:], inside.sample.inputs["capture"][:, 4:])
+    assert torch.equal(edge.sample.target, inside.sample.target)
+    change = (edge.sample.inputs["wiener"] - inside.sample.inputs["wiener"]).abs().mean((0, 2))
     assert float(change[:8].mean()) > 4 * float(change[-16:].mean())
 
 
 def test_samples_depend_on_nothing_but_their_generator(recipe, bank):
     crop = procedural_scene(2, scene_side_px(recipe, bank), scene_side_px(recipe, bank))
-    first = make_sample(crop, CENTRE, recipe, bank, np.random.default_rng(4))
-    again = make_sample(crop, CENTRE, recipe, bank, np.random.default_rng(4))
-    other = make_sample(crop, CENTRE, recipe, bank, np.random.default_rng(5))
-    assert torch.equal(first.planes, again.planes)
-    assert not torch.equal(first.planes, other.planes)
+    first = make_shot(crop, CENTRE, recipe, bank, np.random.default_rng(4))
+    again = make_shot(crop, CENTRE, recipe, bank, np.random.default_rng(4))
+    other = make_shot(crop, CENTRE, recipe, bank, np.random.default_rng(5))
+    assert torch.equal(first.sample.stacked(LAYOUT), again.sample.stacked(LAYOUT))
+    assert not torch.equal(first.sample.stacked(LAYOUT), other.sample.stacked(LAYOUT))
 
 
 def test_drawn_exposures_stay_in_their_ranges(recipe, bank):
@@ -158,13 +159,13 @@ def test_the_filter_knows_the_depth_of_some_samples(recipe, bank):
     side = scene_side_px(some, deep)
     crop = np.random.default_rng(1).random((3, side, side), dtype=np.float32)
     planes = {
-        (depth, known): make_sample(
+        (depth, known): make_shot(
             crop,
             replace(drawn[0], copy=depth, depth_known=known),
             some,
             deep,
             np.random.default_rng(2),
-        ).planes
+        ).sample.stacked(LAYOUT)
         for depth in (0, 1)
         for known in (False, True)
     }
@@ -193,13 +194,15 @@ def spot_sample(recipe, bank, **changes):
     middle = crop.shape[1] // 2
     crop[:, middle, middle] = 20.0
     exposure = replace(CENTRE, iso=1e-3, **changes)
-    sample = make_sample(crop, exposure, recipe, bank, np.random.default_rng(0))
-    green = unstabilise(sample.planes[None, :3], *noise_of(sample), scale=recipe.scale)[0, 1]
+    shot = make_shot(crop, exposure, recipe, bank, np.random.default_rng(0))
+    green = unstabilise(shot.sample.inputs["capture"][None], *noise_of(shot), scale=recipe.scale)[
+        0, 1
+    ]
     return green.numpy().astype(np.float64)
 
 
-def noise_of(sample):
-    return torch.tensor(sample.noise.shot), torch.tensor(sample.noise.read_variance)
+def noise_of(shot):
+    return torch.tensor(shot.noise.shot), torch.tensor(shot.noise.read_variance)
 
 
 def spread(spot):
@@ -256,4 +259,4 @@ def test_as_many_samples_drift_as_the_recipe_says(recipe, bank):
 
 def test_crop_of_another_size_is_refused(recipe, bank):
     with pytest.raises(ContractError, match="a crop must be"):
-        make_sample(np.zeros((3, 8, 8), np.float32), CENTRE, recipe, bank, np.random.default_rng(0))
+        make_shot(np.zeros((3, 8, 8), np.float32), CENTRE, recipe, bank, np.random.default_rng(0))

@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.models_def.training import validation
-from camkit.models_def.training.samples import corner_height_mm
-from camkit.models_def.training.validation import (
+from camkit.models_def.kinds.bayer import validation
+from camkit.models_def.kinds.bayer.samples import corner_height_mm
+from camkit.models_def.kinds.bayer.validation import (
     FIELD_SHARES,
     ISOS,
+    BayerJudge,
     make_validation_captures,
-    score,
-    score_capture,
-    score_wiener,
     to_srgb,
 )
 
@@ -22,33 +20,39 @@ def captures(recipe, bank):
     return make_validation_captures(recipe, bank, None)
 
 
+@pytest.fixture(scope="module")
+def judge(recipe, captures):
+    return BayerJudge(captures=captures, recipe=recipe)
+
+
 def test_each_scene_is_taken_at_each_field_and_iso_by_the_unseen_copy(captures):
     places = {(c.field_share, c.iso) for c in captures}
     assert places == {(f, i) for f in FIELD_SHARES for i in ISOS}
 
 
 def test_the_target_itself_scores_far_above_everything(captures, recipe):
-    whole = [c for c in captures if bool((c.sample.target >= 0).all())]
-    targets = {id(c.sample.planes): c.sample.target for c in whole}
-    capture = whole[0]
-    values = to_srgb(targets[id(capture.sample.planes)], capture, recipe)
+    capture = next(c for c in captures if bool((c.shot.sample.target >= 0).all()))
+    values = to_srgb(capture.shot.sample.target, capture, recipe)
     assert np.abs(values - capture.sharp).max() < 2e-3
 
 
-def test_wiener_scores_above_the_capture(captures, recipe):
-    assert score_wiener(captures, recipe).mean_db > score_capture(captures, recipe).mean_db
+def test_wiener_scores_above_the_capture(judge):
+    baselines = judge.baselines()
+    assert list(baselines) == ["capture", "wiener"]
+    assert baselines["wiener"] > baselines["capture"]
 
 
-def test_score_means_agree_and_low_iso_is_easier(captures, recipe):
-    result = score_wiener(captures, recipe)
-    assert np.mean(list(result.by_iso.values())) == pytest.approx(result.mean_db)
-    assert np.mean(list(result.by_field.values())) == pytest.approx(result.mean_db)
-    assert result.by_iso[100.0] > result.by_iso[1600.0]
+def test_score_means_agree_and_low_iso_is_easier(judge):
+    result = judge.score(lambda planes: planes[:, 3:])
+    assert result.mean_db == judge.baselines()["wiener"]
+    for part in ("by_iso", "by_field"):
+        assert np.mean(list(result.parts[part].values())) == pytest.approx(result.mean_db)
+    assert result.parts["by_iso"]["100"] > result.parts["by_iso"]["1600"]
 
 
-def test_black_scores_far_below(captures, recipe):
-    black = score(captures, recipe, lambda planes: torch.zeros_like(planes[:, :3]))
-    assert black.mean_db < score_capture(captures, recipe).mean_db - 3
+def test_black_scores_far_below(judge):
+    black = judge.score(lambda planes: torch.zeros_like(planes[:, :3]))
+    assert black.mean_db < judge.baselines()["capture"] - 3
 
 
 def test_validation_goes_through_all_depths_of_the_unseen_copy_at_every_field(
@@ -60,7 +64,7 @@ def test_validation_goes_through_all_depths_of_the_unseen_copy_at_every_field(
         taken.append(exposure)
 
     monkeypatch.setattr(validation, "PROCEDURAL_PICTURES", 8)
-    monkeypatch.setattr(validation, "make_sample", note)
+    monkeypatch.setattr(validation, "make_shot", note)
     for depths in (1, 2, 5):
         taken.clear()
         deep = replace(bank, copies=np.repeat(bank.copies, depths, axis=0), depths=depths)

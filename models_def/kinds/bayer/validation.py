@@ -1,6 +1,6 @@
 """Validation: fixed captures of pictures that are never trained on, judged on sRGB values."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -12,17 +12,19 @@ from torch import Tensor
 
 from camkit.colorimetry import apply_matrix, camera_from_rec709, encode_srgb
 from camkit.contracts import FloatArray
-from camkit.models_def.sensors.stabilise import unstabilise
-from camkit.models_def.training.pictures import SCENE_SEED, list_pictures, read_picture, to_linear
-from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.recipe import Recipe
-from camkit.models_def.training.samples import (
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import (
+    LAYOUT,
     Exposure,
-    Sample,
+    Shot,
     corner_height_mm,
-    make_sample,
+    make_shot,
     scene_side_px,
 )
+from camkit.models_def.sensors.stabilise import unstabilise
+from camkit.models_def.training.kind import Restorer, Score
+from camkit.models_def.training.pictures import SCENE_SEED, list_pictures, read_picture, to_linear
 from camkit.scenes import procedural_scene
 
 FIELD_SHARES: Final = (0.0, 0.3, 0.55, 0.8, 0.98)
@@ -32,36 +34,43 @@ BLOCK_OFFSET_PX: Final = 90.0
 PROCEDURAL_PICTURES: Final = 8
 SEED: Final = 424242
 
-Restorer = Callable[[Tensor], Tensor]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidationCapture:
-    """One capture: its sample, the (3, s, s) sharp sRGB picture, and where it was taken."""
+    """One capture: its shot, the (3, s, s) sharp sRGB picture, and where it was taken."""
 
-    sample: Sample
+    shot: Shot
     sharp: FloatArray
     field_share: float
     iso: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Score:
-    """Mean PSNR in dB on sRGB values.
+class BayerJudge:
+    """Judges by fixed captures.
 
     Attributes:
-        mean_db: Over all captures.
-        by_iso: ISO -> dB.
-        by_field: Field height as a share of the corner's -> dB.
+        captures: From `make_validation_captures`.
+        recipe: Camera and scale.
     """
 
-    mean_db: float
-    by_iso: dict[float, float]
-    by_field: dict[float, float]
+    captures: Sequence[ValidationCapture]
+    recipe: BayerRecipe
+
+    def baselines(self) -> Mapping[str, float]:
+        """Give the mean dB of the capture as it is, and of the Wiener bank alone."""
+        return {
+            "capture": self.score(lambda planes: planes[:, :3]).mean_db,
+            "wiener": self.score(lambda planes: planes[:, 3:]).mean_db,
+        }
+
+    def score(self, restore: Restorer) -> Score:
+        """Judge a restoration by its mean PSNR in dB on sRGB values, by ISO and field height."""
+        return score(self.captures, self.recipe, restore)
 
 
 def make_validation_captures(
-    recipe: Recipe, bank: PsfBank, pictures: Path | None
+    recipe: BayerRecipe, bank: PsfBank, pictures: Path | None
 ) -> list[ValidationCapture]:
     """Photograph the middle of each picture at five field heights, two ISOs, the depths in turn.
 
@@ -75,11 +84,11 @@ def make_validation_captures(
             for iso in ISOS:
                 rng = np.random.default_rng((SEED, number, spot, int(iso)))
                 exposure = _exposure(recipe, bank, share, iso, number * len(FIELD_SHARES) + spot)
-                sample = make_sample(crop, exposure, recipe, bank, rng)
+                shot = make_shot(crop, exposure, recipe, bank, rng)
                 inner = (side - recipe.data.sample_px) // 2
                 sharp = encode_srgb(crop[:, inner : side - inner, inner : side - inner])
                 captures.append(
-                    ValidationCapture(sample=sample, sharp=sharp, field_share=share, iso=iso)
+                    ValidationCapture(shot=shot, sharp=sharp, field_share=share, iso=iso)
                 )
     return captures
 
@@ -99,12 +108,12 @@ def _middle(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
     return picture[top : top + side, left : left + side]
 
 
-def _exposure(recipe: Recipe, bank: PsfBank, share: float, iso: float, turn: int) -> Exposure:
+def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn: int) -> Exposure:
     height = share * corner_height_mm(recipe)
     depth = sum(divmod(turn, len(FIELD_SHARES))) % bank.depths
     azimuth = turn * GOLDEN_ANGLE_RAD
     x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
-    offset = BLOCK_OFFSET_PX * recipe.camera.pixel_pitch_um / 1000
+    offset = BLOCK_OFFSET_PX * recipe.sensor.pixel_pitch_um / 1000
     return Exposure(
         x_mm=float(x_mm),
         y_mm=float(y_mm),
@@ -115,45 +124,42 @@ def _exposure(recipe: Recipe, bank: PsfBank, share: float, iso: float, turn: int
     )
 
 
-def score(captures: Sequence[ValidationCapture], recipe: Recipe, restore: Restorer) -> Score:
+def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: Restorer) -> Score:
     """Judge a restoration.
 
     Args:
         captures: From `make_validation_captures`.
         recipe: Camera and scale.
         restore: (1, 6, s, s) stabilised planes -> (1, 3, s, s) stabilised.
+
+    Returns:
+        Mean PSNR on sRGB values; by ISO, and by field height as a share of the corner's.
     """
     with torch.no_grad():
         values = [
-            _psnr(capture, recipe, restore(capture.sample.planes[None])[0]) for capture in captures
+            _psnr(capture, recipe, restore(capture.shot.sample.stacked(LAYOUT)[None])[0])
+            for capture in captures
         ]
-    by_iso = {iso: _mean(values, [c.iso == iso for c in captures]) for iso in ISOS}
-    by_field = {f: _mean(values, [c.field_share == f for c in captures]) for f in FIELD_SHARES}
-    return Score(mean_db=float(np.mean(values)), by_iso=by_iso, by_field=by_field)
+    by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in captures]) for iso in ISOS}
+    by_field = {
+        f"{f:g}": _mean(values, [c.field_share == f for c in captures]) for f in FIELD_SHARES
+    }
+    parts = {"by_iso": by_iso, "by_field": by_field}
+    return Score(mean_db=float(np.mean(values)), parts=parts)
 
 
-def score_capture(captures: Sequence[ValidationCapture], recipe: Recipe) -> Score:
-    """Judge the capture as it is."""
-    return score(captures, recipe, lambda planes: planes[:, :3])
-
-
-def score_wiener(captures: Sequence[ValidationCapture], recipe: Recipe) -> Score:
-    """Judge the Wiener bank alone."""
-    return score(captures, recipe, lambda planes: planes[:, 3:])
-
-
-def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: Recipe) -> FloatArray:
+def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> FloatArray:
     """Take stabilised (3, s, s) planes to sRGB values, vignetting divided out."""
-    noise = capture.sample.noise
+    noise = capture.shot.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     linear = unstabilise(stable[None].float(), shot, read, scale=recipe.scale)[0]
-    matrix, _ = camera_from_rec709(np.array(recipe.camera.color_matrix))
-    even: FloatArray = (linear / capture.sample.illumination).numpy()
+    matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+    even: FloatArray = (linear / capture.shot.illumination).numpy()
     to_rec709 = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     return encode_srgb(apply_matrix(to_rec709, even))
 
 
-def _psnr(capture: ValidationCapture, recipe: Recipe, stable: Tensor) -> float:
+def _psnr(capture: ValidationCapture, recipe: BayerRecipe, stable: Tensor) -> float:
     gap = to_srgb(stable, capture, recipe) - capture.sharp
     return float(-10 * np.log10(np.mean(np.square(gap, dtype=np.float64)) + 1e-12))
 

@@ -1,7 +1,7 @@
 """One training sample: a sharp crop photographed by a copy of the camera, and what it should be.
 
     sharp crop -> exposure, camera space -> blur of a copy -> illumination -> CFA -> noise -> clip,
-    quantise -> white balance -> demosaic -> Wiener (frozen kernel of a block) -> stabilise
+    quantise -> white balance -> demosaic -> Wiener (frozen kernel of a block) -> stabilise -> Shot
 
 A sample is one place on the sensor with one blur. It is simulated with surroundings of
 `margin_px`, so that the Wiener filter sees true context, and cut to `sample_px` afterwards.
@@ -16,21 +16,28 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from camkit.bundle.facts import Port
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.sensors.demosaic import demosaic
 from camkit.models_def.sensors.demosaic import mosaic as sample_cfa
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
-from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.recipe import Recipe
+from camkit.models_def.training.sample import Sample, SampleLayout
 
 CLIPPED_REACH_PX: Final = 4
 UNKNOWN_ABOVE: Final = 0.9
 NOT_JUDGED: Final = -1.0
 HEIGHT_POWER: Final = 0.75
 LIGHT_TINT: Final = 0.08
+LAYOUT: Final = SampleLayout(
+    inputs=(Port(name="capture", channels=3), Port(name="wiener", channels=3)),
+    outputs=(Port(name="clean", channels=3),),
+)
+"""What the networks take and give. A lens of revolution blurs every way, so samples may turn."""
 
 Generator = np.random.Generator
 Sides = tuple[bool, bool, bool, bool]
@@ -66,20 +73,16 @@ class Exposure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """A finished sample.
+class Shot:
+    """A finished sample and what its front end knew.
 
     Attributes:
-        planes: (6, s, s) stabilised capture and Wiener planes.
-        target: (3, s, s) stabilised sharp planes; negative where nothing can be known.
-        weight: (3,) factor to the square-root domain of the signal, see `losses`.
+        sample: Stabilised capture, Wiener planes and sharp planes, (3, s, s) each.
         noise: Noise after white balance.
-        illumination: Relative illumination, contained in planes and target.
+        illumination: Relative illumination, contained in the planes and the target.
     """
 
-    planes: Tensor
-    target: Tensor
-    weight: Tensor
+    sample: Sample
     noise: NoiseModel
     illumination: float
 
@@ -101,25 +104,25 @@ class Circumstances:
     illumination: float
 
 
-def scene_side_px(recipe: Recipe, bank: PsfBank) -> int:
+def scene_side_px(recipe: BayerRecipe, bank: PsfBank) -> int:
     """Give the side of the sharp crop that a sample needs."""
     return recipe.data.sample_px + 2 * (recipe.data.margin_px + bank.radius_px)
 
 
-def corner_height_mm(recipe: Recipe) -> float:
+def corner_height_mm(recipe: BayerRecipe) -> float:
     """Give the field height of the sensor's corner."""
-    camera = recipe.camera
-    sides = (camera.width_px - 1, camera.height_px - 1)
-    return float(np.hypot(*sides)) / 2 * camera.pixel_pitch_um / 1000
+    sensor = recipe.sensor
+    sides = (sensor.width_px - 1, sensor.height_px - 1)
+    return float(np.hypot(*sides)) / 2 * sensor.pixel_pitch_um / 1000
 
 
-def draw_exposure(rng: Generator, recipe: Recipe, bank: PsfBank) -> Exposure:
+def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposure:
     """Draw the conditions of a training sample."""
     data = recipe.data
     height = corner_height_mm(recipe) * rng.random() ** HEIGHT_POWER
     azimuth = rng.uniform(0, 2 * np.pi)
     x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
-    jitter = rng.uniform(-1, 1, 2) * data.block_jitter_px * recipe.camera.pixel_pitch_um / 1000
+    jitter = rng.uniform(-1, 1, 2) * data.block_jitter_px * recipe.sensor.pixel_pitch_um / 1000
     at_border = rng.random() < data.border_share
     borders = rng.random(4) < 0.4 if at_border else np.zeros(4, dtype=bool)
     least, most = data.exposure_min_ev, data.exposure_max_ev
@@ -148,7 +151,7 @@ def _draw_copy(rng: Generator, shares: tuple[float, ...], bank: PsfBank) -> int:
     return copy * bank.depths + int(rng.choice(bank.depths, p=odds))
 
 
-def _draw_drift(rng: Generator, recipe: Recipe) -> tuple[float, float]:
+def _draw_drift(rng: Generator, recipe: BayerRecipe) -> tuple[float, float]:
     """Draw how far the lens has drifted; most have not."""
     data = recipe.data
     if rng.random() >= data.drift_share:
@@ -163,9 +166,9 @@ def tint_crop(rng: Generator, crop: FloatArray) -> FloatArray:
     return crop * tint[:, None, None]
 
 
-def make_sample(
-    crop: FloatArray, exposure: Exposure, recipe: Recipe, bank: PsfBank, rng: Generator
-) -> Sample:
+def make_shot(
+    crop: FloatArray, exposure: Exposure, recipe: BayerRecipe, bank: PsfBank, rng: Generator
+) -> Shot:
     """Photograph a sharp crop and run the front end of the runtime on it.
 
     Args:
@@ -181,8 +184,8 @@ def make_sample(
     side = scene_side_px(recipe, bank)
     if crop.shape != (3, side, side):
         raise ContractError(f"a crop must be (3, {side}, {side}); got {crop.shape}")
-    camera, data = recipe.camera, recipe.data
-    matrix, gains = camera_from_rec709(np.array(camera.color_matrix))
+    sensor, data = recipe.sensor, recipe.data
+    matrix, gains = camera_from_rec709(np.array(sensor.color_matrix))
     illumination = bank.illumination_at(float(np.hypot(exposure.x_mm, exposure.y_mm)))
     to_camera = torch.from_numpy(matrix * exposure.factor).float()
     flat = to_camera @ torch.from_numpy(crop).reshape(3, -1)
@@ -192,9 +195,9 @@ def make_sample(
     )
     blurred = _blur(sharp, kernels, bank.radius_px) * illumination
     capture, saturated = _expose(blurred, gains, recipe, exposure.iso, rng)
-    noise = camera.noise_at(exposure.iso).with_gains(gains)
+    noise = sensor.noise_at(exposure.iso).with_gains(gains)
     planes, unknown = _develop(capture, saturated, gains, recipe, exposure.borders)
-    return finish_sample(
+    return finish_shot(
         planes,
         unknown,
         _cut(sharp, data.sample_px) * illumination,
@@ -212,9 +215,9 @@ def make_sample(
     )
 
 
-def finish_sample(
-    planes: Tensor, unknown: Tensor, true: Tensor, given: Circumstances, recipe: Recipe
-) -> Sample:
+def finish_shot(
+    planes: Tensor, unknown: Tensor, true: Tensor, given: Circumstances, recipe: BayerRecipe
+) -> Shot:
     """Filter and stabilise developed planes, as the runtime does.
 
     Args:
@@ -233,10 +236,12 @@ def finish_sample(
     ]
     target = stabilise(true.clamp(max=data.target_max), shot, read, scale=recipe.scale)
     lost = _lost(true, _cut(unknown, data.sample_px), given.gains)
-    return Sample(
-        planes=torch.cat(stable, dim=1)[0],
-        target=torch.where(lost, torch.tensor(NOT_JUDGED), target)[0],
-        weight=recipe.scale * shot.sqrt(),
+    return Shot(
+        sample=Sample(
+            inputs={port.name: x[0] for port, x in zip(LAYOUT.inputs, stable, strict=True)},
+            target=torch.where(lost, torch.tensor(NOT_JUDGED), target)[0],
+            weight=recipe.scale * shot.sqrt(),
+        ),
         noise=noise,
         illumination=given.illumination,
     )
@@ -274,19 +279,21 @@ def _blur(sharp: Tensor, kernels: Tensor, radius_px: int) -> Tensor:
 
 
 def _expose(
-    light: Tensor, gains: tuple[float, float, float], recipe: Recipe, iso: float, rng: Generator
+    light: Tensor,
+    gains: tuple[float, float, float],
+    recipe: BayerRecipe,
+    iso: float,
+    rng: Generator,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Record (1, 3, h, w) white-balanced light as a mosaic (h, w) and where it clipped."""
-    camera = recipe.camera
-    if camera.cfa is None:
-        raise ContractError("training simulates cameras with a Bayer mosaic; cfa is missing")
-    noise = camera.noise_at(iso)
+    sensor = recipe.sensor
+    noise = sensor.noise_at(iso)
     raw = light / torch.tensor(gains).reshape(1, 3, 1, 1)
-    signal = sample_cfa(raw, camera.cfa)[0].numpy().astype(np.float64)
+    signal = sample_cfa(raw, sensor.cfa)[0].numpy().astype(np.float64)
     recorded = rng.poisson(signal / noise.shot[0]) * noise.shot[0]
     recorded += rng.standard_normal(signal.shape, dtype=np.float32) * noise.read_variance[0] ** 0.5
-    levels = camera.white_level - camera.black_level
-    dn = np.clip(np.rint(recorded * levels), -camera.black_level, levels)
+    levels = sensor.white_level - sensor.black_level
+    dn = np.clip(np.rint(recorded * levels), -sensor.black_level, levels)
     return (dn / levels).astype(np.float32), dn >= levels
 
 
@@ -294,22 +301,20 @@ def _develop(
     capture: FloatArray,
     saturated: NDArray[np.bool_],
     gains: tuple[float, float, float],
-    recipe: Recipe,
+    recipe: BayerRecipe,
     borders: Sides,
 ) -> tuple[Tensor, Tensor]:
     """White-balance and demosaic; give (1, 3, h, w) planes and (1, 1, h, w) clipped pixels.
 
     Where the picture ends, what lies beyond is cut before the demosaic and mirrored afterwards.
     """
-    camera = recipe.camera
-    if camera.cfa is None:
-        raise ContractError("training simulates cameras with a Bayer mosaic; cfa is missing")
+    cfa = recipe.sensor.cfa
     top, bottom, left, right = (recipe.data.margin_px if side else 0 for side in borders)
     height, width = capture.shape
     inside = np.s_[top : height - bottom, left : width - right]
     mosaic = torch.from_numpy(np.ascontiguousarray(capture[inside]))[None]
     gain_map = torch.tensor(gains).reshape(1, 3, 1, 1).expand(1, 3, *mosaic.shape[1:])
-    planes = demosaic(mosaic * sample_cfa(gain_map, camera.cfa), camera.cfa)
+    planes = demosaic(mosaic * sample_cfa(gain_map, cfa), cfa)
     unknown = torch.from_numpy(np.ascontiguousarray(saturated[inside]))[None, None].float()
     if any(borders):
         outside = (left, right, top, bottom)

@@ -8,7 +8,7 @@ from safetensors.torch import save_file
 from torch.nn import functional
 
 from camkit.errors import ContractError
-from camkit.models_def.training.fine_tuning.vgg import (
+from camkit.models_def.kinds.bayer.fine_tuning.vgg import (
     CONVOLUTIONS,
     VggFeatures,
     file_digest,

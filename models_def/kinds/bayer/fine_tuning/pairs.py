@@ -22,13 +22,14 @@ from numpy.typing import NDArray
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, NoiseModel, RadialDistortion
 from camkit.errors import ContractError, DecodeError
-from camkit.models_def.training.fine_tuning.alignment import CLIPPED_ABOVE, AlignedPair, Aligner
-from camkit.models_def.training.fine_tuning.homography import Homography, warp_to
+from camkit.models_def.kinds.bayer.fine_tuning.alignment import CLIPPED_ABOVE, AlignedPair, Aligner
+from camkit.models_def.kinds.bayer.fine_tuning.homography import Homography, warp_to
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import LAYOUT, NOT_JUDGED, Circumstances, finish_shot
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
-from camkit.models_def.training.pool import Batch, cut_patch
-from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.recipe import Recipe
-from camkit.models_def.training.samples import NOT_JUDGED, Circumstances, Sample, finish_sample
+from camkit.models_def.training.pool import cut_patch
+from camkit.models_def.training.sample import Batch, Sample
 from camkit.units import to_mm
 
 SETTINGS: Final = "pairs.toml"
@@ -40,25 +41,30 @@ Generator = np.random.Generator
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairSamples:
-    """Samples of real pairs, in the layout of the pool.
+    """Samples of real pairs, as the pool holds them.
 
     Attributes:
-        planes: (n, 9, s, s) capture, Wiener planes, target.
+        planes: (n, 6, s, s) capture and Wiener planes.
+        targets: (n, 3, s, s).
         weights: (n, 3) factor to the square-root domain.
         alignments: Name of a pair -> how it was aligned.
     """
 
     planes: NDArray[np.float16]
+    targets: NDArray[np.float16]
     weights: FloatArray
     alignments: dict[str, Homography]
 
     def draw_batch(self, rng: Generator, count: int, patch_px: int) -> Batch:
         """Draw random patches of random samples, turned and flipped."""
         chosen = rng.integers(len(self.planes), size=count)
-        patches = [cut_patch(rng, self.planes[i], patch_px).astype(np.float32) for i in chosen]
-        planes = torch.from_numpy(np.stack(patches))
+        cut = [cut_patch(rng, self.planes[i], self.targets[i], patch_px, LAYOUT) for i in chosen]
+        planes, targets = (
+            torch.from_numpy(np.stack(patches).astype(np.float32))
+            for patches in zip(*cut, strict=True)
+        )
         weight = torch.from_numpy(self.weights[chosen])
-        return Batch(planes=planes[:, :6], target=planes[:, 6:], weight=weight)
+        return Batch(inputs=LAYOUT.named(planes), target=targets, weight=weight)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +76,12 @@ class PairSettings:
 
 
 def read_pairs(
-    folder: Path, recipe: Recipe, bank: PsfBank, distortion: RadialDistortion | None, *, seed: int
+    folder: Path,
+    recipe: BayerRecipe,
+    bank: PsfBank,
+    distortion: RadialDistortion | None,
+    *,
+    seed: int,
 ) -> PairSamples:
     """Align every pair of a folder and cut `fine_tuning.pair_samples` samples from each.
 
@@ -86,8 +97,8 @@ def read_pairs(
             size of the sensor, or a pair cannot be aligned; the message names the pair.
     """
     settings = _read_settings(folder / SETTINGS, recipe)
-    noise = recipe.camera.noise_at(settings.iso).with_gains(settings.gains)
-    aligner = Aligner(recipe.camera, bank, distortion)
+    noise = recipe.sensor.noise_at(settings.iso).with_gains(settings.gains)
+    aligner = Aligner(recipe.sensor, bank, distortion)
     samples, alignments = [], {}
     for number, path in enumerate(list_pictures(folder / "capture")):
         rng = np.random.default_rng((seed, 2, number))
@@ -99,9 +110,14 @@ def read_pairs(
         except ContractError as error:
             raise ContractError(f"pair {path.stem}: {error}") from error
         alignments[path.stem] = pair.homography
-    planes = [torch.cat([s.planes, s.target]).numpy().astype(np.float16) for s in samples]
-    weights = [s.weight.numpy() for s in samples]
-    return PairSamples(planes=np.stack(planes), weights=np.stack(weights), alignments=alignments)
+    planes = [s.stacked(LAYOUT).numpy().astype(np.float16) for s in samples]
+    targets = [s.target.numpy().astype(np.float16) for s in samples]
+    return PairSamples(
+        planes=np.stack(planes),
+        targets=np.stack(targets),
+        weights=np.stack([s.weight.numpy() for s in samples]),
+        alignments=alignments,
+    )
 
 
 def read_capture(path: Path) -> FloatArray:
@@ -123,14 +139,14 @@ def read_capture(path: Path) -> FloatArray:
     return np.ascontiguousarray(planes / np.float32(65535))
 
 
-def _read_settings(path: Path, recipe: Recipe) -> PairSettings:
+def _read_settings(path: Path, recipe: BayerRecipe) -> PairSettings:
     try:
         table: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise ContractError(
             f"real pairs need {path} with iso and optionally white_balance: {error}"
         ) from error
-    _, gains = camera_from_rec709(np.array(recipe.camera.color_matrix))
+    _, gains = camera_from_rec709(np.array(recipe.sensor.color_matrix))
     iso, balance = table.pop("iso", None), table.pop("white_balance", list(gains))
     numbers = [iso, *balance] if isinstance(balance, list) else []
     plain = all(isinstance(n, int | float) and n > 0 for n in numbers)
@@ -151,7 +167,7 @@ def _partner(capture: Path) -> Path:
     return found[0]
 
 
-def _draw_place(rng: Generator, pair: AlignedPair, recipe: Recipe) -> tuple[int, int]:
+def _draw_place(rng: Generator, pair: AlignedPair, recipe: BayerRecipe) -> tuple[int, int]:
     """Draw the first pixel (x, y) of a sample that the reference covers at least by half."""
     margin, side = recipe.data.margin_px, recipe.data.sample_px
     height, width = pair.capture.shape[1:]
@@ -171,19 +187,19 @@ def _cut(
     pair: AlignedPair,
     place: tuple[int, int],
     given: tuple[Aligner, PsfBank, NoiseModel, PairSettings],
-    recipe: Recipe,
+    recipe: BayerRecipe,
 ) -> Sample:
     aligner, bank, noise, settings = given
     data, (x, y) = recipe.data, place
     margin, side = data.margin_px, data.sample_px
     centre_px = np.array([place]) + (side - 1) / 2
-    reach_mm = data.block_jitter_px * to_mm(recipe.camera.pixel_pitch_um)
+    reach_mm = data.block_jitter_px * to_mm(recipe.sensor.pixel_pitch_um)
     block_x_mm, block_y_mm = aligner.to_sensor_mm(centre_px)[0] + rng.uniform(-1, 1, 2) * reach_mm
     illumination = float(aligner.illumination(centre_px)[0])
     window = np.s_[:, y - margin : y + side + margin, x - margin : x + side + margin]
     planes = torch.from_numpy(pair.capture[window].copy())[None]
     shown, inside = _warped(pair, place, side)
-    sample = finish_sample(
+    shot = finish_shot(
         planes,
         planes.amax(1, keepdim=True) >= CLIPPED_ABOVE,
         torch.from_numpy(shown * np.float32(illumination)).clamp(min=0)[None],
@@ -195,8 +211,9 @@ def _cut(
         ),
         recipe,
     )
-    judged = torch.where(torch.from_numpy(inside), sample.target, torch.tensor(NOT_JUDGED))
-    return replace(sample, target=judged)
+    target = shot.sample.target
+    judged = torch.where(torch.from_numpy(inside), target, torch.tensor(NOT_JUDGED))
+    return replace(shot.sample, target=judged)
 
 
 def _warped(

@@ -12,21 +12,23 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
-from camkit.models_def.training.checkpoint import State
-from camkit.models_def.training.fine_tuning.adversarial import discriminator_loss, generator_loss
-from camkit.models_def.training.fine_tuning.content import (
+from camkit.models_def.kinds.bayer.fine_tuning.adversarial import discriminator_loss, generator_loss
+from camkit.models_def.kinds.bayer.fine_tuning.content import (
     Views,
     make_views,
     perceptual_loss,
     pixel_loss,
 )
-from camkit.models_def.training.fine_tuning.pairs import PairSamples
-from camkit.models_def.training.fine_tuning.vgg import VggFeatures
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
+from camkit.models_def.kinds.bayer.fine_tuning.vgg import VggFeatures
+from camkit.models_def.kinds.bayer.recipe import FineTuningRecipe
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
+from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights
 from camkit.models_def.training.fitter import Fitter
-from camkit.models_def.training.pool import Batch
-from camkit.models_def.training.recipe import FineTuningRecipe, NetworkRecipe
+from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import learning_rate
 
 OPPONENT_SEED: Final = 2
@@ -59,7 +61,7 @@ class FineTuningFitter:
         self, entry: NetworkRecipe, recipe: FineTuningRecipe, parts: FineTuningParts
     ) -> None:
         self.recipe, self.schedule, self._pairs = recipe, entry.schedule, parts.pairs
-        self.generator = Fitter(entry, parts.device, parts.first)
+        self.generator = Fitter(entry, build_network, parts.device, parts.first)
         device = self.generator.device
         self._to_rec709 = parts.to_rec709.float().to(device)
         self._features = None if parts.features is None else parts.features.to(device)
@@ -97,7 +99,7 @@ class FineTuningFitter:
 
     def _mixed(self, batch: Batch, pairs: PairSamples, step: int) -> Batch:
         """Replace the first patches of a batch by patches of real pairs."""
-        count, _, patch_px, _ = batch.planes.shape
+        count, _, patch_px, _ = batch.target.shape
         real = round(self.recipe.pair_share * count)
         if real == 0:
             return batch
@@ -106,7 +108,10 @@ class FineTuningFitter:
             np.random.default_rng((self.schedule.seed, 3, step)), real, patch_px
         )
         return Batch(
-            planes=torch.cat([drawn.planes, batch.planes[real:]]),
+            inputs={
+                name: torch.cat([planes, batch.inputs[name][real:]])
+                for name, planes in drawn.inputs.items()
+            },
             target=torch.cat([drawn.target, batch.target[real:]]),
             weight=torch.cat([drawn.weight, batch.weight[real:]]),
         )

@@ -1,7 +1,6 @@
 """Fine-tuning as the ordinary trainer runs it: files read, credits written, fitter made."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -10,55 +9,31 @@ import torch
 
 from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
+from camkit.models_def.kinds.bayer.fine_tuning.fitter import FineTuningFitter, FineTuningParts
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples, read_pairs
+from camkit.models_def.kinds.bayer.fine_tuning.vgg import file_digest, read_vgg
+from camkit.models_def.kinds.bayer.material import BayerMaterial
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import corner_height_mm
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
-from camkit.models_def.training.fine_tuning.fitter import FineTuningFitter, FineTuningParts
-from camkit.models_def.training.fine_tuning.pairs import PairSamples, read_pairs
-from camkit.models_def.training.fine_tuning.vgg import file_digest, read_vgg
 from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.fitter import Fits
-from camkit.models_def.training.psf_bank import PsfBank
-from camkit.models_def.training.recipe import NetworkRecipe, Recipe
-from camkit.models_def.training.samples import corner_height_mm
-from camkit.models_def.training.trainer import Refinement
+from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.refinement import FineTuningOptions, Refinement
 
 NAME: Final = "fine_tuned"
-WITHOUT_VGG: Final = (
-    "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
-)
-
-Distort = Callable[[Recipe, Path], RadialDistortion | None]
+Distort = Callable[[BayerRecipe, Path], RadialDistortion | None]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FineTuningOptions:
-    """What fine-tuning is given.
-
-    Attributes:
-        start: Checkpoint or bundle to start from.
-        size: Which network of the recipe; of a bundle with several, that of the same name.
-        vgg: Weights of VGG-19; None compares sRGB values instead of features.
-        pairs: Folder of real pairs.
-        device: cpu or cuda.
-        recipe_folder: For a lens that the recipe names by its path.
-    """
-
-    start: Path
-    size: str
-    vgg: Path | None = None
-    pairs: Path | None = None
-    device: str = "cpu"
-    recipe_folder: Path = Path()
-
-
-def trace_recipe_distortion(recipe: Recipe, folder: Path) -> RadialDistortion:
+def trace_recipe_distortion(recipe: BayerRecipe, folder: Path) -> RadialDistortion:
     """Give the distortion of a recipe's lens; the recipe lies in `folder`."""
     lens = find_lens(recipe.lens.prescription, folder)
     return trace_distortion(lens, corner_height_mm(recipe))
 
 
 def make_refinement(
-    recipe: Recipe, options: FineTuningOptions, *, distort: Distort = trace_recipe_distortion
+    recipe: BayerRecipe, options: FineTuningOptions, *, distort: Distort = trace_recipe_distortion
 ) -> Refinement:
     """Prepare the fine-tuning of a recipe.
 
@@ -72,15 +47,15 @@ def make_refinement(
     """
     first = read_first_weights(options.start, options.size)
     features = None if options.vgg is None else read_vgg(options.vgg)
-    matrix = rec709_from_camera(np.array(recipe.camera.color_matrix))
+    matrix = rec709_from_camera(np.array(recipe.sensor.color_matrix))
 
-    def make_fitter(entry: NetworkRecipe, bank: PsfBank) -> Fits:
+    def make_fitter(entry: NetworkRecipe, material: BayerMaterial) -> Fits:
         pairs: PairSamples | None = None
         if options.pairs is not None:
             pairs = read_pairs(
                 options.pairs,
                 recipe,
-                bank,
+                material.bank,
                 distort(recipe, options.recipe_folder),
                 seed=entry.schedule.seed,
             )
@@ -110,3 +85,14 @@ def _credit(options: FineTuningOptions) -> str:
         features = f"with VGG-19 features of {options.vgg.name} (sha256 {digest}...)"
     pairs = "" if options.pairs is None else f" and real pairs of {options.pairs.name}"
     return f"; fine-tuned against two discriminators, {features}{pairs}"
+
+
+class BayerRefining:
+    """Fine-tuning as `camkit.models_def.training.refinement` asks for it."""
+
+    def refinement(self, recipe: BayerRecipe, options: FineTuningOptions) -> Refinement:
+        """Prepare the fine-tuning of a recipe; see `make_refinement`."""
+        return make_refinement(recipe, options)
+
+
+REFINING: Final = BayerRefining()

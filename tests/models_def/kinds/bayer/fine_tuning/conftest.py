@@ -2,12 +2,9 @@
 
 import pytest
 
-from camkit.models_def.training import validation
-from camkit.models_def.training.recipe import read_recipe
-from camkit.models_def.training.samples import corner_height_mm
+from camkit.models_def.kinds.bayer import validation
 from camkit.models_def.training.trainer import TrainOptions, train
-from tests.gaussian_bank import gaussian_bank
-from tests.models_def.training.conftest import RECIPE, one_thread  # noqa: F401
+from tests.bayer_recipe import RECIPE, bank, material, recipe  # noqa: F401
 
 FINE_TUNING = """
 [networks.trimmed]
@@ -42,20 +39,9 @@ def recipe_path(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def recipe(recipe_path):
-    return read_recipe(recipe_path)
-
-
-@pytest.fixture(scope="session")
-def bank(recipe):
-    height = corner_height_mm(recipe)
-    return gaussian_bank(sensor_height_mm=height, axis_px=0.9, corner_px=1.8)
-
-
-@pytest.fixture(scope="session")
-def trimmed_checkpoint(tmp_path_factory, recipe_path, bank):
+def trimmed_checkpoint(tmp_path_factory, recipe_path, material):  # noqa: F811
     """Four steps of the trimmed U-Net."""
     options = TrainOptions(
         out_dir=tmp_path_factory.mktemp("trimmed"), size="trimmed", workers=0, threads=1
     )
-    return train(recipe_path, options, bank=bank).checkpoint
+    return train(recipe_path, options, material=material).checkpoint

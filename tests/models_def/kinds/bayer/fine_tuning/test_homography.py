@@ -6,8 +6,12 @@ import pytest
 
 from camkit.colorimetry import encode_srgb
 from camkit.errors import ContractError
-from camkit.models_def.training.fine_tuning import homography
-from camkit.models_def.training.fine_tuning.homography import find_homography, map_points, warp_to
+from camkit.models_def.kinds.bayer.fine_tuning import homography
+from camkit.models_def.kinds.bayer.fine_tuning.homography import (
+    find_homography,
+    map_points,
+    warp_to,
+)
 from camkit.scenes import procedural_scene
 
 SIZE = (480, 360)

@@ -8,9 +8,9 @@ import torch
 from camkit.colorimetry import camera_from_rec709, encode_srgb
 from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError, DecodeError
-from camkit.models_def.training.fine_tuning.homography import map_points
-from camkit.models_def.training.fine_tuning.pairs import read_capture, read_pairs
-from camkit.models_def.training.samples import corner_height_mm
+from camkit.models_def.kinds.bayer.fine_tuning.homography import map_points
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_capture, read_pairs
+from camkit.models_def.kinds.bayer.samples import corner_height_mm
 from camkit.scenes import procedural_scene
 
 TRUE = np.array([[0.9, -0.03, 35.0], [0.03, 0.9, 15.0], [3e-5, -2e-5, 1.0]])
@@ -25,9 +25,9 @@ def distortion(recipe):
 
 def ideal_positions(recipe, x, y):
     """Undo the distortion by fixed-point iteration, one point after the other."""
-    camera = recipe.camera
-    centre = np.array([camera.width_px - 1, camera.height_px - 1]) / 2
-    radius_px = corner_height_mm(recipe) * 1000 / camera.pixel_pitch_um
+    sensor = recipe.sensor
+    centre = np.array([sensor.width_px - 1, sensor.height_px - 1]) / 2
+    radius_px = corner_height_mm(recipe) * 1000 / sensor.pixel_pitch_um
     sensor = (np.stack([x, y], -1) - centre) / radius_px
     ideal = sensor
     for _ in range(50):
@@ -40,19 +40,19 @@ def ideal_positions(recipe, x, y):
 def folder(tmp_path_factory, recipe, bank):
     """One pair: a picture, and what a lens that distorts and vignettes makes of it."""
     home = tmp_path_factory.mktemp("pairs")
-    camera = recipe.camera
+    sensor = recipe.sensor
     shown = np.clip(procedural_scene(11, 440, 620), 0, 1)
     srgb = np.rint(255 * encode_srgb(shown)).astype(np.uint8)
-    y, x = np.mgrid[0 : camera.height_px, 0 : camera.width_px].astype(np.float64)
+    y, x = np.mgrid[0 : sensor.height_px, 0 : sensor.width_px].astype(np.float64)
     at = map_points(np.linalg.inv(TRUE), ideal_positions(recipe, x, y).reshape(-1, 2))
     at = at.reshape(*x.shape, 2).astype(np.float32)
     planes = [
         cv2.remap(p, at[..., 0], at[..., 1], cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_CONSTANT)
         for p in shown
     ]
-    matrix, _ = camera_from_rec709(np.array(camera.color_matrix))
+    matrix, _ = camera_from_rec709(np.array(sensor.color_matrix))
     light = EXPOSURE * np.tensordot(matrix, np.stack(planes), 1)
-    heights = np.hypot(x - x.mean(), y - y.mean()) * camera.pixel_pitch_um / 1000
+    heights = np.hypot(x - x.mean(), y - y.mean()) * sensor.pixel_pitch_um / 1000
     light *= np.interp(heights, bank.frozen_heights_mm, bank.relative_illumination)
     capture = np.clip([cv2.GaussianBlur(p, (0, 0), 1.0) for p in light], 0, 1)
     for name in ("capture", "reference"):
@@ -78,8 +78,8 @@ def test_homography_behind_the_distortion_is_found_to_a_tenth_of_a_pixel(samples
 
 def test_targets_lie_on_the_captures_in_their_colours(samples):
     planes = torch.from_numpy(samples.planes.astype(np.float32))
-    assert planes.shape == (4, 9, 64, 64)
-    capture, target = planes[:, :3], planes[:, 6:]
+    assert planes.shape == (4, 6, 64, 64)
+    capture, target = planes[:, :3], torch.from_numpy(samples.targets.astype(np.float32))
     judged = target >= 0
     assert judged.float().mean() > 0.5
     blurred = torch.from_numpy(
@@ -96,7 +96,7 @@ def test_targets_lie_on_the_captures_in_their_colours(samples):
 
 
 def test_what_the_reference_does_not_cover_is_not_judged(samples):
-    target = samples.planes[:, 6:]
+    target = samples.targets
     unknown = target < 0
     assert (unknown.any(1) == unknown.all(1)).all()
 

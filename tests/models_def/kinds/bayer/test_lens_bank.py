@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer import lens_bank
+from camkit.models_def.kinds.bayer.lens_bank import build_lens_bank
 from camkit.models_def.optics.kernel_bank import fabricated_copies
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import format_prescription
-from camkit.models_def.training import lens_bank
-from camkit.models_def.training.lens_bank import build_lens_bank
 from tests.gaussian_bank import gaussian_bank
 
 DUET = find_lens("duet")
@@ -81,7 +81,7 @@ def test_banks_without_depths_keep_the_names_of_their_files(small, tmp_path, mon
     (made,) = tmp_path.iterdir()
     names = ("prescription", "copies", "fields", "kernel_px", "rays", "seed")
     plan = {name: getattr(small.lens, name) for name in names}
-    content = format_prescription(DUET) + json.dumps(plan) + small.camera.model_dump_json()
+    content = format_prescription(DUET) + json.dumps(plan) + small.sensor.model_dump_json()
     content += str(lens_bank.TRACING)
     assert made.name == f"bank-{hashlib.sha256(content.encode()).hexdigest()[:16]}.npz"
     monkeypatch.setattr(lens_bank, "TRACING", lens_bank.TRACING + 1)

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from camkit.colorimetry import encode_srgb
-from camkit.models_def.training.fine_tuning.content import (
+from camkit.models_def.kinds.bayer.fine_tuning.content import (
     make_views,
     perceptual_loss,
     pixel_loss,

@@ -10,6 +10,9 @@ import numpy as np
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import corner_height_mm
 from camkit.models_def.optics.analysis.illumination import relative_illumination_at
 from camkit.models_def.optics.kernel_bank import (
     ChannelResponse,
@@ -18,9 +21,6 @@ from camkit.models_def.optics.kernel_bank import (
 )
 from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.psf import with_object_distance
-from camkit.models_def.training.psf_bank import PsfBank, read_bank, write_bank
-from camkit.models_def.training.recipe import Recipe
-from camkit.models_def.training.samples import corner_height_mm
 
 WAVELENGTHS: Final = 27
 LEAST_ENERGY: Final = 0.97
@@ -28,7 +28,7 @@ TRACING: Final = 2
 """Counts how kernels and light have been traced so far: what was kept before is traced again."""
 
 
-def build_lens_bank(recipe: Recipe, lens: Lens, cache_folder: Path | None = None) -> PsfBank:
+def build_lens_bank(recipe: BayerRecipe, lens: Lens, cache_folder: Path | None = None) -> PsfBank:
     """Trace the lens of a recipe, or read what an earlier call traced.
 
     Args:
@@ -42,7 +42,7 @@ def build_lens_bank(recipe: Recipe, lens: Lens, cache_folder: Path | None = None
     if cache_folder is None:
         return _trace(recipe, lens)
     content = [format_prescription(lens), json.dumps(recipe.lens.to_json())]
-    content += [recipe.camera.model_dump_json(), str(TRACING)]
+    content += [recipe.sensor.model_dump_json(), str(TRACING)]
     content += ["depths apart"] if recipe.data.known_depth_share else []
     name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"bank-{name}.npz"
@@ -52,7 +52,7 @@ def build_lens_bank(recipe: Recipe, lens: Lens, cache_folder: Path | None = None
     return read_bank(cached)
 
 
-def _trace(recipe: Recipe, lens: Lens) -> PsfBank:
+def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
     choices = recipe.lens
     heights = np.linspace(0.0, corner_height_mm(recipe), choices.fields)
     response = _response(recipe)
@@ -66,7 +66,7 @@ def _trace(recipe: Recipe, lens: Lens) -> PsfBank:
             response,
             heights,
             size_px=choices.kernel_px,
-            pitch_um=recipe.camera.pixel_pitch_um,
+            pitch_um=recipe.sensor.pixel_pitch_um,
             rays=choices.rays,
         )
         if kept < LEAST_ENERGY:
@@ -88,13 +88,13 @@ def _trace(recipe: Recipe, lens: Lens) -> PsfBank:
     )
 
 
-def _response(recipe: Recipe) -> ChannelResponse:
-    """Resample the camera's response so finely that lateral colour leaves no steps."""
-    wavelengths_um, response = recipe.camera.channel_response.to_arrays()
+def _response(recipe: BayerRecipe) -> ChannelResponse:
+    """Resample the sensor's response so finely that lateral colour leaves no steps."""
+    wavelengths_um, response = recipe.sensor.response_arrays()
     dense = np.linspace(wavelengths_um[0], wavelengths_um[-1], WAVELENGTHS)
     sampled = np.stack([np.interp(dense, wavelengths_um, row) for row in response])
     return ChannelResponse(
         wavelengths_um=dense,
         response=sampled / sampled.sum(axis=1, keepdims=True),
-        source=recipe.camera.channel_response.source,
+        source="the sensor of the recipe",
     )

@@ -8,12 +8,13 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.training.fine_tuning.fitter import FineTuningFitter, FineTuningParts
-from camkit.models_def.training.fine_tuning.pairs import PairSamples
+from camkit.models_def.kinds.bayer.fine_tuning.fitter import FineTuningFitter, FineTuningParts
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
+from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.training.first_weights import read_first_weights
-from camkit.models_def.training.pool import Batch
-from camkit.models_def.training.recipe import to_recipe
-from tests.models_def.training.conftest import RECIPE
+from camkit.models_def.training.kind import to_recipe
+from camkit.models_def.training.sample import Batch
+from tests.bayer_recipe import RECIPE
 
 
 @pytest.fixture
@@ -32,7 +33,7 @@ def batch(seed=0):
     draw = torch.Generator().manual_seed(seed)
     planes = torch.rand(2, 6, 64, 64, generator=draw)
     target = torch.rand(2, 3, 64, 64, generator=draw)
-    return Batch(planes=planes, target=target, weight=torch.ones(2, 3))
+    return Batch(inputs=LAYOUT.named(planes), target=target, weight=torch.ones(2, 3))
 
 
 def test_discriminators_learn_to_tell_truth_from_output(make):
@@ -60,8 +61,10 @@ def test_scores_of_the_generator_do_not_move_the_discriminators(make):
 
 
 def test_real_pairs_replace_their_share_of_a_batch_by_the_step_alone(make):
-    planes = np.full((3, 9, 64, 64), 0.25, dtype=np.float16)
-    pairs = PairSamples(planes=planes, weights=np.ones((3, 3), np.float32), alignments={})
+    planes = np.full((3, 6, 64, 64), 0.25, dtype=np.float16)
+    pairs = PairSamples(
+        planes=planes, targets=planes[:, :3], weights=np.ones((3, 3), np.float32), alignments={}
+    )
     mixed = make(pairs, pair_share=0.5)._mixed(batch(), pairs, 7)
     assert (mixed.planes[0] == 0.25).all()
     assert torch.equal(mixed.planes[1], batch().planes[1])

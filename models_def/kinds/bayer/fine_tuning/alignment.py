@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.camera import Camera
+from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError
-from camkit.models_def.training.fine_tuning.homography import (
+from camkit.models_def.kinds.bayer.fine_tuning.homography import (
     WORK_SIDE_PX,
     Homography,
     find_homography,
@@ -26,7 +26,7 @@ from camkit.models_def.training.fine_tuning.homography import (
     refine_homography,
     warp_to,
 )
-from camkit.models_def.training.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.units import to_mm
 
 Points = NDArray[np.float64]
@@ -58,11 +58,13 @@ class AlignedPair:
 class Aligner:
     """Aligns pairs of one camera; pixels x, y of a capture that covers the whole sensor."""
 
-    def __init__(self, camera: Camera, bank: PsfBank, distortion: RadialDistortion | None) -> None:
-        """Take the camera; without a distortion the lens is taken to have none."""
-        self._camera, self._bank, self._distortion = camera, bank, distortion
-        self._centre = np.array([camera.width_px - 1, camera.height_px - 1]) / 2
-        self._pitch_mm = to_mm(camera.pixel_pitch_um)
+    def __init__(
+        self, sensor: BayerSensor, bank: PsfBank, distortion: RadialDistortion | None
+    ) -> None:
+        """Take the sensor; without a distortion the lens is taken to have none."""
+        self._sensor, self._bank, self._distortion = sensor, bank, distortion
+        self._centre = np.array([sensor.width_px - 1, sensor.height_px - 1]) / 2
+        self._pitch_mm = to_mm(sensor.pixel_pitch_um)
 
     def align(self, capture: FloatArray, shown: FloatArray) -> AlignedPair:
         """Align a pair.
@@ -75,10 +77,10 @@ class Aligner:
             ContractError: If the capture has not the size of the sensor, or the two cannot be
                 aligned.
         """
-        camera = self._camera
-        if capture.shape[1:] != (camera.height_px, camera.width_px):
+        sensor = self._sensor
+        if capture.shape[1:] != (sensor.height_px, sensor.width_px):
             raise ContractError(
-                f"a capture must cover the sensor, {camera.width_px}x{camera.height_px} px; got "
+                f"a capture must cover the sensor, {sensor.width_px}x{sensor.height_px} px; got "
                 f"{capture.shape[2]}x{capture.shape[1]}"
             )
         # One step of the lattice is a pixel of the picture that is matched.

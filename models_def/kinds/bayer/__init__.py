@@ -1,0 +1,15 @@
+"""A colour camera behind a mosaic: its lens photographed through, its Wiener bank in front.
+
+recipe                 what a person edits beside the common tables
+psf_bank, lens_bank    kernels of the frozen PSF and of fabricated copies
+material               both, as samples need them
+samples                scenes photographed, filtered and stabilised
+validation             what a run is chosen by
+training               all of it as the trainer asks for it: TRAINING
+fine_tuning/           afterwards: discriminators, features, real pairs: REFINING
+"""
+
+from camkit.models_def.kinds.bayer.fine_tuning.refinement import REFINING
+from camkit.models_def.kinds.bayer.training import TRAINING
+
+__all__ = ["REFINING", "TRAINING"]

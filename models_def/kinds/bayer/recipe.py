@@ -1,0 +1,246 @@
+"""Recipes of cameras behind a mosaic: a lens, its light, a Wiener bank, and fine-tuning."""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
+from typing import Any, Final
+
+from camkit.bundle.sensor import BayerSensor
+from camkit.bundle.stages import Wiener
+from camkit.bundle.stages.network import DEFAULT_ROLE
+from camkit.errors import ContractError
+from camkit.models_def.toml_table import section, typed
+from camkit.models_def.training.recipe import (
+    DataRecipe,
+    Recipe,
+    ScheduleRecipe,
+    check_share,
+    common_tables,
+    model,
+    own_schedule,
+    with_new_names,
+)
+
+ROLES: Final = (DEFAULT_ROLE,)
+OWN: Final = ("object_distance_mm", "scale", "wiener", "lens", "fine_tuning")
+CAMERA_PARTS: Final = ("name", "object_distance_mm", "scale", "sensor", "wiener", "lens")
+"""What says which camera it is; how its networks are trained may differ."""
+_OLDER: Final = {"final": "fine_tuning"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LensRecipe:
+    """The lens and how far its copies vary.
+
+    Attributes:
+        prescription: Name of a built-in lens, or path of a file (.toml, .zmx) relative to the
+            recipe.
+        copies: Fabricated copies whose PSFs are trained on; one more is kept for validation.
+        fields: Field heights of the kernel bank.
+        kernel_px: Side of its kernels, odd.
+        rays: Rays in half the pupil.
+        seed: Seed of the fabrication errors.
+        depths_mm: Object distances, increasing, with the sensor where the prescription has it; a
+            sample is taken at one of them by chance, the Wiener filter has their mean kernel.
+            Empty for the distance of the prescription.
+    """
+
+    prescription: str
+    copies: int = 8
+    fields: int = 25
+    kernel_px: int = 129
+    rays: int = 4096
+    seed: int = 101
+    depths_mm: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
+            raise ContractError(f"lens.depths_mm must increase from above 0; got {self.depths_mm}")
+
+    def to_json(self) -> dict[str, Any]:
+        """Give what decides the kernels, to name files by; depths only where there are any."""
+        return {name: value for name, value in asdict(self).items() if value != ()}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BayerDataRecipe(DataRecipe):
+    """How training samples are made.
+
+    Attributes:
+        margin_px: Simulated surroundings of a sample that the Wiener filter sees.
+        iso_min: Lowest ISO, drawn log-uniformly.
+        iso_max: Highest ISO.
+        exposure_min_ev: Least exposure relative to the picture as it is.
+        exposure_max_ev: Greatest exposure; above 0 highlights clip.
+        block_jitter_px: How far the block centre whose kernel filters a patch may lie from it.
+        border_share: Share of samples that lie at one or more picture borders.
+        drift_share: Share of samples whose lens has drifted since it was measured: its kernels
+            are scaled and turned, each uniformly within the two limits below.
+        drift_scale: Largest relative change of the kernels' size, by heat or refocusing.
+        drift_turn_deg: Largest turn of the kernels, by a lens turned in its mount.
+        target_max: Targets are clipped at this multiple of the white level.
+        depth_shares: How often each of `lens.depths_mm` is drawn, relative to the others; empty
+            for equally often.
+        known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
+            `camkit process --depth-m` gives it; the others' has the mean kernel.
+    """
+
+    margin_px: int = 72
+    iso_min: float = 80.0
+    iso_max: float = 6400.0
+    exposure_min_ev: float = -3.0
+    exposure_max_ev: float = 1.0
+    block_jitter_px: float = 176.0
+    border_share: float = 0.2
+    drift_share: float = 0.0
+    drift_scale: float = 0.05
+    drift_turn_deg: float = 5.0
+    target_max: float = 4.0
+    depth_shares: tuple[float, ...] = ()
+    known_depth_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        DataRecipe.__post_init__(self)
+        check_share("data.known_depth_share", self.known_depth_share)
+        check_share("data.border_share", self.border_share)
+        check_share("data.drift_share", self.drift_share)
+        if not 0 <= self.drift_scale < 0.5:
+            raise ContractError(f"data.drift_scale must be in [0, 0.5); got {self.drift_scale}")
+        if not 0 < self.iso_min <= self.iso_max:
+            raise ContractError(f"data.iso_min must be in (0, iso_max]; got {self.iso_min}")
+        if self.exposure_min_ev > self.exposure_max_ev:
+            raise ContractError("data.exposure_min_ev must not exceed exposure_max_ev")
+        if any(not 0 < share < math.inf for share in self.depth_shares):
+            raise ContractError(
+                f"data.depth_shares must be positive and finite; got {self.depth_shares}"
+            )
+
+
+FINE_TUNING_SCHEDULE: Final = ScheduleRecipe(
+    steps=20_000, batch=4, patch_px=256, learning_rate=1e-4, final_rate=0.0, precision="float32"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FineTuningRecipe:
+    """Fine-tuning: a trained network against two discriminators (Sun 2021, section 6.2.2).
+
+    Attributes:
+        schedule: Of the fine-tuning.
+        perceptual_weight: nu1 of eq. (6.12), on the features.
+        pixel_weight: nu2, on the pixels. The thesis prints 0.5 and 0.006 for the two; these
+            defaults are the order of the source it cites (Kupyn et al. 2019).
+        global_weight: sigma_g of eq. (6.14), on the global discriminator.
+        local_weight: sigma_l, on the local one.
+        global_layers: Strided layers of the global discriminator.
+        local_layers: Of the local one.
+        discriminator_width: Channels of their first layer.
+        discriminator_rate: Learning rate of both, with the decay of the schedule.
+        pair_share: Share of a batch drawn from real pairs, where there are any.
+        pair_samples: Samples cut from each real pair.
+    """
+
+    schedule: ScheduleRecipe = FINE_TUNING_SCHEDULE
+    perceptual_weight: float = 0.006
+    pixel_weight: float = 0.5
+    global_weight: float = 0.01
+    local_weight: float = 0.01
+    global_layers: int = 5
+    local_layers: int = 3
+    discriminator_width: int = 64
+    discriminator_rate: float = 1e-4
+    pair_share: float = 0.5
+    pair_samples: int = 32
+
+    def __post_init__(self) -> None:
+        weights = self.perceptual_weight, self.pixel_weight, self.global_weight, self.local_weight
+        if min(weights) < 0 or self.pixel_weight + self.perceptual_weight == 0:
+            raise ContractError(
+                "fine_tuning needs weights >= 0, and one of perceptual and pixel > 0"
+            )
+        counts = self.global_layers, self.local_layers, self.discriminator_width, self.pair_samples
+        if min(counts) < 1 or self.discriminator_rate <= 0:
+            raise ContractError(
+                "fine_tuning needs layers, width, pair_samples, discriminator_rate > 0"
+            )
+        check_share("fine_tuning.pair_share", self.pair_share)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BayerRecipe(Recipe):
+    """A camera behind a mosaic and how its networks are trained.
+
+    Attributes:
+        sensor: With a mosaic, a size and the response of its colours.
+        data: How samples are made.
+        object_distance_mm: Distance the lens is focused on; inf is allowed.
+        scale: Divisor of the stabilised planes, see the manifest.
+        wiener: Prior and blocks of the Wiener bank in front of the networks.
+        lens: The lens, and how far its copies vary.
+        fine_tuning: Later training.
+    """
+
+    sensor: BayerSensor
+    data: BayerDataRecipe
+    object_distance_mm: float
+    scale: float
+    wiener: Wiener
+    lens: LensRecipe
+    fine_tuning: FineTuningRecipe = field(default_factory=FineTuningRecipe)
+
+    def __post_init__(self) -> None:
+        shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
+        if shares and shares != depths:
+            raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
+        if self.data.known_depth_share and depths < 2:
+            raise ContractError("data.known_depth_share needs two or more lens.depths_mm")
+
+
+def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
+    """Turn a parsed TOML table into a recipe.
+
+    Raises:
+        ContractError: If a key is unknown, missing or wrong, or the sensor has no mosaic.
+    """
+    table = with_new_names(table, _OLDER)
+    common = common_tables(table, own=OWN, roles=ROLES)
+    if not isinstance(common.sensor, BayerSensor):
+        raise ContractError("training simulates cameras with a Bayer mosaic; sensor.cfa is missing")
+    if common.sensor.extent is None or common.sensor.channel_response is None:
+        raise ContractError("sensor needs width_px, height_px, pixel_pitch_um, channel_response")
+    return BayerRecipe(
+        name=common.name,
+        kind=common.kind,
+        sensor=common.sensor,
+        networks=common.networks,
+        object_distance_mm=typed("object_distance_mm", table.get("object_distance_mm"), float),
+        scale=typed("scale", table.get("scale", 64.0), float),
+        wiener=model("wiener", Wiener, table),
+        lens=section("lens", LensRecipe, table.get("lens", {})),
+        data=section("data", BayerDataRecipe, table.get("data", {})),
+        fine_tuning=_fine_tuning(table.get("fine_tuning", {})),
+    )
+
+
+def _fine_tuning(table: Any) -> FineTuningRecipe:
+    if not isinstance(table, Mapping):
+        raise ContractError(f"fine_tuning must be a table; got {table!r}")
+    schedule = own_schedule("fine_tuning.schedule", table.get("schedule", {}), FINE_TUNING_SCHEDULE)
+    return section("fine_tuning", FineTuningRecipe, {**table, "schedule": schedule})
+
+
+def samples_digest(recipe: BayerRecipe, seed: int) -> str:
+    """Give a hash of all that decides the training samples, to name their pool by."""
+    content = {
+        "sensor": recipe.sensor.model_dump(mode="json"),
+        "wiener": recipe.wiener.model_dump(mode="json"),
+        "lens": recipe.lens.to_json(),
+        "data": asdict(recipe.data),
+        "scale": recipe.scale,
+        "object_distance_mm": str(recipe.object_distance_mm),
+        "seed": seed,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

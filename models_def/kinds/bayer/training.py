@@ -1,0 +1,145 @@
+"""A camera behind a mosaic as training sees it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from torch import nn
+
+from camkit.bundle.stages import (
+    Color,
+    Demosaic,
+    Illumination,
+    Linearise,
+    Network,
+    RaiseClipped,
+    Repair,
+    Stage,
+    Undistort,
+    WhiteBalance,
+)
+from camkit.models_def.kinds.bayer.material import BayerMaterial, read_material, trace_material
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import (
+    CAMERA_PARTS,
+    ROLES,
+    BayerRecipe,
+    samples_digest,
+    to_bayer_recipe,
+)
+from camkit.models_def.kinds.bayer.samples import (
+    LAYOUT,
+    draw_exposure,
+    make_shot,
+    scene_side_px,
+    tint_crop,
+)
+from camkit.models_def.kinds.bayer.validation import BayerJudge, make_validation_captures
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.models_def.training.sample import Sample, SampleLayout
+
+
+class BayerMaker:
+    """Makes sample i of a recipe."""
+
+    def __init__(
+        self, recipe: BayerRecipe, bank: PsfBank, pictures: Path | None, seed: int
+    ) -> None:
+        self._recipe, self._bank, self._seed = recipe, bank, seed
+        self._source: SceneSource = open_source(
+            pictures,
+            picture_share=recipe.data.picture_share,
+            scenes=recipe.data.procedural_scenes,
+            scene_px=recipe.data.scene_px,
+        )
+
+    def make(self, index: int) -> Sample:
+        """Photograph a crop of a scene."""
+        rng = np.random.default_rng((self._seed, index))
+        exposure = draw_exposure(rng, self._recipe, self._bank)
+        crop = self._source.draw_crop(rng, scene_side_px(self._recipe, self._bank))
+        crop = tint_crop(rng, crop)
+        return make_shot(crop, exposure, self._recipe, self._bank, rng).sample
+
+
+class BayerTraining:
+    """Fulfils `camkit.models_def.training.kind.TrainingKind`."""
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """One network, behind the Wiener bank."""
+        return ROLES
+
+    @property
+    def camera_parts(self) -> tuple[str, ...]:
+        """What says which camera a recipe describes."""
+        return CAMERA_PARTS
+
+    def to_recipe(self, table: Mapping[str, Any]) -> BayerRecipe:
+        """Check the tables of a recipe."""
+        return to_bayer_recipe(table)
+
+    def stages(self, recipe: BayerRecipe) -> tuple[Stage, ...]:
+        """Give the stages of every camera of this kind, with the recipe's bank."""
+        return (
+            Linearise(),
+            Repair(),
+            WhiteBalance(),
+            Demosaic(method="fast"),
+            recipe.wiener,
+            Network(scale=recipe.scale),
+            RaiseClipped(),
+            Illumination(),
+            Undistort(),
+            Color(),
+        )
+
+    def build_network(self, name: str, **config: Any) -> nn.Module:
+        """Build a network of the catalogue."""
+        return build_network(name, **config)
+
+    def layout(self, recipe: BayerRecipe, role: str) -> SampleLayout:
+        """Capture and Wiener planes in, clean planes out."""
+        del recipe, role
+        return LAYOUT
+
+    def prepare(
+        self, recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path
+    ) -> BayerMaterial:
+        """Trace the lens and its copies."""
+        return trace_material(recipe, recipe_folder, cache_folder)
+
+    def read_material(self, folder: Path) -> BayerMaterial:
+        """Read the kernels that a trainer wrote."""
+        return read_material(folder)
+
+    def samples_digest(self, recipe: BayerRecipe, role: str, seed: int) -> str:
+        """Hash what decides the samples."""
+        del role
+        return samples_digest(recipe, seed)
+
+    def maker(
+        self,
+        recipe: BayerRecipe,
+        role: str,
+        material: BayerMaterial,
+        pictures: Path | None,
+        seed: int,
+    ) -> BayerMaker:
+        """Open the scenes."""
+        del role
+        return BayerMaker(recipe, material.bank, pictures, seed)
+
+    def judge(
+        self, recipe: BayerRecipe, role: str, material: BayerMaterial, pictures: Path | None
+    ) -> BayerJudge:
+        """Photograph pictures that are never trained on."""
+        del role
+        return BayerJudge(
+            captures=make_validation_captures(recipe, material.bank, pictures), recipe=recipe
+        )
+
+
+TRAINING: Final = BayerTraining()

@@ -1,0 +1,109 @@
+"""A lens as freezing sees it: traced wherever it is asked for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import torch
+
+from camkit.contracts import RadialDistortion
+from camkit.errors import ContractError
+from camkit.models_def.optics.analysis.illumination import relative_illumination_at
+from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.kernel_bank import focused_copies
+from camkit.models_def.optics.optics import FieldLayout, FloatGrid, radial_layout
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
+
+RAYS: Final = 4096
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LensOptics:
+    """A lens of revolution; fulfils `camkit.models_def.optics.optics.Optics`.
+
+    Distortion and illumination are those at the lens's own object distance.
+
+    Attributes:
+        lens: The prescription.
+        rays: In half the pupil, per wavelength traced.
+    """
+
+    lens: Lens
+    rays: int = RAYS
+
+    @property
+    def name(self) -> str:
+        """Name of the lens."""
+        return self.lens.name
+
+    @property
+    def facts(self) -> Mapping[str, float]:
+        """Its focal length."""
+        return {"efl_mm": paraxial_data(self.lens).efl_mm}
+
+    @property
+    def depths_mm(self) -> tuple[float, ...]:
+        """The object distance of the prescription."""
+        return (self.lens.object_distance_mm,)
+
+    @property
+    def focus_mm(self) -> float:
+        """The object distance of the prescription."""
+        return self.lens.object_distance_mm
+
+    @property
+    def reference_wavelength_um(self) -> float:
+        """That of the prescription."""
+        return self.lens.reference_wavelength_um
+
+    @property
+    def wavelengths_um(self) -> None:
+        """A lens may be traced at any wavelength."""
+        return
+
+    def layout(self, corner_mm: float, fields: int) -> FieldLayout:
+        """Give heights from the axis to the corner, evenly spaced."""
+        return radial_layout(np.linspace(0.0, corner_mm, fields))
+
+    def kernels(
+        self,
+        fields: FieldLayout,
+        wavelengths_um: FloatGrid,
+        *,
+        depth_mm: float,
+        side_px: int,
+        pitch_um: float,
+    ) -> TracedPsf:
+        """Trace the kernels at heights along +y; the sensor stays where the lens has it.
+
+        Raises:
+            ContractError: If the places do not lie along +y, or no light reaches a kernel.
+        """
+        if fields.symmetry != "radial":
+            raise ContractError("a lens of revolution is traced along +y; other places are turned")
+        with torch.no_grad():
+            return trace_psf(
+                with_object_distance(self.lens, depth_mm),
+                torch.from_numpy(fields.y_mm),
+                torch.from_numpy(wavelengths_um),
+                side_px,
+                pitch_um,
+                rays=self.rays,
+            )
+
+    def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
+        """Trace the distortion at the reference wavelength; see `trace_distortion`."""
+        return trace_distortion(self.lens, radius_mm, channels=channels)
+
+    def illumination(self, fields: FieldLayout) -> FloatGrid:
+        """Trace the relative illumination; the first place is the axis."""
+        light = relative_illumination_at(self.lens, torch.from_numpy(fields.y_mm))
+        return np.asarray(light.numpy() / float(light[0]), dtype=np.float64)
+
+    def copies(self, count: int, seed: int) -> "tuple[LensOptics, ...]":
+        """Give the nominal lens and fabricated copies, each focused when it was assembled."""
+        lenses = focused_copies(self.lens, count, seed)
+        return tuple(replace(self, lens=lens) for lens in lenses)

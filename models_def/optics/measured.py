@@ -1,0 +1,225 @@
+"""A PSF that was measured, or computed elsewhere, as freezing sees it: known at its own samples.
+
+Between its places, depths and wavelengths kernels are blended as every lookup blends them; beyond
+its depths nothing is known. It is frozen at the places and wavelengths that it has: others would
+hold no more.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.bundle.psf_file import read_psf
+from camkit.contracts import FrozenPsf, RadialDistortion, depth_weights, grid_heights_mm
+from camkit.errors import ContractError
+from camkit.models_def.optics.optics import (
+    FieldLayout,
+    FloatGrid,
+    grid_layout,
+    radial_layout,
+    uniform_layout,
+)
+from camkit.models_def.optics.psf import TracedPsf
+from camkit.models_def.sensors.psf import field_kernels, grid_neighbours
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredOptics:
+    """Optics known by kernels; fulfils `camkit.models_def.optics.optics.Optics`.
+
+    Attributes:
+        psf: The kernels, at any pitch.
+        name: For people.
+    """
+
+    psf: FrozenPsf
+    name: str
+
+    @property
+    def facts(self) -> Mapping[str, float]:
+        """Nothing but its kernels is known."""
+        return {}
+
+    @property
+    def depths_mm(self) -> tuple[float, ...]:
+        """The depths at which it was measured."""
+        return tuple(self.psf.depths_mm.tolist())
+
+    @property
+    def focus_mm(self) -> float:
+        """The farthest depth at which it was measured."""
+        return float(self.psf.depths_mm[-1])
+
+    @property
+    def reference_wavelength_um(self) -> float:
+        """The middle one of those at which it was measured."""
+        return float(self.psf.wavelengths_um[self.psf.wavelengths_um.size // 2])
+
+    @property
+    def wavelengths_um(self) -> FloatGrid:
+        """The wavelengths at which it was measured."""
+        return self.psf.wavelengths_um
+
+    def layout(self, corner_mm: float, fields: int) -> FieldLayout:
+        """Give the places at which it was measured."""
+        del corner_mm, fields
+        psf = self.psf
+        if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
+            return grid_layout(psf.grid_x_mm, psf.grid_y_mm)
+        return (
+            uniform_layout() if psf.symmetry == "uniform" else radial_layout(psf.field_heights_mm)
+        )
+
+    def kernels(
+        self,
+        fields: FieldLayout,
+        wavelengths_um: FloatGrid,
+        *,
+        depth_mm: float,
+        side_px: int,
+        pitch_um: float,
+    ) -> TracedPsf:
+        """Blend the kernels to places, depth and wavelengths, at another pitch if need be.
+
+        Raises:
+            ContractError: If the depth lies beyond those measured.
+        """
+        psf = self.psf
+        shares = torch.from_numpy(depth_weights(psf.depths_mm, depth_mm))
+        known = torch.from_numpy(psf.kernels.astype(np.float64))
+        at_depth = torch.einsum("d,fdlhw->flhw", shares, known)
+        hats = [np.interp(wavelengths_um, psf.wavelengths_um, unit) for unit in _units(psf)]
+        waves = torch.einsum("ln,flhw->fnhw", torch.from_numpy(np.stack(hats)), at_depth)
+        x_mm, y_mm = (torch.from_numpy(axis) for axis in (fields.x_mm, fields.y_mm))
+        found = field_kernels(waves, psf).at(x_mm, y_mm).to(torch.float64)
+        found = resampled(found, psf.pixel_pitch_um / pitch_um)
+        inside = _window(found, side_px)
+        kept = inside.sum((-2, -1)) / found.sum((-2, -1))
+        return TracedPsf(
+            kernels=inside / inside.sum((-2, -1), keepdim=True).clamp_min(1e-30), energy_kept=kept
+        )
+
+    def distortion(self, radius_mm: float, channels: int) -> RadialDistortion:
+        """Give the distortion as measured, for every channel; one row stands for all.
+
+        Raises:
+            ContractError: If it was measured for another number of channels.
+        """
+        del radius_mm
+        rows = self.psf.distortion.coefficients
+        if len(rows) not in (1, channels):
+            raise ContractError(
+                f"{self.name} has the distortion of {len(rows)} channels, the sensor {channels}"
+            )
+        coefficients = np.ascontiguousarray(np.broadcast_to(rows, (channels, 4)))
+        return replace(self.psf.distortion, coefficients=coefficients)
+
+    def illumination(self, fields: FieldLayout) -> FloatGrid:
+        """Give the relative illumination, blended as kernels are."""
+        psf, light = self.psf, self.psf.relative_illumination
+        if psf.grid_x_mm is not None and psf.grid_y_mm is not None:
+            grid, at = (
+                (torch.from_numpy(x.copy()), torch.from_numpy(y.copy()))
+                for x, y in ((psf.grid_x_mm, psf.grid_y_mm), (fields.x_mm, fields.y_mm))
+            )
+            field, share = grid_neighbours(grid, *at)
+            return np.asarray((light[field.numpy()] * share.numpy()).sum(1), dtype=np.float64)
+        return np.interp(np.hypot(fields.x_mm, fields.y_mm), psf.field_heights_mm, light)
+
+    def copies(self, count: int, seed: int) -> "tuple[MeasuredOptics, ...]":
+        """Give itself: how others of it would differ was not measured."""
+        del count, seed
+        return (self,)
+
+
+def read_measured(path: Path) -> MeasuredOptics:
+    """Read a PSF file (`camkit/bundle/psf_file.py`).
+
+    Raises:
+        BundleError: If it is missing, damaged or not a PSF.
+    """
+    return MeasuredOptics(psf=read_psf(path), name=path.stem)
+
+
+def measured_psf(
+    kernels: NDArray[np.floating],
+    *,
+    pixel_pitch_um: float,
+    wavelengths_um: tuple[float, ...],
+    grid_mm: tuple[FloatGrid, FloatGrid] | None = None,
+    depth_mm: float = np.inf,
+) -> FrozenPsf:
+    """Make a PSF of arrays: of one depth, without distortion, of even light.
+
+    Args:
+        kernels: (wavelength, h, w) for the same everywhere, or (row, column, wavelength, h, w) on
+            a grid; >= 0 and of any sum, odd sides, centred on the chief ray.
+        pixel_pitch_um: Of their samples.
+        wavelengths_um: Increasing.
+        grid_mm: (column,) and (row,) positions of a grid.
+        depth_mm: At which they were measured.
+
+    Raises:
+        ContractError: If the shapes disagree, or a kernel is none.
+    """
+    places = (1, 1) if grid_mm is None else (grid_mm[1].size, grid_mm[0].size)
+    if kernels.ndim != (3 if grid_mm is None else 5) or kernels.shape[:-3] not in ((), places):
+        raise ContractError(
+            f"kernels must be {'' if grid_mm is None else 'row, column, '}wavelength, h, w for "
+            f"{places[0]} x {places[1]} places; got {kernels.shape}"
+        )
+    fields = kernels.reshape(places[0] * places[1], 1, *kernels.shape[-3:]).astype(np.float64)
+    sums = fields.sum((-2, -1), keepdims=True)
+    if not (sums > 0).all():
+        raise ContractError("every kernel needs light")
+    return FrozenPsf(
+        kernels=np.ascontiguousarray(fields / sums, dtype=np.float32),
+        field_heights_mm=np.zeros(1) if grid_mm is None else grid_heights_mm(*grid_mm),
+        depths_mm=np.array([depth_mm]),
+        wavelengths_um=np.array(wavelengths_um),
+        pixel_pitch_um=pixel_pitch_um,
+        distortion=RadialDistortion(coefficients=np.array([[1.0, 0, 0, 0]]), radius_mm=1.0),
+        relative_illumination=np.ones(places[0] * places[1]),
+        symmetry="uniform" if grid_mm is None else "grid",
+        grid_x_mm=None if grid_mm is None else grid_mm[0],
+        grid_y_mm=None if grid_mm is None else grid_mm[1],
+    )
+
+
+def resampled(kernels: Tensor, ratio: float) -> Tensor:
+    """Give (..., h, w) kernels at another pitch: light spread by the area that samples share.
+
+    Args:
+        kernels: Odd sides; the middle sample stays in the middle.
+        ratio: Pitch of the kernels over the pitch wanted.
+    """
+    if abs(ratio - 1) < 1e-6:
+        return kernels
+    rows, columns = (_shares(side, ratio).to(kernels.dtype) for side in kernels.shape[-2:])
+    return rows @ kernels @ columns.T
+
+
+def _shares(side: int, ratio: float) -> Tensor:
+    """Give (made, side): the share of each sample that falls into each one made."""
+    half = int(np.ceil(side * ratio / 2 - 0.5))
+    made = torch.arange(-half, half + 1, dtype=torch.float64)[:, None]
+    given = (torch.arange(side, dtype=torch.float64)[None] - side // 2) * ratio
+    low = torch.maximum(made - 0.5, given - ratio / 2)
+    high = torch.minimum(made + 0.5, given + ratio / 2)
+    return (high - low).clamp(min=0) / ratio
+
+
+def _window(kernels: Tensor, side_px: int) -> Tensor:
+    """Cut or fill (..., h, w) up to the middle (..., side_px, side_px)."""
+    h, w = kernels.shape[-2:]
+    rows, columns = (side_px - h) // 2, (side_px - w) // 2
+    return torch.nn.functional.pad(kernels, (columns, columns, rows, rows))
+
+
+def _units(psf: FrozenPsf) -> FloatGrid:
+    return np.eye(psf.wavelengths_um.size)

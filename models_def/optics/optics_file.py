@@ -1,0 +1,23 @@
+"""Optics by the suffix of a file: a lens, or a PSF that was measured."""
+
+from pathlib import Path
+from typing import Final
+
+from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.lens_optics import LensOptics
+from camkit.models_def.optics.measured import read_measured
+from camkit.models_def.optics.optics import Optics
+
+MEASURED: Final = ".safetensors"
+
+
+def read_optics(path: Path) -> Optics:
+    """Read optics: .safetensors as a measured PSF, anything else as a lens (`read_lens`).
+
+    Raises:
+        BundleError: If a PSF is missing or damaged.
+        CamkitError: If a lens is wrong, see `read_lens`.
+    """
+    if path.suffix.lower() == MEASURED:
+        return read_measured(path)
+    return LensOptics(lens=read_lens(path))

@@ -1,0 +1,169 @@
+"""What training asks of a kind of camera: scenes drawn, samples made, results judged.
+
+    recipe -> training_kind -> TrainingKind -> prepare   material: what samples are made with
+                                            -> maker     sample i of a role
+                                            -> judge     fixed captures to choose by
+
+The part of a kind for this floor (`camkit.kinds.Kind.part`) names its object `TRAINING`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar, cast
+
+from torch import Tensor, nn
+
+from camkit.bundle.stages import Stage
+from camkit.errors import UnsupportedError
+from camkit.kinds import find_kind
+from camkit.models_def.toml_table import read_table, typed
+from camkit.models_def.training.recipe import DEFAULT_KIND, Recipe, with_new_names
+from camkit.models_def.training.sample import Sample, SampleLayout
+
+Restorer = Callable[[Tensor], Tensor]
+"""(1, c, h, w) of all inputs -> (1, c, scale h, scale w) of all outputs."""
+
+_OLDER: Mapping[str, str] = {"camera": "sensor"}
+
+R = TypeVar("R", bound=Recipe)
+M = TypeVar("M", bound="Material")
+
+
+class Material(Protocol):
+    """What samples are made with, prepared once: the kernels of a lens, say."""
+
+    @property
+    def lens_toml(self) -> str:
+        """Give the lens as text; empty where there is none."""
+        ...
+
+    def digest(self) -> str:
+        """Give the sha256 of all that decides samples."""
+        ...
+
+    def write(self, folder: Path) -> None:
+        """Write it for another process."""
+        ...
+
+
+class SampleMaker(Protocol):
+    """Makes the samples of one role; a worker process holds one."""
+
+    def make(self, index: int) -> Sample:
+        """Make sample i: a pure function of recipe, material, seed and i."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """How well a network does.
+
+    Attributes:
+        mean_db: Over all captures.
+        parts: What is told apart -> value -> dB; "by_iso" -> "100" -> 31.2.
+    """
+
+    mean_db: float
+    parts: Mapping[str, Mapping[str, float]]
+
+
+class Judge(Protocol):
+    """Fixed captures that are never trained on."""
+
+    def baselines(self) -> Mapping[str, float]:
+        """Give what a network must beat: name -> mean dB."""
+        ...
+
+    def score(self, restore: Restorer) -> Score:
+        """Judge a restoration."""
+        ...
+
+
+class TrainingKind(Protocol[R, M]):
+    """A kind of camera as training sees it."""
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of its networks, in the order in which a picture meets them."""
+        ...
+
+    @property
+    def camera_parts(self) -> tuple[str, ...]:
+        """Attributes of its recipe that say which camera it is, not how it is trained."""
+        ...
+
+    def to_recipe(self, table: Mapping[str, Any]) -> R:
+        """Check the tables of a recipe; raise ContractError naming the key."""
+        ...
+
+    def stages(self, recipe: R) -> tuple[Stage, ...]:
+        """Give the stages of the camera, in order."""
+        ...
+
+    def build_network(self, name: str, **config: Any) -> nn.Module:
+        """Build an untrained network with the attribute `stride_px`; see `build_network`."""
+        ...
+
+    def layout(self, recipe: R, role: str) -> SampleLayout:
+        """Say what the samples of a role hold, and so what its networks take and give."""
+        ...
+
+    def prepare(self, recipe: R, recipe_folder: Path, cache_folder: Path) -> M:
+        """Prepare what samples need; what takes long is kept in the cache."""
+        ...
+
+    def read_material(self, folder: Path) -> M:
+        """Read what `Material.write` wrote."""
+        ...
+
+    def samples_digest(self, recipe: R, role: str, seed: int) -> str:
+        """Give a hash of all in the recipe that decides the samples, to name their pool by."""
+        ...
+
+    def maker(
+        self, recipe: R, role: str, material: M, pictures: Path | None, seed: int
+    ) -> SampleMaker:
+        """Open the scenes and give the maker of a role's samples."""
+        ...
+
+    def judge(self, recipe: R, role: str, material: M, pictures: Path | None) -> Judge:
+        """Make the captures that a role is judged by; of procedural scenes without pictures."""
+        ...
+
+
+def training_kind(name: str) -> TrainingKind[Any, Any]:
+    """Give the part of a kind that training asks.
+
+    Raises:
+        UnsupportedError: If there is no such kind, or it cannot be trained.
+    """
+    part = find_kind(name).part("models_def")
+    if not hasattr(part, "TRAINING"):
+        raise UnsupportedError(f"cameras of the kind {name!r} cannot be trained: no TRAINING")
+    return cast("TrainingKind[Any, Any]", part.TRAINING)
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Read and check a recipe of any kind.
+
+    Raises:
+        ContractError: If the file is missing, is no TOML, or a key is unknown, missing or wrong.
+        UnsupportedError: If its kind cannot be trained.
+    """
+    return to_recipe(read_table(path, "recipe"))
+
+
+def to_recipe(table: Mapping[str, Any]) -> Recipe:
+    """Turn a parsed TOML table into the recipe of its kind; raises as `read_recipe` does."""
+    kind = typed("kind", table.get("kind", DEFAULT_KIND), str)
+    recipe: Recipe = training_kind(kind).to_recipe(with_new_names(table, _OLDER))
+    return recipe
+
+
+def build_role(
+    kind: TrainingKind[R, M], recipe: R, role: str, size: str
+) -> tuple[nn.Module, SampleLayout]:
+    """Build the untrained network of a role and size, and say what it takes and gives."""
+    entry = recipe.network(size, role)
+    return kind.build_network(entry.network, **entry.config), kind.layout(recipe, role)

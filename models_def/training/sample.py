@@ -1,0 +1,101 @@
+"""A training sample: what a network is given, by name, and what it should make of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from camkit.bundle.facts import Port
+from camkit.errors import ContractError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleLayout:
+    """The shape of the samples of one role.
+
+    Attributes:
+        inputs: What the network is given, in the order of its channels.
+        outputs: What it gives, in the order of its channels; one scale.
+        turned: Whether a sample turned or mirrored is as good a sample. Not where the network
+            should know which way blur points.
+    """
+
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    turned: bool = True
+
+    def __post_init__(self) -> None:
+        if not self.inputs or len({port.scale for port in self.outputs}) != 1:
+            raise ContractError("samples need inputs, and outputs of one scale")
+
+    @property
+    def input_channels(self) -> int:
+        """Channels of all inputs."""
+        return sum(port.channels for port in self.inputs)
+
+    @property
+    def output_channels(self) -> int:
+        """Channels of all outputs."""
+        return sum(port.channels for port in self.outputs)
+
+    @property
+    def scale(self) -> int:
+        """Samples along a side of the outputs for one of the inputs."""
+        return self.outputs[0].scale
+
+    def named(self, planes: Tensor) -> dict[str, Tensor]:
+        """Split (b, channels, h, w) of all inputs by their names."""
+        parts = torch.split(planes, [port.channels for port in self.inputs], dim=1)
+        return {port.name: part for port, part in zip(self.inputs, parts, strict=True)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """A finished sample.
+
+    Attributes:
+        inputs: Name -> (c, s, s), what the network is given.
+        target: (c, scale s, scale s), what it should give; negative where nothing can be known.
+        weight: (c,) factor to the square-root domain of the signal, see `losses`.
+    """
+
+    inputs: Mapping[str, Tensor]
+    target: Tensor
+    weight: Tensor
+
+    def stacked(self, layout: SampleLayout) -> Tensor:
+        """Give all inputs as one (channels, s, s), in the order of the layout.
+
+        Raises:
+            ContractError: If the sample is not of that layout.
+        """
+        planes = torch.cat([self.inputs[port.name] for port in layout.inputs])
+        side = layout.scale * planes.shape[-1]
+        wanted = (layout.output_channels, side, side)
+        if len(planes) != layout.input_channels or tuple(self.target.shape) != wanted:
+            raise ContractError(
+                f"a sample must have {layout.input_channels} channels and a target of {wanted}; "
+                f"got {tuple(planes.shape)} and {tuple(self.target.shape)}"
+            )
+        return planes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """Patches of one step.
+
+    Attributes:
+        inputs: Name -> (b, c, p, p), in the order of the network's channels.
+        target: (b, c, scale p, scale p).
+        weight: (b, c).
+    """
+
+    inputs: Mapping[str, Tensor]
+    target: Tensor
+    weight: Tensor
+
+    @property
+    def planes(self) -> Tensor:
+        """All inputs as one (b, channels, p, p)."""
+        return torch.cat(list(self.inputs.values()), dim=1)

@@ -1,0 +1,9 @@
+"""The fixtures of a small camera behind a mosaic."""
+
+from tests.bayer_recipe import (  # noqa: F401
+    bank,
+    material,
+    one_thread,
+    recipe,
+    recipe_path,
+)

@@ -1,0 +1,164 @@
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.recipe import CAMERA_PARTS, samples_digest
+from camkit.models_def.training.kind import read_recipe, to_recipe
+from camkit.models_def.training.recipe import differing_part
+
+RECIPES = Path(__file__).resolve().parents[4] / "models_def" / "recipes"
+SHIPPED = RECIPES / "duet.toml"
+
+
+def differing_camera(one, other):
+    return differing_part(one, other, CAMERA_PARTS)
+
+
+def table(recipe_path, **changes):
+    content = tomllib.loads(recipe_path.read_text(encoding="utf-8"))
+    for dotted, value in changes.items():
+        *path, last = dotted.split("__")
+        place = content
+        for part in path:
+            place = place.setdefault(part, {})
+        if value is None:
+            del place[last]
+        else:
+            place[last] = value
+    return content
+
+
+def test_shipped_recipe_has_its_networks_and_the_stated_sensor():
+    recipe = read_recipe(SHIPPED)
+    assert set(recipe.networks["restore"]) == {"S", "M", "L", "trimmed"}
+    sensor = recipe.sensor
+    assert (sensor.width_px, sensor.height_px, sensor.pixel_pitch_um) == (6000, 4000, 5.96)
+    levels = sensor.white_level - sensor.black_level
+    full_well_e = sensor.noise[0].gain_e_per_dn * levels
+    assert full_well_e == pytest.approx(sensor.full_well_e, rel=1e-3)
+
+
+def test_network_schedule_overrides_the_common_one(recipe):
+    assert recipe.network("S").schedule.steps == 12
+    assert recipe.network("M").schedule.steps == 60
+    assert recipe.network("M").schedule.batch == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "value", "named"),
+    [
+        ("colour", 1, "recipe: unknown key 'colour'"),
+        ("data__sampel_px", 64, "data: unknown key 'sampel_px'"),
+        ("data__sample_px", 64.5, "data.sample_px must be of type int"),
+        ("data__picture_share", 1.5, "data.picture_share must lie in 0..1"),
+        ("data__drift_share", -0.1, "data.drift_share must lie in 0..1"),
+        ("data__drift_scale", 0.5, "data.drift_scale must be in"),
+        ("schedule__loss", "l3", "schedule.loss must be one of"),
+        ("schedule__precision", "float8", "schedule.precision must be one of"),
+        ("schedule__steps", True, "schedule.steps must be of type int"),
+        ("lens__prescription", None, "lens lacks prescription"),
+        ("sensor__width_px", -1, "sensor.width_px"),
+        ("sensor__shape", 3, "sensor.shape"),
+        ("wiener__prior_scale", None, "wiener.prior_scale"),
+        ("networks__S__netwrok", "x", "networks.S: unknown key"),
+        ("networks__S__network", None, "networks.S.network must be of type str"),
+        ("networks__S", 3, "networks.S must be a table"),
+        ("schedule", 3, "schedule must be a table"),
+        ("sensor", 3, "sensor must be a table"),
+        ("sensor__cfa", None, "sensor.cfa is missing"),
+        ("sensor__type", "spad", "sensor"),
+        ("sensor__channel_response", None, "channel_response"),
+        ("fine_tuning", 3, "fine_tuning must be a table"),
+        ("kind", 3, "kind must be of type str"),
+        ("networks", {}, "at least one table"),
+        ("name", None, "name must be of type str"),
+    ],
+)
+def test_wrong_recipes_are_refused_by_naming_the_key(recipe_path, change, value, named):
+    with pytest.raises(ContractError, match=named):
+        to_recipe(table(recipe_path, **{change: value}))
+
+
+def test_recipes_of_old_checkpoints_have_fine_tuning_under_its_older_name(recipe_path):
+    text = recipe_path.read_text(encoding="utf-8")
+    settings = "\npixel_weight = 0.006\nschedule = { steps = 7 }\n"
+    older = to_recipe(tomllib.loads(text + "[final]" + settings))
+    today = to_recipe(tomllib.loads(text + "[fine_tuning]" + settings))
+    assert older == today
+    assert (older.fine_tuning.pixel_weight, older.fine_tuning.schedule.steps) == (0.006, 7)
+
+
+def test_recipes_of_old_checkpoints_have_the_sensor_under_its_older_name(recipe_path):
+    text = recipe_path.read_text(encoding="utf-8")
+    older = to_recipe(tomllib.loads(text.replace("[sensor", "[camera")))
+    assert older == read_recipe(recipe_path)
+    with pytest.raises(ContractError, match="camera is the older name of sensor"):
+        to_recipe(tomllib.loads(text) | {"camera": {}})
+
+
+def test_fine_tuning_under_both_names_is_refused(recipe_path):
+    with pytest.raises(ContractError, match="final is the older name of fine_tuning"):
+        to_recipe(table(recipe_path, final={}, fine_tuning={}))
+
+
+def test_unknown_size_is_refused_with_those_there_are(recipe):
+    with pytest.raises(ContractError, match="S, M; got 'XL'"):
+        recipe.network("XL")
+
+
+def test_missing_and_broken_files_are_refused(tmp_path):
+    with pytest.raises(ContractError, match="cannot read recipe"):
+        read_recipe(tmp_path / "none.toml")
+    broken = tmp_path / "broken.toml"
+    broken.write_text("name = ", encoding="utf-8")
+    with pytest.raises(ContractError, match="not valid TOML"):
+        read_recipe(broken)
+
+
+def test_digest_follows_what_decides_the_samples_only(recipe_path, recipe):
+    same = to_recipe(table(recipe_path, schedule__steps=99))
+    other = to_recipe(table(recipe_path, wiener__prior_scale=1e-4))
+    assert samples_digest(same, 1) == samples_digest(recipe, 1)
+    assert samples_digest(other, 1) != samples_digest(recipe, 1)
+    assert samples_digest(recipe, 2) != samples_digest(recipe, 1)
+
+
+def test_training_may_differ_within_a_camera_but_nothing_else(recipe_path):
+    one = to_recipe(table(recipe_path))
+    longer = to_recipe(table(recipe_path, schedule__steps=99, data__iso_max=900.0))
+    assert differing_camera(one, longer) is None
+    assert differing_camera(one, to_recipe(table(recipe_path, scale=32.0))) == "scale"
+    assert differing_camera(one, to_recipe(table(recipe_path, wiener__overlap_px=16))) == "wiener"
+
+
+def test_depths_decide_the_samples_where_there_are_any(recipe_path):
+    deep = to_recipe(table(recipe_path, lens__depths_mm=[500, 1000.0]))
+    plain = to_recipe(table(recipe_path))
+    assert deep.lens.depths_mm == (500.0, 1000.0)
+    assert samples_digest(deep, 1) != samples_digest(plain, 1)
+    assert "depths_mm" not in plain.lens.to_json()
+    assert differing_camera(deep, plain) == "lens"
+
+
+@pytest.mark.parametrize("depths_mm", [[1000.0, 500.0], [0.0, 1.0], [700.0, 700.0]])
+def test_depths_that_do_not_increase_are_refused(recipe_path, depths_mm):
+    with pytest.raises(ContractError, match=r"lens\.depths_mm"):
+        to_recipe(table(recipe_path, lens__depths_mm=depths_mm))
+
+
+def test_only_several_depths_can_be_known(recipe_path):
+    with pytest.raises(ContractError, match="needs two or more"):
+        to_recipe(table(recipe_path, data__known_depth_share=0.5))
+    with pytest.raises(ContractError, match=r"must lie in 0\.\.1"):
+        to_recipe(table(recipe_path, data__known_depth_share=1.5))
+
+
+@pytest.mark.parametrize(
+    ("shares", "message"),
+    [([1.0], "1 entries"), ([1.0, 0.0], "positive"), ([1.0, float("inf")], "finite")],
+)
+def test_shares_of_depths_must_fit_the_depths(recipe_path, shares, message):
+    with pytest.raises(ContractError, match=message):
+        to_recipe(table(recipe_path, lens__depths_mm=[500.0, 900.0], data__depth_shares=shares))
