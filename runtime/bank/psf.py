@@ -89,10 +89,18 @@ class FieldKernels:
     grid_y_mm: FloatGrid | None = None
 
     def __post_init__(self) -> None:
-        if self.kernels.ndim != 4 or self.kernels.shape[0] != self.field_heights_mm.size:
+        fields = self.field_heights_mm.size
+        if self.kernels.ndim != 4 or self.kernels.shape[0] != fields:
             raise ContractError(
-                f"expected {self.field_heights_mm.size} fields of (c, h, w) kernels; "
-                f"got {self.kernels.shape}"
+                f"expected {fields} fields of (c, h, w) kernels; got {self.kernels.shape}"
+            )
+        places = [axis.size for axis in (self.grid_y_mm, self.grid_x_mm) if axis is not None]
+        if self.symmetry == "uniform" and fields != 1:
+            raise ContractError(f"uniform kernels are of one field; got {fields}")
+        if (len(places) == 2 and np.prod(places) == fields) != (self.symmetry == "grid"):
+            raise ContractError(
+                f"a grid, and nothing else, has a position for each of its {fields} fields; "
+                f"got {self.symmetry} with positions {places}"
             )
 
     @property
