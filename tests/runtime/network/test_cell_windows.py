@@ -1,4 +1,4 @@
-"""Networks on lattice cells: there the bits of the untiled run, elsewhere what stands in."""
+"""Networks on lattice cells: the bits of the untiled run there, what stands in elsewhere."""
 
 import threading
 
