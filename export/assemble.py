@@ -50,10 +50,10 @@ from camkit.models_def.training.checkpoint import (
 )
 from camkit.models_def.training.kind import Design, TrainingKind, training_kind
 from camkit.models_def.training.recipe import Recipe, differing_part
-from camkit.runtime.check import check_bundle
 from camkit.runtime.geometry.distortion import distort_points
-from camkit.runtime.golden_run import case_work
 from camkit.runtime.plan.loss import read_loss_model
+from camkit.runtime.proof.check import check_bundle
+from camkit.runtime.proof.golden_run import case_work
 from camkit.units import UM_PER_MM
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")

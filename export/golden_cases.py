@@ -12,10 +12,10 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import MOSAIC, Extent
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.golden_run import case_work
 from camkit.runtime.kind import runtime_part
-from camkit.runtime.simulate import SimulationOptions
+from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.twin.light import stated_balance
+from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.runtime.twin.truth import ideal_picture, picture_scale
 from camkit.scenes import procedural_scene
 

@@ -34,10 +34,7 @@ QUANTITIES: Final = {
 
 
 def grey_noise(noise: NoiseModel) -> float:
-    """Give the standard deviation of a green sample, or of the middle channel, at mid grey.
-
-    That is before white balance.
-    """
+    """Give the standard deviation at mid grey, before white balance; green's of three colours."""
     middle = len(noise.shot) // 2
     return float(np.sqrt(noise.shot[middle] * GREY + noise.read_variance[middle]))
 

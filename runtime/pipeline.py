@@ -31,10 +31,8 @@ from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.options import Options
-from camkit.runtime.plan.decision import Work
-from camkit.runtime.plan.planner import default_size
+from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
-from camkit.runtime.plan.ways import planned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +97,7 @@ class Pipeline:
         self._speeds: dict[tuple[str, str], float] = {}
         self._speed: Speed | None = None
         self.size: str | None = None
-        if bundle is not None and _runs_networks(bundle, options):
+        if bundle is not None and asked_work(bundle, options).networks:
             self.size = default_size(bundle, options)
             for role in bundle.manifest.networks:
                 self.network(role, self.size)
@@ -325,10 +323,6 @@ def load(
     if bundle is None or str(bundle).lower() == "none":
         return Pipeline(None, chosen)
     return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
-
-
-def _runs_networks(bundle: Bundle, options: Options) -> bool:
-    return planned(bundle.manifest.stages, Work(method=options.method)).networks
 
 
 def _engine(

@@ -6,6 +6,7 @@ Every stage reads rows from a `RowSource` and yields bands of finished rows from
     capture -> [bands] -> RollingRows -> reader -> next stage -> [bands] -> ...
 """
 
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, Protocol
 
@@ -104,8 +105,8 @@ def read_bands(source: RowSource) -> Iterator[Rows]:
 class RollingRows:
     """Bands that arrive from top to bottom, kept only while a reader still needs them.
 
-    Readers know their rows, but the rows know only the places of their readers: without a cycle
-    everything is freed as soon as the last reader is.
+    Readers know their rows, but the rows know their readers weakly: without a cycle everything is
+    freed as soon as the last reader is, and for a reader that is gone nothing is kept.
     """
 
     def __init__(self, shape: tuple[int, int, int], bands: Iterator[Rows]) -> None:
@@ -113,21 +114,23 @@ class RollingRows:
         self._bands = bands
         self._kept: list[tuple[int, Rows]] = []
         self._end = 0
-        self._tops: list[int] = []
+        self._readers: list[weakref.ref[RowReader]] = []
 
     def reader(self) -> "RowReader":
         """Give a new reader; make all readers before the first one reads."""
-        self._tops.append(0)
-        return RowReader(self, len(self._tops) - 1)
+        reader = RowReader(self)
+        self._readers.append(weakref.ref(reader))
+        return reader
 
-    def pieces_for(self, reader: int, top: int, bottom: int) -> list[Rows]:
+    def pieces_for(self, reader: "RowReader", top: int, bottom: int) -> list[Rows]:
         """Give rows to one of the readers; `RowReader.read` says what is refused."""
         if not 0 <= top < bottom <= self.shape[1]:
             raise ContractError(f"rows {top}..{bottom} lie outside 0..{self.shape[1]}")
-        if top < self._tops[reader]:
-            raise ContractError(f"rows are read downwards; got {top} after {self._tops[reader]}")
-        self._tops[reader] = top
-        needed = min(self._tops)
+        if top < reader.top:
+            raise ContractError(f"rows are read downwards; got {top} after {reader.top}")
+        reader.top = top
+        living = [other for known in self._readers if (other := known()) is not None]
+        needed = min(other.top for other in living)
         self._kept = [
             _without_stale(y, b, needed) for y, b in self._kept if y + b.shape[1] > needed
         ]
@@ -151,11 +154,15 @@ def _without_stale(top: int, band: Rows, needed: int) -> tuple[int, Rows]:
 
 
 class RowReader:
-    """One reader of `RollingRows`; it never moves back."""
+    """One reader of `RollingRows`; it never moves back.
 
-    def __init__(self, rows: RollingRows, number: int) -> None:
+    Attributes:
+        top: First row of its last reading.
+    """
+
+    def __init__(self, rows: RollingRows) -> None:
         self._rows = rows
-        self._number = number
+        self.top = 0
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -173,4 +180,4 @@ class RowReader:
 
     def pieces(self, top: int, bottom: int) -> list[Rows]:
         """Give the same rows as they lie, in consecutive pieces."""
-        return self._rows.pieces_for(self._number, top, bottom)
+        return self._rows.pieces_for(self, top, bottom)

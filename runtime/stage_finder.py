@@ -42,13 +42,15 @@ def stage_module(name: str) -> ModuleType:
 def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:
     """Name every stage for people and clocks: its type, and its role or number among twins."""
     types: list[str] = [stage.type for stage in stages]
+    roles = [(stage.type, getattr(stage, "role", None)) for stage in stages]
     keys: list[str] = []
-    for number, stage in enumerate(stages):
-        if types.count(stage.type) == 1:
-            keys.append(stage.type)
-            continue
-        twin = types[: number + 1].count(stage.type)
-        keys.append(f"{stage.type} {getattr(stage, 'role', twin)}")
+    for number, (type_, role) in enumerate(roles):
+        if types.count(type_) == 1:
+            keys.append(type_)
+        elif role is not None and roles.count((type_, role)) == 1:
+            keys.append(f"{type_} {role}")
+        else:
+            keys.append(f"{type_} {types[: number + 1].count(type_)}")
     return tuple(keys)
 
 

@@ -159,3 +159,18 @@ def with_noise(planes: FloatArray, noise: NoiseModel, rng: np.random.Generator) 
 def psnr_db(a: FloatArray, b: FloatArray, cut_px: int = 0) -> float:
     inner = np.s_[..., cut_px : a.shape[-2] - cut_px, cut_px : a.shape[-1] - cut_px]
     return float(-10 * np.log10(np.square(a[inner].astype(np.float64) - b[inner]).mean() + 1e-20))
+
+
+def blur_directly(planes: FloatArray, local: LocalPsf) -> FloatArray:
+    """Let every pixel of mirrored (c, h, w) planes scatter its own kernel, one after the other."""
+    down, across = (side // 2 for side in local.kernels.kernels.shape[-2:])
+    _, height, width = planes.shape
+    wide = np.pad(planes, ((0, 0), (down, down), (across, across)), mode="reflect")
+    canvas = np.zeros((len(planes), height + 4 * down, width + 4 * across))
+    for row in range(height + 2 * down):
+        for col in range(width + 2 * across):
+            place = local.position_mm(col - across, row - down)
+            at = np.s_[:, row : row + 2 * down + 1, col : col + 2 * across + 1]
+            canvas[at] += wide[:, row, col, None, None] * local.kernels.at(*place)
+    inner = np.s_[:, 2 * down : -2 * down, 2 * across : -2 * across]
+    return canvas[inner].astype(np.float32)

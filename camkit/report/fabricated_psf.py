@@ -91,5 +91,4 @@ def _trace(bundle: Bundle, text: str, seed: int) -> FrozenPsf:
         least_energy=LEAST_ENERGY,
     )
     _, copy = focused_copies(parse_prescription(text), 2, seed)
-    optics, sensor = LensOptics(lens=copy), light_sensor(bundle.manifest)
-    return freeze(optics, sensor, dense_grid(frozen_grid)).psf
+    return freeze(LensOptics(lens=copy), light_sensor(bundle.manifest), dense_grid(frozen_grid)).psf

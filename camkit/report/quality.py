@@ -24,7 +24,7 @@ from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 from camkit.runtime.files.picture import read_scene
 from camkit.runtime.geometry.sensor_window import centred_origin
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
 
 FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)

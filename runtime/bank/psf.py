@@ -89,10 +89,18 @@ class FieldKernels:
     grid_y_mm: FloatGrid | None = None
 
     def __post_init__(self) -> None:
-        if self.kernels.ndim != 4 or self.kernels.shape[0] != self.field_heights_mm.size:
+        fields = self.field_heights_mm.size
+        if self.kernels.ndim != 4 or self.kernels.shape[0] != fields:
             raise ContractError(
-                f"expected {self.field_heights_mm.size} fields of (c, h, w) kernels; "
-                f"got {self.kernels.shape}"
+                f"expected {fields} fields of (c, h, w) kernels; got {self.kernels.shape}"
+            )
+        places = [axis.size for axis in (self.grid_y_mm, self.grid_x_mm) if axis is not None]
+        if self.symmetry == "uniform" and fields != 1:
+            raise ContractError(f"uniform kernels are of one field; got {fields}")
+        if (len(places) == 2 and np.prod(places) == fields) != (self.symmetry == "grid"):
+            raise ContractError(
+                f"a grid, and nothing else, has a position for each of its {fields} fields; "
+                f"got {self.symmetry} with positions {places}"
             )
 
     @property
@@ -288,19 +296,22 @@ def _catmull_rom(t: FloatGrid) -> tuple[FloatGrid, FloatGrid, FloatGrid, FloatGr
 
 def _scaled(kernels: FloatArray, ratio: float) -> FloatArray:
     """Scale (field, c, h, w) kernels."""
-    old = kernels.shape[-1]
-    half = max(1, int(np.ceil((old // 2) * ratio)))
+    sides = kernels.shape[-2:]
+    halves = [max(1, int(np.ceil((side // 2) * ratio))) for side in sides]
     # Blurring to the coarser grid first keeps energy that falls between the new samples.
     source = kernels
     if ratio < 1.0:
         sigma = 0.5 * np.sqrt(1 / ratio**2 - 1)
         source = scipy.ndimage.gaussian_filter(kernels, (0, 0, sigma, sigma), mode="constant")
-    at = np.arange(-half, half + 1) / ratio + old // 2
-    grid = np.meshgrid(at, at, indexing="ij")
+    at = [
+        np.arange(-half, half + 1) / ratio + side // 2
+        for half, side in zip(halves, sides, strict=True)
+    ]
+    grid = np.meshgrid(*at, indexing="ij")
     scaled = np.stack(
         [
             scipy.ndimage.map_coordinates(k, grid, order=1, mode="constant")
-            for k in source.reshape(-1, old, old)
+            for k in source.reshape(-1, *sides)
         ]
-    ).reshape(*kernels.shape[:2], 2 * half + 1, 2 * half + 1)
+    ).reshape(*kernels.shape[:2], *(2 * half + 1 for half in halves))
     return np.asarray(scaled / scaled.sum(axis=(-2, -1), keepdims=True), dtype=np.float32)

@@ -38,8 +38,8 @@ def scatter(
 
     Args:
         planes: (c, h + 2 margin, w + 2 margin) float32: the window and what lies around it.
-        kernels_at: Gives the (c, k, k) float32 kernels of a sensor position (x_mm, y_mm); k odd,
-            at most 2 margin + 1.
+        kernels_at: Gives the (c, kh, kw) float32 kernels of a sensor position (x_mm, y_mm); odd
+            sides of at most 2 margin + 1.
         window: Where the inner h x w pixels lie on the sensor.
         margin_px: Width of the margin.
         step_px: Distance of block centres.
@@ -65,13 +65,13 @@ def scatter(
             x_px, y_px = (left + right - 1) / 2 - margin_px, (top + bottom - 1) / 2 - margin_px
             x_mm, y_mm = window.to_mm(x_px, y_px)
             kernels = kernels_at(float(x_mm), float(y_mm))
-            reach = margin_px + kernels.shape[-1] // 2
+            down, across = (margin_px + side // 2 for side in kernels.shape[1:])
             for total, block in (
                 (out, planes[:, top:bottom, left:right] * weight),
                 (light, weight[None]),
             ):
                 spread = convolve_full(block, kernels, workers=workers)
-                _add_inside(total, spread, top - reach, left - reach)
+                _add_inside(total, spread, top - down, left - across)
     out /= light
     return out
 

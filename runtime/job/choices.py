@@ -17,7 +17,9 @@ from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.plan.ways import offered_methods
 from camkit.runtime.stage_finder import stage_module
 
-GENERAL: Final = frozenset({"assume", "max_mem_bytes", "threads", "method", "unit"})
+GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method", "unit"})
+ON_A_SENSOR: Final = frozenset({"assume"})
+"""What means something wherever the size of the sensor is known."""
 
 
 def known_options(stages: Sequence[Stage]) -> frozenset[str]:
@@ -34,6 +36,8 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
     """
     stages = DEVELOPMENT if bundle is None else bundle.manifest.stages
     known = known_options(stages)
+    if bundle is not None and bundle.manifest.sensor.extent is not None:
+        known |= ON_A_SENSOR
     plain = Options()
     given = [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]
     where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"

@@ -13,7 +13,7 @@ from camkit.bundle.plane import Plane
 from camkit.bundle.reader import Bundle
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
-from camkit.runtime.capture import Capture
+from camkit.runtime.capture import COLOURS, Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
 from camkit.runtime.geometry.placement import Placement, place
@@ -47,7 +47,7 @@ class Job:
         case: What was planned for; None before, and without a bundle.
         windows: Role -> the windows of its network, once they are planned.
         probe: Gives the rows of a plane by name, made for the asking stage alone and equal to those
-            that it will be given; set by the walker.
+            that it will be given; to be called when the first row is asked for, set by the walker.
         known: Planes of this capture that were made before; what gives them does not run.
         clipped_fraction: Share of clipped samples in the rows read so far.
     """
@@ -99,10 +99,25 @@ class Job:
         """Give the threads to compute with."""
         return self.setup.threads
 
+    def unheard(self) -> "Job":
+        """Give the same job for a walk whose counts and notes nobody hears."""
+        other = Job(self.setup, self.capture, cancel=self.cancel, known=self.known)
+        other.record = dict(self.record)
+        other.work, other.case, other.falls_back = self.work, self.case, self.falls_back
+        for name in ("placement", "noise"):
+            if name in self.__dict__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
+
     def _check_input(self) -> None:
         """Refuse a capture that the sensor does not give."""
         bundle = self.bundle
         if bundle is None:
+            if self.capture.channels != COLOURS:
+                raise ContractError(
+                    f"without a bundle only captures of {COLOURS} colours are developed; this one "
+                    f"has {self.capture.channels} channel(s)"
+                )
             return
         wanted = bundle.manifest.sensor.inputs
         if self.capture.contract not in wanted:

@@ -261,11 +261,11 @@ class Reconstruction:
             return None
         options = job.options
         if job.falls_back:
-            below = without_networks(self._setup.stages, bundle.manifest.all_planes, Work())
+            below = without_networks(bundle.manifest, Work())
             if below is None:
                 raise ContractError(
-                    f"nothing stands for the networks of bundle {bundle.manifest.name}: it has no "
-                    "fallback; say --on-unsafe warn or fail"
+                    f"bundle {bundle.manifest.name} has nothing to fall back to: its networks "
+                    "cannot be left out; say --on-unsafe warn"
                 )
             options = replace(options, method=below.method)
         case = Case(

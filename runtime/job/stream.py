@@ -70,8 +70,8 @@ class Stream:
 
     def shared(self, takers: int) -> list["Stream"]:
         """Give a stream for each of several takers; rows are kept until all have read them."""
-        if takers == 1:
-            return [self]
+        if takers < 2:
+            return [self][:takers]
         rolling = RollingRows(self.shape, self.bands())
         return [
             replace(self, source=rolling.reader(), made=None, owned=False) for _ in range(takers)

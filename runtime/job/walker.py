@@ -5,7 +5,7 @@
 Nothing is computed before the first row is asked for.
 """
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
 from dataclasses import replace
 from typing import Final
 
@@ -17,7 +17,7 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
-from camkit.runtime.plan.ways import LEFT_OUT, stand_in, ways_of
+from camkit.runtime.plan.ways import LEFT_OUT, stand_ins, ways_of
 from camkit.runtime.rows import ArrayRows, Rows, RowSource
 from camkit.runtime.stage_finder import stage_keys, stage_module
 
@@ -34,12 +34,21 @@ class Walk:
         ways: The way each takes; set by `settle`.
     """
 
-    def __init__(self, job: Job) -> None:
-        """Make every stage ready; what was not planned yet is done by `settle`."""
+    def __init__(self, job: Job, *, before: int | None = None) -> None:
+        """Make every stage ready; what was not planned yet is done by `settle`.
+
+        Args:
+            job: The capture.
+            before: Number of a stage; planes that it and those behind it give cannot be asked for
+                beforehand. None for all planes.
+        """
         self._job = job
         self.stages = job.setup.stages
         self.keys = stage_keys(self.stages)
         self.ways: tuple[str, ...] = ()
+        self._before = len(self.stages) if before is None else before
+        self._instead: dict[str, str] = {}
+        self._planes = _planes_of(job)
         job.probe = self._probe
         self._works: list[StageWork] = [
             stage_module(stage.type).prepare(stage, job) for stage in self.stages
@@ -49,10 +58,12 @@ class Walk:
         """Choose the ways by the job's plan, and share the memory among the stages that run.
 
         Raises:
-            ContractError: If the memory does not do.
+            ContractError: If the memory does not do, or a stage is left out that no plane stands in
+                for.
         """
         job = self._job
         self.ways = ways_of(self.stages, job.work)
+        self._instead = stand_ins(self.stages, self.ways, self._planes)
         job.record["stages"] = {
             key: {"way": way or "left out"} for key, way in zip(self.keys, self.ways, strict=True)
         }
@@ -86,26 +97,20 @@ class Walk:
             wanted: Name of the plane.
 
         Raises:
-            ContractError: If a stage is left out that no plane stands in for.
+            ContractError: If no stage gives it.
         """
-        job = self._job
-        alias = self._alias()
-        last = alias.get(wanted, wanted)
-        on_the_way = self._on_the_way(alias, last)
-        takers = self._takers(on_the_way, alias, last)
-        ready: dict[str, list[Stream]] = {}
-        self._offer(ready, takers, CAPTURE, _capture_stream(job, self._planes()[CAPTURE]))
-        for name, known in job.known.items():
-            self._offer(ready, takers, name, known)
-        for number in on_the_way:
-            stage, work, key = self.stages[number], self._works[number], self.keys[number]
-            taken = [ready[alias.get(name, name)].pop() for name in stage.takes]
-            for name, given in zip(stage.gives, work.run(taken), strict=True):
+        self._giver_of(wanted)
+        job, last = self._job, self._instead.get(wanted, wanted)
+        needed = self._needed(last)
+        takers = Counter([last, *(name for number in needed for name in self._taken(number))])
+        there = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.known}
+        ready = {name: stream.shared(takers[name]) for name, stream in there.items()}
+        for number in needed:
+            taken = [ready[name].pop() for name in self._taken(number)]
+            made = self._works[number].run(taken)
+            for name, given in zip(self.stages[number].gives, made, strict=True):
                 if name not in job.known:
-                    self._offer(ready, takers, name, given.timed(job.clock, key))
-        if last not in ready:
-            names = ", ".join(name for stage in self.stages for name in stage.gives)
-            raise ContractError(f"no stage gives the plane {wanted!r}; there are {names}")
+                    ready[name] = given.timed(job.clock, self.keys[number]).shared(takers[name])
         return ready[last].pop()
 
     def keep(self, wanted: str) -> Stream:
@@ -114,76 +119,67 @@ class Walk:
         rows = stream.rows()
         whole = ArrayRows(rows.read(0, rows.shape[1]))
         kept = replace(stream, source=whole, made=None, owned=False)
-        self._job.known[self._alias().get(wanted, wanted)] = kept
+        self._job.known[self._instead.get(wanted, wanted)] = kept
         return kept
-
-    def _alias(self) -> dict[str, str]:
-        """Give the planes that stages which are left out would give -> those that stand for them.
-
-        Raises:
-            ContractError: If no plane stands in for what a stage gives.
-        """
-        planes = self._planes()
-        alias: dict[str, str] = {}
-        for stage, way in zip(self.stages, self.ways, strict=True):
-            if way == LEFT_OUT:
-                instead = stand_in(stage, planes)
-                alias[stage.gives[0]] = alias.get(instead, instead)
-        return alias
-
-    def _on_the_way(self, alias: Mapping[str, str], wanted: str) -> list[int]:
-        """Number the stages, in order, whose planes the wanted one is made of and are not known."""
-        needed, found = {wanted}, []
-        for number in reversed(range(len(self.stages))):
-            stage = self.stages[number]
-            made = needed.intersection(stage.gives) - self._job.known.keys()
-            if made and self.ways[number] != LEFT_OUT:
-                found.append(number)
-                needed |= {alias.get(name, name) for name in stage.takes}
-        return found[::-1]
 
     def taken_by(self, number: int) -> list[Stream]:
         """Give the streams that a stage takes; every call walks anew."""
         return [self.stream(name) for name in self.stages[number].takes]
 
-    def _takers(
-        self, on_the_way: Sequence[int], alias: Mapping[str, str], wanted: str
-    ) -> dict[str, int]:
-        """Count who takes each plane, on the way to the wanted one."""
-        takers = {wanted: 1}
-        for number in on_the_way:
-            for name in self.stages[number].takes:
-                taken = alias.get(name, name)
-                takers[taken] = takers.get(taken, 0) + 1
-        return takers
+    def _needed(self, wanted: str) -> list[int]:
+        """Give the stages, in order, whose planes the wanted one is made of and are not known."""
+        planes, needed, known = {wanted}, [], self._job.known.keys()
+        for number in range(len(self.stages) - 1, -1, -1):
+            made = planes.intersection(self.stages[number].gives) - known
+            if made and self.ways[number] != LEFT_OUT:
+                planes.update(self._taken(number))
+                needed.append(number)
+        return needed[::-1]
 
-    @staticmethod
-    def _offer(
-        ready: dict[str, list[Stream]], takers: Mapping[str, int], name: str, stream: Stream
-    ) -> None:
-        count = takers.get(name, 0)
-        if count:
-            ready[name] = stream.shared(count)
+    def _taken(self, number: int) -> tuple[str, ...]:
+        """Name the planes that a stage takes; those that stand in for what is left out."""
+        return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
 
-    def _planes(self) -> dict[str, Plane]:
-        bundle = self._job.bundle
-        if bundle is None:
-            return {CAPTURE: _plain_plane(self._job)}
-        return bundle.manifest.all_planes
+    def _giver_of(self, plane: str) -> int:
+        """Give the number of the stage that gives a plane; -1 for the sensor.
+
+        Raises:
+            ContractError: If none does.
+        """
+        if plane == CAPTURE:
+            return -1
+        for number, stage in enumerate(self.stages):
+            if plane in stage.gives:
+                return number
+        there = ", ".join([CAPTURE, *(name for stage in self.stages for name in stage.gives)])
+        raise ContractError(f"no stage gives the plane {plane!r}; there are {there}")
 
     def _probe(self, plane: str) -> RowSource:
-        """Give rows of a plane that are made for one stage alone, before its first row."""
-        job = Job(self._job.setup, self._job.capture, cancel=self._job.cancel)
-        job.work = self._job.work
-        walk = Walk(job)
+        """Give rows of a plane that are made for one stage alone, before its first row.
+
+        Raises:
+            ContractError: If the ways are not settled yet, or the plane does not lie before the
+                stage that asks.
+        """
+        if not self.ways:
+            raise ContractError(
+                f"the plane {plane!r} is asked for too early: stages look at planes when their "
+                "first row is asked for, not while they are made ready"
+            )
+        number = self._giver_of(plane)
+        if number >= self._before:
+            raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
+        walk = Walk(self._job.unheard(), before=number)
         walk.settle()
         return walk.stream(plane).rows()
 
 
-def _plain_plane(job: Job) -> Plane:
-    """Give the plane of a capture without a bundle."""
+def _planes_of(job: Job) -> dict[str, Plane]:
+    """Give the planes that are stated; without a bundle that of the capture alone."""
+    if job.bundle is not None:
+        return job.bundle.manifest.all_planes
     channels = MOSAIC if job.capture.cfa is not None else RGB
-    return Plane(type="uint16", channels=channels, domain="dn")
+    return {CAPTURE: Plane(type="uint16", channels=channels, domain="dn")}
 
 
 def _capture_stream(job: Job, plane: Plane) -> Stream:

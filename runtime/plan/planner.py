@@ -20,7 +20,12 @@ from camkit.runtime.plan.rule import apply_rules
 from camkit.runtime.plan.rules.size import REFERENCE, size_cost_db
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import work_shares
-from camkit.runtime.plan.ways import planned, without_networks
+from camkit.runtime.plan.ways import (
+    planned,
+    stand_ins,
+    ways_of,
+    without_networks,
+)
 from camkit.runtime.stage_finder import stage_module
 
 LADDER: Final = (0.0, 1.0, 3.0, 10.0, 30.0)
@@ -104,7 +109,7 @@ def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
     """
     options = case.options
     model = read_loss_model(case.bundle.manifest.plan)
-    work = _first_work(case, default_size(case.bundle, options))
+    work = asked_work(case.bundle, options)
     if not work.networks:
         return _ruled(case, work)
     if options.max_seconds is not None:
@@ -119,14 +124,25 @@ def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
     return _ruled(replace(case, loss_db=spend), work)
 
 
-def _first_work(case: Case, size: str) -> Work:
-    options, stages = case.options, case.bundle.manifest.stages
+def asked_work(bundle: Bundle, options: Options) -> Work:
+    """Give what a caller asked for, before any capture is known.
+
+    Raises:
+        ContractError: If no stage has the method, or what it leaves out cannot be.
+    """
+    stages = bundle.manifest.stages
     unwanted = {
         stage.type
         for stage in stages
         if (test := getattr(stage_module(stage.type), "is_left_out", None)) and test(options)
     }
-    work = Work(method=options.method, size=size, mode=options.mode, left_out=frozenset(unwanted))
+    work = Work(
+        method=options.method,
+        size=default_size(bundle, options),
+        mode=options.mode,
+        left_out=frozenset(unwanted),
+    )
+    stand_ins(stages, ways_of(stages, work), bundle.manifest.all_planes)
     return planned(stages, work)
 
 
@@ -175,22 +191,25 @@ def _within_seconds(case: Case, work: Work, model: LossModel | None, speed: Spee
         raise ContractError("a plan within a time needs max_seconds")
     unit = 0.0 if model is None else model.adaptive_db
     most_db = case.options.max_error_db
-    ladder = []
+    plans = []
     for size in _sizes(case):
         for factor in LADDER if model is not None else LADDER[:1]:
             spend = 0.0 if factor == 0 else size_cost_db(case, size) + factor * unit
-            ladder.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
-    ordered = sorted(ladder, key=lambda plan: plan.cost_db)
+            plans.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
+
+    def seconds(plan: Plan) -> float:
+        return estimate_seconds(plan.case, plan.work, speed)
+
     # The bank alone is the last resort: what it costs is not bounded by any prediction.
-    manifest = case.bundle.manifest
-    below = without_networks(manifest.stages, manifest.all_planes, work)
-    if below is not None:
-        ordered.append(_ruled(case, below))
-    fitting = (p for p in ordered if estimate_seconds(p.case, p.work, speed) <= limit)
-    chosen = next(fitting, ordered[-1])
+    last = without_networks(case.bundle.manifest, work)
+    ordered = sorted(plans, key=lambda plan: plan.cost_db)
+    ordered += [] if last is None else [_ruled(case, last)]
+    cheapest = min(plans, key=seconds) if last is None else ordered[-1]
+    chosen = next((plan for plan in ordered if seconds(plan) <= limit), cheapest)
     note = ""
-    if estimate_seconds(chosen.case, chosen.work, speed) > limit:
-        note = f"even the least work is expected to take more than {limit:g} s"
+    if seconds(chosen) > limit:
+        least = "the least work" if last is None else "the bank alone"
+        note = f"even {least} is expected to take more than {limit:g} s"
     elif most_db is not None and model is not None and chosen.cost_db > model.budget_db(most_db):
         note = f"{limit:g} s allow no plan within {most_db:g} dB"
     return replace(chosen, note=note)

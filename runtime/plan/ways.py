@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.plane import Plane
 from camkit.bundle.stages import Network, Stage
 from camkit.errors import ContractError
@@ -55,11 +56,10 @@ def planned(stages: Sequence[Stage], work: Work) -> Work:
     )
 
 
-def without_networks(
-    stages: Sequence[Stage], planes: Mapping[str, Plane], work: Work
-) -> Work | None:
-    """Give the work by the best method that runs no network; None where nothing stands for it."""
-    methods = offered_methods(stages, planes)
+def without_networks(manifest: Manifest, work: Work) -> Work | None:
+    """Give the work by the best method that runs no network; None if they cannot be left out."""
+    stages = manifest.stages
+    methods = offered_methods(stages, manifest.all_planes)
     tried = (planned(stages, replace(work, method=method)) for method in methods)
     return next((other for other in tried if not other.networks), None)
 
@@ -75,7 +75,7 @@ def offered_methods(stages: Sequence[Stage], planes: Mapping[str, Plane]) -> tup
         method
         for method in (*methods_of(stages), DEVELOP)
         if all(
-            way != LEFT_OUT or _stand_ins(stage, planes)
+            way != LEFT_OUT or known_stand_in(stage, planes) is not None
             for stage, way in zip(stages, ways_of(stages, Work(method=method)), strict=True)
         )
     )
@@ -95,27 +95,51 @@ def _last_with(stages: Sequence[Stage], method: str) -> int:
     )
 
 
+def stand_ins(
+    stages: Sequence[Stage], ways: Sequence[str], planes: Mapping[str, Plane]
+) -> dict[str, str]:
+    """Give what the stages that are left out would give -> the plane that stands for it.
+
+    Args:
+        stages: In order.
+        ways: Of each.
+        planes: By name, that of the sensor among them.
+
+    Raises:
+        ContractError: If nothing stands for it.
+    """
+    instead: dict[str, str] = {}
+    for stage, way in zip(stages, ways, strict=True):
+        if way == LEFT_OUT:
+            name = stand_in(stage, planes)
+            instead[stage.gives[0]] = instead.get(name, name)
+    return instead
+
+
 def stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str:
     """Name the plane that stands for what a stage gives where it is left out.
 
     Args:
-        stage: Gives one plane.
+        stage: Any.
         planes: By name, that of the sensor among them.
 
     Raises:
         ContractError: If no plane that it takes does.
     """
-    if found := _stand_ins(stage, planes):
-        return found[0]
+    name = known_stand_in(stage, planes)
+    if name is not None:
+        return name
     raise ContractError(
         f"the stage {stage.type} cannot be left out: none of {', '.join(stage.takes)} stands for "
         f"{', '.join(stage.gives)}"
     )
 
 
-def _stand_ins(stage: Stage, planes: Mapping[str, Plane]) -> list[str]:
-    """Name the planes that stand for the one that a stage gives, the best known first."""
-    if len(stage.gives) != 1:
-        return []
+def known_stand_in(stage: Stage, planes: Mapping[str, Plane]) -> str | None:
+    """Name the plane that stands for what a stage gives; None if none does."""
     given = planes[stage.gives[0]]
-    return [name for name in reversed(stage.takes) if planes[name].stands_for(given)]
+    if len(stage.gives) == 1:
+        for name in reversed(stage.takes):
+            if planes[name].stands_for(given):
+                return name
+    return None

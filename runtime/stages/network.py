@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.stages import Network
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
@@ -37,7 +37,9 @@ OPTIONS: Final = (
 
 def prepare(entry: Network, job: Job) -> StageWork:
     """Hold the capture against the envelope; the windows are planned when the memory is known."""
-    if not job.falls_back:
+    if entry.transform == "stabilise":
+        _ = job.noise  # known to the plan before any row
+    if "envelope" not in job.record:  # one network has looked already
         job.falls_back = _falls_back(job)
     stage = _NetworkStage(entry, job)
     return StageWork(
@@ -142,12 +144,15 @@ class _NetworkStage:
             stand_in=stand_in,
         )
         if entry.transform == "stabilise":
-            bands = self._linear(bands, taken)
+            bands = self._linear(bands, taken[-1], len(facts.outputs))
         return self._split(bands, taken[-1], [port.channels for port in facts.outputs])
 
-    def _linear(self, bands: Iterator[FloatArray], taken: Sequence[Stream]) -> Iterator[FloatArray]:
-        """Take stabilised bands back to light, in place."""
-        noise, scale = self._job.noise.with_gains(taken[-1].gains), self._entry.scale
+    def _linear(
+        self, bands: Iterator[FloatArray], last: Stream, ports: int
+    ) -> Iterator[FloatArray]:
+        """Take stabilised bands back to light, in place; every port by the noise of `last`."""
+        one, scale = self._job.noise.with_gains(last.gains), self._entry.scale
+        noise = NoiseModel(shot=one.shot * ports, read_variance=one.read_variance * ports)
 
         def undo(rows: FloatArray, _: int) -> None:
             unstabilise(rows, noise, scale=scale, out=rows)

@@ -28,8 +28,8 @@ BYTES_PER_BLOCK_ROW: Final = 80
 
 
 def prepare(entry: Wiener, job: Job) -> StageWork:
-    """Say which kernels are taken, where there is a choice."""
-    bundle, depth_mm = job.known_bundle, job.options.depth_mm
+    """Say which kernels are taken, where there is a choice, and what the noise is."""
+    bundle, depth_mm, _ = job.known_bundle, job.options.depth_mm, job.noise
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
         known = ", ".join(map(depth_name, depths_mm))
@@ -37,7 +37,7 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         planes, mask = taken[0], taken[1] if len(taken) > 1 else None
-        bank = make_bank(entry, job, planes.gains)
+        bank = make_bank(entry, job, planes)
         unknown = None if mask is None else mask.rows().read
         bands = bank.restore_bands(planes.rows(), unknown, _plain(job))
         return (planes.with_bands(bands),)
@@ -46,23 +46,23 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
     return StageWork(run=run, held_bytes=held)
 
 
-def make_bank(entry: Wiener, job: Job, gains: tuple[float, ...]) -> BlockBank:
+def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     """Make the bank of a capture.
 
     Args:
         entry: The manifest's stage.
         job: The capture.
-        gains: By which the light of the planes was multiplied.
+        planes: What it will restore.
     """
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
     kernels = color_kernels(bundle.psf, *sensor.response_arrays(), depth_mm=job.options.depth_mm)
     local = LocalPsf(
-        kernels=kernels.scaled(job.placement.kernel_scale), window=job.placement.window
+        kernels=kernels.scaled(job.placement.kernel_scale), window=job.window_of(planes.plane)
     )
     method = job.work.method if job.work.method in METHODS else METHODS[0]
-    noise = job.noise.with_gains(gains)
+    noise = job.noise.with_gains(planes.gains)
     return restoration_bank(local, entry, noise, method=method, threads=job.threads)
 
 

@@ -3,8 +3,6 @@
 clean planes of the twin -> ideal geometry, if the picture has it -> linear Rec.709
 """
 
-from typing import Any
-
 import numpy as np
 
 from camkit.bundle.golden import IMAGE
@@ -15,9 +13,8 @@ from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.runtime.geometry.warp import undistort_bands
-from camkit.runtime.job.choices import known_options
 from camkit.runtime.rows import ArrayRows
-from camkit.runtime.simulate import Simulation
+from camkit.runtime.twin.simulate import Simulation
 
 
 def light_sensor(manifest: Manifest) -> ColorSensor:
@@ -91,8 +88,3 @@ def ideal_picture(simulation: Simulation, bundle: Bundle) -> FloatArray:
         bands = undistort_bands(ArrayRows(clean), bundle.psf.distortion, window)
         clean = np.concatenate(list(bands), axis=1)
     return true_picture(clean, light_sensor(manifest))
-
-
-def in_sensor_geometry(manifest: Manifest) -> dict[str, Any]:
-    """Give the options by which a bundle's pictures stay in the geometry of its sensor."""
-    return {"undistort": False} if "undistort" in known_options(manifest.stages) else {}

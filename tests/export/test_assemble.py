@@ -19,8 +19,8 @@ from camkit.export.assemble import Parts, export_bundle
 from camkit.export.network_facts import ExportedNetwork
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
-from camkit.runtime.golden_run import case_work
 from camkit.runtime.plan.loss import plan_entries
+from camkit.runtime.proof.golden_run import case_work
 from tests.plan_factory import MODEL
 
 _MEASURED: dict[str, ExportedNetwork] = {}

@@ -6,7 +6,7 @@ import numpy as np
 
 from camkit.export.card import card_text
 from camkit.export.golden_cases import CaseRecipe, photograph
-from camkit.runtime.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from camkit.scenes import procedural_scene
 from tests.deep_bundle import FOCUS_MM, write_deep_bundle
 

@@ -1,13 +1,13 @@
-"""Torch and the twin of the runtime give the same capture; training makes the same noise."""
+"""Torch and the runtime's twin give the same capture; training makes the same noise."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.signal
 import torch
 
-from camkit.bundle.sensor import ColorSensor, PlanesSensor, nested_sensor
+from camkit.bundle.sensor import BayerSensor, ColorSensor, Extent
+from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import FrozenPsf
 from camkit.models_def.kinds.bayer import samples as training
 from camkit.models_def.sensors.demosaic import mosaic
@@ -16,35 +16,16 @@ from camkit.models_def.sensors.psf import color_kernels
 from camkit.models_def.training.kind import read_recipe
 from camkit.runtime.geometry.scatter import scatter as runtime_scatter
 from camkit.runtime.geometry.sensor_window import SensorWindow
-from camkit.runtime.simulate import SimulationOptions, simulate
 from camkit.runtime.twin.exposure import Setting, expose
-from camkit.runtime.twin.light import Light, LightOptions, lens_of, light_of, scene_window
-from tests.camera_factory import make_psf, make_sensor, whole_window
-from tests.psf_factory import grid_psf, streak_kernel, uniform_psf
+from camkit.runtime.twin.light import Light, lens_of
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
+from tests.camera_factory import make_psf, make_sensor
+from tests.planes_bundle import planes_sensor
+from tests.psf_factory import PITCH_UM, grid_psf, streak_kernel, uniform_psf
 
 PARITY = 1e-5
 STEP_PX = 48
 RECIPE = Path(__file__).resolve().parents[2] / "models_def" / "recipes" / "duet.toml"
-GREY = {
-    "width_px": 400,
-    "height_px": 300,
-    "pixel_pitch_um": 10.0,
-    "channels": ["Y"],
-    "black_level": 0.0,
-    "white_level": 4095.0,
-    "full_well_e": 9000.0,
-    "noise": [{"iso": 100.0, "gain_e_per_dn": 2.0, "read_noise_e": 1.0}],
-    "channel_response": {"wavelengths_um": [0.55], "response": [[1.0]], "source": ""},
-}
-
-
-def grey_sensor() -> PlanesSensor:
-    return PlanesSensor.model_validate(nested_sensor(GREY))
-
-
-def streaks_on_a_grid() -> FrozenPsf:
-    streaks = np.stack([streak_kernel(90.0 * i) for i in range(4)]).reshape(2, 2, 21, 21)
-    return grid_psf(streaks, np.array([-1.5, 1.5]), np.array([-1.0, 1.0]))
 
 
 def block_kernels(
@@ -60,50 +41,52 @@ def block_kernels(
     x_mm, y_mm = window.to_mm(x_px.numpy().ravel(), y_px.numpy().ravel())
     fields = color_kernels(psf, *sensor.response_arrays())
     kernels = fields.at(torch.from_numpy(x_mm), torch.from_numpy(y_mm))
-    return kernels.reshape(len(rows), len(columns), -1, side, side)
+    return kernels.reshape(len(rows), len(columns), len(sensor.channels), side, side)
 
 
-CAMERAS = {
-    "radial": (make_sensor(400, 300), make_psf(make_sensor(400, 300), side=11)),
-    "uniform": (grey_sensor(), uniform_psf(streak_kernel(200.0))),
-    "grid": (grey_sensor(), streaks_on_a_grid()),
-}
-
-
-@pytest.mark.parametrize("size", [(96, 64), (131, 57), (40, 1)])
-@pytest.mark.parametrize(("sensor", "psf"), CAMERAS.values(), ids=CAMERAS.keys())
-def test_varying_blur_agrees(sensor: ColorSensor, psf: FrozenPsf, size: tuple[int, int]) -> None:
-    window = SensorWindow(
-        size_px=size,
-        origin_px=(200, 150),
-        sensor_size_px=(400, 300),
-        pitch_um=sensor.pixel_pitch_um,
-    )
-    margin, channels = psf.kernels.shape[-1] // 2, len(sensor.channels)
-    shape = channels, size[1] + 2 * margin, size[0] + 2 * margin
+def assert_blur_agrees(sensor: ColorSensor, psf: FrozenPsf, window: SensorWindow) -> None:
+    margin = psf.kernels.shape[-1] // 2
+    width, height = window.size_px
+    shape = (len(sensor.channels), height + 2 * margin, width + 2 * margin)
     planes = np.random.default_rng(0).random(shape, dtype=np.float32)
     lens = lens_of(psf, sensor)
+    assert lens.margin_px == margin
     expected = runtime_scatter(planes, lens.kernels_at, window, margin_px=margin, step_px=STEP_PX)
     kernels = block_kernels(sensor, psf, window, STEP_PX)
     found = scatter(torch.from_numpy(planes), kernels, step_px=STEP_PX)
     assert np.abs(found.numpy() - expected).max() <= PARITY
 
 
-@pytest.mark.parametrize("turn_deg", [0.0, 90.0, 250.0])
-def test_streaks_fall_where_direct_convolution_puts_them_in_both(turn_deg: float) -> None:
-    """A point of light throws its streak to one side, in the twin and in training alike."""
-    sensor, streak = grey_sensor(), streak_kernel(turn_deg)
-    psf, scene = uniform_psf(streak), np.zeros((3, 64, 96), np.float32)
-    scene[:, 20, 30] = scene[:, 40, 70] = 0.9
-    window = scene_window(scene, sensor, None)
-    light = light_of(scene, sensor, lens_of(psf, sensor), window, LightOptions(vignette=False))
-    expected = scipy.signal.convolve2d(light.clean[0], streak, "same")
-    assert np.abs(light.planes[0] - expected).max() <= PARITY
-    margin = ((0, 0), (10, 10), (10, 10))
-    planes = torch.from_numpy(np.pad(light.clean, margin))
-    found = scatter(planes, block_kernels(sensor, psf, window, 128))
-    inner = np.s_[10:-10, 10:-10]
-    assert np.abs(found[0].numpy() - expected)[inner].max() <= PARITY
+@pytest.mark.parametrize("size", [(96, 64), (131, 57), (40, 1)])
+@pytest.mark.parametrize("axis_px", [None, (120.0, 260.5)])
+def test_varying_blur_agrees(size: tuple[int, int], axis_px: tuple[float, float] | None) -> None:
+    sensor = make_sensor(400, 300)
+    window = SensorWindow(
+        size_px=size,
+        origin_px=(200, 150),
+        sensor_size_px=(400, 300),
+        pitch_um=5.96,
+        axis_px=axis_px,
+    )
+    assert_blur_agrees(sensor, make_psf(sensor, side=11), window)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+@pytest.mark.parametrize("symmetry", ["uniform", "grid"])
+def test_blur_by_streaks_agrees_for_any_number_of_channels(symmetry: str, channels: int) -> None:
+    names = ("R", "G", "B") if channels == 3 else tuple("abcd")[:channels]
+    extent = Extent(width_px=131, height_px=97, pixel_pitch_um=PITCH_UM)
+    sensor = planes_sensor(names, extent=extent)
+    psf = uniform_psf(streak_kernel(25.0), (0.5, 0.6), channels)
+    if symmetry == "grid":
+        turns = (10.0, 80.0, 190.0, 250.0, 300.0, 355.0)
+        streaks = np.stack([streak_kernel(turn) for turn in turns]).reshape(2, 3, 21, 21)
+        at_mm = np.array([-0.4, 0.1, 0.5]), np.array([-0.3, 0.2])
+        psf = grid_psf(streaks, *at_mm, (0.5, 0.6), channels)
+    window = SensorWindow(
+        size_px=(131, 97), origin_px=(0, 0), sensor_size_px=(131, 97), pitch_um=PITCH_UM
+    )
+    assert_blur_agrees(sensor, psf, window)
 
 
 def test_noiseless_capture_agrees() -> None:
@@ -114,11 +97,12 @@ def test_noiseless_capture_agrees() -> None:
     expected = simulate(scene, sensor, psf, options)
 
     margin = psf.kernels.shape[-1] // 2
-    planes = np.pad(expected.clean, ((0, 0), (margin, margin), (margin, margin)), mode="reflect")
-    kernels = block_kernels(sensor, psf, expected.window, 128)
-    blurred = scatter(torch.from_numpy(planes), kernels)
-    gains = torch.tensor(expected.white_balance)[:, None, None]
-    raw = mosaic(blurred[None] / gains, "RGGB")[0].numpy()
+    matrix, gains = camera_from_rec709(np.array(sensor.color_matrix))
+    inside = apply_matrix(matrix, scene)
+    around = np.pad(inside, ((0, 0), (margin, margin), (margin, margin)), mode="reflect")
+    planes = torch.from_numpy(np.maximum(around, 0))
+    blurred = scatter(planes, block_kernels(sensor, psf, expected.window, 128))
+    raw = mosaic(blurred[None] / torch.tensor(gains)[:, None, None], "RGGB")[0].numpy()
     noise = sensor.noise_at(options.iso)
     one_dn = 1 / (sensor.white_level - sensor.black_level)
     found = np.minimum(raw, sensor.full_well_e * noise.shot[1]) / one_dn
@@ -132,20 +116,18 @@ def test_noiseless_capture_agrees() -> None:
 
 def test_noise_of_training_and_simulation_has_the_same_spread() -> None:
     recipe = read_recipe(RECIPE)
-    sensor = recipe.sensor.model_copy(
-        update={
-            "extent": recipe.sensor.extent.model_copy(update={"width_px": 300, "height_px": 300})
-        }
+    sensor, level, gains = recipe.sensor, 0.1, (2.0, 1.0, 1.5)
+    assert isinstance(sensor, BayerSensor)
+    planes = np.full((3, 300, 300), level, dtype=np.float32)
+    window = SensorWindow(
+        size_px=(300, 300), origin_px=(0, 0), sensor_size_px=(300, 300), pitch_um=6.0
     )
-    level, gains = 0.1, (2.0, 1.0, 1.5)
-    planes = np.array(gains, np.float32)[:, None, None] * np.full((3, 300, 300), level, np.float32)
     light = Light(
-        planes=planes, clean=planes, window=whole_window(sensor), gains=gains, vignetting=None
+        planes=planes, clean=planes, window=window, gains=(1.0, 1.0, 1.0), vignetting=None
     )
     dn = expose(light, sensor, Setting(iso=1600, seed=0))
     signal = (dn.astype(float) - sensor.black_level) / (sensor.white_level - sensor.black_level)
-    found, _ = training._expose(
-        torch.from_numpy(planes)[None], gains, recipe, 1600, np.random.default_rng(0)
-    )
+    balanced = torch.tensor(gains).reshape(1, 3, 1, 1) * torch.full((1, 3, 300, 300), level)
+    found, _ = training._expose(balanced, gains, recipe, 1600, np.random.default_rng(0))
     assert found.var() == pytest.approx(signal.var(), rel=0.04)
     assert found.mean() == pytest.approx(signal.mean(), abs=2e-4)

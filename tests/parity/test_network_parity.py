@@ -79,7 +79,7 @@ def test_probe_stays_within_the_graph_walk_and_the_stated_halo(name: str) -> Non
         272,
         np.random.default_rng(0),
         stride_px=facts.stride_px,
-        channels=6,
+        channels=facts.input_channels,
     )
     assert reach.halo_px <= facts.receptive_field_radius_px <= HALOS_PX[name]
     assert HALOS_PX[name] - facts.stride_px < reach.halo_px

@@ -92,7 +92,9 @@ def test_what_one_side_takes_for_a_field_the_other_does_too() -> None:
     np.testing.assert_allclose(
         ours.at(*at)[0].numpy(), theirs.at(float(at[0]), float(at[1])), atol=LOOKUP_TOLERANCE
     )
-    everywhere = numpy_psf.FieldKernels(
+    one = numpy_psf.FieldKernels(
         kernels=kernels[:1], field_heights_mm=np.zeros(1), symmetry="uniform"
     )
-    np.testing.assert_allclose(everywhere.at(1.0, -1.0), kernels[0], atol=LOOKUP_TOLERANCE)
+    twin = torch_psf.field_kernels(torch.from_numpy(kernels[:1]), _uniform())
+    np.testing.assert_allclose(twin.at(*at)[0].numpy(), one.at(0.2, -0.3), atol=LOOKUP_TOLERANCE)
+    np.testing.assert_allclose(one.at(0.2, -0.3), kernels[0], atol=LOOKUP_TOLERANCE)

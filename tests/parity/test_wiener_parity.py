@@ -3,12 +3,20 @@ import pytest
 import torch
 
 from camkit.bundle.stages import Wiener
+from camkit.contracts import NoiseModel
 from camkit.models_def.sensors.wiener import taper_edges as taper_torch
 from camkit.models_def.sensors.wiener import to_otf as to_otf_torch
 from camkit.models_def.sensors.wiener import wiener_restore
 from camkit.runtime.bank.blocks import Block, taper_edges, to_otf
 from camkit.runtime.bank.wiener import wiener_filter
-from tests.psf_factory import ISO_100, blur_periodic, coma_kernels, texture, with_noise
+from tests.psf_factory import (
+    ISO_100,
+    blur_periodic,
+    coma_kernels,
+    streak_kernel,
+    texture,
+    with_noise,
+)
 
 TOLERANCE = 1e-5
 KERNELS = coma_kernels(radius_px=10)[0]
@@ -53,6 +61,25 @@ def test_block_filter_and_torch_agree(size, clip_iterations, mask_channels):
         torch.from_numpy(np.stack(masks)) if mask_channels else None,
     )
     np.testing.assert_allclose(restored.numpy(), np.stack(expected), atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("channels", [1, 2, 5])
+def test_any_number_of_channels_with_one_sided_streaks_agrees(channels):
+    """A kernel that is its mirror image would hide a flip on one side."""
+    kernel = np.stack([streak_kernel(40.0 * c, 9, 9) for c in range(channels)])
+    scene = np.resize(texture(64, 64, seed=3), (channels, 64, 64))
+    noise = NoiseModel(shot=(2e-5,) * channels, read_variance=(4e-9,) * channels)
+    planes = with_noise(blur_periodic(scene, kernel), noise, np.random.default_rng(1))
+    otf = to_otf(kernel, 64)
+    block = Block(samples=taper_edges(planes, otf, 6), otf=otf)
+    restored = wiener_restore(
+        torch.from_numpy(planes)[None],
+        torch.from_numpy(kernel)[None],
+        *tensors(noise),
+        settings(0),
+    )
+    expected = wiener_filter(settings(0), noise)(block)
+    np.testing.assert_allclose(restored[0].numpy(), expected, atol=TOLERANCE)
 
 
 def test_one_noise_per_patch_agrees_with_one_by_one():

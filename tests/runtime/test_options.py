@@ -9,8 +9,12 @@ from camkit.runtime.options import Options, parse_memory
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
-        ({"size": "XL"}, "S, M, L"),
-        ({"method": "magic"}, "net, wiener"),
+        ({"quality": "good"}, "exact, best, adaptive, draft"),
+        ({"max_seconds": 0.0}, "seconds must be > 0"),
+        ({"max_error_db": -1.0}, "error in dB must be > 0"),
+        ({"on_unsafe": "ignore"}, "warn, fallback, fail"),
+        ({"dtype": "bf16"}, "fp32, fp16"),
+        ({"provider": "tpu"}, "cpu, cuda"),
         ({"mode": "quick"}, "exact, fast, whole"),
         ({"demosaic": "best"}, "fast, quality"),
         ({"color": "p3"}, "rec709, acescg, camera"),

@@ -11,9 +11,9 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.tiling import Cancelled
-from camkit.runtime.options import Method, Options
+from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.deep_bundle import write_deep_bundle
@@ -121,7 +121,7 @@ def test_a_dead_pixel_is_repaired_and_reported(bundle: Path, mosaic: np.ndarray)
     work = pipeline.start(
         pipeline.capture_of(broken, iso=100.0, white_balance=None, origin_px=None)
     )
-    image = work.fill(None)
+    image = work.fill()
     assert any("repaired" in warning for warning in work.warnings)
     np.testing.assert_allclose(image, _run(bundle, mosaic), atol=0.1)
 
@@ -131,22 +131,22 @@ def test_the_plan_is_known_before_any_work(bundle: Path, mosaic: np.ndarray) -> 
     work = pipeline.start(
         pipeline.capture_of(mosaic, iso=100.0, white_balance=None, origin_px=None)
     )
-    assert work.plan["noise"]["source"] == "bundle"
-    assert work.plan["tiles"]["mode"] == "exact"
+    assert work.record["noise"]["source"] == "bundle"
+    assert work.record["tiles"]["mode"] == "exact"
     assert set(work.seconds) <= {"noise"}
 
 
 def test_noise_is_measured_where_no_iso_is_known(bundle: Path, mosaic: np.ndarray) -> None:
     pipeline = load(bundle)
     work = pipeline.start(pipeline.capture_of(mosaic, iso=None, white_balance=None, origin_px=None))
-    assert work.plan["noise"]["source"] == "measured"
+    assert work.record["noise"]["source"] == "measured"
 
 
 @pytest.mark.parametrize(
     ("image", "message"),
     [
         (np.zeros((64, 96), np.float64), "uint8, uint16 or float32"),
-        (np.zeros((4, 64, 96), np.float32), r"\(h, w\) or \(3, h, w\)"),
+        (np.zeros((4, 64, 96), np.float32), r"\(h, w\) or \(3, h, w\); got \(4, 64, 96\)"),
         (np.zeros((60, 96), np.uint16), "96x60"),
     ],
 )
@@ -162,7 +162,7 @@ def test_linear_planes_are_taken_with_a_note(bundle: Path) -> None:
         pipeline.capture_of(planes, iso=100.0, white_balance=None, origin_px=None)
     )
     assert any("linear RGB" in warning for warning in work.warnings)
-    assert np.isfinite(work.fill(None)).all()
+    assert np.isfinite(work.fill()).all()
 
 
 def test_a_size_the_bundle_lacks_is_refused(bundle: Path) -> None:
@@ -183,7 +183,8 @@ def test_arrays_need_a_bundle(mosaic: np.ndarray) -> None:
 @pytest.mark.parametrize("method", ["wiener", "rl", "admm-tv"])
 def test_classical_methods_need_no_network(bundle: Path, mosaic: np.ndarray, method: str) -> None:
     pipeline = load(bundle, method=method)
-    assert pipeline.engine is None
+    assert pipeline.size is None
+    assert pipeline._engines == {}
     assert np.isfinite(pipeline.process_array(mosaic, iso=100.0)).all()
 
 
@@ -209,18 +210,18 @@ def near(deep: Bundle) -> Simulation:
     """A capture of a scene half as far as the focus."""
     scene = texture(96, 96)
     options = SimulationOptions(depth_mm=500.0, origin_px=(80, 40), distort=False)
-    return simulate(scene, deep.manifest.camera, deep.psf, options)
+    return simulate(scene, deep.manifest.sensor, deep.psf, options)
 
 
 @pytest.mark.parametrize("method", ["wiener", "rl", "admm-tv"])
 def test_every_method_restores_best_with_the_kernels_of_the_depth(
-    method: Method, deep: Bundle, near: Simulation
+    method: str, deep: Bundle, near: Simulation
 ) -> None:
     found = {}
     for depth_m in (0.5, None, 1.0):
         chosen = Options(method=method, depth_m=depth_m, color="camera", undistort=False)
         image = Pipeline(deep, chosen).process_array(
-            near.mosaic, iso=100.0, white_balance=near.white_balance, origin_px=(80, 40)
+            near.samples, iso=100.0, white_balance=near.white_balance, origin_px=(80, 40)
         )
         found[depth_m] = psnr_db(image, near.clean, cut_px=16)
     assert found[0.5] > found[None] + 0.1
@@ -233,7 +234,7 @@ def test_without_a_depth_the_bank_has_the_mean_kernel(deep: Bundle, near: Simula
     images = []
     for bundle in (deep, replace(deep, _psf=shallow)):
         pipeline = Pipeline(bundle, Options(method="wiener"))
-        images.append(pipeline.process_array(near.mosaic, iso=100.0, origin_px=(80, 40)))
+        images.append(pipeline.process_array(near.samples, iso=100.0, origin_px=(80, 40)))
     np.testing.assert_allclose(images[0], images[1], atol=2e-5)
 
 
@@ -242,7 +243,7 @@ def test_a_depth_without_kernels_is_refused_before_any_work(bundle: Path, deep: 
         Pipeline(deep, Options(depth_m=3.0))
     with pytest.raises(ContractError, match="the one depth infinity; got 3 m"):
         load(bundle, depth_m=3.0)
-    with pytest.raises(ContractError, match="there is none here"):
+    with pytest.raises(ContractError, match="--depth-m means nothing without a bundle"):
         load(None, depth_m=3.0)
 
 

@@ -18,12 +18,12 @@ from torch import Tensor, nn
 
 from camkit.bundle.facts import Port
 from camkit.bundle.psf_file import psf_to_bytes, read_psf, write_psf
-from camkit.bundle.stages import Color, Linearise, Network, Repair, Stage
+from camkit.bundle.stages import Color, Linearise, Network, Repair
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.models_def.sensors.forward import blur
 from camkit.models_def.sensors.psf import FieldKernels, color_kernels
 from camkit.models_def.sensors.stabilise import stabilise
-from camkit.models_def.training.kind import Restorer, Score
+from camkit.models_def.training.kind import Design, Restorer, Score
 from camkit.models_def.training.pictures import SCENE_SEED, open_source
 from camkit.models_def.training.sample import Sample, SampleLayout
 from camkit.scenes import procedural_scene
@@ -171,15 +171,18 @@ class ToyPart:
         """Check the tables of a recipe."""
         return to_toy_recipe(table)
 
-    def stages(self, recipe: ToyRecipe) -> tuple[Stage, ...]:
+    def design(self, recipe: ToyRecipe) -> Design:
         """No bank, no correction of optics."""
         del recipe
-        return (
-            Linearise(),
-            Repair(),
-            Network(role="denoise", takes=("sound",), gives=("quiet",), scale=SCALE),
-            Network(role="upscale", takes=("quiet",), gives=("fine",), transform="none"),
-            Color(takes=("fine",)),
+        return Design(
+            stages=(
+                Linearise(),
+                Repair(),
+                Network(role="denoise", takes=("sound",), gives=("quiet",), scale=SCALE),
+                Network(role="upscale", takes=("quiet",), gives=("fine",), transform="none"),
+                Color(takes=("fine",)),
+            ),
+            fails_on=("streaks of another direction",),
         )
 
     def build_network(self, name: str, **config: Any) -> nn.Module:

@@ -55,7 +55,7 @@ def freeze(
 
     grid = FreezeGrid(depths_mm=_depths(depths_mm), energy=energy, max_side_px=max_side_px)
     chosen = read_recipe(_default_recipe() if recipe is None else recipe)
-    stages = training_kind(chosen.kind).stages(chosen)
+    stages = training_kind(chosen.kind).design(chosen).stages
     if not isinstance(chosen.sensor, ColorSensor):
         raise UnsupportedError(f"a {chosen.sensor.type} sensor has no response to freeze a PSF for")
     found = read_optics(optics)

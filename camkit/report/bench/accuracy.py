@@ -13,10 +13,10 @@ from camkit.errors import CamkitError
 from camkit.report.bench.known_captures import KnownCapture
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.trial import Trial
+from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import DEVELOP
-from camkit.runtime.twin.truth import in_sensor_geometry
 
 Key = tuple[object, ...]
 INPUT: Key = ("input",)

@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.runtime.files.picture import read_scene
 from camkit.runtime.kind import runtime_part
 from camkit.runtime.network.engine import available_threads
-from camkit.runtime.simulate import SimulationOptions
+from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.scenes import procedural_scene
 
 SCENE_SEED: Final = 7

@@ -16,6 +16,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.shot import NOISE_SEED, Shot
 from camkit.runtime.bank.psf import color_kernels
@@ -38,7 +39,7 @@ from camkit.runtime.twin.light import (
     scene_window,
     stated_balance,
 )
-from camkit.runtime.twin.truth import in_sensor_geometry, light_sensor
+from camkit.runtime.twin.truth import light_sensor
 
 INPUT: Final = "input"
 BEFORE: Final = "before"

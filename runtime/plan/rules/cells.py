@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.bundle.stages import Network
 from camkit.runtime.plan.decision import (
     FULL,
     PLAIN,
@@ -18,6 +19,7 @@ from camkit.runtime.plan.decision import (
 from camkit.runtime.plan.estimate import tier_work_of
 from camkit.runtime.plan.loss import CellLosses, read_loss_model
 from camkit.runtime.plan.tiers import FloatGrid, choose_tiers
+from camkit.runtime.plan.ways import known_stand_in
 
 ORDER: Final = 20
 
@@ -35,6 +37,10 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
         return work, Decision(what="cells", choice="all full", reason=reason)
     if case.loss_db <= 0:
         return work, Decision(what="cells", choice="all full", reason="no loss may be spent")
+    manifest = case.bundle.manifest
+    if not all(known_stand_in(s, manifest.all_planes) for s in manifest.stages_of(Network)):
+        reason = "no plane stands in where the network does not run"
+        return work, Decision(what="cells", choice="all full", reason=reason)
     losses = model.predict(case.scene)
     small = _smaller(case, work, losses)
     with_small = replace(work, small=small)

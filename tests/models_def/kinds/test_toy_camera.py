@@ -77,8 +77,6 @@ def test_its_kind_is_found_like_any_other(recipe_path):
     assert read_recipe(recipe_path).network("S", "upscale").network == "upscaler"
     with pytest.raises(UnsupportedError, match="not fine-tuned"):
         refining_kind("toy")
-    with pytest.raises(UnsupportedError, match="no part in report"):
-        find_kind("toy").part("report")
 
 
 @pytest.mark.parametrize("role", ROLES)

@@ -4,7 +4,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
-from camkit.contracts import FrozenPsf
 from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from tests.deep_bundle import deep_psf
 from tests.psf_factory import coma_kernels, frozen_psf

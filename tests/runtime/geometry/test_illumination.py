@@ -6,7 +6,7 @@ from camkit.runtime.geometry.illumination import (
     illumination_band,
 )
 from camkit.runtime.geometry.sensor_window import SensorWindow
-from tests.camera_factory import PITCH_UM, make_sensor, make_psf, whole_window
+from tests.camera_factory import PITCH_UM, make_psf, make_sensor, whole_window
 
 LOOKUP_ERROR = 2e-5
 

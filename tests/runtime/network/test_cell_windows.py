@@ -1,4 +1,4 @@
-"""Networks on lattice cells: the bits of the untiled run there, the planes that stand in elsewhere."""
+"""Networks on lattice cells: the bits of the untiled run there, what stands in elsewhere."""
 
 import threading
 

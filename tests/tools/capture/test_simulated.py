@@ -11,7 +11,7 @@ from camkit.colorimetry import apply_matrix
 from camkit.errors import UnsupportedError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from tests.bundle_factory import tiny_sensor
 from tests.wide_bundle import write_wide_bundle
 from tools.capture.simulated import captured, color_sensor, rec709_of

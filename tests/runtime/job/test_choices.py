@@ -1,0 +1,199 @@
+"""What means nothing to a camera is refused by name, not ignored."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.stages import Color, Linearise, Repair
+from camkit.bundle.writer import write_bundle
+from camkit.errors import ContractError
+from camkit.runtime.job.choices import check_choices
+from camkit.runtime.options import Options, flag_of
+from camkit.runtime.unit import Unit
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages, write_tiny_bundle
+from tests.deep_bundle import write_deep_bundle
+from tests.planes_bundle import planes_sensor, write_planes_bundle
+
+CHANGED: dict[str, Any] = {
+    "size": "M",
+    "quality": "draft",
+    "max_seconds": 1.0,
+    "max_error_db": 0.1,
+    "depth_m": float("inf"),
+    "method": "develop",
+    "mode": "whole",
+    "demosaic": "fast",
+    "color": "camera",
+    "white_balance": (2.0, 1.0, 2.0),
+    "exposure_ev": 1.0,
+    "vignetting": False,
+    "undistort": False,
+    "assume": "centre",
+    "on_unsafe": "fallback",
+    "max_mem_bytes": 500_000_000,
+    "threads": 1,
+    "tile_px": 32,
+    "dtype": "fp16",
+    "provider": "cuda",
+    "unit": None,
+}
+"""Every option away from its default; a unit is tested by itself."""
+FREE = {"max_mem_bytes", "threads", "method"}
+OF_STAGE = {
+    "network": {
+        *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
+        *("dtype", "provider"),
+    },
+    "wiener": {"depth_m"},
+    "demosaic": {"demosaic"},
+    "white_balance": {"white_balance"},
+    "color": {"color", "exposure_ev"},
+    "illumination": {"vignetting"},
+    "undistort": {"undistort"},
+}
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    """Give a camera that takes pictures of any size and does nothing but repair them."""
+    stages = (Linearise(gives=("light",)), Repair(takes=("light",), gives=("sound",)))
+    folder = tmp_path_factory.mktemp("bare")
+    return write_planes_bundle(folder, stages, sensor=planes_sensor(size_px=None))
+
+
+def _refused(bundle: Bundle | None, **choices: Any) -> str:
+    with pytest.raises(ContractError) as caught:
+        check_choices(bundle, Options(**choices))
+    return str(caught.value)
+
+
+def test_every_option_is_in_the_list_of_this_test() -> None:
+    assert set(CHANGED) == {field.name for field in dataclasses.fields(Options)}
+    claimed = set.union(*OF_STAGE.values())
+    assert set(CHANGED) == claimed | FREE | {"assume", "unit"}
+
+
+@pytest.mark.parametrize("name", CHANGED)
+def test_a_camera_of_every_stage_knows_every_option(tiny: Bundle, name: str) -> None:
+    check_choices(tiny, Options(**{name: CHANGED[name]}))
+
+
+@pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
+def test_each_option_that_means_nothing_is_refused_by_name(bare: Bundle, name: str) -> None:
+    if name in FREE:
+        check_choices(bare, Options(**{name: CHANGED[name]}))
+        return
+    said = _refused(bare, **{name: CHANGED[name]})
+    assert said.startswith(f"{flag_of(name)} means nothing to bundle planes")
+
+
+@pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
+def test_each_option_that_means_nothing_without_a_bundle_is_refused_by_name(name: str) -> None:
+    if name in FREE | {"color", "exposure_ev", "white_balance", "demosaic"}:
+        check_choices(None, Options(**{name: CHANGED[name]}))
+        return
+    said = _refused(None, **{name: CHANGED[name]})
+    assert said.startswith(f"{flag_of(name)} means nothing without a bundle")
+
+
+@pytest.mark.parametrize(
+    "left_out",
+    [
+        *(["network"], ["wiener", "network"], ["white_balance"], ["color"], ["illumination"]),
+        ["undistort"],
+    ],
+    ids="+".join,
+)
+def test_a_camera_without_a_stage_refuses_its_options_and_no_other(
+    left_out: list[str], tmp_path: Path
+) -> None:
+    members, changes = tiny_members(), {}
+    if "network" in left_out:
+        del members["network_m.onnx"]
+        changes = {"networks": {}}
+    path = tmp_path / "less.camkit"
+    write_bundle(path, tiny_manifest(stages=tiny_stages(*left_out), **changes), members)
+    bundle = open_bundle(path)
+    foreign = set.union(*(OF_STAGE[stage] for stage in left_out))
+    for name, value in CHANGED.items():
+        if name in foreign:
+            assert flag_of(name) in _refused(bundle, **{name: value})
+        else:
+            check_choices(bundle, Options(**{name: value}))
+
+
+def test_all_foreign_options_are_named_at_once(bare: Bundle) -> None:
+    said = _refused(bare, size="M", demosaic="fast", depth_m=1.0)
+    assert said.startswith("--size, --depth-m, --demosaic means nothing")
+
+
+def test_a_method_that_no_stage_has_is_refused_with_those_there_are(
+    tiny: Bundle, bare: Bundle
+) -> None:
+    for method in ("net", "wiener", "rl", "admm-tv", "develop"):
+        check_choices(tiny, Options(method=method))
+    assert "net, wiener, rl, admm-tv, develop to bundle tiny; got 'magic'" in _refused(
+        tiny, method="magic"
+    )
+    assert "method must be one of develop to bundle planes; got 'wiener'" in _refused(
+        bare, method="wiener"
+    )
+    check_choices(None, Options(method="develop"))
+    assert "one of develop without a bundle; got 'net'" in _refused(None, method="net")
+
+
+def test_methods_of_stages_that_the_bundle_leaves_out_are_refused(tmp_path: Path) -> None:
+    members = tiny_members()
+    del members["network_m.onnx"]
+    path = tmp_path / "bank.camkit"
+    write_bundle(path, tiny_manifest(stages=tiny_stages("network"), networks={}), members)
+    assert "one of wiener, rl, admm-tv, develop" in _refused(open_bundle(path), method="net")
+
+
+def test_a_place_may_be_assumed_only_on_a_sensor_of_known_size(tiny: Bundle, bare: Bundle) -> None:
+    check_choices(tiny, Options(assume="scale"))
+    assert "--assume means nothing" in _refused(bare, assume="scale")
+
+
+def test_a_unit_of_another_bundle_or_of_none_is_refused(tiny: Bundle) -> None:
+    own = Unit(name="body 1", bundle_sha256=tiny.sha256)
+    check_choices(tiny, Options(unit=own))
+    other = dataclasses.replace(own, bundle_sha256="0" * 64)
+    assert "measured with the bundle" in _refused(tiny, unit=other)
+    assert "there is none" in _refused(None, unit=own)
+
+
+def test_a_depth_that_the_psf_does_not_reach_is_refused(tiny: Bundle, tmp_path: Path) -> None:
+    deep = write_deep_bundle(tmp_path)
+    check_choices(deep, Options(depth_m=0.7))
+    check_choices(tiny, Options(depth_m=np.inf))
+    assert "0.5 m to 2 m" in _refused(deep, depth_m=3.0)
+    assert "the one depth infinity; got 3 m" in _refused(tiny, depth_m=3.0)
+
+
+def test_flags_are_those_of_the_command() -> None:
+    """A message must name what a person can type."""
+    import inspect
+
+    from camkit.cli.use.process import process
+
+    parameters = inspect.signature(process).parameters
+    typed = {"--" + name.rstrip("_").replace("_", "-") for name in parameters}
+    for_programs = {"tile_px", "dtype", "provider"}
+    assert {name for name in CHANGED if flag_of(name) not in typed} <= for_programs
+
+
+def test_no_color_means_no_option_of_color(tmp_path: Path) -> None:
+    stages = (Linearise(gives=("light",)), Color(takes=("light",)))
+    camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
+    check_choices(camera, Options(exposure_ev=1.0, color="acescg"))
+    assert "--wb means nothing" in _refused(camera, white_balance=(2.0, 1.0, 2.0))

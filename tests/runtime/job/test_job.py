@@ -1,0 +1,112 @@
+"""What is known of a capture before its first row: its place, its noise, what people are told."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.bundle.plane import Grid
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.stages import Color, Linearise
+from camkit.contracts import NoiseModel
+from camkit.errors import ContractError
+from tests.bundle_factory import tiny_sensor, write_tiny_bundle
+from tests.job_factory import OWN_BALANCE, SHAPE, made_job, made_mosaic, made_planes, start
+from tests.planes_bundle import planes_sensor, write_planes_bundle
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
+
+
+def test_a_capture_that_states_everything_leaves_nothing_to_note(bundle: Bundle) -> None:
+    assert start(bundle, made_mosaic()).job.notes == []
+
+
+def test_notes_of_the_decode_come_first(bundle: Bundle) -> None:
+    capture = made_mosaic(notes=("half of it is missing",), white_balance=None)
+    notes = start(bundle, capture).job.notes
+    assert notes[0] == "half of it is missing"
+    assert len(notes) == 2
+
+
+def test_planes_in_place_of_a_mosaic_are_noted(bundle: Bundle) -> None:
+    notes = start(bundle, made_planes()).job.notes
+    assert notes == ["a linear RGB capture in a raw_bayer_v1 bundle: not demosaicked"]
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_planes_that_the_sensor_does_not_give_are_refused(bundle: Bundle, count: int) -> None:
+    capture = made_planes(samples=np.zeros((count, *SHAPE), np.float32))
+    with pytest.raises(ContractError, match="takes raw_bayer_v1 or linear_rgb_v1"):
+        made_job(capture, bundle)
+    with pytest.raises(ContractError, match=rf"without a bundle .* {count} channel"):
+        made_job(capture)
+
+
+def test_a_mosaic_is_refused_by_a_sensor_of_planes(tmp_path: Path) -> None:
+    stages = (Linearise(gives=("light",)), Color(takes=("light",)))
+    camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
+    with pytest.raises(ContractError, match="takes linear_planes_v1, the capture is raw_bayer_v1"):
+        made_job(made_mosaic(), camera)
+
+
+def test_an_assumed_place_is_noted_and_a_wrong_size_is_refused(bundle: Bundle) -> None:
+    small = made_mosaic(samples=np.full((32, 48), 500, np.uint16))
+    centred = start(bundle, small, assume="centre").job
+    assert centred.placement.window.origin_px == (24.0, 16.0)
+    assert centred.notes == [centred.placement.note]
+    with pytest.raises(ContractError, match="48x32 pixels, the bundle's sensor 96x64"):
+        start(bundle, small)
+
+
+def test_noise_is_the_files_before_the_bundles_before_a_measured_one(bundle: Bundle) -> None:
+    stated = NoiseModel(shot=(1e-3,) * 3, read_variance=(1e-6,) * 3)
+    captures = {
+        "file": made_mosaic(noise=stated),
+        "bundle": made_mosaic(),
+        "measured": made_mosaic(iso=None),
+    }
+    for source, capture in captures.items():
+        assert start(bundle, capture).record["noise"]["source"] == source
+    job = start(bundle, captures["file"]).job
+    assert job.record["noise"]["shot"] == stated.shot
+    assert job.noise == stated, "before white balance, which is a stage"
+    assert job.white_balance == OWN_BALANCE
+    at_iso = start(bundle, replace(captures["bundle"], iso=400.0)).job.noise
+    assert at_iso == tiny_sensor().noise_at(400)
+
+
+def test_noise_is_known_for_every_channel_of_a_camera(tmp_path: Path) -> None:
+    sensor = planes_sensor(tuple("ABCDE"))
+    stages = (Linearise(gives=("light",)),)
+    camera = write_planes_bundle(tmp_path, stages, sensor=sensor, products={"image": "light"})
+    capture = made_planes(samples=np.random.default_rng(0).random((5, *SHAPE), np.float32))
+    for known in (capture, replace(capture, iso=None)):
+        assert len(made_job(known, camera).noise.shot) == 5
+
+
+def test_the_window_of_a_finer_plane_covers_the_same_place(bundle: Bundle) -> None:
+    job = made_job(
+        made_mosaic(
+            samples=np.zeros((20, 32), np.uint16), origin_px=(10, 6), sensor_size_px=(96, 64)
+        ),
+        bundle,
+    )
+    plane = bundle.manifest.planes["clean"]
+    assert job.window_of(plane) is job.placement.window
+    for scale in (2, 3):
+        finer = plane.model_copy(update={"grid": Grid().finer(scale)})
+        window = job.window_of(finer)
+        assert job.grid_px(finer) == (20 * scale, 32 * scale) == window.size_px[::-1]
+        # the middle of the samples of one pixel is the middle of the pixel
+        for coarse in (0, 7, 31):
+            first = scale * coarse
+            middle = np.mean([window.to_mm(first + i, 0.0)[0] for i in range(scale)])
+            assert middle == pytest.approx(float(job.placement.window.to_mm(coarse, 0.0)[0]))
+        assert window.corner_radius_mm == pytest.approx(
+            job.placement.window.corner_radius_mm, abs=0.006
+        )
+        np.testing.assert_allclose(window.centre_mm, job.placement.window.centre_mm, atol=1e-12)
