@@ -17,10 +17,10 @@ from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.bundle.stages import Color, Linearise, Network, Parts, Repair
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FrozenPsf
-from camkit.runtime.golden_run import case_work
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.ranges import node_activations
-from camkit.runtime.simulate import SimulationOptions, simulate
+from camkit.runtime.proof.golden_run import case_work
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from camkit.runtime.twin.truth import ideal_picture
 from camkit.scenes import procedural_scene
 from tests.psf_factory import PITCH_UM, grid_psf, streak_kernel

@@ -20,7 +20,7 @@ from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.kind import Gains, RuntimePart
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.raw import file_sha256
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from camkit.runtime.twin.truth import light_sensor
 
 NAME: Final = "toy"

@@ -34,9 +34,7 @@ def scene() -> FloatArray:
 def test_a_crop_of_the_light_takes_its_fine_truth_along() -> None:
     fine = texture(128, 192)
     window = scene_window(fine, SENSOR, None, scale=2)
-    light = light_of(
-        fine, SENSOR, lens_of(make_psf(SENSOR), SENSOR), window, LightOptions(scale=2)
-    )
+    light = light_of(fine, SENSOR, lens_of(make_psf(SENSOR), SENSOR), window, LightOptions(scale=2))
     small = crop_light(light, (17, 9))
     np.testing.assert_array_equal(small.planes, light.planes[:, :9, :17])
     np.testing.assert_array_equal(small.clean, light.clean[:, :18, :34])
@@ -74,9 +72,7 @@ def test_a_scene_of_broken_pixels_is_refused(scene: FloatArray) -> None:
 
 
 def test_a_window_in_finer_samples_covers_the_same_place() -> None:
-    window = SensorWindow(
-        size_px=(40, 24), origin_px=(7, 9), sensor_size_px=(96, 64), pitch_um=6.0
-    )
+    window = SensorWindow(size_px=(40, 24), origin_px=(7, 9), sensor_size_px=(96, 64), pitch_um=6.0)
     fine = window.resampled(0.5, (80, 48))
     pairs = np.array([[0.0, 0.0], [1.0, 1.0]])
     found = [

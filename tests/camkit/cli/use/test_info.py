@@ -99,7 +99,7 @@ def test_the_schema_describes_the_example_brought_up_to_date_and_nothing_more(
     assert _faults(json.loads(old), schema, schema)
     assert _faults(manifest | {"surprise": 1}, schema, schema)
     assert _faults(manifest | {"sensor": {"type": "film"}}, schema, schema)
-    assert _faults(manifest | {"networks": {"XL": {}}}, schema, schema)
+    assert _faults(manifest | {"networks": {"restore": {"XL": {}}}}, schema, schema)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from camkit.report.stress.shot import NOISE_SEED
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.simulate import SimulationOptions, simulate
 from camkit.runtime.twin.exposure import Setting
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 
 
 @pytest.mark.parametrize(
