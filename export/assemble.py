@@ -1,68 +1,72 @@
 """Checkpoints, frozen PSF and prescription -> one bundle, proved before it is written.
 
-PSF, camera       -> golden captures                    (golden_cases)
-a first bundle    -> what a network is given for them
-checkpoints       -> networks -> ONNX + measured facts  (network_facts)
-a second bundle   -> its outputs on the golden captures
+checkpoints       -> networks -> ONNX, with what their graphs say   (network_facts)
+a first bundle    -> golden captures, and what its networks are given for them
+networks, inputs  -> measured facts                                 (network_facts)
+a second bundle   -> its outputs on the golden captures             (golden_cases)
 everything        -> card, preview, manifest -> bundle -> `check_bundle`
+
+What a camera is made of, its kind says (`camkit.models_def.training.kind.Design`).
 """
 
 import json
 import tempfile
-import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 import numpy as np
 
-from camkit.bundle.golden import GoldenArrays, golden_to_bytes
-from camkit.bundle.manifest import (
-    Color,
-    Demosaic,
-    Illumination,
-    Manifest,
-    Network,
-    NetworkSize,
-    Threshold,
-    Undistort,
-    WhiteBalance,
-    Wiener,
-)
+from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
+from camkit.bundle.manifest import Manifest, Threshold, planes_of
+from camkit.bundle.optics import PSF, FrozenPsfOptics
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
-from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, PSF, STRESS_PSF, Bundle
+from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, STRESS_PSF, Bundle
+from camkit.bundle.stages import Parts as KnownParts
+from camkit.bundle.stages import Stage, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, ParityError
 from camkit.export.card import card_text, preview_png
 from camkit.export.golden_cases import (
-    GOLDEN_RECIPES,
     CaseRecipe,
     Cases,
     add_outputs,
     photograph,
+    photograph_all,
 )
-from camkit.export.network_facts import MeasuredNetwork, measure_network
+from camkit.export.network_facts import ExportedNetwork, draft_network, measure_network
 from camkit.models_def.optics.distortion import trace_distortion
-from camkit.models_def.optics.lens_file.lens_file import built_in_lenses, find_lens, read_lens
+from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
-from camkit.models_def.training.checkpoint import Checkpoint, load_network, read_checkpoint
-from camkit.models_def.training.recipe import Recipe, differing_camera, to_recipe
-from camkit.runtime.check import check_bundle
+from camkit.models_def.training.checkpoint import (
+    Checkpoint,
+    load_network,
+    read_checkpoint,
+    recipe_of,
+)
+from camkit.models_def.training.kind import Design, TrainingKind, training_kind
+from camkit.models_def.training.recipe import Recipe, differing_part
 from camkit.runtime.geometry.distortion import distort_points
-from camkit.runtime.golden_run import develop_case
-from camkit.runtime.options import Options
-from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.loss import read_loss_model
+from camkit.runtime.proof.check import check_bundle
+from camkit.runtime.proof.golden_run import case_work
 from camkit.units import UM_PER_MM
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
+PROBE: Final = "probe"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
-SIZES: Final[tuple[NetworkSize, ...]] = get_args(NetworkSize)
-DEFAULT_SIZE: Final[NetworkSize] = "M"
+SIZES: Final = ("S", "M", "L")
+DEFAULT_SIZE: Final = "M"
 SAME_LENS_PX: Final = 0.01
+
+Found = dict[str, dict[str, Checkpoint]]
+"""Role -> size -> checkpoint."""
+Networks = dict[str, dict[str, ExportedNetwork]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +74,7 @@ class Parts:
     """What goes into a bundle.
 
     Attributes:
-        checkpoints: One per size, of one camera.
+        checkpoints: One per role and size, of one camera.
         psf: Frozen PSF of `camkit freeze`.
         stress_psf: Kernels off the design point.
         prescription: The lens as designed; None for that of the checkpoints.
@@ -96,39 +100,41 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         What was written: sizes of network, bytes, and the lines of the proof.
 
     Raises:
-        ContractError: If the checkpoints are not of one camera, a size comes twice, or the PSF
-            was frozen from another lens.
+        ContractError: If the checkpoints are not of one camera, one size of a role comes twice or
+            not at all, or the PSF was frozen from another lens.
         ParityError: If torch and ONNX, or the bundle and its own golden cases, disagree.
         BundleError: If the parts contradict each other.
     """
-    checkpoints = _read_checkpoints(parts.checkpoints)
-    recipe = _recipe(checkpoints)
-    members = _members(parts, _lens_of(parts, recipe, checkpoints))
+    camera = _camera(parts)
+    members = _members(parts, _lens_of(parts, camera.checkpoints))
     with tempfile.TemporaryDirectory() as folder:
-        bare = write_bundle(
-            Path(folder) / "bare.camkit", _manifest(recipe, parts, checkpoints, {}, {}), members
+        drafts = _each(
+            camera.checkpoints,
+            lambda role, size, checkpoint: draft_network(
+                f"{role}_{size}", load_network(checkpoint), camera.kind.layout(camera.recipe, role)
+            ),
         )
-        cases = _golden_cases(bare)
-        windows = _network_inputs(bare, cases, recipe.scale)
-        networks = {
-            size: measure_network(size, load_network(checkpoint), windows)
-            for size, checkpoint in checkpoints.items()
-        }
-        for network in networks.values():
-            members |= network.members
-        second = write_bundle(
-            Path(folder) / "second.camkit",
-            _manifest(recipe, parts, checkpoints, networks, {}),
-            members,
+        manifest = _manifest(camera, parts, drafts)
+        first = write_bundle(Path(folder) / "first.camkit", manifest, members | _models(drafts))
+        cases = photograph_all(first)
+        windows = _windows(first, cases)
+        networks = _each(
+            camera.checkpoints,
+            lambda role, size, checkpoint: measure_network(
+                drafts[role][size], load_network(checkpoint), windows[role, size]
+            ),
         )
-        golden = add_outputs(second, cases, dict(zip(cases, windows[1:], strict=True)))
+        members |= _models(networks)
+        manifest = _manifest(camera, parts, networks)
+        second = write_bundle(Path(folder) / "second.camkit", manifest, members)
+        golden = add_outputs(second, cases)
         members[GOLDEN] = golden_to_bytes(golden)
-        members[CARD] = card_text(second, golden).encode()
+        members[CARD] = card_text(second, golden, camera.design.fails_on).encode()
         members[PREVIEW] = preview_png(second, golden)
-        manifest = _manifest(recipe, parts, checkpoints, networks, cases)
+        manifest = manifest.model_copy(update={"golden": tuple(case for case, _ in cases.values())})
         third = Path(folder) / "third.camkit"
         write_bundle(third, manifest, members)
-        report = check_bundle(third, run=develop_case)
+        report = check_bundle(third, run=case_work)
         if not report.passed:
             raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -137,87 +143,118 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         "bundle": str(out),
         "bytes": out.stat().st_size,
         "sha256": bundle.sha256,
-        "sizes": ", ".join(networks),
+        "sizes": ", ".join(bundle.manifest.sizes),
         **{f"check {i}": line for i, line in enumerate(report.lines())},
     }
 
 
-def _read_checkpoints(paths: tuple[Path, ...]) -> dict[NetworkSize, Checkpoint]:
-    found: dict[NetworkSize, Checkpoint] = {}
-    for path in paths:
-        checkpoint = read_checkpoint(path)
-        size = next((known for known in SIZES if known == checkpoint.size), None)
-        if size is None and len(paths) == 1:
-            size = DEFAULT_SIZE
-        if size in found:
-            raise ContractError(f"two checkpoints are of size {size}: keep one")
-        if size is None:
-            raise ContractError(
-                f"{path} is of size {checkpoint.size}; a bundle holds the sizes S, M and L "
-                "(any other network must be alone in its bundle)"
-            )
-        found[size] = checkpoint
-    if not found:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Camera:
+    """What is exported: one camera, with every size of every role."""
+
+    kind: TrainingKind[Any, Any]
+    recipe: Recipe
+    design: Design
+    checkpoints: Found
+    psf: FrozenPsf
+    freeze: Mapping[str, Any]
+
+
+def _camera(parts: Parts) -> _Camera:
+    if not parts.checkpoints:
         raise ContractError("export needs at least one checkpoint")
-    recipes = {size: to_recipe(tomllib.loads(c.recipe_toml)) for size, c in found.items()}
-    first = next(iter(recipes.values()))
-    for size, recipe in recipes.items():
-        if what := differing_camera(first, recipe):
+    checkpoints = [read_checkpoint(path) for path in parts.checkpoints]
+    recipe = recipe_of(checkpoints[0])
+    kind = training_kind(recipe.kind)
+    for path, checkpoint in zip(parts.checkpoints[1:], checkpoints[1:], strict=True):
+        what = differing_part(recipe, recipe_of(checkpoint), ("kind", *kind.camera_parts))
+        if what:
             raise ContractError(
-                f"the checkpoints are of different cameras: the recipe of {size} has another "
-                f"{what}; train them for one"
+                f"the checkpoints are of different cameras: the recipe of {path} has another "
+                f"{what} than that of {parts.checkpoints[0]}; train them for one"
             )
-    return dict(sorted(found.items(), key=lambda item: SIZES.index(item[0])))
+    return _Camera(
+        kind=kind,
+        recipe=recipe,
+        design=kind.design(recipe),
+        checkpoints=_by_role(kind.roles, parts.checkpoints, checkpoints),
+        psf=read_psf(parts.psf),
+        freeze=_freeze_facts(parts),
+    )
 
 
-def _recipe(checkpoints: dict[NetworkSize, Checkpoint]) -> Recipe:
-    return to_recipe(tomllib.loads(next(iter(checkpoints.values())).recipe_toml))
-
-
-def _golden_cases(bare: Bundle) -> Cases:
-    cases: Cases = {}
-    for name, recipe in GOLDEN_RECIPES.items():
-        case, capture, reference = photograph(name, recipe, bare)
-        cases[name] = case, GoldenArrays(capture=capture, reference=reference)
-    return cases
-
-
-def _network_inputs(bare: Bundle, cases: Cases, scale: float) -> list[FloatArray]:
-    """Give (1, 6, h, w) windows as the network sees them: a larger probe first, then the cases."""
-    probe, capture, _ = photograph("probe", PROBE_RECIPE, bare)
-    captures = [(probe, capture), *((case, arrays.capture) for case, arrays in cases.values())]
-    pipeline = Pipeline(bare, Options(method="wiener", threads=1))
-    windows = []
-    for case, image in captures:
-        work = pipeline.start(
-            pipeline.capture_of(
-                image, iso=case.iso, white_balance=case.white_balance, origin_px=case.origin_px
+def _by_role(roles: tuple[str, ...], paths: tuple[Path, ...], given: list[Checkpoint]) -> Found:
+    """Sort checkpoints by role and size: every role in the same sizes."""
+    found: Found = {role: {} for role in roles}
+    for path, checkpoint in zip(paths, given, strict=True):
+        role, size = checkpoint.role, checkpoint.size
+        if role not in found:
+            have = ", ".join(roles)
+            raise ContractError(f"{path} is of the role {role!r}; this kind of camera has {have}")
+        alone = [c.role for c in given].count(role) == 1
+        if size not in SIZES and not alone:
+            raise ContractError(
+                f"{path} is of size {size}; a bundle holds the sizes S, M and L "
+                "(any other network must be alone in its role)"
             )
-        )
-        windows.append(work.network_input(scale)[None])
+        size = size if size in SIZES else DEFAULT_SIZE
+        if size in found[role]:
+            raise ContractError(f"two checkpoints of the role {role} are of size {size}: keep one")
+        found[role][size] = checkpoint
+    wanted = {size for sizes in found.values() for size in sizes}
+    for role, sizes in found.items():
+        if missing := sorted(wanted - sizes.keys(), key=SIZES.index):
+            raise ContractError(f"there is no checkpoint of the role {role}, size {missing[0]}")
+    return {
+        role: dict(sorted(s.items(), key=lambda i: SIZES.index(i[0]))) for role, s in found.items()
+    }
+
+
+def _each(found: Found, make: Callable[[str, str, Checkpoint], ExportedNetwork]) -> Networks:
+    return {
+        role: {size: make(role, size, checkpoint) for size, checkpoint in sizes.items()}
+        for role, sizes in found.items()
+    }
+
+
+def _models(networks: Networks) -> dict[str, bytes]:
+    made: dict[str, bytes] = {}
+    for sizes in networks.values():
+        for network in sizes.values():
+            made |= network.members
+    return made
+
+
+def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
+    """Give what every network is given: for a larger probe first, then for the golden cases."""
+    case, capture, reference = photograph(PROBE, PROBE_RECIPE, bundle)
+    captures = [(case, GoldenArrays(capture=capture, reference=reference)), *cases.values()]
+    windows: dict[tuple[str, str], list[FloatArray]] = {}
+    for size in bundle.manifest.sizes:
+        for one, arrays in captures:
+            work = case_work(bundle, one, arrays, size)
+            for role in bundle.manifest.networks:
+                given = np.ascontiguousarray(work.network_input(role))[None]
+                windows.setdefault((role, size), []).append(given)
     return windows
 
 
-def _lens_of(
-    parts: Parts, recipe: Recipe, checkpoints: dict[NetworkSize, Checkpoint]
-) -> Lens | None:
-    """Give the lens of the camera; None where a checkpoint from before names one by a path."""
-    texts = {c.lens_toml for c in checkpoints.values() if c.lens_toml}
+def _lens_of(parts: Parts, checkpoints: Found) -> Lens | None:
+    """Give the lens of the camera; None where it has none, or a checkpoint does not carry it."""
+    texts = {c.lens_toml for sizes in checkpoints.values() for c in sizes.values() if c.lens_toml}
     if len(texts) > 1:
         raise ContractError(
             "the checkpoints were trained with different lenses; train them for one"
         )
     if parts.prescription is not None:
         return read_lens(parts.prescription)
-    if texts:
-        return parse_prescription(texts.pop())
-    name = recipe.lens.prescription
-    return find_lens(name) if name in built_in_lenses() else None
+    return parse_prescription(texts.pop()) if texts else None
 
 
 def _check_lens(lens: Lens, psf: FrozenPsf, path: Path) -> None:
     """Refuse a PSF that was frozen from another lens: no two have the same distortion."""
-    own, frozen = trace_distortion(lens, psf.distortion.radius_mm), psf.distortion
+    frozen = psf.distortion
+    own = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
     along = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
     off_mm = np.abs(distort_points(along, own) - distort_points(along, frozen)).max()
     off_px = off_mm * UM_PER_MM / psf.pixel_pitch_um
@@ -240,44 +277,45 @@ def _members(parts: Parts, lens: Lens | None) -> dict[str, bytes]:
     return members
 
 
-def _manifest(
-    recipe: Recipe,
-    parts: Parts,
-    checkpoints: dict[NetworkSize, Checkpoint],
-    networks: dict[NetworkSize, MeasuredNetwork],
-    cases: Cases,
-) -> Manifest:
-    distance = recipe.object_distance_mm
+def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
+    recipe, design, psf = camera.recipe, camera.design, camera.psf
+    distance = design.object_distance_mm
+    optics = FrozenPsfOptics(
+        pixel_pitch_um=psf.pixel_pitch_um,
+        symmetry=psf.symmetry,
+        object_distance_mm=None if np.isinf(distance) else distance,
+    )
+    facts: dict[str, dict[str, NetworkFacts]] = {
+        role: {size: network.facts for size, network in sizes.items()}
+        for role, sizes in networks.items()
+    }
+    stages = tuple(_on_frozen_grid(stage, camera.freeze) for stage in design.stages)
+    known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
+    data = dict.fromkeys(c.training_data for s in camera.checkpoints.values() for c in s.values())
     return Manifest(
+        kind=recipe.kind,
         name=recipe.name,
         version=parts.version,
         licence=LICENCE,
-        training_data=next(iter(checkpoints.values())).training_data,
-        camera=recipe.camera,
-        object_distance_mm=None if np.isinf(distance) else distance,
-        input_contract="raw_bayer_v1",
-        border="edge",
-        stages=(
-            WhiteBalance(),
-            Demosaic(method="fast"),
-            _bank(recipe, parts),
-            *((Network(scale=recipe.scale),) if networks else ()),
-            Illumination(),
-            Undistort(),
-            Color(),
-        ),
-        networks={size: network.facts for size, network in networks.items()},
-        golden=tuple(case for case, _ in cases.values()),
-        freeze=_freeze_facts(parts),
+        training_data="; ".join(data),
+        sensor=recipe.sensor,
+        optics=optics,
+        stages=stages,
+        planes=planes_of(stages, known),
+        products={IMAGE: stages[-1].gives[0], **design.products},
+        networks=facts,
+        freeze=dict(camera.freeze),
         plan=_plan_entries(parts),
         exported_with={name: metadata.version(name) for name in PACKAGES},
     )
 
 
-def _bank(recipe: Recipe, parts: Parts) -> Wiener:
-    """Give the recipe's bank on the block grid that freezing chose by measured loss."""
-    grid = {k: v for k, v in _freeze_facts(parts).items() if k in {"block_px", "overlap_px"}}
-    return Wiener.model_validate({**recipe.wiener.model_dump(), **grid})
+def _on_frozen_grid(stage: Stage, freeze: Mapping[str, Any]) -> Stage:
+    """Give a stage; a Wiener bank on the block grid that freezing chose by measured loss."""
+    if not isinstance(stage, Wiener):
+        return stage
+    grid = {key: freeze[key] for key in ("block_px", "overlap_px") if key in freeze}
+    return Wiener.model_validate({**stage.model_dump(), **grid})
 
 
 def _plan_entries(parts: Parts) -> dict[str, Threshold] | None:

@@ -1,37 +1,47 @@
 """The card of a bundle for people, and its preview picture."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Final
 
 import numpy as np
 
-from camkit.bundle.golden import GoldenArrays
+from camkit.bundle.golden import IMAGE, GoldenArrays
 from camkit.bundle.reader import Bundle
+from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, depth_name
 from camkit.export.energy import energy_diameter_px, modulation
 
-BORDER_PX = 16
+BORDER_PX: Final = 16
+_PLACES: Final = {"radial": "field heights", "uniform": "place", "grid": "places"}
 
 
-def card_text(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> str:
-    """Write the card: what it is, what it was trained on, what was measured, where it fails."""
+def card_text(
+    bundle: Bundle, golden: Mapping[str, GoldenArrays], fails_on: Sequence[str] = ()
+) -> str:
+    """Write the card: what it is, what it was trained on, what was measured, where it fails.
+
+    Args:
+        bundle: The camera, with its networks.
+        golden: Its golden cases, outputs included.
+        fails_on: What it fails on, besides objects at other depths.
+    """
     manifest = bundle.manifest
-    camera, psf = manifest.camera, bundle.psf
+    sensor, psf = manifest.sensor, bundle.psf
     depths = ", ".join(map(depth_name, psf.depths_mm))
     lines = [
         f"# {manifest.name} {manifest.version}",
         "",
-        f"Sensor {camera.width_px}x{camera.height_px} of {camera.pixel_pitch_um} um, "
-        f"{camera.cfa or 'no mosaic'}, full well {camera.full_well_e:g} e-. "
-        f"PSF frozen at {psf.field_heights_mm.size} field heights and "
+        f"Sensor {sensor.width_px}x{sensor.height_px} of {sensor.pixel_pitch_um} um, "
+        f"{_seen_by(sensor)}. "
+        f"PSF frozen at {psf.field_heights_mm.size} {_PLACES[psf.symmetry]} and "
         f"{psf.wavelengths_um.size} wavelengths, {psf.kernels.shape[-1]} px a side, "
         f"for objects at {depths}.",
         "",
         f"Licence of the weights: {manifest.licence}. Trained on: {manifest.training_data}.",
         "",
-        f"Response of the colours: {camera.channel_response.source}.",
-        "",
+        *_response(sensor),
         "## PSF over the field" + (", mean of the depths" if psf.depths_mm.size > 1 else ""),
         "",
         "| field height (mm) | circle of 95 % energy (px) | MTF at 0.1 cycles/px | illumination |",
@@ -43,39 +53,51 @@ def card_text(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> str:
             f"| {height:.2f} | {energy_diameter_px(kernel, 0.95):.0f} | "
             f"{modulation(kernel, 0.1):.2f} | {psf.relative_illumination[i]:.3f} |"
         )
+    lines += ["", "## Networks", "", *_networks(bundle), ""]
+    lines += ["## Golden cases (same PSF, PSNR in dB on sRGB values)", ""]
     lines += [
-        "",
-        "## Networks",
-        "",
-        "| size | kMAC/px | parameters | reach (px) |",
-        "|---|---|---|---|",
-    ]
-    for size, facts in manifest.networks.items():
-        lines.append(
-            f"| {size} | {facts.mac_per_pixel / 1e3:.1f} | {facts.parameters} | {facts.reach_px} |"
-        )
-    lines += [
-        "",
-        "## Golden cases (same PSF, PSNR in dB on sRGB values)",
-        "",
-        "| case | " + " | ".join(manifest.networks) + " |",
-        "|---|" + "---|" * len(manifest.networks),
+        "| case | " + " | ".join(manifest.sizes) + " |",
+        "|---|" + "---|" * len(manifest.sizes),
     ]
     for name, arrays in golden.items():
-        values = (
-            f"{_psnr_db(arrays.outputs[size], arrays.reference):.2f}" for size in manifest.networks
-        )
+        images = arrays.outputs[IMAGE]
+        values = (f"{_psnr_db(images[size], arrays.reference):.2f}" for size in manifest.sizes)
         lines.append(f"| {name} | " + " | ".join(values) + " |")
     lines += [
         "",
         "## Where it fails",
         "",
-        f"Depths other than {depths}, sources that clip over more than the PSF, light of a narrow "
-        "band, and lenses off by more than the fabrication errors it was trained with "
-        "(radius 0.2 %, thickness 0.03 mm, index 0.0005, focus 0.02 mm).",
+        ", ".join([f"Depths other than {depths}", *fails_on]) + ".",
         "",
     ]
     return "\n".join(lines)
+
+
+def _response(sensor: Sensor) -> list[str]:
+    if isinstance(sensor, SpadSensor) or sensor.channel_response is None:
+        return []
+    return [f"Response of the colours: {sensor.channel_response.source}.", ""]
+
+
+def _seen_by(sensor: Sensor) -> str:
+    if isinstance(sensor, SpadSensor):
+        return "counting photons"
+    seen = sensor.cfa if isinstance(sensor, BayerSensor) else ", ".join(sensor.channels)
+    return f"{seen}, full well {sensor.full_well_e:g} e-"
+
+
+def _networks(bundle: Bundle) -> list[str]:
+    """Give a table of every network; with roles where there are several."""
+    networks = bundle.manifest.networks
+    rows = ["| network | kMAC/px | parameters | reach (px) |", "|---|---|---|---|"]
+    for role, sizes in networks.items():
+        for size, facts in sizes.items():
+            name = size if len(networks) == 1 else f"{size} ({role})"
+            rows.append(
+                f"| {name} | {facts.mac_per_pixel / 1e3:.1f} | {facts.parameters} | "
+                f"{facts.reach_px} |"
+            )
+    return rows
 
 
 def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
@@ -83,12 +105,13 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
     from matplotlib.figure import Figure
 
     psf = bundle.psf
-    shown = np.linspace(0, psf.field_heights_mm.size - 1, 5).round().astype(int)
+    shown = np.unique(np.linspace(0, psf.field_heights_mm.size - 1, 5).round().astype(int))
     figure = Figure(figsize=(10, 7.5), dpi=80, layout="constrained")
     axes = figure.subplots(3, 5)
     for column, i in enumerate(shown):
         kernel = psf.kernels[i].mean(axis=0)
-        thirds = np.array_split(np.arange(kernel.shape[0]), 3)
+        bands = np.arange(kernel.shape[0])
+        thirds = np.array_split(bands, 3) if bands.size >= 3 else [bands] * 3
         picture = np.stack([kernel[part].mean(axis=0) for part in reversed(thirds)], axis=-1)
         axes[0, column].imshow((picture / picture.max()) ** 0.5)
         axes[0, column].set_title(f"{psf.field_heights_mm[i]:.1f} mm", fontsize=9)
@@ -99,13 +122,14 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
         axes[1, column].set_ylim(0, 1)
         axes[1, column].set_xlabel("cycles/px", fontsize=8)
     axes[1, 0].set_ylabel("MTF")
+    best = bundle.manifest.sizes[-1]
     for column, (name, arrays) in enumerate(golden.items()):
-        best = list(arrays.outputs)[-1]
+        image = arrays.outputs[IMAGE][best]
         gain = 1 / max(float(np.quantile(arrays.reference, 0.99)), 1e-3)
-        pair = np.concatenate([arrays.outputs[best], arrays.reference], axis=1) * gain
+        pair = np.concatenate([image, arrays.reference], axis=1) * gain
         axes[2, column].imshow(encode_srgb(pair.astype(np.float32)).transpose(1, 2, 0))
         axes[2, column].set_title(f"{name}: {best} over truth", fontsize=8)
-    for axis in axes[2]:
+    for axis in (*axes[0, shown.size :], *axes[1, shown.size :], *axes[2]):
         axis.axis("off")
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})

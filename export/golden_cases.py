@@ -1,21 +1,22 @@
 """Small captures of known scenes: the golden cases of a bundle, and probes for measurements."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.golden import GoldenArrays
-from camkit.bundle.manifest import Camera, GoldenCase
+from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle
-from camkit.colorimetry import apply_matrix, rec709_from_camera
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.bundle.sensor import MOSAIC, Extent
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.geometry.warp import undistort_bands
-from camkit.runtime.golden_run import develop_case
-from camkit.runtime.rows import ArrayRows
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.kind import runtime_part
+from camkit.runtime.proof.golden_run import case_work
+from camkit.runtime.twin.light import stated_balance
+from camkit.runtime.twin.simulate import SimulationOptions
+from camkit.runtime.twin.truth import ideal_picture, picture_scale
 from camkit.scenes import procedural_scene
 
 SIDE_STEP_PX: Final = 64
@@ -53,25 +54,28 @@ GOLDEN_RECIPES: Final = {
 
 def photograph(
     name: str, recipe: CaseRecipe, bundle: Bundle
-) -> tuple[GoldenCase, np.ndarray, FloatArray]:
+) -> tuple[GoldenCase, NDArray[Any], FloatArray]:
     """Simulate one case with the camera of a bundle, at its reference depth.
 
     Returns:
-        The case, its capture (h, w) uint16, and the sharp scene (3, h, w) float32 in the
-        geometry and colour of the output.
+        The case, its capture as the sensor gives it, and the sharp scene (3, h, w) float32 in the
+        geometry and colour of the product `image`.
     """
-    camera, psf = bundle.manifest.camera, bundle.psf
-    side_px = _side_px(camera, recipe)
-    origin = _origin(camera, recipe.field, side_px)
-    scene = procedural_scene(recipe.scene_seed, side_px, side_px)
+    manifest = bundle.manifest
+    scale, extent = picture_scale(manifest), manifest.sensor.known_extent
+    side_px = _side_px(extent, recipe)
+    step_px = 2 if manifest.sensor.captured == MOSAIC else 1
+    origin = _origin(extent, recipe.field, side_px, step_px)
+    scene = procedural_scene(recipe.scene_seed, scale * side_px, scale * side_px)
     options = SimulationOptions(
         iso=recipe.iso,
         seed=recipe.scene_seed,
         origin_px=origin,
         exposure=recipe.exposure,
-        depth_mm=bundle.reference_depth_mm,
+        scale=scale,
+        depth_mm=bundle.reference_depth_mm if manifest.optics else None,
     )
-    simulation = simulate(scene, camera, psf, options)
+    simulation = runtime_part(manifest.kind).simulate(scene, bundle, options)
     case = GoldenCase(
         name=name,
         recipe={
@@ -81,54 +85,51 @@ def photograph(
         },
         iso=recipe.iso,
         origin_px=origin,
-        white_balance=simulation.white_balance,
+        white_balance=stated_balance(simulation.white_balance),
     )
-    return case, simulation.mosaic, _reference(simulation, camera, psf)
+    return case, simulation.samples, ideal_picture(simulation, bundle)
 
 
-def add_outputs(
-    bundle: Bundle, cases: Cases, windows: Mapping[str, FloatArray]
-) -> dict[str, GoldenArrays]:
-    """Give the cases with the pipeline's output for every size, and what the network was given.
+def photograph_all(bundle: Bundle) -> Cases:
+    """Photograph all golden cases, their outputs still to be added."""
+    cases: Cases = {}
+    for name, recipe in GOLDEN_RECIPES.items():
+        case, capture, reference = photograph(name, recipe, bundle)
+        cases[name] = case, GoldenArrays(capture=capture, reference=reference)
+    return cases
 
-    Args:
-        bundle: The bundle with its networks.
-        cases: Captures and references.
-        windows: (1, 6, h, w) network input per case.
-    """
+
+def add_outputs(bundle: Bundle, cases: Cases) -> dict[str, GoldenArrays]:
+    """Give the cases with what the pipeline makes of them, for every product and size."""
     return {
-        name: GoldenArrays(
-            capture=arrays.capture,
-            reference=arrays.reference,
+        name: replace(
+            arrays,
             outputs={
-                size: develop_case(bundle, case, arrays, size) for size in bundle.manifest.networks
+                product: {
+                    size: case_work(bundle, case, arrays, size).fill(product=product)
+                    for size in bundle.manifest.sizes
+                }
+                for product in bundle.manifest.products
             },
-            network_input=windows[name][0],
         )
         for name, (case, arrays) in cases.items()
     }
 
 
-def _side_px(camera: Camera, recipe: CaseRecipe) -> int:
+def _side_px(extent: Extent, recipe: CaseRecipe) -> int:
     """Give the side of a case: a small sensor makes it smaller."""
-    least = min(camera.width_px, camera.height_px)
+    least = min(extent.width_px, extent.height_px)
     side_px = min(recipe.size_px, least // SIDE_STEP_PX * SIDE_STEP_PX)
     if side_px == 0:
         raise ContractError(
             f"a sensor needs at least {SIDE_STEP_PX} x {SIDE_STEP_PX} px; got "
-            f"{camera.width_px} x {camera.height_px}"
+            f"{extent.width_px} x {extent.height_px}"
         )
     return side_px
 
 
-def _origin(camera: Camera, field: float, side_px: int) -> tuple[int, int]:
+def _origin(extent: Extent, field: float, side_px: int, step_px: int) -> tuple[int, int]:
     """Place a case on the diagonal, on a whole CFA cell."""
-    spare = np.array([camera.width_px, camera.height_px]) - side_px
-    x, y = (spare * (1 + field) / 2).astype(int) // 2 * 2
+    spare = np.array([extent.width_px, extent.height_px]) - side_px
+    x, y = (spare * (1 + field) / 2).astype(int) // step_px * step_px
     return int(x), int(y)
-
-
-def _reference(simulation: Simulation, camera: Camera, psf: FrozenPsf) -> FloatArray:
-    rows = ArrayRows(simulation.clean)
-    ideal = np.concatenate(list(undistort_bands(rows, psf.distortion, simulation.window)), axis=1)
-    return apply_matrix(rec709_from_camera(np.array(camera.color_matrix)), ideal)

@@ -1,4 +1,8 @@
-"""What is measured about a network at export, for the manifest and for `camkit check`."""
+"""What is measured about a network at export, for the manifest and for `camkit check`.
+
+torch network -> draft_network     its graph, with what follows from that alone: enough to run it
+              -> measure_network   on what it is given in the pipeline: reach, range, parity, halo
+"""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,10 +10,11 @@ from typing import Final
 import numpy as np
 from torch import nn
 
-from camkit.bundle.manifest import HaloError, NetworkFacts
+from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.export.onnx_graph import check_parity, to_fp16, to_onnx
+from camkit.models_def.training.sample import SampleLayout
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.probe import halo_error_curve, perturbation_reach
@@ -21,61 +26,92 @@ HALO_STEP_PX: Final = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MeasuredNetwork:
-    """An exported network with its facts and members."""
+class ExportedNetwork:
+    """An exported network with its facts and members; the fp32 model is among them."""
 
     facts: NetworkFacts
     members: dict[str, bytes]
 
 
-def measure_network(size: str, network: nn.Module, windows: list[FloatArray]) -> MeasuredNetwork:
-    """Export a network and measure all that a bundle states of it.
+def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> ExportedNetwork:
+    """Export a network with what its graph says of it; nothing is measured yet.
 
     Args:
-        size: S, M or L.
+        name: Of its member, without suffix.
         network: The trained network.
-        windows: (1, 6, h, w) typical inputs, those of the golden cases among them.
+        layout: What it takes and gives.
+
+    Raises:
+        ContractError: If the network takes or gives something else.
+        ParityError: If torch and ONNX disagree.
+    """
+    model = to_onnx(network, channels=layout.input_channels, scale=layout.scale)
+    graph = inspect_graph(model)
+    facts = NetworkFacts(
+        member=f"{name}.onnx",
+        inputs=layout.inputs,
+        outputs=layout.outputs,
+        receptive_field_radius_px=graph.receptive_field_radius_px,
+        receptive_field_probe_px=0,
+        stride_px=graph.stride_px,
+        global_operators=graph.global_operators,
+        max_activation=0.0,
+        fp16_safe=False,
+        mac_per_pixel=graph.mac_per_pixel,
+        bytes_per_pixel=graph.bytes_per_pixel,
+        parity_max_abs=0.0,
+        parameters=graph.parameters,
+    )
+    return ExportedNetwork(facts=facts, members={facts.member: model})
+
+
+def measure_network(
+    draft: ExportedNetwork, network: nn.Module, windows: list[FloatArray]
+) -> ExportedNetwork:
+    """Measure all that a bundle states of a network.
+
+    Args:
+        draft: Of `draft_network`.
+        network: The same network in torch.
+        windows: (1, channels, h, w) typical inputs, those of the golden cases among them; the
+            first is the largest.
 
     Raises:
         ParityError: If torch and ONNX disagree.
     """
-    model = to_onnx(network)
-    parity = check_parity(network, model, windows)
-    graph = inspect_graph(model)
-    engine = NetworkEngine(model, threads=1)
+    facts = draft.facts
+    model = draft.members[facts.member]
+    parity = check_parity(network, model, windows, scale=facts.output_scale)
+    engine = NetworkEngine(model, threads=1, scale=facts.output_scale)
     activations = node_activations(model, windows)
     reach = perturbation_reach(
         engine.run,
-        _probe_size(graph.receptive_field_radius_px, graph.stride_px),
+        _probe_size(facts.receptive_field_radius_px, facts.stride_px),
         np.random.default_rng(PROBE_SEED),
-        stride_px=graph.stride_px,
+        stride_px=facts.stride_px,
+        channels=facts.input_channels,
+        scale=facts.output_scale,
     )
-    reach_px = max(reach.halo_px, graph.receptive_field_radius_px)
-    member = f"network_{size}.onnx"
-    fp16_member: str | None = f"network_{size}_fp16.onnx"
-    members = {member: model}
+    reach_px = max(reach.halo_px, facts.receptive_field_radius_px)
+    members = dict(draft.members)
+    fp16_member: str | None = facts.member.replace(".onnx", "_fp16.onnx")
     try:
-        members[f"network_{size}_fp16.onnx"] = to_fp16(model, activations, headroom=FP16_HEADROOM)
+        members[str(fp16_member)] = to_fp16(model, activations, headroom=FP16_HEADROOM)
     except UnsupportedError:
         fp16_member = None
-    facts = NetworkFacts(
-        member=member,
-        fp16_member=fp16_member,
-        receptive_field_radius_px=graph.receptive_field_radius_px,
-        receptive_field_probe_px=reach.halo_px,
-        stride_px=graph.stride_px,
-        global_operators=graph.global_operators,
-        halo_error=_halo_error(engine, windows[0][0], reach_px, graph.stride_px),
-        max_activation=max(activations.values()),
-        node_activation=activations,
-        fp16_headroom=FP16_HEADROOM,
-        fp16_safe=fp16_member is not None,
-        mac_per_pixel=graph.mac_per_pixel,
-        bytes_per_pixel=graph.bytes_per_pixel,
-        parity_max_abs=parity,
-        parameters=graph.parameters,
+    measured = {
+        "fp16_member": fp16_member,
+        "receptive_field_probe_px": reach.halo_px,
+        "halo_error": _halo_error(engine, windows[0][0], reach_px, facts.stride_px),
+        "max_activation": max(activations.values()),
+        "node_activation": activations,
+        "fp16_headroom": FP16_HEADROOM,
+        "fp16_safe": fp16_member is not None,
+        "parity_max_abs": parity,
+    }
+    return ExportedNetwork(
+        facts=NetworkFacts.model_validate({**dict(facts), **measured}), members=members
     )
-    return MeasuredNetwork(facts=facts, members=members)
 
 
 def _probe_size(radius_px: int, stride_px: int) -> int:
@@ -88,7 +124,8 @@ def _halo_error(
     engine: NetworkEngine, sample: FloatArray, reach_px: int, stride_px: int
 ) -> tuple[HaloError, ...]:
     halos = range(0, reach_px + HALO_STEP_PX, HALO_STEP_PX)
+    costs = halo_error_curve(engine.run, sample, halos, stride_px=stride_px, scale=engine.scale)
     return tuple(
         HaloError(halo_px=cost.halo_px, max_abs=cost.max_abs, psnr_db=cost.psnr_db)
-        for cost in halo_error_curve(engine.run, sample, halos, stride_px=stride_px)
+        for cost in costs
     )

@@ -27,19 +27,20 @@ FP16_LIMIT: Final = 65504.0 / 4
 _PARITY_SEED: Final = 20
 
 
-def to_onnx(network: nn.Module, *, channels: int = 6) -> bytes:
+def to_onnx(network: nn.Module, *, channels: int = 6, scale: int = 1) -> bytes:
     """Export a network with free height and width and prove it against torch.
 
     Args:
-        network: (1, channels, h, w) -> (1, 3, h, w); its `stride_px` divides h and w.
+        network: (1, channels, h, w) -> (1, k, scale h, scale w); its `stride_px` divides h and w.
         channels: Input planes.
+        scale: Samples along a side of the output for one pixel of the input.
 
     Returns:
         A serialised ONNX model, opset 20, IR 10, input "input", output "output". Equal weights
         give equal bytes.
 
     Raises:
-        ContractError: If the network does not take `channels` planes.
+        ContractError: If the network does not take `channels` planes, or gives another scale.
         ParityError: If onnxruntime does not reproduce torch.
     """
     declared = getattr(network, "in_channels", channels)
@@ -49,20 +50,25 @@ def to_onnx(network: nn.Module, *, channels: int = 6) -> bytes:
     was_training = network.training
     network.eval()
     try:
-        model = _stripped(_traced(network, channels, stride))
-        check_parity(network, model, _random_windows(channels, stride))
+        model = _stripped(
+            _traced(network, channels, stride), _given(network, channels, scale), scale
+        )
+        check_parity(network, model, _random_windows(channels, stride), scale=scale)
     finally:
         network.train(was_training)
     return model
 
 
-def check_parity(network: nn.Module, model: bytes, windows: Iterable[FloatArray]) -> float:
+def check_parity(
+    network: nn.Module, model: bytes, windows: Iterable[FloatArray], *, scale: int = 1
+) -> float:
     """Compare torch and onnxruntime.
 
     Args:
         network: The torch network, on the CPU.
         model: Its export.
         windows: (1, channels, h, w) float32 inputs.
+        scale: Samples along a side of the output for one pixel of the input.
 
     Returns:
         The largest |difference| / max(1, max |y|) seen.
@@ -70,14 +76,14 @@ def check_parity(network: nn.Module, model: bytes, windows: Iterable[FloatArray]
     Raises:
         ParityError: If that exceeds 1e-5 or is not finite.
     """
-    engine = NetworkEngine(model, threads=1)
+    engine = NetworkEngine(model, threads=1, scale=scale)
     worst = 0.0
     for window in windows:
         with torch.no_grad():
             expected = np.asarray(network(torch.from_numpy(window)))
         got = engine.run(window)
-        scale = max(1.0, float(np.abs(expected).max()))
-        difference = float(np.abs(got - expected).max()) / scale
+        largest = max(1.0, float(np.abs(expected).max()))
+        difference = float(np.abs(got - expected).max()) / largest
         if not difference <= PARITY_TOLERANCE:
             raise ParityError(
                 f"torch and ONNX differ by {difference:.3g} of full scale on {window.shape}, "
@@ -175,7 +181,24 @@ def _traced(network: nn.Module, channels: int, stride: int) -> onnx.ModelProto:
     return program.model_proto
 
 
-def _stripped(traced: onnx.ModelProto) -> bytes:
+def _given(network: nn.Module, channels: int, scale: int) -> int:
+    """Give the output planes of a network.
+
+    Raises:
+        ContractError: If its output is not (1, k, scale h, scale w).
+    """
+    side = 4 * int(getattr(network, "stride_px", 1))
+    with torch.no_grad():
+        shape = tuple(network(torch.zeros(1, channels, side, side)).shape)
+    if len(shape) != 4 or shape[0] != 1 or shape[2:] != (scale * side, scale * side):
+        raise ContractError(
+            f"the network makes {shape} of (1, {channels}, {side}, {side}); its output must be "
+            f"{scale} time(s) as fine as its input"
+        )
+    return int(shape[1])
+
+
+def _stripped(traced: onnx.ModelProto, outputs: int, scale: int) -> bytes:
     """Rebuild the model from its arithmetic alone: names counted, no paths, no stack traces."""
     graph = traced.graph
     renamed = {"input": "input", "output": "output"}
@@ -195,12 +218,14 @@ def _stripped(traced: onnx.ModelProto) -> bytes:
         nodes.append(clean)
     channels = graph.input[0].type.tensor_type.shape.dim[1].dim_value
     float32 = onnx.TensorProto.FLOAT
+    own = "" if scale == 1 else f"{scale}_"
+    sides = [f"{own}height", f"{own}width"]
     model = helper.make_model(
         helper.make_graph(
             nodes,
             "network",
             [helper.make_tensor_value_info("input", float32, [1, channels, "height", "width"])],
-            [helper.make_tensor_value_info("output", float32, [1, 3, "height", "width"])],
+            [helper.make_tensor_value_info("output", float32, [1, outputs, *sides])],
             weights,
         ),
         producer_name="camkit",

@@ -17,7 +17,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.kinds import find_kind
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.simulate import Simulation, SimulationOptions
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions
 
 Gains = tuple[float, float, float]
 

@@ -9,7 +9,7 @@ A `Pipeline` is immutable and may serve many threads at once; each capture gets 
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.setup import Setup
+from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import runtime_part
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
@@ -146,8 +147,15 @@ class Pipeline:
         *,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
+        known: Mapping[str, Stream] | None = None,
     ) -> Reconstruction:
         """Plan the reconstruction of one capture; its bands do the work.
+
+        Args:
+            capture: What the sensor gave.
+            progress: Called with (tiles done, tiles in all).
+            cancel: Asked at every tile; true raises `Cancelled`.
+            known: Planes of this capture that another reconstruction kept, by name.
 
         Raises:
             ContractError: If capture and bundle do not fit each other.
@@ -159,7 +167,7 @@ class Pipeline:
             speed=self.speed,
             threads=self.threads,
         )
-        return Reconstruction(setup, capture, progress=progress, cancel=cancel)
+        return Reconstruction(setup, capture, progress=progress, cancel=cancel, known=known)
 
     def process(
         self,

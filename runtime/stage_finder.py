@@ -61,3 +61,10 @@ def methods_of(stages: Sequence[Stage]) -> tuple[str, ...]:
             method for stage in reversed(stages) for method in stage_module(stage.type).METHODS
         )
     )
+
+
+def all_methods() -> tuple[str, ...]:
+    """Name the ways of every stage of this runtime, whatever a bundle lists."""
+    places = importlib.import_module(STAGES).__path__
+    names = sorted(module.name for module in pkgutil.iter_modules(places))
+    return tuple(dict.fromkeys(m for name in names for m in stage_module(name).METHODS))

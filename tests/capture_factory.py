@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from camkit.bundle.reader import open_bundle
-from camkit.runtime.simulate import SimulationOptions, simulate, write_capture
+from camkit.runtime.twin.simulate import SimulationOptions, simulate, write_capture
 from tests.bundle_factory import write_tiny_bundle
 
 

@@ -18,7 +18,9 @@ A file here is a command; a folder holds what commands are made of.
     measure             time, tiling and RAW files of docs/results/measurements.md
     build_glass         the glass catalogues, from their sources
     coverage_gate       refuses a test run that covers too little
+    rooms               modules that know one camera only, and lines of code
 
+    capture/            simulated captures, for the tools that judge pictures
     comparison/         parts of `quality`
     plan/               parts of `plan_report`
     design/             parts of the tools around a design

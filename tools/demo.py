@@ -25,7 +25,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.signal.demosaic import demosaic
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate, write_capture
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate, write_capture
 from camkit.scenes import procedural_scene
 from tools.capture.simulated import rec709_of
 

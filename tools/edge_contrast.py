@@ -27,7 +27,7 @@ from camkit.contracts import depth_name
 from camkit.report.quality import FIELD_SHARES, crop_origin
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from tools.capture.simulated import captured, color_sensor, rec709_of
 from tools.design.edge import (
     ACROSS,

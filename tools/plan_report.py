@@ -80,6 +80,7 @@ def main() -> int:
 
 def _calibrate(options: argparse.Namespace) -> int:
     bundle = open_bundle(find_bundle(options.bundle))
+    work, small = _work(bundle)
     began = time.process_time()
     captures = []
     targets = pipelines(bundle)
@@ -89,7 +90,6 @@ def _calibrate(options: argparse.Namespace) -> int:
         captures.append(measure_cells(bundle, targets, f"{name} ISO {iso:g}", simulation))
         spent = time.process_time() - began
         print(f"{number + 1:3d} {captures[-1].name}: {spent:.0f} CPU s", file=sys.stderr)
-    work, small = _work(bundle)
     made = fit_model(captures, work, small)
     entries = plan_entries(
         made.model, adaptive_cost_db=made.adaptive[0], draft_cost_db=made.draft[0]
@@ -126,7 +126,11 @@ def _scenes(options: argparse.Namespace) -> Iterator[tuple[str, FloatArray]]:
 
 
 def _work(bundle: Bundle) -> tuple[TierWork, str | None]:
-    """Give what the tiers cost in this bundle, and its smallest size below the reference."""
+    """Give what the tiers cost in this bundle, and its smallest size below the reference.
+
+    Raises:
+        ContractError: If it has not one network.
+    """
     roles = tuple(bundle.manifest.networks)
     if len(roles) != 1:
         raise ContractError(

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 
-from camkit.bundle.chain import check_use, join_stages
+from camkit.bundle.chain import CAPTURE, capture_plane, check_use, join_stages
 from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Sorted, Word
 from camkit.bundle.facts import Card, NetworkFacts
 from camkit.bundle.optics import Optics
@@ -157,6 +157,11 @@ class Manifest(Entry):
     def parts(self) -> Parts:
         """Give what stages look at to say what they give."""
         return Parts(sensor=self.sensor, optics=self.optics, networks=self.networks)
+
+    @property
+    def all_planes(self) -> dict[str, Plane]:
+        """Give every plane by name, that of the sensor first."""
+        return {CAPTURE: capture_plane(self.sensor), **self.planes}
 
     def stage(self, kind: type[_S]) -> _S | None:
         """Give the first stage of one type, or None if this camera does without it."""

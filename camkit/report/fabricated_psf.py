@@ -13,6 +13,7 @@ from camkit.bundle.psf_file import read_psf, write_psf
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
+from camkit.runtime.twin.truth import light_sensor
 
 PRESCRIPTION: Final = "prescription.toml"
 MAX_SIDE_PX: Final = 161
@@ -44,7 +45,7 @@ def fabricated_psf(
     """
     text = lens_text(bundle, prescription)
     shape = bundle.psf.kernels.shape
-    content = [text, bundle.manifest.camera.model_dump_json(), repr((shape[:3], seed))]
+    content = [text, bundle.manifest.sensor.model_dump_json(), repr((shape[:3], seed))]
     content.append(repr((_max_side_px(bundle.psf), ENERGY, [bundle.reference_depth_mm])))
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"psf-{seed}-{name}.safetensors"
@@ -77,6 +78,7 @@ def lens_text(bundle: Bundle, prescription: Path | None) -> str:
 def _trace(bundle: Bundle, text: str, seed: int) -> FrozenPsf:
     from camkit.models_def.optics.frozen import FreezeGrid, dense_grid, freeze
     from camkit.models_def.optics.kernel_bank import focused_copies
+    from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.prescription import parse_prescription
 
     psf = bundle.psf
@@ -89,4 +91,4 @@ def _trace(bundle: Bundle, text: str, seed: int) -> FrozenPsf:
         least_energy=LEAST_ENERGY,
     )
     _, copy = focused_copies(parse_prescription(text), 2, seed)
-    return freeze(copy, bundle.manifest.camera, dense_grid(frozen_grid)).psf
+    return freeze(LensOptics(lens=copy), light_sensor(bundle.manifest), dense_grid(frozen_grid)).psf

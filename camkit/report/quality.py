@@ -8,6 +8,7 @@ the border of `BORDER_PX` cut off.
 """
 
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -16,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
+from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle
-from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
+from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 from camkit.runtime.files.picture import read_scene
 from camkit.runtime.geometry.sensor_window import centred_origin
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
 
 FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Places from centred on the axis to touching the sensor's corner, as shares of that way."""
@@ -72,12 +75,18 @@ class Exposed:
     """A capture that was simulated, beside the truth.
 
     Attributes:
-        simulation: Mosaic and place.
-        sharp: (3, h, w) float32 sRGB values of the sharp picture in sensor geometry.
+        simulation: Samples and place.
+        truths: Product -> what a perfect camera would give, in sensor geometry; for `image`
+            (3, h, w) float32 sRGB values.
     """
 
     simulation: Simulation
-    sharp: FloatArray
+    truths: Mapping[str, FloatArray]
+
+    @property
+    def sharp(self) -> FloatArray:
+        """Give the truth of the picture."""
+        return self.truths[IMAGE]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,26 +144,24 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Ex
 
     Args:
         shot: Place, ISO and noise.
-        scene: (3, h, w) float32 linear Rec.709.
+        scene: (3, h, w) float32 linear Rec.709, as fine as the pictures of the bundle.
         bundle: The camera; its PSF is what methods may know.
         lens: The PSF that the light really takes, at the bundle's reference depth.
     """
-    camera = bundle.manifest.camera
-    sensor = (camera.width_px, camera.height_px)
+    sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
     quadrant = QUADRANTS[shot.number % len(QUADRANTS)]
-    size = (scene.shape[2], scene.shape[1])
+    size = (scene.shape[2] // scale, scene.shape[1] // scale)
+    whole = (sensor.width_px, sensor.height_px)
     options = SimulationOptions(
         iso=shot.iso,
         seed=shot.noise_seed,
-        origin_px=crop_origin(size, sensor, FIELD_SHARES[shot.position], quadrant),
+        origin_px=crop_origin(size, whole, FIELD_SHARES[shot.position], quadrant),
+        scale=scale,
         depth_mm=bundle.reference_depth_mm,
     )
-    simulation = simulate(scene, camera, lens, options)
-    matrix = rec709_from_camera(np.array(camera.color_matrix, dtype=np.float64))
-    return Exposed(
-        simulation=simulation,
-        sharp=encode_srgb(apply_matrix(matrix, simulation.clean)),
-    )
+    simulation = simulate(scene, sensor, lens, options)
+    sharp = encode_srgb(true_picture(simulation.clean, sensor))
+    return Exposed(simulation=simulation, truths={IMAGE: sharp})
 
 
 def read_picture(path: Path, most_px: int | None = None) -> FloatArray:

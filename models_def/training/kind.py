@@ -4,18 +4,20 @@
                                             -> maker     sample i of a role
                                             -> judge     fixed captures to choose by
 
-The part of a kind for this floor (`camkit.kinds.Kind.part`) names its object `TRAINING`.
+A kind's part of the design side (`camkit.models_def.kinds.NAME`, or the `models_def` of its own
+package) defines `PART`, which fulfils `TrainingKind`.
 """
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
 from torch import Tensor, nn
 
 from camkit.bundle.stages import Stage
-from camkit.errors import UnsupportedError
+from camkit.errors import ContractError
 from camkit.kinds import find_kind
 from camkit.models_def.toml_table import read_table, typed
 from camkit.models_def.training.recipe import DEFAULT_KIND, Recipe, with_new_names
@@ -80,6 +82,23 @@ class Judge(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A camera as its bundle will state it, but for what is measured at export.
+
+    Attributes:
+        stages: In order; the last gives the product `image`.
+        products: Further results: name -> plane.
+        object_distance_mm: Distance of focus from the first surface.
+        fails_on: For its card: what it fails on, besides objects at other depths.
+    """
+
+    stages: tuple[Stage, ...]
+    products: Mapping[str, str] = field(default_factory=dict)
+    object_distance_mm: float = math.inf
+    fails_on: tuple[str, ...] = ()
+
+
 class TrainingKind(Protocol[R, M]):
     """A kind of camera as training sees it."""
 
@@ -97,8 +116,8 @@ class TrainingKind(Protocol[R, M]):
         """Check the tables of a recipe; raise ContractError naming the key."""
         ...
 
-    def stages(self, recipe: R) -> tuple[Stage, ...]:
-        """Give the stages of the camera, in order."""
+    def design(self, recipe: R) -> Design:
+        """Give the camera as its bundle will state it."""
         ...
 
     def build_network(self, name: str, **config: Any) -> nn.Module:
@@ -137,11 +156,12 @@ def training_kind(name: str) -> TrainingKind[Any, Any]:
 
     Raises:
         UnsupportedError: If there is no such kind, or it cannot be trained.
+        ContractError: If its part defines no PART.
     """
     part = find_kind(name).part("models_def")
-    if not hasattr(part, "TRAINING"):
-        raise UnsupportedError(f"cameras of the kind {name!r} cannot be trained: no TRAINING")
-    return cast("TrainingKind[Any, Any]", part.TRAINING)
+    if not hasattr(part, "PART"):
+        raise ContractError(f"{part.__name__} must define PART as a TrainingKind")
+    return cast("TrainingKind[Any, Any]", part.PART)
 
 
 def read_recipe(path: Path) -> Recipe:

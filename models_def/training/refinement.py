@@ -1,6 +1,6 @@
 """Later training of a trained network, for the kinds that have one.
 
-The part of such a kind for this floor names its object `REFINING`.
+The part of such a kind defines `REFINING` beside its `PART`, which fulfils `RefiningKind`.
 """
 
 from collections.abc import Callable

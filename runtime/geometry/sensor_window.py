@@ -1,6 +1,6 @@
 """Where a capture lies on its sensor: pixel positions to millimetres from the optical axis."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,24 @@ class SensorWindow:
         width, height = self.size_px
         x_mm, y_mm = self.to_mm(np.array([0, width - 1.0]), np.array([0, height - 1.0]))
         return float(np.hypot(np.abs(x_mm).max(), np.abs(y_mm).max()))
+
+    def resampled(self, ratio: float, size_px: tuple[int, int]) -> "SensorWindow":
+        """Give the same window in samples of another distance.
+
+        Args:
+            ratio: Distance of the new samples over that of the old ones.
+            size_px: (width, height) in new samples.
+        """
+        axis_x, axis_y = ((at + 0.5) / ratio - 0.5 for at in self.known_axis_px)
+        (x, y), (width, height) = self.origin_px, self.sensor_size_px
+        return replace(
+            self,
+            size_px=size_px,
+            origin_px=(x / ratio, y / ratio),
+            sensor_size_px=(round(width / ratio), round(height / ratio)),
+            pitch_um=self.pitch_um * ratio,
+            axis_px=(axis_x, axis_y),
+        )
 
     def to_mm(self, x_px: PixelGrid, y_px: PixelGrid) -> tuple[FloatGrid, FloatGrid]:
         """Give the sensor position of pixel positions of the capture (0, 0 = top left pixel)."""

@@ -3,21 +3,28 @@
 Every option belongs to a stage, which names it in its OPTIONS, or to every camera (GENERAL).
 """
 
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Final
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Wiener
+from camkit.bundle.stages import Stage, Wiener
 from camkit.contracts import depth_weights
 from camkit.errors import ContractError
 from camkit.runtime.job.setup import DEVELOPMENT
 from camkit.runtime.options import Options, flag_of
 from camkit.runtime.plan.decision import DEVELOP
-from camkit.runtime.stage_finder import methods_of, stage_module
+from camkit.runtime.plan.ways import offered_methods
+from camkit.runtime.stage_finder import stage_module
 
 GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method", "unit"})
 ON_A_SENSOR: Final = frozenset({"assume"})
 """What means something wherever the size of the sensor is known."""
+
+
+def known_options(stages: Sequence[Stage]) -> frozenset[str]:
+    """Name the options that mean something to some stages."""
+    return GENERAL.union(*(stage_module(stage.type).OPTIONS for stage in stages))
 
 
 def check_choices(bundle: Bundle | None, options: Options) -> None:
@@ -28,7 +35,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
             to any stage, the unit is of another bundle, or the PSF does not reach the depth.
     """
     stages = DEVELOPMENT if bundle is None else bundle.manifest.stages
-    known = GENERAL.union(*(stage_module(stage.type).OPTIONS for stage in stages))
+    known = known_options(stages)
     if bundle is not None and bundle.manifest.sensor.extent is not None:
         known |= ON_A_SENSOR
     plain = Options()
@@ -39,7 +46,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
             f"{', '.join(map(flag_of, foreign))} means nothing {where}: no stage of it knows of "
             "that; leave it out"
         )
-    methods = (*methods_of(stages), DEVELOP)
+    methods = (DEVELOP,) if bundle is None else offered_methods(stages, bundle.manifest.all_planes)
     if options.method is not None and options.method not in methods:
         raise ContractError(
             f"method must be one of {', '.join(methods)} {where}; got {options.method!r}"

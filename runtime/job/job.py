@@ -5,8 +5,7 @@
 Stages read it and add to it; each fact is found once, whoever asks first.
 """
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +19,7 @@ from camkit.runtime.color import ColorStage
 from camkit.runtime.geometry.placement import Placement, place
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.job.setup import Setup
+from camkit.runtime.job.stream import Stream
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.options import Options
@@ -48,6 +48,7 @@ class Job:
         windows: Role -> the windows of its network, once they are planned.
         probe: Gives the rows of a plane by name, made for the asking stage alone and equal to those
             that it will be given; to be called when the first row is asked for, set by the walker.
+        known: Planes of this capture that were made before; what gives them does not run.
         clipped_fraction: Share of clipped samples in the rows read so far.
     """
 
@@ -58,6 +59,7 @@ class Job:
         *,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
+        known: Mapping[str, Stream] | None = None,
     ) -> None:
         self.setup = setup
         self.capture = capture
@@ -73,6 +75,7 @@ class Job:
         self.case: Case | None = None
         self.windows: dict[str, NetworkWindows] = {}
         self.probe: Callable[[str], RowSource] | None = None
+        self.known = dict(known or {})
         self.clipped_fraction = 0.0
         self._check_input()
 
@@ -98,7 +101,7 @@ class Job:
 
     def unheard(self) -> "Job":
         """Give the same job for a walk whose counts and notes nobody hears."""
-        other = Job(self.setup, self.capture, cancel=self.cancel)
+        other = Job(self.setup, self.capture, cancel=self.cancel, known=self.known)
         other.record = dict(self.record)
         other.work, other.case, other.falls_back = self.work, self.case, self.falls_back
         for name in ("placement", "noise"):
@@ -143,23 +146,8 @@ class Job:
         window, ratio = self.placement.window, plane.grid.pitch_ratio
         if ratio == 1:
             return window
-        (x, y), axis = window.origin_px, window.known_axis_px
-
-        def scaled(position: float) -> float:
-            return (position + 0.5) / ratio - 0.5
-
         height, width = self.grid_px(plane)
-        return replace(
-            window,
-            size_px=(width, height),
-            origin_px=(x / ratio, y / ratio),
-            sensor_size_px=(
-                round(window.sensor_size_px[0] / ratio),
-                round(window.sensor_size_px[1] / ratio),
-            ),
-            pitch_um=window.pitch_um * ratio,
-            axis_px=(scaled(axis[0]), scaled(axis[1])),
-        )
+        return window.resampled(ratio, (width, height))
 
     def grid_px(self, plane: Plane) -> tuple[int, int]:
         """Give (height, width) of a plane of this capture."""

@@ -5,7 +5,7 @@
 Nothing is computed before the first band is asked for; a `Reconstruction` serves one thread, once.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -20,6 +20,7 @@ from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.setup import DEVELOPMENT, Setup
+from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import Walk
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
@@ -52,6 +53,7 @@ class Reconstruction:
         *,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
+        known: Mapping[str, Stream] | None = None,
     ) -> None:
         """Plan everything that is known before the first row.
 
@@ -60,7 +62,7 @@ class Reconstruction:
         """
         self.capture = capture
         self._setup = setup
-        self.job = Job(setup, capture, progress=progress, cancel=cancel)
+        self.job = Job(setup, capture, progress=progress, cancel=cancel, known=known)
         self._walk = Walk(self.job)
         self.plan = self._decide()
         self._walk.settle()
@@ -188,6 +190,14 @@ class Reconstruction:
     def rows_of(self, plane: str) -> RowSource:
         """Give the rows of any plane of the manifest, for export, reports and tests."""
         return self._walk.stream(plane).rows()
+
+    def keep(self, plane: str) -> Stream:
+        """Read a plane of the manifest whole and make it known.
+
+        What gives it does not run again, neither here nor in another reconstruction of the same
+        capture that is told of it (`known` of `Pipeline.start`).
+        """
+        return self._walk.keep(plane)
 
     def network_input(self, role: str) -> FloatArray:
         """Give what the network of a role is given for the whole capture, (c, h, w).

@@ -6,6 +6,7 @@ Nothing is computed before the first row is asked for.
 """
 
 from collections import Counter
+from dataclasses import replace
 from typing import Final
 
 from camkit.bundle.chain import CAPTURE
@@ -16,8 +17,8 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
-from camkit.runtime.plan.ways import LEFT_OUT, known_planes, stand_ins, ways_of
-from camkit.runtime.rows import Rows, RowSource
+from camkit.runtime.plan.ways import LEFT_OUT, stand_ins, ways_of
+from camkit.runtime.rows import ArrayRows, Rows, RowSource
 from camkit.runtime.stage_finder import stage_keys, stage_module
 
 FIXED_BYTES: Final = 260_000_000
@@ -102,23 +103,35 @@ class Walk:
         job, last = self._job, self._instead.get(wanted, wanted)
         needed = self._needed(last)
         takers = Counter([last, *(name for number in needed for name in self._taken(number))])
-        ready = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]).shared(takers[CAPTURE])}
+        there = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.known}
+        ready = {name: stream.shared(takers[name]) for name, stream in there.items()}
         for number in needed:
             taken = [ready[name].pop() for name in self._taken(number)]
             made = self._works[number].run(taken)
             for name, given in zip(self.stages[number].gives, made, strict=True):
-                ready[name] = given.timed(job.clock, self.keys[number]).shared(takers[name])
+                if name not in job.known:
+                    ready[name] = given.timed(job.clock, self.keys[number]).shared(takers[name])
         return ready[last].pop()
+
+    def keep(self, wanted: str) -> Stream:
+        """Read a plane whole; from now on it is known, and what gives it does not run again."""
+        stream = self.stream(wanted)
+        rows = stream.rows()
+        whole = ArrayRows(rows.read(0, rows.shape[1]))
+        kept = replace(stream, source=whole, made=None, owned=False)
+        self._job.known[self._instead.get(wanted, wanted)] = kept
+        return kept
 
     def taken_by(self, number: int) -> list[Stream]:
         """Give the streams that a stage takes; every call walks anew."""
         return [self.stream(name) for name in self.stages[number].takes]
 
     def _needed(self, wanted: str) -> list[int]:
-        """Give the stages on the way to a plane, in order."""
-        planes, needed = {wanted}, []
+        """Give the stages, in order, whose planes the wanted one is made of and are not known."""
+        planes, needed, known = {wanted}, [], self._job.known.keys()
         for number in range(len(self.stages) - 1, -1, -1):
-            if self.ways[number] != LEFT_OUT and planes.intersection(self.stages[number].gives):
+            made = planes.intersection(self.stages[number].gives) - known
+            if made and self.ways[number] != LEFT_OUT:
                 planes.update(self._taken(number))
                 needed.append(number)
         return needed[::-1]
@@ -164,7 +177,7 @@ class Walk:
 def _planes_of(job: Job) -> dict[str, Plane]:
     """Give the planes that are stated; without a bundle that of the capture alone."""
     if job.bundle is not None:
-        return known_planes(job.bundle.manifest)
+        return job.bundle.manifest.all_planes
     channels = MOSAIC if job.capture.cfa is not None else RGB
     return {CAPTURE: Plane(type="uint16", channels=channels, domain="dn")}
 

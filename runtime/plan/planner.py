@@ -21,7 +21,6 @@ from camkit.runtime.plan.rules.size import REFERENCE, size_cost_db
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import work_shares
 from camkit.runtime.plan.ways import (
-    known_planes,
     planned,
     stand_ins,
     ways_of,
@@ -143,7 +142,7 @@ def asked_work(bundle: Bundle, options: Options) -> Work:
         mode=options.mode,
         left_out=frozenset(unwanted),
     )
-    stand_ins(stages, ways_of(stages, work), known_planes(bundle.manifest))
+    stand_ins(stages, ways_of(stages, work), bundle.manifest.all_planes)
     return planned(stages, work)
 
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from camkit.bundle.chain import CAPTURE, capture_plane
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.plane import Plane
 from camkit.bundle.stages import Network, Stage
@@ -59,13 +58,27 @@ def planned(stages: Sequence[Stage], work: Work) -> Work:
 
 def without_networks(manifest: Manifest, work: Work) -> Work | None:
     """Give the work by the best method that runs no network; None if they cannot be left out."""
-    stages, planes = manifest.stages, known_planes(manifest)
-    for method in (*methods_of(stages), DEVELOP):
-        other = planned(stages, replace(work, method=method))
-        left_out = [s for s, way in zip(stages, ways_of(stages, other), strict=True) if not way]
-        if not other.networks and all(known_stand_in(stage, planes) for stage in left_out):
-            return other
-    return None
+    stages = manifest.stages
+    methods = offered_methods(stages, manifest.all_planes)
+    tried = (planned(stages, replace(work, method=method)) for method in methods)
+    return next((other for other in tried if not other.networks), None)
+
+
+def offered_methods(stages: Sequence[Stage], planes: Mapping[str, Plane]) -> tuple[str, ...]:
+    """Name the methods by which the stages can be walked, the best first.
+
+    Args:
+        stages: In order.
+        planes: By name, that of the sensor among them.
+    """
+    return tuple(
+        method
+        for method in (*methods_of(stages), DEVELOP)
+        if all(
+            way != LEFT_OUT or known_stand_in(stage, planes) is not None
+            for stage, way in zip(stages, ways_of(stages, Work(method=method)), strict=True)
+        )
+    )
 
 
 def _last_with(stages: Sequence[Stage], method: str) -> int:
@@ -80,11 +93,6 @@ def _last_with(stages: Sequence[Stage], method: str) -> int:
     raise ContractError(
         f"method must be one of {', '.join((*methods_of(stages), DEVELOP))}; got {method!r}"
     )
-
-
-def known_planes(manifest: Manifest) -> dict[str, Plane]:
-    """Give all planes of a manifest by name, that of the sensor among them."""
-    return {CAPTURE: capture_plane(manifest.sensor), **manifest.planes}
 
 
 def stand_ins(

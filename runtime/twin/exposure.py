@@ -4,7 +4,7 @@ References: Foi et al. 2008; EMVA 1288 release 4.0, ch. 2.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +58,7 @@ def expose(light: Light, sensor: ColorSensor, setting: Setting) -> NDArray[np.ui
     Returns:
         (h, w) of a mosaic, (c, h, w) of planes.
     """
-    signal = _sampled(light, sensor)
+    signal = signal_of(light, sensor)
     rng = np.random.default_rng(setting.seed) if setting.noise else None
     noise = noise_of(sensor, setting)
     # Fewer, larger electrons give the larger noise; the well then holds as much light as before.
@@ -128,12 +128,16 @@ def sample_mosaic(planes: FloatArray, cfa: CfaPattern, gains: Gains) -> FloatArr
     return mosaic
 
 
-def _sampled(light: Light, sensor: ColorSensor) -> NDArray[Any]:
-    """Give the signal of the pixels, dimmed by the optics."""
+def sample_planes(planes: FloatArray, sensor: ColorSensor, gains: Gains) -> FloatArray:
+    """Give what the pixels see of (c, h, w) white-balanced planes: (h, w) behind a mosaic."""
     if isinstance(sensor, BayerSensor):
-        signal = sample_mosaic(light.planes, sensor.cfa, light.gains)
-    else:
-        signal = light.planes / np.array(light.gains, dtype=np.float32)[:, None, None]
+        return sample_mosaic(planes, sensor.cfa, gains)
+    return planes / np.array(gains, dtype=np.float32)[:, None, None]
+
+
+def signal_of(light: Light, sensor: ColorSensor) -> FloatArray:
+    """Give the signal of the pixels, 1.0 = white level, dimmed by the optics."""
+    signal = sample_planes(light.planes, sensor, light.gains)
     if light.vignetting is not None:
         height = light.window.size_px[1]
         for top in range(0, height, NOISE_ROWS):

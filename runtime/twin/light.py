@@ -48,7 +48,8 @@ class Light:
 
     Attributes:
         planes: (c, h, w) float32 blurred, white-balanced camera space, without vignetting.
-        clean: (c, h, w) float32 as a perfect lens would have given it.
+        clean: (c, s h, s w) float32 as a perfect lens would have given it, with the `scale` s of
+            the scene.
         window: Place on the sensor.
         gains: White balance, one gain per channel.
         vignetting: The PSF whose illumination still dims it; None for none.
@@ -67,12 +68,15 @@ class LightOptions:
 
     Attributes:
         exposure: Factor on the scene.
+        scale: Samples of the scene along a side of a pixel, which sees their mean; for cameras
+            whose pictures are finer than their sensor.
         distort: Apply the radial distortion.
         vignette: Apply the relative illumination.
         workers: Threads of the FFT; the result does not depend on them.
     """
 
     exposure: float = 1.0
+    scale: int = 1
     distort: bool = True
     vignette: bool = True
     workers: int = 1
@@ -134,7 +138,8 @@ def light_of(
     """Let a scene fall on the sensor.
 
     Args:
-        scene: (3, h, w) float32 linear Rec.709 in ideal geometry, >= 0, of the size of the window.
+        scene: (3, s h, s w) float32 linear Rec.709 in ideal geometry, >= 0; h and w those of the
+            window, s the `scale` of the options.
         sensor: Colour of its channels.
         lens: What the light goes through.
         window: Place on the sensor, see `scene_window`.
@@ -142,45 +147,85 @@ def light_of(
     """
     chosen = options or LightOptions()
     matrix, gains = camera_space(sensor)
-    margin = lens.margin_px
-    extended = _on_sensor(scene, matrix * chosen.exposure, lens.psf, window, chosen, margin)
+    matrix, margin = matrix * chosen.exposure, lens.margin_px
+    seen = cell_means(scene, chosen.scale)
+    extended = _on_sensor(seen, matrix, lens.psf, window, chosen, margin)
     planes = scatter(extended, lens.kernels_at, window, margin_px=margin, workers=chosen.workers)
     # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
     np.maximum(planes, 0, out=planes)
-    _, height, width = scene.shape
+    _, height, width = seen.shape
+    if chosen.scale == 1:
+        clean = extended[:, margin : margin + height, margin : margin + width].copy()
+    else:
+        fine = window.resampled(1 / chosen.scale, (scene.shape[2], scene.shape[1]))
+        clean = _on_sensor(scene, matrix, lens.psf, fine, chosen, 0)
     return Light(
         planes=planes,
-        clean=extended[:, margin : margin + height, margin : margin + width].copy(),
+        clean=clean,
         window=window,
         gains=lens.gains or gains,
         vignetting=lens.psf if chosen.vignette else None,
     )
 
 
+def cell_means(planes: FloatArray, scale: int) -> FloatArray:
+    """Give (c, h, w) means over cells of (c, s h, s w) planes, `scale` samples a side."""
+    if scale == 1:
+        return planes
+    channels, height, width = planes.shape
+    cells = planes.reshape(channels, height // scale, scale, width // scale, scale)
+    return np.asarray(cells.mean(axis=(2, 4)), dtype=np.float32)
+
+
 def crop_light(light: Light, size_px: tuple[int, int]) -> Light:
     """Give the top left part of a light, as a smaller capture at the same place."""
     width, height = size_px
-    window = replace(light.window, size_px=size_px)
-    planes, clean = (p[:, :height, :width].copy() for p in (light.planes, light.clean))
-    return replace(light, planes=planes, clean=clean, window=window)
+    scale = light.clean.shape[2] // light.planes.shape[2]
+    return replace(
+        light,
+        planes=light.planes[:, :height, :width].copy(),
+        clean=light.clean[:, : scale * height, : scale * width].copy(),
+        window=replace(light.window, size_px=size_px),
+    )
+
+
+def stated_balance(gains: Gains) -> tuple[float, float, float] | None:
+    """Give the gains as a capture states them: those of three colours, else None."""
+    if len(gains) != 3:
+        return None
+    red, green, blue = gains
+    return red, green, blue
 
 
 def scene_window(
-    scene: FloatArray, sensor: ColorSensor, origin_px: tuple[int, int] | None
+    scene: FloatArray, sensor: ColorSensor, origin_px: tuple[int, int] | None, *, scale: int = 1
 ) -> SensorWindow:
     """Give where a scene lies on the sensor; centred without an origin.
 
+    Args:
+        scene: (3, h, w) linear Rec.709.
+        sensor: Its size, pitch and mosaic.
+        origin_px: (x, y) of the first pixel.
+        scale: Samples of the scene along a side of a pixel.
+
     Raises:
-        ContractError: If the scene is not finite (3, h, w), or leaves the sensor or the CFA cell.
+        ContractError: If the scene is not finite (3, h, w), is not of whole pixels, or leaves the
+            sensor or the CFA cell.
     """
     if scene.ndim != 3 or scene.shape[0] != 3 or min(scene.shape) < 1:
         raise ContractError(f"a scene must be (3, h, w); got {scene.shape}")
     low, high = float(scene.min()), float(scene.max())
     if not (low >= 0 and np.isfinite(high)):
         raise ContractError(f"a scene must be finite and >= 0; got {low} to {high}")
+    if scale < 1 or scene.shape[1] % scale or scene.shape[2] % scale:
+        raise ContractError(
+            f"a scene of {scale} samples a pixel needs sides that are multiples of it; got "
+            f"{scene.shape[2]}x{scene.shape[1]}"
+        )
     extent = sensor.known_extent
     step = 2 if sensor.captured == MOSAIC else 1
-    size, whole = (scene.shape[2], scene.shape[1]), (extent.width_px, extent.height_px)
+    size = (scene.shape[2] // scale, scene.shape[1] // scale)
+    whole = (extent.width_px, extent.height_px)
     origin = centred_origin(size, whole, multiple=step) if origin_px is None else origin_px
     spans = zip(origin, size, whole, strict=True)
     if any(start < 0 or start % step or start + side > most for start, side, most in spans):

@@ -9,27 +9,27 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.bundle.golden import golden_from_bytes
+from camkit.bundle.golden import IMAGE, golden_from_bytes
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import GOLDEN, open_bundle
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, ParityError
 from camkit.export import assemble
 from camkit.export.assemble import Parts, export_bundle
-from camkit.export.network_facts import MeasuredNetwork
+from camkit.export.network_facts import ExportedNetwork
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
-from camkit.runtime.golden_run import develop_case
 from camkit.runtime.plan.loss import plan_entries
+from camkit.runtime.proof.golden_run import case_work
 from tests.plan_factory import MODEL
 
-_MEASURED: dict[str, MeasuredNetwork] = {}
+_MEASURED: dict[str, ExportedNetwork] = {}
 
 RECIPE = """
 name = "small"
 object_distance_mm = inf
 
-[camera]
+[sensor]
 width_px = 640
 height_px = 560
 pixel_pitch_um = 6.0
@@ -40,7 +40,7 @@ full_well_e = 20000.0
 noise = [{ iso = 100.0, gain_e_per_dn = 5.0, read_noise_e = 3.0 }]
 color_matrix = [[0.9, -0.2, -0.1], [-0.4, 1.2, 0.2], [-0.1, 0.2, 0.7]]
 
-[camera.channel_response]
+[sensor.channel_response]
 wavelengths_um = [0.45, 0.55, 0.62]
 response = [[0.0, 0.1, 1.0], [0.1, 1.0, 0.1], [1.0, 0.1, 0.0]]
 source = "made up for tests"
@@ -113,10 +113,11 @@ def _measure_each_network_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The facts of the one network of these tests are measured in the first of them."""
     honest = assemble.measure_network
 
-    def remembered(size: str, network: Any, windows: Any) -> MeasuredNetwork:
-        if size not in _MEASURED:
-            _MEASURED[size] = honest(size, network, windows)
-        return _MEASURED[size]
+    def remembered(draft: ExportedNetwork, network: Any, windows: Any) -> ExportedNetwork:
+        name = draft.facts.member
+        if name not in _MEASURED:
+            _MEASURED[name] = honest(draft, network, windows)
+        return _MEASURED[name]
 
     monkeypatch.setattr(assemble, "measure_network", remembered)
 
@@ -126,7 +127,7 @@ def test_an_exported_bundle_states_measured_facts_and_repeats_its_golden_cases(
 ) -> None:
     report = export_bundle(parts, tmp_path / "small.camkit")
     bundle = open_bundle(tmp_path / "small.camkit")
-    facts = bundle.manifest.networks["S"]
+    facts = bundle.network_facts("restore", "S")
     assert facts.reach_px <= 64
     assert facts.halo_error[-1].max_abs == 0
     assert facts.halo_error[0].max_abs > 0
@@ -134,8 +135,9 @@ def test_an_exported_bundle_states_measured_facts_and_repeats_its_golden_cases(
     assert {case.name for case in bundle.manifest.golden} == {"typical", "saturated", "very_dark"}
     arrays = golden_from_bytes(bundle.member(GOLDEN))
     for case in bundle.manifest.golden:
-        again = develop_case(bundle, case, arrays[case.name], "S")
-        np.testing.assert_array_equal(again, arrays[case.name].outputs["S"])
+        again = case_work(bundle, case, arrays[case.name], "S").fill()
+        stored = arrays[case.name].outputs[IMAGE]["S"]
+        np.testing.assert_array_equal(again.astype(np.float16), stored.astype(np.float16))
     assert report["bytes"] == (tmp_path / "small.camkit").stat().st_size
     assert b"95 % energy" in bundle.member("card.md")
 
@@ -148,7 +150,7 @@ def test_nothing_is_written_when_the_bundle_fails_its_check(
     def lie(*arguments: object) -> object:
         cases = honest(*arguments)  # type: ignore[arg-type]
         return {
-            name: replace(case, outputs={s: image + 1.0 for s, image in case.outputs.items()})
+            name: replace(case, outputs={IMAGE: {"S": case.outputs[IMAGE]["S"] + 1.0}})
             for name, case in cases.items()
         }
 
@@ -167,7 +169,26 @@ def test_two_checkpoints_of_one_size_are_refused(parts: Parts, tmp_path: Path) -
 def test_a_size_that_no_bundle_holds_must_be_alone(parts: Parts, tmp_path: Path) -> None:
     write_checkpoint(tmp_path / "other.pt", _checkpoint("trimmed"))
     both = replace(parts, checkpoints=(*parts.checkpoints, tmp_path / "other.pt"))
-    with pytest.raises(ContractError, match="alone in its bundle"):
+    with pytest.raises(ContractError, match="alone in its role"):
+        export_bundle(both, tmp_path / "x.camkit")
+
+
+def test_sizes_that_differ_from_checkpoint_to_checkpoint_are_of_one_camera(
+    parts: Parts, tmp_path: Path
+) -> None:
+    other = replace(
+        _checkpoint("M"), recipe_toml=RECIPE.replace("full_well_e = 20000", "full_well_e = 10000")
+    )
+    write_checkpoint(tmp_path / "m.pt", other)
+    both = replace(parts, checkpoints=(*parts.checkpoints, tmp_path / "m.pt"))
+    with pytest.raises(ContractError, match=r"m\.pt has another sensor"):
+        export_bundle(both, tmp_path / "x.camkit")
+
+
+def test_a_role_that_the_kind_does_not_have_is_refused(parts: Parts, tmp_path: Path) -> None:
+    write_checkpoint(tmp_path / "m.pt", replace(_checkpoint("M"), role="sharpen"))
+    both = replace(parts, checkpoints=(*parts.checkpoints, tmp_path / "m.pt"))
+    with pytest.raises(ContractError, match=r"role 'sharpen'.*has restore"):
         export_bundle(both, tmp_path / "x.camkit")
 
 

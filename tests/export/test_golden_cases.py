@@ -6,7 +6,7 @@ import numpy as np
 
 from camkit.export.card import card_text
 from camkit.export.golden_cases import CaseRecipe, photograph
-from camkit.runtime.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from camkit.scenes import procedural_scene
 from tests.deep_bundle import FOCUS_MM, write_deep_bundle
 
@@ -20,8 +20,9 @@ def test_a_case_of_several_depths_lies_at_the_focus(tmp_path: Path) -> None:
         iso=100.0, seed=4, origin_px=case.origin_px, exposure=0.7, depth_mm=FOCUS_MM
     )
     scene = procedural_scene(4, 48, 48)
-    expected = simulate(scene, deep.manifest.camera, deep.psf, options)
-    np.testing.assert_array_equal(capture, expected.mosaic)
+    sensor = deep.manifest.sensor
+    expected = simulate(scene, sensor, deep.psf, options)
+    np.testing.assert_array_equal(capture, expected.samples)
     assert reference.shape == (3, 48, 48)
 
 

@@ -130,6 +130,29 @@ def test_wrong_channels_are_refused(network: nn.Module) -> None:
         to_onnx(network, channels=3)
 
 
+class _Finer(nn.Module):
+    """(1, 1, h, w) -> (1, 2, 2 h, 2 w)."""
+
+    stride_px = 2
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        fine = nn.functional.pixel_shuffle(torch.cat([x] * 4, dim=1), 2)
+        return torch.cat([fine, 2 * fine], dim=1)
+
+
+def test_a_finer_output_of_any_channels_is_exported() -> None:
+    data = to_onnx(_Finer(), channels=1, scale=2)
+    facts = inspect_graph(data)
+    assert (facts.output_channels, facts.output_scale) == (2, 2)
+    window = np.random.default_rng(1).random((1, 1, 6, 10)).astype(np.float32)
+    assert check_parity(_Finer(), data, [window], scale=2) == 0
+
+
+def test_an_output_of_another_scale_is_refused() -> None:
+    with pytest.raises(ContractError, match=r"\(1, 2, 16, 16\) of \(1, 1, 8, 8\)"):
+        to_onnx(_Finer(), channels=1)
+
+
 def test_half_precision_is_half_the_size_and_near_the_same(
     model: bytes, activations: dict[str, float]
 ) -> None:

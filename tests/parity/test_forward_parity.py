@@ -16,9 +16,9 @@ from camkit.models_def.sensors.psf import color_kernels
 from camkit.models_def.training.kind import read_recipe
 from camkit.runtime.geometry.scatter import scatter as runtime_scatter
 from camkit.runtime.geometry.sensor_window import SensorWindow
-from camkit.runtime.simulate import SimulationOptions, simulate
 from camkit.runtime.twin.exposure import Setting, expose
 from camkit.runtime.twin.light import Light, lens_of
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from tests.camera_factory import make_psf, make_sensor
 from tests.planes_bundle import planes_sensor
 from tests.psf_factory import PITCH_UM, grid_psf, streak_kernel, uniform_psf

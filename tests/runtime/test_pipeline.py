@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.runtime.network.tiling import Cancelled
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.deep_bundle import write_deep_bundle

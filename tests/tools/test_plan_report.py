@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.writer import write_bundle
+from camkit.errors import ContractError
 from camkit.runtime.plan.loss import read_loss_model
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages
 from tests.plan_factory import HEIGHT_PX, WIDTH_PX, half_textured_mosaic, write_planned_bundle
 from tests.tiny_design import run_tool
 
@@ -56,6 +59,16 @@ def test_calibrate_writes_one_plan_into_a_file_and_into_a_bundle(
     assert {n: written.member(n) for n in written.names} == {
         n: bundle.member(n) for n in bundle.names
     }
+
+
+def test_a_camera_without_a_network_is_refused_before_any_work(
+    tool: Callable[..., int], tmp_path: Path
+) -> None:
+    manifest = tiny_manifest(stages=tiny_stages("network"), networks={})
+    members = {n: d for n, d in tiny_members().items() if n != "network_m.onnx"}
+    write_bundle(tmp_path / "plain.camkit", manifest, members)
+    with pytest.raises(ContractError, match="tiny has none"):
+        tool("calibrate", "--bundle", tmp_path / "plain.camkit")
 
 
 def test_report_proves_the_scenes_asked_for(

@@ -8,7 +8,7 @@ from camkit.colorimetry import Matrix, rec709_from_camera
 from camkit.errors import UnsupportedError
 from camkit.runtime.capture import Capture
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.simulate import Simulation
+from camkit.runtime.twin.simulate import Simulation
 
 
 def color_sensor(bundle: Bundle) -> ColorSensor:

@@ -44,7 +44,7 @@ class LocalCapture:
         planes: (3, h, w) float32, linear, white-balanced camera RGB, vignetting still in.
         psf: The kernels per colour and the place of the crop on the sensor.
         noise: Noise of the planes.
-        saturated: (h, w) or (3, h, w), true where the sensor clipped; None if nowhere.
+        saturated: (1 or 3, h, w), true where the sensor clipped; None if nowhere.
     """
 
     planes: FloatArray

@@ -23,7 +23,7 @@ from camkit.runtime.color import recover_highlights
 from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.simulate import Simulation
+from camkit.runtime.twin.simulate import Simulation
 from tools.capture.simulated import captured, color_sensor, rec709_of
 from tools.comparison.peers import LocalCapture
 

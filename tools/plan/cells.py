@@ -23,7 +23,7 @@ from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.plan.loss import EXACT
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.scene import CELL_PX, CellArray, Scene, lattice_shape, measure_scene
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from tools.capture.simulated import captured, color_sensor, rec709_of
 
 PLAIN_TARGET: Final = "plain"

@@ -20,7 +20,7 @@ from camkit.runtime.plan.blocks import plain_share
 from camkit.runtime.plan.estimate import network_seconds
 from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.simulate import Simulation
+from camkit.runtime.twin.simulate import Simulation
 from tools.plan.cells import cell_errors, photograph, sharp_of, start
 from tools.plan.scenes import ProofScene
 

@@ -53,17 +53,17 @@ def freeze(
     from camkit.models_def.optics.optics_file import read_optics
     from camkit.models_def.training.kind import read_recipe, training_kind
 
-    plan = read_recipe(_default_recipe() if recipe is None else recipe)
-    stages = training_kind(plan.kind).stages(plan)
-    if not isinstance(plan.sensor, ColorSensor):
-        raise UnsupportedError(f"a {plan.sensor.type} sensor has no response to freeze a PSF for")
+    grid = FreezeGrid(depths_mm=_depths(depths_mm), energy=energy, max_side_px=max_side_px)
+    chosen = read_recipe(_default_recipe() if recipe is None else recipe)
+    stages = training_kind(chosen.kind).design(chosen).stages
+    if not isinstance(chosen.sensor, ColorSensor):
+        raise UnsupportedError(f"a {chosen.sensor.type} sensor has no response to freeze a PSF for")
     found = read_optics(optics)
     out.parent.mkdir(parents=True, exist_ok=True)
-    grid = FreezeGrid(depths_mm=_depths(depths_mm), energy=energy, max_side_px=max_side_px)
     told = freeze_optics(
         found,
         out,
-        sensor=plan.sensor,
+        sensor=chosen.sensor,
         settings=next((stage for stage in stages if isinstance(stage, Wiener)), None),
         limit_db=limit_db,
         grid=grid,
@@ -71,7 +71,7 @@ def freeze(
     )
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
-        write_psf(stress_out, freeze_stress(found, plan.sensor, grid).psf)
+        write_psf(stress_out, freeze_stress(found, chosen.sensor, grid).psf)
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
         report.write_text(json.dumps(told.to_json(), indent=2) + "\n", encoding="utf-8")

@@ -27,9 +27,9 @@ def bench(
     ] = None,
     images: Annotated[int | None, typer.Option(help="Only the first N of them.")] = None,
     out_dir: Annotated[Path, typer.Option(help="Folder of table, chart and page.")] = Path("bench"),
-    sizes: Annotated[str | None, typer.Option(help="S,M,L; default: all.")] = None,
+    sizes: Annotated[str | None, typer.Option(help="Such as S,M,L; default: all.")] = None,
     methods: Annotated[
-        str | None, typer.Option(help="net,wiener,rl,admm-tv,develop; default: all.")
+        str | None, typer.Option(help="Such as net,wiener,develop; default: all.")
     ] = None,
     modes: Annotated[
         str | None, typer.Option(help="exact,fast,whole; default: all three for size M.")
@@ -136,7 +136,7 @@ def _lines(rows: "list[Row]") -> list[str]:
     table: list[tuple[str, ...]] = [heads]
     for row in rows:
         numbers = [
-            "-" if row[key] is None else format(row[key], form)
+            "-" if row.get(key) is None else format(row[key], form)
             for key, form in zip(keys, forms, strict=True)
         ]
         peak = "-" if row["peak_rss_mb"] is None else f"{row['peak_rss_mb']:.0f}"

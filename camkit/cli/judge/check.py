@@ -23,8 +23,8 @@ def check(
 ) -> None:
     """Prove a bundle: schema, hashes, graphs, golden cases, tiled = whole, fp16 range."""
     from camkit.bundle.reader import find_bundle
-    from camkit.runtime.check import check_bundle
-    from camkit.runtime.golden_run import case_work
+    from camkit.runtime.proof.check import check_bundle
+    from camkit.runtime.proof.golden_run import case_work
 
     report = check_bundle(find_bundle(bundle), level=level, run=case_work)
     if json_:

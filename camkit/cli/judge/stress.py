@@ -42,12 +42,11 @@ def stress(
 ) -> None:
     """Turn one knob after the other until the networks no longer help, and say where that is."""
     from camkit.bundle.reader import find_bundle, open_bundle
-    from camkit.report.stress.run import StressOptions, run_stress, write_envelope
+    from camkit.report.stress.run import StressOptions, run_stress, scenarios_for, write_envelope
     from camkit.report.stress.scenario import choose
 
-    chosen = choose(scenarios)
     if list_:
-        for scenario in chosen:
+        for scenario in choose(scenarios):
             typer.echo(f"{scenario.name:20} {scenario.title}")
         return
     if bundle is None:
@@ -58,7 +57,7 @@ def stress(
         )
     opened = open_bundle(find_bundle(bundle))
     options = StressOptions(
-        scenarios=chosen,
+        scenarios=scenarios_for(opened, scenarios),
         sizes=() if sizes is None else tuple(s.strip() for s in sizes.split(",")),
         scenes=scenes,
         quick=quick,

@@ -65,8 +65,9 @@ def _describe_bundle(file: str) -> dict[str, Any]:
 
     bundle = open_bundle(find_bundle(file))
     manifest = bundle.manifest.model_dump(mode="json", exclude={"members"}, exclude_none=True)
-    for facts in manifest["networks"].values():
-        facts.pop("node_activation", None)
+    for sizes in manifest["networks"].values():
+        for facts in sizes.values():
+            facts.pop("node_activation", None)
     return {
         "bundle": str(bundle.path),
         "sha256": bundle.sha256,
@@ -76,7 +77,7 @@ def _describe_bundle(file: str) -> dict[str, Any]:
 
 
 def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
-    from camkit.bundle.reader import PSF
+    from camkit.bundle.optics import PSF
     from camkit.contracts import depth_name
 
     if PSF not in bundle.names:

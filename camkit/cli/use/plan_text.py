@@ -56,9 +56,7 @@ def print_plans(
 def _planned(
     task: "Task", pipeline: "Pipeline", headerless: "MosaicOptions | None"
 ) -> dict[str, Any]:
-    from camkit.runtime.raw import read_capture
-
-    work = pipeline.start(read_capture(task.source, mosaic=headerless))
+    work = pipeline.start(pipeline.read(task.source, headerless))
     work.explain()
     details = dict(work.record)
     return {

@@ -34,7 +34,7 @@ def simulate(
     from camkit.contracts import depth_name
     from camkit.runtime.kind import runtime_part
     from camkit.runtime.network.engine import available_threads
-    from camkit.runtime.simulate import SimulationOptions
+    from camkit.runtime.twin.simulate import SimulationOptions
 
     if out.exists() and not overwrite:
         raise ContractError(f"{out} exists; say --overwrite or another name")

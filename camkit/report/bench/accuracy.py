@@ -2,19 +2,21 @@
 
 import math
 import statistics
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from camkit.bundle.manifest import Network, Wiener
+from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError
 from camkit.report.bench.known_captures import KnownCapture
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.trial import Trial
+from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.decision import DEVELOP
 
 Key = tuple[object, ...]
 INPUT: Key = ("input",)
@@ -49,39 +51,46 @@ class Restorers:
         self._threads = threads
         self._made: dict[tuple[Key, bool], Pipeline] = {}
 
-    def restore(self, trial: Trial | None, known: KnownCapture) -> FloatArray:
-        """Give linear Rec.709, (3, h, w), in the geometry of the capture's truth.
+    def restore(
+        self, trial: Trial | None, known: KnownCapture, products: Iterable[str] = (IMAGE,)
+    ) -> dict[str, FloatArray]:
+        """Give products (c, h, w) in the geometry of the capture's truth; pictures linear Rec.709.
 
         Args:
-            trial: The method; None or a trial without a bundle develops only.
+            trial: The method; None, or one without a bundle, restores nothing.
             known: The capture.
+            products: Those wanted.
 
         Raises:
             CamkitError: If the method cannot do it.
         """
-        key = INPUT if trial is None or trial.path is None else trial.accuracy_key
-        place = key, known.undistort
+        place = INPUT if trial is None else score_key(trial), known.undistort
         if place not in self._made:
             self._made[place] = self._make(trial, undistort=known.undistort)
-        return self._made[place].process_array(
+        pipeline = self._made[place]
+        capture = pipeline.capture_of(
             known.capture,
             iso=known.iso,
             white_balance=known.white_balance,
             origin_px=known.origin_px,
         )
+        work = pipeline.start(capture)
+        return {product: work.fill(product=product) for product in products}
 
     def _make(self, trial: Trial | None, *, undistort: bool) -> Pipeline:
-        if trial is None or trial.path is None:
-            plain = Options(method="wiener", undistort=undistort, threads=self._threads)
-            return Pipeline(without_restoration(self._bundle), plain)
-        chosen: dict[str, Any] = trial.options() | {"threads": self._threads, "tile_px": None}
-        return Pipeline(open_bundle(trial.path), Options(**chosen, undistort=undistort))
+        chosen: dict[str, Any] = {"method": DEVELOP}
+        bundle = self._bundle
+        if trial is not None and score_key(trial) != INPUT:
+            assert trial.path is not None
+            bundle = open_bundle(trial.path)
+            chosen = trial.options() | {"tile_px": None}
+        geometry = {} if undistort else in_sensor_geometry(bundle.manifest)
+        return Pipeline(bundle, Options(**chosen | geometry | {"threads": self._threads}))
 
 
-def without_restoration(bundle: Bundle) -> Bundle:
-    """Give the bundle without its Wiener bank and networks: all else is done alike."""
-    stages = tuple(s for s in bundle.manifest.stages if not isinstance(s, Wiener | Network))
-    return replace(bundle, manifest=bundle.manifest.model_copy(update={"stages": stages}))
+def score_key(trial: Trial) -> Key:
+    """Give under which key a trial has its scores: rows that restore nothing are the input."""
+    return INPUT if trial.method == DEVELOP else trial.accuracy_key
 
 
 def measure_accuracy(
@@ -98,36 +107,41 @@ def measure_accuracy(
         captures: With a known truth; each is made once and not kept.
         restorers: Of that camera.
         metrics: What to measure.
-        on_result: Called with every result, `INPUT` first.
+        on_result: Called with every picture, that of `INPUT` first, if the camera has one.
 
     Returns:
-        Scores by `Trial.accuracy_key`, and those of `INPUT`.
+        Scores by `score_key`.
     """
     methods: dict[Key, Trial | None] = {INPUT: None}
-    methods |= {t.accuracy_key: t for t in trials if t.path is not None}
+    methods |= {score_key(t): t for t in trials if score_key(t) != INPUT}
     found = {key: Scores() for key in methods}
+    products = dict.fromkeys(metric.product for metric in metrics)
     for known in captures:
         for key, trial in methods.items():
             if found[key].error is not None:
                 continue
             try:
-                restored = restorers.restore(trial, known)
+                restored = restorers.restore(trial, known, products)
             except CamkitError as error:
                 found[key] = Scores(error=str(error))
                 continue
             _add(found[key], known, restored, metrics)
-            if on_result is not None:
-                on_result(key, known, restored)
+            if on_result is not None and IMAGE in restored:
+                on_result(key, known, restored[IMAGE])
     return found
 
 
 def _add(
-    scores: Scores, known: KnownCapture, restored: FloatArray, metrics: Sequence[Metric]
+    scores: Scores,
+    known: KnownCapture,
+    restored: Mapping[str, FloatArray],
+    metrics: Sequence[Metric],
 ) -> None:
     scores.psf.add(known.psf)
     values = scores.by_picture.setdefault(known.picture, {})
-    for metric in metrics:
-        for name, value in metric.measure(restored, known.sharp).items():
+    for metric in (m for m in metrics if m.product in known.truths):
+        truth = known.truths[metric.product]
+        for name, value in metric.measure(restored[metric.product], truth).items():
             values.setdefault(name, []).append(value)
 
 

@@ -8,6 +8,7 @@ from typing import Final
 import cv2
 import numpy as np
 
+from camkit.bundle.golden import IMAGE
 from camkit.colorimetry import decode_srgb, encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.bench.accuracy import INPUT, Key
@@ -51,21 +52,23 @@ class CropCollector:
         self._keys = {INPUT, *keys}
         self._every = every
         self._seen = -1
+        self._known: KnownCapture | None = None
         self._place: tuple[slice, slice] | None = None
         self._gain = np.float32(1)
 
     def take(self, key: Key, known: KnownCapture, restored: FloatArray) -> None:
-        """Keep the patch of a result; a result of `INPUT` begins a new capture."""
-        if key == INPUT:
+        """Keep the patch of a result; the first result of a capture begins a patch."""
+        if known is not self._known:
+            self._known = known
             self._seen += 1
             wanted = self._seen % self._every == 0 and len(self.patches) < MOST_CAPTURES
-            self._place = busiest_place(known.sharp) if wanted else None
+            self._place = busiest_place(known.truths[IMAGE]) if wanted else None
             if self._place is not None:
-                self._begin(known, known.sharp[:, *self._place])
+                self._begin(known, known.truths[IMAGE][:, *self._place])
         if self._place is None or key not in self._keys:
             return
         linear = np.ascontiguousarray(restored[:, *self._place])
-        error = encode_srgb(linear) - known.sharp[:, *self._place]
+        error = encode_srgb(linear) - known.truths[IMAGE][:, *self._place]
         mean_square = float(np.mean(np.square(error), dtype=np.float64))
         self.patches[-1].pictures[key] = png_base64(encode_srgb(linear * self._gain))
         self.patches[-1].psnr_db[key] = -10 * float(np.log10(max(mean_square, 1e-12)))

@@ -5,7 +5,7 @@ pictures   five field positions, two sensitivities, fabricated lenses traced afr
            bundle holds its prescription and torch is there (`camkit.report.quality`)
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import util
@@ -15,20 +15,24 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.golden import golden_from_bytes
+from camkit.bundle.golden import IMAGE, golden_from_bytes
 from camkit.bundle.reader import GOLDEN, PRESCRIPTION, Bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
+from camkit.report.bench.part import BenchPart
 from camkit.report.fabricated_psf import fabricated_psf
+from camkit.report.kind_finder import find_part
 from camkit.report.quality import (
     FIELD_SHARES,
+    Exposed,
     PsfSource,
     Shot,
-    expose,
     list_set,
     read_picture,
 )
+from camkit.runtime.twin.light import stated_balance
+from camkit.runtime.twin.truth import picture_scale
 
 ISOS: Final = (100.0, 1600.0)
 MOST_PX: Final = 1024
@@ -45,12 +49,13 @@ class KnownCapture:
         picture: Name of the picture; captures of one picture share it.
         caption: What distinguishes the capture, for people.
         psf: Lens of the capture: fresh (fabricated, traced afresh) or bundle.
-        capture: (h, w) mosaic in DN or (3, h, w) linear.
+        capture: What the sensor gave, as `Pipeline.capture_of` takes it.
         iso: Sensitivity.
         white_balance: Gains (R, G, B).
         origin_px: (x, y) on the sensor.
         undistort: Whether the truth is in ideal geometry; else in that of the sensor.
-        sharp: (3, h, w) float32 sRGB values.
+        truths: Product -> what a perfect camera would give; for `image` (3, h, w) float32 sRGB
+            values.
     """
 
     picture: str
@@ -61,7 +66,7 @@ class KnownCapture:
     white_balance: tuple[float, float, float] | None
     origin_px: tuple[int, int]
     undistort: bool
-    sharp: FloatArray
+    truths: Mapping[str, FloatArray]
 
 
 def golden_captures(bundle: Bundle) -> list[KnownCapture]:
@@ -78,7 +83,7 @@ def golden_captures(bundle: Bundle) -> list[KnownCapture]:
             white_balance=case.white_balance,
             origin_px=case.origin_px,
             undistort=True,
-            sharp=encode_srgb(arrays[case.name].reference),
+            truths={IMAGE: encode_srgb(arrays[case.name].reference)},
         )
         for case in cases
         if min(arrays[case.name].reference.shape[1:]) >= LEAST_PX
@@ -99,16 +104,17 @@ def picture_captures(
     Raises:
         ContractError: If the folder holds no pictures, or one is too small.
     """
-    camera = bundle.manifest.camera
-    most_px = min(MOST_PX, camera.width_px, camera.height_px)
+    sensor, scale = bundle.manifest.sensor, picture_scale(bundle.manifest)
+    most_px = min(MOST_PX, scale * sensor.width_px, scale * sensor.height_px)
     psf = psf_source(bundle)
+    photograph = find_part(bundle.manifest.kind, "bench", BenchPart).photograph
 
     @lru_cache(maxsize=4)
     def lens(seed: int) -> FrozenPsf:
         return fabricated_psf(bundle, seed, cache_folder=cache_folder)
 
     for number, path in enumerate(list_set(folder, count)):
-        scene = read_picture(path, most_px)
+        scene = _whole_pixels(read_picture(path, most_px), scale)
         if min(scene.shape[1:]) < LEAST_PX:
             raise ContractError(
                 f"{path} has {scene.shape[2]}x{scene.shape[1]} pixels; a picture to measure on "
@@ -125,7 +131,7 @@ def picture_captures(
                     psf=psf,
                 )
                 kernels = lens(shot.fabrication_seed) if psf == "fresh" else bundle.psf
-                yield _photograph(shot, scene, bundle, kernels, share)
+                yield _known(shot, photograph(shot, scene, bundle, kernels), share)
 
 
 def psf_source(bundle: Bundle) -> PsfSource:
@@ -134,20 +140,23 @@ def psf_source(bundle: Bundle) -> PsfSource:
     return "fresh" if traceable else "bundle"
 
 
-def _photograph(
-    shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf, share: float
-) -> KnownCapture:
-    exposed = expose(shot, scene, bundle, lens)
+def _whole_pixels(scene: FloatArray, scale: int) -> FloatArray:
+    """Cut a scene to whole pixels of a sensor."""
+    height, width = (side // scale * scale for side in scene.shape[1:])
+    return np.ascontiguousarray(scene[:, :height, :width])
+
+
+def _known(shot: Shot, exposed: Exposed, share: float) -> KnownCapture:
     simulation = exposed.simulation
     x, y = (int(v) for v in simulation.window.origin_px)
     return KnownCapture(
         picture=shot.picture.name,
         caption=f"{shot.picture.stem}, {share:.0%} of the way to the corner, ISO {shot.iso:g}",
         psf=shot.psf,
-        capture=simulation.mosaic,
+        capture=simulation.samples,
         iso=simulation.iso,
-        white_balance=simulation.white_balance,
+        white_balance=stated_balance(simulation.white_balance),
         origin_px=(x, y),
         undistort=False,
-        sharp=exposed.sharp,
+        truths=exposed.truths,
     )

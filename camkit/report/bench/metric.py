@@ -1,11 +1,11 @@
-"""The type of a metric, and all metrics that are registered."""
+"""The type of a metric, and the metrics that any kind of camera may name."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from camkit.bundle.reader import Bundle
+from camkit.bundle.golden import IMAGE
 from camkit.contracts import FloatArray
-from camkit.report.bench.discovery import discover
+from camkit.report.discovery import discover
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,16 +28,18 @@ class Metric:
     """A metric.
 
     Attributes:
+        name: By which kinds of cameras name it.
         columns: What it measures.
-        measure: Function of (result, truth), both (3, h, w); gives a value per column name.
-        applies: Whether results of a bundle can be measured with it.
+        measure: Function of (result, truth), both (c, h, w); gives a value per column name.
+        product: Which of the results.
     """
 
+    name: str
     columns: tuple[Column, ...]
     measure: Callable[[FloatArray, FloatArray], dict[str, float]]
-    applies: Callable[[Bundle], bool]
+    product: str = IMAGE
 
 
 def registered_metrics() -> tuple[Metric, ...]:
-    """Give all metrics that are registered."""
+    """Give the metrics that any kind of camera may name."""
     return discover("camkit.report.bench.metrics", "METRIC", Metric)

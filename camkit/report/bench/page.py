@@ -125,7 +125,7 @@ def summary(report: dict[str, Any], camera: str) -> str:
     """Say in a sentence or two what a camera's rows show."""
     rows = [row for row in report["rows"] if row["camera"] == camera]
     facts = report["cameras"][camera]
-    scored = [row for row in rows if row["psnr_db"] is not None and row["kind"] != "develop"]
+    scored = [row for row in rows if row.get("psnr_db") is not None and row["kind"] != "develop"]
     own = [row for row in scored if row["bundle"] == camera]
     text = (
         f"Captures of {facts['width']} x {facts['height']} px ({facts['capture']}); accuracy on "
@@ -159,7 +159,7 @@ def _in_words(row: Row) -> str:
 
 def _table(report: dict[str, Any], camera: str) -> list[str]:
     rows = [row for row in report["rows"] if row["camera"] == camera]
-    timed = [r for r in rows if r["seconds_median"] is not None and r["psnr_db"] is not None]
+    timed = [r for r in rows if r["seconds_median"] is not None and r.get("psnr_db") is not None]
     points = [(r["seconds_median"], r["psnr_db"]) for r in timed]
     front = {id(timed[index]) for index in pareto_front(points)}
     heads = "".join(f'<th title="{escape(c.meaning)}">{escape(c.head)}</th>' for c in COLUMNS)

@@ -10,6 +10,7 @@ from camkit.report.bench.accuracy import (
     Scores,
     mean_and_spread,
     mean_gain,
+    score_key,
     standard_error_of_gain,
 )
 from camkit.report.bench.metric import Metric
@@ -19,6 +20,8 @@ from camkit.report.bench.trial import Trial
 
 Row = dict[str, Any]
 MP_OF_REFERENCE: Final = 24.0
+NETWORK: Final = "network"
+"""The stage of networks; where there are several, their keys go on with the role."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +30,7 @@ class Facts:
 
     Attributes:
         size_px: (width, height) of the capture that is timed.
-        mac_per_px: Of the trial's network.
+        mac_per_px: Of the trial's networks.
         gemm_gmac_per_s: Peak of the machine at the trial's threads.
         scores: Of all methods of the trial's camera.
         metrics: Of that camera.
@@ -75,7 +78,7 @@ def make_row(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
         **_accuracy(trial, facts),
     }
     failed = next((run.error for run in runs if run.error is not None), None)
-    scores = facts.scores.get(_key(trial))
+    scores = facts.scores.get(score_key(trial))
     row["error"] = failed or (None if scores is None else scores.error)
     return row
 
@@ -114,8 +117,9 @@ def _spread_columns(name: str, spread: Spread | None) -> Row:
 
 
 def _network_share(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
-    """Give the network's useful multiply-adds per second over the machine's peak (CPU only)."""
-    seconds = _stage_medians(runs).get("network")
+    """Give the networks' useful multiply-adds per second over the machine's peak (CPU only)."""
+    stages = _stage_medians(runs).items()
+    seconds = sum(s for stage, s in stages if stage.split()[0] == NETWORK)
     share = None
     known = facts.mac_per_px is not None and facts.gemm_gmac_per_s is not None
     if known and seconds and trial.provider == "cpu":
@@ -129,7 +133,7 @@ def _network_share(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
 
 
 def _accuracy(trial: Trial, facts: Facts) -> Row:
-    scores, of_input = facts.scores.get(_key(trial)), facts.scores.get(INPUT)
+    scores, of_input = facts.scores.get(score_key(trial)), facts.scores.get(INPUT)
     of_base = facts.scores.get(facts.base_key)
     lenses = set() if scores is None else scores.psf
     row: Row = {
@@ -157,10 +161,6 @@ def _gain(
     if scores is None or other is None or scores is other:
         return None, None
     return mean_gain(scores, other, column), standard_error_of_gain(scores, other, column)
-
-
-def _key(trial: Trial) -> Key:
-    return INPUT if trial.path is None else trial.accuracy_key
 
 
 def _means(scores: Scores | None, column: str) -> tuple[float | None, float | None]:

@@ -1,11 +1,10 @@
-"""What makes the rows of one sort, and all makers that are registered."""
+"""What makes the rows of one sort, and the makers that serve every camera."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from camkit.errors import ContractError
-from camkit.report.bench.discovery import discover
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
+from camkit.report.discovery import discover
 
 MakeTrials = Callable[[Entrant, Axes, Ground], tuple[list[Trial], list[Skip]]]
 
@@ -27,28 +26,5 @@ class RowMaker:
 
 
 def row_makers() -> tuple[RowMaker, ...]:
-    """Give all makers that are registered."""
+    """Give the makers that serve every camera."""
     return discover("camkit.report.bench.rows", "ROWS", RowMaker)
-
-
-def make_trials(
-    entrants: Sequence[Entrant], axes: Axes, ground: Ground
-) -> tuple[list[Trial], list[Skip]]:
-    """Give the trials of all bundles, and what cannot be measured.
-
-    Raises:
-        ContractError: If a method has no maker.
-    """
-    registered = row_makers()
-    known = [method for maker in registered for method in maker.methods]
-    if unknown := [m for m in axes.methods or () if m not in known]:
-        raise ContractError(f"methods are {', '.join(known)}; got {', '.join(unknown)}")
-    trials: list[Trial] = []
-    skips: list[Skip] = []
-    for entrant in entrants:
-        for maker in registered:
-            if axes.methods is None or set(axes.methods) & set(maker.methods):
-                made, left = maker.trials(entrant, axes, ground)
-                trials += made
-                skips += left
-    return trials, skips

@@ -9,22 +9,23 @@ from typing import Any, Final
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.errors import CamkitError, ContractError
-from camkit.report.bench.accuracy import INPUT, Key, Restorers, Scores, measure_accuracy
+from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy, score_key
 from camkit.report.bench.crops import MOST_CAPTURES, CropCollector, Patch
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.report.bench.known_captures import ISOS, KnownCapture, golden_captures, picture_captures
+from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
-from camkit.report.bench.metric import Metric, registered_metrics
+from camkit.report.bench.metric import Metric
 from camkit.report.bench.process_run import Job, Run, run_job
 from camkit.report.bench.row import Facts, Row, make_row
-from camkit.report.bench.row_maker import make_trials
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
 from camkit.report.bench.timed_capture import SCENE_TEXT, timed_capture
 from camkit.report.bench.timing import interleaved
 from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
+from camkit.report.kind_finder import camera_of
 from camkit.report.quality import FIELD_SHARES, list_set
+from camkit.runtime.kind import runtime_part
 from camkit.runtime.network.engine import available_threads, usable_providers
-from camkit.runtime.raw import read_capture
 
 REPORT_VERSION: Final = 1
 Tell = Callable[[str], None]
@@ -117,7 +118,8 @@ def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Ent
     found = [Entrant(label=b.manifest.name, bundle=b, camera=b.manifest.name) for b in own]
     for name in references:
         bundle = open_bundle(find_bundle(name))
-        host = next((b for b in own if b.manifest.camera == bundle.manifest.camera), None)
+        camera = camera_of(bundle.manifest)
+        host = next((b for b in own if camera_of(b.manifest) == camera), None)
         if host is None:
             raise ContractError(
                 f"{bundle.path.name} is the camera of none of the bundles; a reference must be of "
@@ -132,7 +134,8 @@ def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Ent
 
 def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
     if settings.capture is not None:
-        shot = read_capture(settings.capture)
+        manifest = entrant.bundle.manifest
+        shot = runtime_part(manifest.kind).read(settings.capture, None, manifest)
         return Camera(
             entrant=entrant,
             capture=settings.capture,
@@ -141,9 +144,10 @@ def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
         )
     width, height = settings.width_px, settings.height_px
     if settings.small:
-        sensor = entrant.bundle.manifest.camera
-        width = width or min(QUICK_SIZE_PX[0], sensor.width_px)
-        height = height or min(QUICK_SIZE_PX[1], sensor.height_px)
+        extent = entrant.bundle.manifest.sensor.extent
+        most = QUICK_SIZE_PX if extent is None else (extent.width_px, extent.height_px)
+        width = width or min(QUICK_SIZE_PX[0], most[0])
+        height = height or min(QUICK_SIZE_PX[1], most[1])
     photo = settings.photo
     path, size = timed_capture(entrant.bundle, width, height, folder, photo)
     text = photo.name if photo else SCENE_TEXT
@@ -197,7 +201,7 @@ def _judge(
     """Measure the accuracy of all methods of one camera; without it the seconds still stand."""
     bundle, label = camera.entrant.bundle, camera.entrant.label
     own = [trial for trial in trials if trial.camera == label]
-    metrics = tuple(metric for metric in registered_metrics() if metric.applies(bundle))
+    metrics = metrics_of(bundle.manifest)
     captures, count, text = _known_captures(bundle, settings, folder)
     plain = [trial.accuracy_key for trial in own if not trial.is_variant]
     collector = CropCollector(plain, every=max(1, count // MOST_CAPTURES))
@@ -254,7 +258,7 @@ def _join(
         base = _base_of(trial, trials)
         mac = None
         if trial.size is not None:
-            mac = bundles[trial.bundle].network_facts(trial.size).mac_per_pixel
+            mac = bundles[trial.bundle].manifest.mac_per_pixel(trial.size)
         facts = Facts(
             size_px=cameras[trial.camera].size_px,
             mac_per_px=mac,
@@ -263,7 +267,7 @@ def _join(
             metrics=judged[trial.camera].metrics,
             base=runs[base],
             base_label=base.label,
-            base_key=INPUT if base.path is None else base.accuracy_key,
+            base_key=score_key(base),
         )
         rows.append(make_row(trial, runs[trial], facts))
     report = {

@@ -6,18 +6,20 @@ from typing import Final
 
 import numpy as np
 
-from camkit.bundle.reader import PSF, Bundle
+from camkit.bundle.reader import Bundle
+from camkit.bundle.sensor import Sensor
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.files.picture import read_scene
+from camkit.runtime.kind import runtime_part
 from camkit.runtime.network.engine import available_threads
-from camkit.runtime.simulate import SimulationOptions, simulate, write_capture
+from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.scenes import procedural_scene
 
 SCENE_SEED: Final = 7
 EXPOSURE: Final = 0.8
 SCENE_TEXT: Final = f"procedural scene {SCENE_SEED}, lights cut at white, exposure {EXPOSURE:g}"
-_VERSION: Final = 1
+_VERSION: Final = 2
 
 
 def timed_capture(
@@ -27,7 +29,7 @@ def timed_capture(
     folder: Path,
     photo: Path | None = None,
 ) -> tuple[Path, tuple[int, int]]:
-    """Give a DNG of the bundle's camera, simulated now or by an earlier call.
+    """Give a file of the bundle's camera, simulated now or by an earlier call.
 
     The lights of the procedural scene are cut at white: clipped blocks cost several times what
     others cost, and how many there are is a matter of the scene.
@@ -47,19 +49,16 @@ def timed_capture(
         ContractError: If the size does not fit the sensor, or the photo is smaller.
         UnsupportedError: If the camera cannot be simulated.
     """
-    camera = bundle.manifest.camera
-    width, height = width_px or camera.width_px, height_px or camera.height_px
-    if width > camera.width_px or height > camera.height_px:
-        raise ContractError(
-            f"{bundle.path.name} has a sensor of {camera.width_px}x{camera.height_px} px; "
-            f"got {width}x{height}"
-        )
-    lens = bundle.manifest.members[PSF].sha256
-    depth_mm = bundle.reference_depth_mm
+    manifest, part = bundle.manifest, runtime_part(bundle.manifest.kind)
+    width, height = _sides(manifest.sensor, width_px, height_px, bundle.path.name)
+    optics = manifest.optics
+    lens = None if optics is None else manifest.members[optics.member].sha256
+    depth_mm = None if optics is None else bundle.reference_depth_mm
     shown = hashlib.sha256(photo.read_bytes()).hexdigest() if photo else SCENE_TEXT
-    parts = (camera.model_dump_json(), lens, depth_mm, width, height, shown, _VERSION)
+    camera = (manifest.kind, manifest.sensor.model_dump_json(), lens, depth_mm)
+    parts = (*camera, width, height, shown, _VERSION)
     key = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
-    path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}.dng"
+    path = folder / f"{bundle.manifest.name}-{width}x{height}-{key}{part.suffix}"
     if not path.is_file():
         if photo is None:
             scene = np.minimum(procedural_scene(SCENE_SEED, height, width), np.float32(1))
@@ -70,9 +69,22 @@ def timed_capture(
             depth_mm=depth_mm,
             workers=available_threads(None),
         )
-        simulation = simulate(scene, camera, bundle.psf, options)
-        write_capture(path, simulation, camera, bundle.manifest.name)
+        part.write(path, part.simulate(scene, bundle, options), bundle)
     return path, (width, height)
+
+
+def _sides(
+    sensor: Sensor, width_px: int | None, height_px: int | None, name: str
+) -> tuple[int, int]:
+    """Give (width, height): those asked for, else the sensor's, which none exceeds."""
+    if sensor.extent is None and width_px and height_px:
+        return width_px, height_px
+    width, height = width_px or sensor.width_px, height_px or sensor.height_px
+    if width > sensor.width_px or height > sensor.height_px:
+        raise ContractError(
+            f"{name} has a sensor of {sensor.width_px}x{sensor.height_px} px; got {width}x{height}"
+        )
+    return width, height
 
 
 def _middle(scene: FloatArray, name: str, height: int, width: int) -> FloatArray:

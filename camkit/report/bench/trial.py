@@ -8,8 +8,10 @@ from typing import Any, Final, NamedTuple
 
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
+from camkit.runtime.plan.rules.size import REFERENCE
 
-BASE_SIZE: Final = "M"
+BASE_SIZE: Final = REFERENCE
+"""The size that other rows are compared with, where a bundle has it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +24,7 @@ class Trial:
         path: That bundle; None only develops.
         maker: Name of the row maker: network, classical, develop or what else registers.
         method: As `camkit process --method` takes it, or develop.
-        size: S, M or L; None without a network.
+        size: Such as S, M or L; None without a network.
         mode: exact, fast or whole; None without a network.
         dtype: fp32 or fp16; None without a network.
         provider: What onnxruntime computes on; None without a network.
@@ -102,7 +104,7 @@ class Axes:
     around the base trial, so that the default stays short.
 
     Attributes:
-        sizes: S, M, L; None for all that the bundle holds.
+        sizes: Such as S, M or L; None for all that the bundle holds.
         methods: None for all that are registered.
         modes: exact, fast, whole.
         dtypes: fp32, fp16.
@@ -122,7 +124,7 @@ class Axes:
     vary: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("modes", "dtypes", "providers", "sizes"):
+        for name in ("modes", "dtypes", "providers"):
             values = getattr(self, name)
             known = KNOWN[name]
             if values is not None and (unknown := [v for v in values if v not in known]):
@@ -136,7 +138,6 @@ class Axes:
 
 
 KNOWN: Final[dict[str, tuple[str, ...]]] = {
-    "sizes": ("S", "M", "L"),
     "modes": ("exact", "fast", "whole"),
     "dtypes": ("fp32", "fp16"),
     "providers": ("cpu", "cuda", "tensorrt", "openvino"),

@@ -1,7 +1,7 @@
 """Where a method stops helping: the break rule, the point between two values, its confidence.
 
-A method is broken at a value where, in the mean over the scenes, it is worse than the input or
-than the Wiener bank by more than a tie, or its chi^2 per pixel exceeds the limit; or where a
+A method is broken at a value where, in the mean over the scenes, it is worse than a rival (the
+input, the bank alone) by more than a tie, or its chi^2 per pixel exceeds the limit; or where a
 scenario found a fault on any scene (NaN, a seam, invented contrast). From the nominal value
 outwards, the break point is where the first of these crosses, linear between the last sound and
 the first broken value (over the logarithm where the scenario says so). A fault has no margin to

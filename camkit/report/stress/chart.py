@@ -10,19 +10,14 @@ import numpy as np
 from camkit.report.stress.break_point import Break, Grid
 from camkit.report.stress.consistency import LIMIT
 from camkit.report.stress.curve import Curve
-from camkit.report.stress.rig import BEFORE, INPUT, WIENER
+from camkit.report.stress.rig import BEFORE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-COLOURS: Final = {
-    INPUT: "#888888",
-    WIENER: "#d08a00",
-    "S": "#5aa9e6",
-    "M": "#1f4e9c",
-    "L": "#7b2d8b",
-}
-OTHER: Final = "#2a9d5c"
+RIVAL_COLOURS: Final = ("#888888", "#d08a00", "#8a6d3b")
+JUDGED_COLOURS: Final = ("#5aa9e6", "#1f4e9c", "#7b2d8b", "#2a9d5c")
+"""In the order of the methods; one beside it, of another bundle, has the colour of its namesake."""
 
 
 def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
@@ -45,9 +40,9 @@ def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
         axis.set_ylabel(label)
         axis.grid(alpha=0.25)
         for found in breaks:
-            if found.point is not None and found.method in ("S", "M", "L"):
+            if found.point is not None and BEFORE not in found.method:
                 place = _position(curve, found.point)
-                axis.axvline(place, color=COLOURS[found.method], lw=1, ls=":")
+                axis.axvline(place, color=_colour(curve, found.method), lw=1, ls=":")
     if len(rows) > 1 and rows[1][0] is curve.chi2:
         axes[1].axhline(LIMIT, color="#b00020", lw=0.8)
         axes[1].set_yscale("log")
@@ -78,11 +73,19 @@ def _line(axis: "Axes", curve: Curve, method: str, found: tuple[Grid, Grid]) -> 
     mean = np.array([row.mean() for row in rows])
     apart = [row[np.isfinite(row)] for row in (grid - common)[known]]
     error = np.array([row.std() / np.sqrt(row.size) for row in apart])
-    name = method.split(" ", maxsplit=1)[0]
     dashed = BEFORE in method
-    colour = COLOURS.get(name, OTHER)
+    colour = _colour(curve, method)
     axis.plot(x, mean, "o--" if dashed else "o-", ms=3, lw=1.4, color=colour, label=method)
     axis.fill_between(x, mean - error, mean + error, color=colour, alpha=0.12, lw=0)
+
+
+def _colour(curve: Curve, method: str) -> str:
+    """Give the colour of a method."""
+    namesake = method.removesuffix(f" {BEFORE}")
+    for names, colours in ((curve.rivals, RIVAL_COLOURS), (curve.judged, JUDGED_COLOURS)):
+        if namesake in names:
+            return colours[names.index(namesake) % len(colours)]
+    return JUDGED_COLOURS[-1]
 
 
 def _position(curve: Curve, value: float) -> float:

@@ -1,6 +1,6 @@
 """Does a restoration explain its capture? chi^2 per pixel of the residual after blurring again.
 
-    restored planes -> blur by the bundle's PSF -> mosaic -> (capture - mosaic)^2 / variance
+    restored light -> blur by the bundle's PSF -> samples -> (capture - samples)^2 / variance
 
 The variance is that of the noise that the twin added, plus that of the model: demosaicking and
 regularisation leave residuals at edges that no photon explains, in proportion to the contrast
@@ -18,9 +18,10 @@ import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel
-from camkit.report.stress.twin import Lens, Shot
+from camkit.report.stress.shot import Shot
 from camkit.runtime.geometry.scatter import scatter
-from camkit.runtime.simulate import sample_mosaic
+from camkit.runtime.twin.exposure import sample_planes
+from camkit.runtime.twin.light import Lens, cell_means
 
 LIMIT: Final = 1.3
 """chi^2 per pixel above which a restoration no longer fits its capture."""
@@ -64,26 +65,30 @@ def residual(planes: FloatArray, shot: Shot, lens: Lens) -> Residual | None:
     """Blur the middle of a restoration and compare it with its capture.
 
     Args:
-        planes: (3, h, w) restored, white-balanced camera space, vignetting still in.
+        planes: (c, s h, s w) restored, white-balanced camera space, vignetting still in; a pixel
+            sees the mean of its s x s samples.
         shot: The capture.
         lens: As the restoration assumed it.
 
     Returns:
-        None where fewer than a tenth of the samples can be judged.
+        None where fewer than a tenth of the samples can be judged, or the planes are not the
+        channels of the sensor.
     """
+    capture, gains = shot.capture, shot.light.gains
+    if planes.shape[0] != len(shot.sensor.channels):
+        return None
+    planes = cell_means(planes, planes.shape[2] // capture.width)
     rows, columns = (_middle(side) for side in planes.shape[1:])
-    judged = judged_pixels(shot)[rows, columns]
+    judged = judged_pixels(shot)[..., rows, columns]
     if judged.size == 0 or judged.mean() < 0.1:
         return None
     blurred = _blur(planes, shot, lens, (rows, columns))
-    cfa, gains, capture = shot.cfa, shot.light.gains, shot.capture
-    assert cfa is not None
-    predicted = sample_mosaic(blurred, cfa, gains).astype(np.float64)[judged]
-    contrast = sample_mosaic(_contrast(blurred), cfa, gains)[judged].astype(np.float64)
-    captured = capture.linear_rows(rows.start, rows.stop)[:, columns][judged].astype(np.float64)
+    predicted = sample_planes(blurred, shot.sensor, gains).astype(np.float64)[judged]
+    contrast = sample_planes(_contrast(blurred), shot.sensor, gains)[judged].astype(np.float64)
+    captured = capture.linear_rows(rows.start, rows.stop)[..., columns][judged]
     step = 1 / (capture.white_level - float(capture.black_level.max()))
     return Residual(
-        squared=np.square(captured - predicted),
+        squared=np.square(captured.astype(np.float64) - predicted),
         noise_variance=_variance(shot.noise, predicted) + step * step / 12,
         contrast=np.square(contrast),
     )
@@ -114,7 +119,7 @@ def _blur(planes: FloatArray, shot: Shot, lens: Lens, part: tuple[slice, slice])
 
 
 def judged_pixels(shot: Shot) -> NDArray[np.bool_]:
-    """Give (h, w), true away from the border and from clipped and spoiled samples."""
+    """Give bool of the shape of the samples, true away from border, clipped and spoiled ones."""
     capture = shot.capture
     clipped = capture.saturated_rows(0, capture.height)
     if shot.spoiled is not None:
@@ -122,16 +127,18 @@ def judged_pixels(shot: Shot) -> NDArray[np.bool_]:
     judged = ~near(clipped, CLIPPED_REACH_PX)
     if shot.spoiled is not None:
         judged &= ~near(shot.spoiled, SPOILED_REACH_PX)
-    judged[:BORDER_PX] = judged[-BORDER_PX:] = False
-    judged[:, :BORDER_PX] = judged[:, -BORDER_PX:] = False
+    judged[..., :BORDER_PX, :] = judged[..., -BORDER_PX:, :] = False
+    judged[..., :BORDER_PX] = judged[..., -BORDER_PX:] = False
     return judged
 
 
 def near(mask: NDArray[np.bool_], reach_px: int) -> NDArray[np.bool_]:
-    """Give what lies within a square of `reach_px` around true samples."""
+    """Give what lies within a square of `reach_px` around true samples, plane by plane."""
     if not mask.any():
         return mask.copy()
-    return np.asarray(scipy.ndimage.maximum_filter(mask, 2 * reach_px + 1, mode="constant"))
+    side = 2 * reach_px + 1
+    size = (1,) * (mask.ndim - 2) + (side, side)
+    return np.asarray(scipy.ndimage.maximum_filter(mask, size, mode="constant"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,12 +172,12 @@ def calibrate(nominal: Residual) -> Scale:
 
 
 def _variance(noise: NoiseModel, signal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the variance of green samples; the twin's noise is alike in all colours."""
-    return noise.shot[1] * np.maximum(signal, 0) + noise.read_variance[1]
+    """Give the variance of samples; the twin's noise is alike in all channels."""
+    return noise.shot[0] * np.maximum(signal, 0) + noise.read_variance[0]
 
 
 def _contrast(planes: FloatArray) -> FloatArray:
-    """Give the standard deviation within a small square around every pixel, (3, h, w)."""
+    """Give the standard deviation within a small square around every pixel, (c, h, w)."""
     size = (1, CONTRAST_PX, CONTRAST_PX)
     mean = scipy.ndimage.uniform_filter(planes, size)
     square = scipy.ndimage.uniform_filter(np.square(planes), size)

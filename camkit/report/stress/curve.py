@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from camkit.report.stress.break_point import Break, Grid, Margins, find_break, margins_of
-from camkit.report.stress.rig import INPUT, WIENER
 from camkit.report.stress.scenario import Scenario
-from camkit.report.stress.score import Outcome
 from camkit.report.stress.sweep import Point
+from camkit.report.stress.verdict import Outcome
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +24,7 @@ class Curve:
         extra: Name -> method -> (n, scenes).
         seen: Quantity of the runtime -> (n, scenes).
         outcomes: (value index, scene index) -> method -> outcome.
+        rivals: Methods that the others must not fall behind.
     """
 
     scenario: Scenario
@@ -35,6 +35,7 @@ class Curve:
     extra: Mapping[str, Mapping[str, Grid]]
     seen: Mapping[str, Grid]
     outcomes: Mapping[tuple[int, int], Mapping[str, Outcome]]
+    rivals: tuple[str, ...] = ()
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -42,10 +43,9 @@ class Curve:
         return tuple(self.psnr_db)
 
     @property
-    def networks(self) -> tuple[str, ...]:
-        """Name the methods that may break: the networks, or the Wiener bank without any."""
-        found = tuple(m for m in self.methods if m not in (INPUT, WIENER))
-        return found or tuple(m for m in self.methods if m != INPUT)
+    def judged(self) -> tuple[str, ...]:
+        """Name the methods that may break."""
+        return tuple(m for m in self.methods if m not in self.rivals)
 
     @property
     def nominal(self) -> int:
@@ -59,8 +59,14 @@ class Curve:
         return f"{value:g} {self.scenario.unit}".rstrip()
 
 
-def curve_of(scenario: Scenario, points: Iterable[Point]) -> Curve:
-    """Collect the points of one scenario."""
+def curve_of(scenario: Scenario, points: Iterable[Point], rivals: tuple[str, ...]) -> Curve:
+    """Collect the points of one scenario.
+
+    Args:
+        scenario: The scenario.
+        points: Of a sweep.
+        rivals: Methods that the others must not fall behind.
+    """
     mine = [p for p in points if p.scenario == scenario.name]
     values = tuple(sorted({p.value for p in mine}))
     scenes = tuple(dict.fromkeys(p.scene for p in mine))
@@ -90,6 +96,7 @@ def curve_of(scenario: Scenario, points: Iterable[Point]) -> Curve:
         extra={name: {m: extra_grid(m, name) for m in methods} for name in extras},
         seen={q: _fill(shape, {at: s.get(q) for at, s in seen.items()}) for q in quantities},
         outcomes=outcomes,
+        rivals=rivals,
     )
 
 
@@ -102,7 +109,7 @@ def _fill(shape: tuple[int, int], cells: Mapping[tuple[int, int], float | None])
 
 def margins(curve: Curve, method: str) -> Margins:
     """Give how far a method is from breaking."""
-    rivals: Sequence[str] = (INPUT, WIENER) if curve.scenario.rival else ()
+    rivals: Sequence[str] = curve.rivals if curve.scenario.rival else ()
     faults = np.zeros((len(curve.values), len(curve.scenes)), dtype=bool)
     for at, found in curve.outcomes.items():
         faults[at] = method in found and found[method].fault is not None
@@ -120,9 +127,9 @@ def margins(curve: Curve, method: str) -> Margins:
 
 
 def breaks_of(curve: Curve) -> tuple[Break, ...]:
-    """Find the break points of every network, on every side of the nominal that was swept."""
+    """Find the break points of every judged method, on every side of the nominal that was swept."""
     found = []
-    for method in curve.networks:
+    for method in curve.judged:
         margin = margins(curve, method)
         if curve.nominal > 0:
             found.append(find_break(margin, method, "down"))

@@ -33,7 +33,7 @@ class Section:
 
     Attributes:
         curve: What was measured.
-        breaks: Of all networks.
+        breaks: Of all judged methods.
         chart: PNG.
         patches: The worst place; None if there is none.
     """
@@ -66,7 +66,7 @@ def stress_page(
         f"<style>{STYLE}</style><h1>{escape(title)}</h1>",
         _table(("", ""), [(escape(k), escape(v)) for k, v in facts.items()]),
         f"<p>A method breaks where, in the mean over the scenes, it is more than {TIE_DB} dB "
-        "worse than doing nothing or than the Wiener bank, where its chi&sup2; per pixel exceeds "
+        f"worse than {_rivals(sections)}, where its chi&sup2; per pixel exceeds "
         f"{LIMIT} (1 on an undisturbed capture), or where it gives something that cannot be: NaN, "
         "a seam, contrast that is not in the scene. In brackets: 95 % confidence over the scenes; "
         "&infin; is beyond the tested range.</p>",
@@ -79,12 +79,18 @@ def stress_page(
     return "\n".join(parts)
 
 
+def _rivals(sections: Sequence[Section]) -> str:
+    """Name the methods that the others must not fall behind."""
+    names = dict.fromkeys(name for section in sections for name in section.curve.rivals)
+    return escape(" or ".join(names)) or "nothing else"
+
+
 def _summary(sections: Sequence[Section]) -> str:
     rows = []
     for section in sections:
         scenario = section.curve.scenario
         link = f"<a href='#{scenario.name}'>{escape(scenario.title)}</a>"
-        for method in section.curve.networks:
+        for method in section.curve.judged:
             mine = [b for b in section.breaks if b.method == method]
             words = "; ".join(describe_break(section.curve, b) for b in mine)
             broken = any(b.point is not None for b in mine)
@@ -130,7 +136,7 @@ def _section(section: Section) -> str:
         patches = section.patches
         place = f"{section.curve.label(patches.value)}, {patches.scene}"
         parts.append(
-            f"<p>Where it fails most against input and Wiener bank: {escape(place)}, "
+            f"<p>Where it fails most against {_rivals([section])}: {escape(place)}, "
             f"x {patches.x_px}, y {patches.y_px}:</p>"
         )
         parts += [

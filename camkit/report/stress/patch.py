@@ -9,9 +9,8 @@ import numpy as np
 from camkit.contracts import FloatArray
 from camkit.report.stress.break_point import sound_values
 from camkit.report.stress.curve import Curve, margins
-from camkit.report.stress.rig import INPUT, WIENER
-from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import PATCH_PX, Comparison, Judge
+from camkit.report.stress.score import PATCH_PX
+from camkit.report.stress.verdict import Examiner, SweptScene
 
 ENLARGED: Final = 2
 
@@ -36,13 +35,13 @@ class Patches:
 
 
 def worst_patches(
-    curve: Curve, judge: Judge, scenes: tuple[Scene, ...], method: str
+    curve: Curve, judge: Examiner, scenes: tuple[SweptScene, ...], method: str
 ) -> Patches | None:
     """Take the worst capture of a scenario again and cut its worst patch.
 
     Args:
         curve: What was measured.
-        judge: The rig.
+        judge: Restores and judges.
         scenes: Of the sweep.
         method: Whose worst patch.
 
@@ -58,9 +57,7 @@ def worst_patches(
     if scene is None or patch_px is None:
         return None
     shot = curve.scenario.shoot(judge, scene, value)
-    compare = Comparison(shot, judge.rig)
-    finished = {m: compare.finish(p) for m, p in judge.rig.restore(shot).planes.items()}
-    pictures = {"sharp": compare.sharp, **finished}
+    pictures = judge.pictures(shot)
     x, y = patch_px
     cut = np.s_[:, y : y + PATCH_PX, x : x + PATCH_PX]
     return Patches(
@@ -75,12 +72,12 @@ def worst_patches(
 def worst_place(curve: Curve, method: str) -> tuple[int, int] | None:
     """Give (value index, scene index) of the capture to look at; None if nothing was compared.
 
-    The value is the first broken one, else that of the least gain in PSNR over the input and the
-    Wiener bank; the scene is that of the least gain.
+    The value is the first broken one, else that of the least gain in PSNR over its rivals; the
+    scene is that of the least gain.
     """
     if method not in curve.methods:
         return None
-    plain = [curve.psnr_db[m] for m in (INPUT, WIENER) if m in curve.psnr_db and m != method]
+    plain = [curve.psnr_db[m] for m in curve.rivals if m in curve.psnr_db and m != method]
     grid = curve.psnr_db[method] - (np.fmax.reduce(plain) if plain else 0.0)
     known = np.isfinite(grid)
     if not known.any():

@@ -18,7 +18,7 @@ def scenario_json(
 
     Args:
         curve: What was measured.
-        breaks: Of all networks.
+        breaks: Of all judged methods.
         bundle: What was tested.
         primary: The method whose nearest break is `break_point`.
     """

@@ -1,97 +1,72 @@
-"""Every method on one capture: the input, the Wiener bank and the networks behind it.
+"""Every method on one capture, by the pipeline itself: the input, the bank, the networks.
 
-The stages are those of `camkit.runtime.job.reconstruction`, joined so that the Wiener bank, which
-all methods share, is computed once; a test holds both to the same bits.
+    scene -> light through a lens -> capture -> the walker, once per method -> light and picture
+
+What methods share (the planes in front of the first network) is computed once and kept.
 """
 
-import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from camkit.bundle.manifest import Demosaic, Network, Wiener
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.bundle.stages import Network
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.twin import (
+from camkit.report.stress.shot import NOISE_SEED, Shot
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.capture import Capture
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.kind import runtime_part
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.decision import DEVELOP, Work
+from camkit.runtime.plan.rules.size import REFERENCE
+from camkit.runtime.plan.ways import offered_methods, planned
+from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.twin.exposure import Setting, expose, levels_of, noise_of
+from camkit.runtime.twin.light import (
     Lens,
     Light,
-    Setting,
-    Shot,
+    LightOptions,
+    lens_of,
     light_of,
-    nominal_lens,
-    photograph,
+    scene_window,
+    stated_balance,
 )
-from camkit.runtime.bank.baselines import restoration_bank
-from camkit.runtime.bank.blocks import LocalPsf
-from camkit.runtime.bank.psf import color_kernels, kernel_at
-from camkit.runtime.capture import Capture
-from camkit.runtime.geometry.placement import place
-from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.network.graph import check_graph
-from camkit.runtime.network.guard import TileGuard
-from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
-from camkit.runtime.rows import ArrayRows
-from camkit.runtime.signal.front_rows import FrontRows
-from camkit.runtime.signal.stabilise import stabilise, unstabilise
+from camkit.runtime.twin.truth import light_sensor
 
 INPUT: Final = "input"
-WIENER: Final = "wiener"
 BEFORE: Final = "before"
 """Marks the networks of the bundle that is compared with: "M before"."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trained:
-    """A network with what it needs to run.
+class Method:
+    """One way to restore.
 
     Attributes:
-        name: Of the method.
-        bundle: Where it came from.
-        size: S, M or L.
-        engine: The network, on one thread.
-        scale: Of the stabilising transform.
+        name: As reports have it.
+        pipeline: What does it, on one thread.
+        plane: Name of the plane that holds the restored light; None if none does.
+        networks: Whether networks take part.
     """
 
     name: str
-    bundle: Bundle
-    size: str
-    engine: NetworkEngine
-    scale: float
+    pipeline: Pipeline
+    plane: str | None
+    networks: bool
 
-    def run(
-        self,
-        planes: FloatArray,
-        wiener: FloatArray,
-        noise: NoiseModel,
-        *,
-        tile_px: int | None = None,
-    ) -> FloatArray:
-        """Restore (3, h, w) white-balanced planes; bad tiles are errors that name them.
-
-        Raises:
-            ContractError: If a tile is not finite or not bounded.
-        """
-        given = np.concatenate(
-            [stabilise(part, noise, scale=self.scale) for part in (planes, wiener)]
-        )
-        facts = self.bundle.network_facts(self.size)
-        limits = TileLimits(
-            stride_px=facts.stride_px,
-            halo_px=facts.reach_px,
-            bytes_per_px=facts.bytes_per_pixel,
-            tile_px=tile_px,
-            whole=tile_px is None,
-        )
-        plan = plan_windows(planes.shape[1], planes.shape[2], limits)
-        guard = TileGuard(fallback=False)
-        bands = infer_bands(self.engine.run, ArrayRows(given), plan, guard=guard)
-        stable = np.concatenate(list(bands), axis=1)
-        return unstabilise(stable, noise, scale=self.scale)
+    @property
+    def bundle(self) -> Bundle:
+        """Give the bundle that does it."""
+        assert self.pipeline.bundle is not None
+        return self.pipeline.bundle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,120 +74,130 @@ class Restored:
     """What the methods made of one capture.
 
     Attributes:
-        planes: Method -> (3, h, w) float32, white-balanced camera space, vignetting still in.
+        planes: Method -> (c, s h, s w) float32 restored light in the geometry of the sensor,
+            white-balanced, vignetting still in; empty where no plane holds it.
+        pictures: Method -> (3, h, w) linear Rec.709, the product `image` in sensor geometry.
         faults: Method -> why it gave nothing.
-        noise: After white balance, as the methods were told.
     """
 
     planes: Mapping[str, FloatArray]
+    pictures: Mapping[str, FloatArray]
     faults: Mapping[str, str]
-    noise: NoiseModel
 
 
 class Rig:
-    """A bundle with its networks made ready, and the lights that its scenarios share.
+    """A bundle with its methods made ready, and the lights that its scenarios share.
 
     Attributes:
+        sensor: Of the camera.
         lens: Through which captures are taken: the bundle's, at its reference depth.
         assumed_lens: What restorations go by: the kernels of the bank. Another one only where
             the bundle knows several depths.
+        methods: From doing nothing to the networks, those of `before` last.
+        rivals: Names of the methods that the others must not fall behind.
     """
 
     def __init__(
-        self, bundle: Bundle, sizes: tuple[str, ...], *, before: Bundle | None = None
+        self,
+        bundle: Bundle,
+        sizes: Sequence[str],
+        *,
+        before: Bundle | None = None,
+        chosen: Mapping[str, Any] | None = None,
     ) -> None:
-        """Make the networks ready.
+        """Make the methods ready.
+
+        Args:
+            bundle: What is tested.
+            sizes: Of its networks.
+            before: Another bundle of the same camera, whose networks stand beside.
+            chosen: Further fields of `Options`, for all methods.
 
         Raises:
-            ContractError: If the bundle has no Wiener bank or lacks a size.
+            ContractError: If the bundle lacks a size.
+            UnsupportedError: If its sensor counts photons.
         """
-        stage = bundle.manifest.stage(Wiener)
-        if stage is None:
-            raise ContractError(
-                f"bundle {bundle.manifest.name} has no Wiener bank to compare its networks with"
-            )
         self.bundle = bundle
         self.before = before
-        self.networks = tuple(_trained(bundle, size, size) for size in sizes)
+        self.sensor = light_sensor(bundle.manifest)
+        self._sizes = tuple(sizes)
+        self._chosen = dict(chosen or {})
+        networks = _networks(bundle, sizes, "", self._chosen)
         if before is not None:
-            have = [size for size in sizes if size in before.manifest.networks]
-            self.networks += tuple(_trained(before, size, f"{size} {BEFORE}") for size in have)
-        self._stage = stage
-        self.lens = nominal_lens(bundle)
-        self.assume(None)
+            have = [size for size in sizes if size in before.manifest.sizes]
+            networks += _networks(before, have, f" {BEFORE}", self._chosen)
+        simple = _simple(bundle, self._chosen)
+        self.methods = (*simple, *networks)
+        judged = networks or simple[1:]
+        self.rivals = tuple(m.name for m in self.methods if m not in judged)
+        self.lens = self.lens_at(bundle.reference_depth_mm)
+        depth_mm = Options(**self._chosen).depth_mm
+        kernels = color_kernels(bundle.psf, *self.sensor.response_arrays(), depth_mm=depth_mm)
+        self.assumed_lens = replace(self.lens, kernels_at=kernels.at)
+        self._from_array = runtime_part(bundle.manifest.kind).from_array
         self._lights: dict[str, Light] = {}
-
-    def assume(self, depth_mm: float | None) -> None:
-        """Give the bank the kernels of a depth, as `--depth-m` does; None for the mean kernel."""
-        response = self.bundle.manifest.camera.channel_response.to_arrays()
-        kernels = color_kernels(self.bundle.psf, *response, depth_mm=depth_mm)
-        heights_mm = self.bundle.psf.field_heights_mm
-        self._kernels = kernels
-        self.assumed_lens = replace(
-            self.lens, kernels_at=lambda x, y: kernel_at(kernels, heights_mm, x, y)
-        )
+        self._others: dict[tuple[tuple[str, Any], ...], Rig] = {}
         self._last: tuple[Capture, Restored] | None = None
 
-    def told(self, depth_mm: float) -> "Rig":
-        """Give a rig like this one whose methods know the depth."""
-        other = copy.copy(self)
-        other.assume(depth_mm)
-        return other
+    def choosing(self, **chosen: Any) -> "Rig":
+        """Give a rig like this one whose methods have further options; it is kept."""
+        key = tuple(sorted(chosen.items()))
+        if key not in self._others:
+            options = self._chosen | chosen
+            self._others[key] = Rig(self.bundle, self._sizes, before=self.before, chosen=options)
+        return self._others[key]
 
     @property
-    def methods(self) -> tuple[str, ...]:
-        """Name the methods, from doing nothing to the networks."""
-        return (INPUT, WIENER, *(n.name for n in self.networks))
+    def networks(self) -> tuple[Method, ...]:
+        """Give the methods in which networks take part."""
+        return tuple(m for m in self.methods if m.networks)
 
     @property
     def primary(self) -> str:
-        """Name the method whose break point is the scenario's: M, else the first network."""
-        names = [n.name for n in self.networks]
-        return "M" if "M" in names else (names[0] if names else WIENER)
+        """Name the method whose break point is the scenario's: the usual size, else the first."""
+        names = [m.name for m in self.methods if m.name not in self.rivals]
+        return REFERENCE if REFERENCE in names else (*names, INPUT)[0]
+
+    def lens_at(self, depth_mm: float) -> Lens:
+        """Give the lens as the bundle knows it, for one object distance."""
+        return lens_of(self.bundle.psf, self.sensor, depth_mm=depth_mm)
 
     def light(self, scene: Scene, lens: Lens | None = None) -> Light:
         """Let a scene fall on the sensor; that through the nominal lens is kept by its name."""
-        if lens is not None:
-            return light_of(scene, self.bundle, lens)
-        if scene.name not in self._lights:
-            self._lights[scene.name] = light_of(scene, self.bundle, self.lens)
-        return self._lights[scene.name]
+        if lens is None and scene.name in self._lights:
+            return self._lights[scene.name]
+        extent = self.sensor.known_extent
+        origin = scene.origin_px((extent.width_px, extent.height_px))
+        window = scene_window(scene.linear, self.sensor, origin, scale=scene.scale)
+        options = LightOptions(scale=scene.scale)
+        made = light_of(scene.linear, self.sensor, lens or self.lens, window, options)
+        if lens is None:
+            self._lights[scene.name] = made
+        return made
 
     def shoot(self, scene: Scene, lens: Lens | None = None, setting: Setting | None = None) -> Shot:
         """Record a scene through a lens (None: the nominal one) with a setting of the camera."""
-        return self.record(self.light(scene, lens), setting)
+        return self.record(scene, self.light(scene, lens), setting)
 
-    def record(self, light: Light, setting: Setting | None = None) -> Shot:
-        """Record light with a setting of the camera."""
-        return photograph(light, self.bundle.manifest.camera, setting or Setting())
-
-    def front(self, capture: Capture) -> tuple[FloatArray, NDArray[np.bool_], NoiseModel]:
-        """Give repaired, balanced, demosaicked (3, h, w) planes, unknown samples and the noise."""
-        gains = capture.white_balance or (1.0, 1.0, 1.0)
-        camera = self.bundle.manifest.camera
-        noise = capture.noise or camera.noise_at(capture.iso or 100.0)
-        demosaic = self.bundle.manifest.stage(Demosaic)
-        method = "fast" if demosaic is None else demosaic.method
-        rows = FrontRows(capture, gains, method=method, repair=True)
-        planes = rows.read(0, capture.height)
-        return planes, rows.unknown_rows(0, capture.height), noise.with_gains(gains)
-
-    def deconvolve(
-        self,
-        capture: Capture,
-        planes: FloatArray,
-        unknown: NDArray[np.bool_],
-        noise: NoiseModel,
-    ) -> FloatArray:
-        """Give the Wiener planes of a capture's planes."""
-        window = place(capture, self.bundle.manifest.camera, None).window
-        local = LocalPsf(
-            kernels=self._kernels,
-            field_heights_mm=self.bundle.psf.field_heights_mm,
-            window=window,
+    def record(self, scene: Scene, light: Light, setting: Setting | None = None) -> Shot:
+        """Record light; the same scene has the same noise seed in every scenario."""
+        chosen = replace(setting or Setting(), seed=NOISE_SEED + scene.number)
+        samples = expose(light, self.sensor, chosen)
+        x, y = (int(v) for v in light.window.origin_px)
+        balance = stated_balance(light.gains)
+        made = self._from_array(samples, self.bundle.manifest, chosen.iso, balance, (x, y))
+        black, white = levels_of(self.sensor, chosen)
+        capture = replace(
+            made, black_level=np.full_like(made.black_level, black), white_level=white
         )
-        bank = restoration_bank(local, self._stage, noise)
-        return bank.restore_array(planes, unknown)
+        return Shot(
+            scene=scene,
+            capture=capture,
+            light=light,
+            sensor=self.sensor,
+            exposure=chosen.exposure,
+            noise=noise_of(self.sensor, chosen),
+        )
 
     def restore(self, shot: Shot) -> Restored:
         """Let every method restore a capture; what fails is a fault of the method.
@@ -220,37 +205,78 @@ class Rig:
         The last result is kept, since a scenario may look at one capture in several ways.
         """
         if self._last is None or not _same(self._last[0], shot.capture):
-            self._last = shot.capture, self._restore(shot)
+            self._last = shot.capture, self._restore(shot.capture)
         return self._last[1]
 
-    def _restore(self, shot: Shot) -> Restored:
-        planes, unknown, noise = self.front(shot.capture)
-        wiener = self.deconvolve(shot.capture, planes, unknown, noise)
-        found, faults = {INPUT: planes, WIENER: wiener}, {}
-        for network in self.networks:
+    def _restore(self, capture: Capture) -> Restored:
+        planes, pictures, faults = {}, {}, {}
+        shared: dict[str, dict[str, Stream]] = {}
+        for method in self.methods:
+            source = method.bundle.sha256
+            if source not in shared:
+                shared[source] = self._shared(method.bundle, capture)
             try:
-                found[network.name] = network.run(planes, wiener, noise)
+                work = method.pipeline.start(capture, known=shared[source])
+                kept = None if method.plane is None else work.keep(method.plane).rows()
+                pictures[method.name] = work.fill()
+                if kept is not None:
+                    planes[method.name] = kept.read(0, kept.shape[1])
             except ContractError as error:
-                faults[network.name] = str(error)
-        return Restored(planes=found, faults=faults, noise=noise)
+                faults[method.name] = str(error)
+        return Restored(planes=planes, pictures=pictures, faults=faults)
+
+    def _shared(self, bundle: Bundle, capture: Capture) -> dict[str, Stream]:
+        """Give the planes that the first network takes, which are the same for all sizes."""
+        known: dict[str, Stream] = {}
+        first = bundle.manifest.stage(Network)
+        method = next((m for m in self.networks if m.bundle is bundle), None)
+        if first is None or method is None:
+            return known
+        for plane in first.takes:
+            known[plane] = method.pipeline.start(capture, known=known).keep(plane)
+        return known
+
+
+def restored_plane(manifest: Manifest) -> str | None:
+    """Name the plane that holds the light when all that restores is done; None if none does."""
+    last = next((s for s in manifest.stages[::-1] if stage_module(s.type).METHODS), None)
+    names = list(manifest.planes)[::-1] if last is None else last.gives
+    known = manifest.planes
+    return next((n for n in names if known[n].domain == "linear" and known[n].grid.warped), None)
+
+
+def _networks(
+    bundle: Bundle, sizes: Sequence[str], mark: str, chosen: Mapping[str, Any]
+) -> tuple[Method, ...]:
+    return tuple(_method(bundle, f"{size}{mark}", {"size": size, **chosen}) for size in sizes)
+
+
+def _simple(bundle: Bundle, chosen: Mapping[str, Any]) -> tuple[Method, ...]:
+    """Give the methods without networks that the bundle offers: nothing, and what comes first."""
+    manifest = bundle.manifest
+    offered = offered_methods(manifest.stages, manifest.all_planes)
+    usual = [methods[0] for s in manifest.stages if (methods := stage_module(s.type).METHODS)]
+    found = [DEVELOP, *(m for m in usual if not planned(manifest.stages, Work(method=m)).networks)]
+    return tuple(
+        _method(bundle, INPUT if name == DEVELOP else name, {"method": name, **chosen})
+        for name in found
+        if name in offered
+    )
+
+
+def _method(bundle: Bundle, name: str, chosen: Mapping[str, Any]) -> Method:
+    options = Options(threads=1, **in_sensor_geometry(bundle.manifest), **chosen)
+    return Method(
+        name=name,
+        pipeline=Pipeline(bundle, options),
+        plane=restored_plane(bundle.manifest),
+        networks="size" in chosen,
+    )
 
 
 def _same(a: Capture, b: Capture) -> bool:
     """Tell whether two captures are restored alike."""
-    facts = [(c.iso, c.white_balance, c.white_level, c.origin_px) for c in (a, b)]
+    facts = [(c.iso, c.white_balance, c.white_level, c.origin_px, c.noise) for c in (a, b)]
     return facts[0] == facts[1] and np.array_equal(
         a.samples, b.samples, equal_nan=a.samples.dtype == np.float32
     )
-
-
-def _trained(bundle: Bundle, size: str, name: str) -> Trained:
-    networks, stage = bundle.manifest.networks, bundle.manifest.stage(Network)
-    if size not in networks or stage is None:
-        raise ContractError(
-            f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(networks)) or 'none'}; "
-            f"asked for {size}"
-        )
-    data = bundle.network_bytes(size)
-    check_graph(data, bundle.network_facts(size))
-    engine = NetworkEngine(data, threads=1)
-    return Trained(name=name, bundle=bundle, size=size, engine=engine, scale=stage.scale)

@@ -15,18 +15,18 @@ from camkit.bundle.manifest import Range
 from camkit.bundle.reader import Bundle
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
+from camkit.report.kind_finder import camera_of, find_part
 from camkit.report.stress.break_point import Break
 from camkit.report.stress.chart import draw_curve
 from camkit.report.stress.curve import Curve, breaks_of, curve_of
 from camkit.report.stress.measured_ranges import measured_ranges
 from camkit.report.stress.page import Section, stress_page
+from camkit.report.stress.part import StressPart
 from camkit.report.stress.patch import worst_patches
 from camkit.report.stress.report import scenario_json, skipped_json
-from camkit.report.stress.rig import Rig
-from camkit.report.stress.scenario import Scenario
-from camkit.report.stress.scene import Scene, stress_scenes
-from camkit.report.stress.score import Judge
+from camkit.report.stress.scenario import Scenario, choose
 from camkit.report.stress.sweep import Sweep, run_sweep, sweep_identity
+from camkit.report.stress.verdict import Examiner, SweptScene
 
 DEFAULT_SCENES: Final = 8
 QUICK_SCENES: Final = 2
@@ -66,7 +66,7 @@ class StressResult:
         envelope: The measured ranges of the primary method.
         primary: Its name.
         curves: What was measured.
-        breaks: Scenario -> break points of all networks.
+        breaks: Scenario -> break points of all judged methods.
         page: Where the page lies; None if none was written.
     """
 
@@ -76,6 +76,15 @@ class StressResult:
     curves: tuple[Curve, ...]
     breaks: Mapping[str, tuple[Break, ...]]
     page: Path | None
+
+
+def scenarios_for(bundle: Bundle, names: str | None) -> tuple[Scenario, ...]:
+    """Give the scenarios that a comma-separated list names, those of the bundle's kind among them.
+
+    Raises:
+        ContractError: If one is unknown.
+    """
+    return choose(names, find_part(bundle.manifest.kind, "stress", StressPart).scenarios)
 
 
 def run_stress(
@@ -95,21 +104,23 @@ def run_stress(
 
     Raises:
         ContractError: If sizes, scenes or bundles do not fit.
+        BundleError: If the camera cannot be photographed with.
     """
-    sizes = options.sizes or tuple(bundle.manifest.networks)
     _check_same_camera(bundle, before)
     reasons = {s.name: s.applies(bundle) for s in options.scenarios}
     taken = tuple(s.for_bundle(bundle) for s in options.scenarios if reasons[s.name] is None)
-    judge = Judge(Rig(bundle, sizes, before=before))
-    primary = judge.rig.primary
-    scenes = _scenes(bundle, options)
+    count = options.scenes or (QUICK_SCENES if options.quick else DEFAULT_SCENES)
+    part = find_part(bundle.manifest.kind, "stress", StressPart)
+    judge = part.examiner(bundle, options.sizes or bundle.manifest.sizes, before)
+    primary = judge.primary
+    scenes = part.scenes(bundle, count, options.data_folder)
     sweep = Sweep(scenarios=taken, scenes=scenes, quick=options.quick)
     points, total = [], len(sweep.tasks())
     for point in run_sweep(sweep, judge, _journal(options, judge)):
         points.append(point)
         if progress is not None:
             progress(point.scenario, len(points), total)
-    curves = tuple(curve_of(scenario, points) for scenario in taken)
+    curves = tuple(curve_of(scenario, points, judge.rivals) for scenario in taken)
     breaks = {c.scenario.name: breaks_of(c) for c in curves}
     rows = [scenario_json(c, breaks[c.scenario.name], bundle, primary) for c in curves]
     rows += [
@@ -127,7 +138,7 @@ def run_stress(
         page=_page_path(options),
     )
     if options.out_dir is not None:
-        _write(options.out_dir, result, judge, scenes)
+        _write(options.out_dir, result, bundle, (judge, scenes))
     return result
 
 
@@ -145,22 +156,15 @@ def write_envelope(bundle: Bundle, envelope: Mapping[str, Range]) -> Bundle:
     return write_bundle(bundle.path, manifest, members)
 
 
-def _scenes(bundle: Bundle, options: StressOptions) -> tuple[Scene, ...]:
-    count = options.scenes or (QUICK_SCENES if options.quick else DEFAULT_SCENES)
-    camera = bundle.manifest.camera
-    sensor = (camera.width_px, camera.height_px)
-    return stress_scenes(count, sensor, folder=options.data_folder)
-
-
 def _check_same_camera(bundle: Bundle, before: Bundle | None) -> None:
-    if before is not None and before.manifest.camera != bundle.manifest.camera:
+    if before is not None and camera_of(before.manifest) != camera_of(bundle.manifest):
         raise ContractError(
             f"bundles {before.path} and {bundle.path} are not of one camera; compare networks on "
             "one camera only"
         )
 
 
-def _journal(options: StressOptions, judge: Judge) -> Path | None:
+def _journal(options: StressOptions, judge: Examiner) -> Path | None:
     if options.out_dir is None:
         return None
     return options.out_dir / f"points-{sweep_identity(judge)}.jsonl"
@@ -170,8 +174,14 @@ def _page_path(options: StressOptions) -> Path | None:
     return None if options.out_dir is None else options.out_dir / PAGE
 
 
-def _write(folder: Path, result: StressResult, judge: Judge, scenes: tuple[Scene, ...]) -> None:
+def _write(
+    folder: Path,
+    result: StressResult,
+    bundle: Bundle,
+    ground: tuple[Examiner, tuple[SweptScene, ...]],
+) -> None:
     """Write results and page."""
+    judge, scenes = ground
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(result.rows, indent=1) + "\n"
     (folder / RESULTS).write_text(text, encoding="utf-8")
@@ -186,10 +196,10 @@ def _write(folder: Path, result: StressResult, judge: Judge, scenes: tuple[Scene
                 patches=worst_patches(curve, judge, scenes, result.primary),
             )
         )
-    manifest = judge.rig.bundle.manifest
+    manifest = bundle.manifest
     facts = {
-        "bundle": f"{manifest.name} {manifest.version}, sha256 {judge.rig.bundle.sha256[:16]}",
-        "networks": ", ".join(n.name for n in judge.rig.networks) or "none",
+        "bundle": f"{manifest.name} {manifest.version}, sha256 {bundle.sha256[:16]}",
+        "networks": ", ".join(m for m in judge.methods if m not in judge.rivals) or "none",
         "scenes": ", ".join(scene.name for scene in scenes),
         "captures": str(sum(len(c.outcomes) for c in result.curves)),
     }

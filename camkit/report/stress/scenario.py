@@ -2,33 +2,53 @@
 
 A scenario is one file in a folder of `scenarios/` that defines `SCENARIO`; nothing else has to
 know of it. One that photographs says how in `shoot`, and gets PSNR, chi^2 and patches for every
-method of the rig. Another kind of camera, or of judgement, brings its own `measure`, and says in
-`applies` for which bundles it is meant.
+method of the bundle. One with another judgement brings its own `measure`. Each says in `applies`
+for which bundles it is meant, by asking what a bundle states.
+
+A kind of camera may bring scenarios of its own (`camkit.report.stress.part`): they get the
+examiner and the scenes of that kind.
 """
 
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.sensor import SpadSensor
 from camkit.errors import ContractError
-from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge, Verdict
-from camkit.report.stress.twin import Shot
+from camkit.report.discovery import discover
+from camkit.report.stress.verdict import Examiner, SweptScene, Verdict
 
 End = Literal["low", "high", "both"]
-Shoot = Callable[[Judge, Scene, float], Shot]
-Measure = Callable[[Judge, Scene, float], Verdict]
+Shoot = Callable[[Any, Any, float], Any]
+"""(examiner, scene, value) -> a capture that the examiner scores; all three those of the kind."""
+Measure = Callable[[Any, Any, float], Verdict]
 Applies = Callable[[Bundle], str | None]
 
 
 def photographs(bundle: Bundle) -> str | None:
     """Say why a bundle cannot take scenarios that photograph; None if it can."""
-    if bundle.manifest.input_contract == "raw_bayer_v1":
-        return None
-    return f"it takes {bundle.manifest.input_contract}, the scenario a Bayer mosaic"
+    manifest = bundle.manifest
+    if isinstance(manifest.sensor, SpadSensor):
+        return f"it takes {manifest.sensor.inputs[0]}, the scenario a photograph"
+    if manifest.optics is None:
+        return "it states no optics to photograph through"
+    return None
+
+
+def has_networks(bundle: Bundle) -> str | None:
+    """Say why a bundle cannot take scenarios of networks; None if it can."""
+    return photographs(bundle) if bundle.manifest.networks else "it holds no network"
+
+
+def varies_over_field(bundle: Bundle) -> str | None:
+    """Say why a bundle cannot take scenarios that move its kernels; None if it can."""
+    optics = bundle.manifest.optics
+    if optics is not None and optics.symmetry == "uniform":
+        return "its PSF is the same over the field"
+    return photographs(bundle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,14 +63,14 @@ class Scenario:
         values: Increasing.
         nominal: The value of an undisturbed capture, one of `values`.
         quick: A subset that holds `nominal`.
-        shoot: Takes the capture of one value.
+        shoot: Takes the capture of one value, for the examiner to score.
         measure: Measures one value; None scores what `shoot` gives.
         labels: Names of the values, where they have no order that could be interpolated.
         log: Break points are interpolated over the logarithm.
         bounds: Quantities of the runtime's envelope that this scenario limits, and at which end.
         applies: Says why a bundle cannot take part; None if it can.
         fit: Gives the scenario with the values of a bundle, where they depend on it.
-        rival: Whether being below the input or the Wiener bank breaks a method here.
+        rival: Whether being below the methods without networks breaks a method here.
         note: What a reader of the page should know.
     """
 
@@ -89,7 +109,7 @@ class Scenario:
         """Give the scenario with the values that a bundle asks for."""
         return self if self.fit is None else self.fit(bundle)
 
-    def take(self, judge: Judge, scene: Scene, value: float) -> Verdict:
+    def take(self, judge: Examiner, scene: SweptScene, value: float) -> Verdict:
         """Measure one value on one scene."""
         if self.measure is not None:
             return self.measure(judge, scene, value)
@@ -108,22 +128,24 @@ SCENARIOS: Final = "camkit.report.stress.scenarios"
 
 
 def all_scenarios() -> tuple[Scenario, ...]:
-    """Give every scenario, by folder and file."""
-    from camkit.report.bench.discovery import discover
-
+    """Give every scenario that serves all cameras, by folder and file."""
     places = importlib.import_module(SCENARIOS).__path__
     folders = sorted(m.name for m in pkgutil.iter_modules(places) if m.ispkg)
     packages = [f"{SCENARIOS}.{name}" for name in folders]
     return tuple(s for package in packages for s in discover(package, SCENARIO, Scenario))
 
 
-def choose(names: str | None) -> tuple[Scenario, ...]:
+def choose(names: str | None, own: tuple[Scenario, ...] = ()) -> tuple[Scenario, ...]:
     """Give the scenarios that a comma-separated list names; all without one.
+
+    Args:
+        names: The list.
+        own: Scenarios of a kind of camera, beside those that serve every camera.
 
     Raises:
         ContractError: If one is unknown.
     """
-    known = {scenario.name: scenario for scenario in all_scenarios()}
+    known = {scenario.name: scenario for scenario in (*all_scenarios(), *own)}
     if names is None:
         return tuple(known.values())
     wanted = [name.strip() for name in names.split(",") if name.strip()]

@@ -1,14 +1,16 @@
 """Sharp scenes for the sweeps: procedural ones with seeds of their own, or a user's pictures."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import FIELD_SHARES, QUADRANTS, crop_origin, list_set, read_picture
+from camkit.runtime.twin.truth import picture_scale
 from camkit.scenes import procedural_scene
 
 SCENE_SEED: Final = 9_000_000
@@ -25,7 +27,8 @@ class Scene:
     Attributes:
         name: For reports and journals.
         number: Decides place and noise.
-        linear: (3, h, w) float32 linear Rec.709, 0..`WHITE`.
+        linear: (3, s h, s w) float32 linear Rec.709, 0..`WHITE`.
+        scale: Samples s along a side of a pixel, as those of the bundle's picture.
         share: Its place between the middle of the sensor (0) and its corner (1); None for one
             that its number decides.
     """
@@ -33,6 +36,7 @@ class Scene:
     name: str
     number: int
     linear: FloatArray
+    scale: int = 1
     share: float | None = None
 
     @property
@@ -44,8 +48,12 @@ class Scene:
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Give (width, height)."""
-        return self.linear.shape[2], self.linear.shape[1]
+        """Give (width, height) in pixels of the sensor."""
+        return self.linear.shape[2] // self.scale, self.linear.shape[1] // self.scale
+
+    def showing(self, linear: FloatArray, name: str) -> "Scene":
+        """Give a scene of another content at a place that the number decides."""
+        return replace(self, linear=linear, name=name, share=None)
 
     def origin_px(self, sensor_size_px: tuple[int, int]) -> tuple[int, int]:
         """Give the even (x, y) of the scene on a sensor.
@@ -57,42 +65,46 @@ class Scene:
         return crop_origin(self.size_px, sensor_size_px, self.field_share, quadrant)
 
 
-def stress_scenes(
-    count: int, sensor_size_px: tuple[int, int], *, folder: Path | None = None
-) -> tuple[Scene, ...]:
-    """Give the scenes of a sweep.
+def stress_scenes(bundle: Bundle, count: int, folder: Path | None = None) -> tuple[Scene, ...]:
+    """Give the scenes of a sweep, as fine as the pictures of a bundle.
 
     Args:
+        bundle: The camera; scenes are at most as large as its sensor.
         count: How many.
-        sensor_size_px: (width, height); scenes are at most as large.
         folder: Pictures to take instead of procedural scenes; their middle is used.
 
     Raises:
         ContractError: If `count` < 1 or the folder holds too few pictures of the size.
+        UnsupportedError: If the bundle makes no picture, or states no sensor size.
     """
     if count < 1:
         raise ContractError(f"a sweep needs at least one scene; got {count}")
-    width, height = (min(SIDE_PX, side // 2 * 2) for side in sensor_size_px)
+    sensor, scale = bundle.manifest.sensor, picture_scale(bundle.manifest)
+    sides = (min(SIDE_PX, side // 2 * 2) for side in (sensor.width_px, sensor.height_px))
+    width, height = (scale * side for side in sides)
     if folder is not None:
-        return _from_folder(folder, count, (width, height))
+        return _from_folder(folder, count, (width, height), scale)
     return tuple(
         Scene(
             name=f"procedural:{SCENE_SEED + i}",
             number=i,
             linear=np.minimum(procedural_scene(SCENE_SEED + i, height, width), WHITE),
+            scale=scale,
         )
         for i in range(count)
     )
 
 
-def _from_folder(folder: Path, count: int, size_px: tuple[int, int]) -> tuple[Scene, ...]:
+def _from_folder(
+    folder: Path, count: int, size_px: tuple[int, int], scale: int
+) -> tuple[Scene, ...]:
     width, height = size_px
     found: list[Scene] = []
     for path in list_set(folder):
         linear = read_picture(path, max(size_px))[:, :height, :width]
         if linear.shape[1:] == (height, width):
             scaled = np.ascontiguousarray(linear * np.float32(WHITE))
-            found.append(Scene(name=path.name, number=len(found), linear=scaled))
+            found.append(Scene(name=path.name, number=len(found), linear=scaled, scale=scale))
         if len(found) == count:
             return tuple(found)
     raise ContractError(

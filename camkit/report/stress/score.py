@@ -5,30 +5,28 @@ darkened back to the exposure of the scene, with the border cut off.
 """
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
-from camkit.colorimetry import apply_matrix, encode_srgb, rec709_from_camera
+from camkit.bundle.reader import Bundle
+from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.stress.consistency import (
     CLIPPED_REACH_PX,
-    Residual,
     Scale,
     calibrate,
     near,
     residual,
 )
-from camkit.report.stress.rig import INPUT, WIENER, Restored, Rig
+from camkit.report.stress.rig import INPUT, Restored, Rig
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.twin import Shot
-from camkit.runtime.color import recover_highlights
+from camkit.report.stress.shot import NOMINAL_ISO, Shot
+from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.envelope import observe
-from camkit.runtime.geometry.illumination import divide_illumination
+from camkit.runtime.twin.truth import true_picture
 
 BEST_DB: Final = 120.0
 """Equal pictures would be infinitely good, which no mean survives."""
@@ -37,45 +35,44 @@ LEAST_SHARE: Final = 0.02
 """A PSNR needs at least this share of the picture."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
-    """One method on one capture.
-
-    Attributes:
-        psnr_db: On sRGB values; None where nothing can be compared.
-        chi2: Per sample, 1 on nominal captures; None where nothing can be judged.
-        fault: What is wrong whatever the PSNR: it breaks the method at this value.
-        patch_px: (x, y) of the worst square of `PATCH_PX`.
-        extra: Other numbers of the scenario, by name with unit.
-    """
-
-    psnr_db: float | None
-    chi2: float | None = None
-    fault: str | None = None
-    patch_px: tuple[int, int] | None = None
-    extra: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """All methods on one capture.
-
-    Attributes:
-        outcomes: Method -> outcome.
-        seen: What the runtime sees of the capture beforehand (`camkit.runtime.envelope`).
-    """
-
-    outcomes: Mapping[str, Outcome]
-    seen: Mapping[str, float] = field(default_factory=dict)
-
-
 class Judge:
-    """Scores captures of a rig; keeps the calibration of chi^2 per method and scene."""
+    """Scores captures of cameras that photograph; keeps the calibration of chi^2.
+
+    Attributes:
+        rig: The methods.
+    """
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
         self._scales: dict[tuple[str, str], Scale] = {}
         self._scored: dict[bytes, Verdict] = {}
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Name the methods, from doing nothing to the networks."""
+        return tuple(method.name for method in self.rig.methods)
+
+    @property
+    def rivals(self) -> tuple[str, ...]:
+        """Name the methods that the networks must not fall behind."""
+        return self.rig.rivals
+
+    @property
+    def primary(self) -> str:
+        """Name the method whose break point is the scenario's."""
+        return self.rig.primary
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """Give bundles and methods."""
+        before = self.rig.before
+        return self.rig.bundle.sha256, before and before.sha256, self.methods
+
+    def pictures(self, shot: Shot) -> dict[str, FloatArray]:
+        """Give the truth and what every method made of a capture as sRGB values."""
+        compare = Comparison(shot)
+        restored = self.rig.restore(shot).pictures
+        return {"sharp": compare.sharp} | {m: compare.finish(p) for m, p in restored.items()}
 
     def score(self, shot: Shot) -> Verdict:
         """Let every method restore a capture and judge it; equal captures are judged once."""
@@ -95,16 +92,16 @@ class Judge:
             restored: From the rig.
             with_chi2: False where chi^2 has no calibration.
         """
-        compare = Comparison(shot, self.rig)
+        compare = Comparison(shot)
         outcomes = {}
-        errors = {method: compare.errors(planes) for method, planes in restored.planes.items()}
-        plain = [errors[method] for method in (INPUT, WIENER) if method in errors]
-        for method, planes in restored.planes.items():
-            least = np.minimum.reduce(plain) if method not in (INPUT, WIENER) and plain else 0.0
+        errors = {method: compare.errors(p) for method, p in restored.pictures.items()}
+        plain = [errors[method] for method in self.rivals if method in errors]
+        for method, picture in restored.pictures.items():
+            least = np.minimum.reduce(plain) if method not in self.rivals and plain else 0.0
             psnr_db, patch_px = compare.rate(errors[method], least)
             judged = with_chi2 and method != INPUT
-            chi2 = self._chi2(method, planes, shot) if judged else None
-            fault = None if np.isfinite(planes).all() else "NaN or inf in the picture"
+            chi2 = self._chi2(method, restored, shot) if judged else None
+            fault = None if np.isfinite(picture).all() else "NaN or inf in the picture"
             outcomes[method] = Outcome(psnr_db=psnr_db, chi2=chi2, fault=fault, patch_px=patch_px)
         for method, fault in restored.faults.items():
             outcomes[method] = Outcome(psnr_db=None, fault=fault)
@@ -119,17 +116,27 @@ class Judge:
                 self._scales[name, scene.name] = Scale() if nominal is None else calibrate(nominal)
         return self._scales.get((method, scene.name), Scale())
 
-    def _chi2(self, method: str, planes: FloatArray, shot: Shot) -> float | None:
-        found: Residual | None = residual(planes, shot, self.rig.assumed_lens)
-        if found is None:
+    def _chi2(self, method: str, restored: Restored, shot: Shot) -> float | None:
+        if method not in restored.planes:
             return None
-        return self.scale(method, shot.light.scene).chi2(found)
+        found = residual(restored.planes[method], shot, self.rig.assumed_lens)
+        return None if found is None else self.scale(method, shot.scene).chi2(found)
+
+
+def judge_of(bundle: Bundle, sizes: tuple[str, ...], before: Bundle | None) -> Judge:
+    """Give the judge of a camera that photographs.
+
+    Args:
+        bundle: What is tested.
+        sizes: Of its networks.
+        before: Another bundle of the same camera, whose networks stand beside.
+    """
+    return Judge(Rig(bundle, sizes, before=before))
 
 
 def see(rig: Rig, shot: Shot) -> dict[str, float]:
     """Give what the runtime sees of a capture before it is processed."""
-    camera = rig.bundle.manifest.camera
-    noise = shot.capture.noise or camera.noise_at(shot.capture.iso or 100.0)
+    noise = shot.capture.noise or rig.sensor.noise_at(shot.capture.iso or NOMINAL_ISO)
     return observe(shot.capture, noise)
 
 
@@ -138,7 +145,7 @@ def _digest(shot: Shot) -> bytes:
     capture, light = shot.capture, shot.light
     parts: list[object] = [capture.iso, capture.white_balance, capture.white_level, shot.noise]
     parts += [capture.origin_px, shot.exposure, shot.border_px, shot.away_from_clipped]
-    parts += [light.scene.name, shot.spoiled is None]
+    parts += [shot.scene.name, shot.spoiled is None, capture.noise]
     arrays = (capture.samples, light.clean)
     digest = hashlib.sha256(repr(parts).encode())
     for array in arrays:
@@ -147,26 +154,24 @@ def _digest(shot: Shot) -> bytes:
 
 
 class Comparison:
-    """A capture's truth, against which planes are rated."""
+    """A capture's truth, against which pictures are rated.
 
-    def __init__(self, shot: Shot, rig: Rig) -> None:
-        color_matrix = np.array(rig.bundle.manifest.camera.color_matrix, dtype=np.float64)
-        self._matrix = rec709_from_camera(color_matrix)
-        self._shot, self._psf = shot, rig.lens.psf
-        self.sharp = encode_srgb(apply_matrix(self._matrix, shot.light.clean))
+    Attributes:
+        sharp: (3, h, w) sRGB values.
+    """
+
+    def __init__(self, shot: Shot) -> None:
+        self._exposure = np.float32(shot.exposure)
+        self.sharp = encode_srgb(true_picture(shot.light.clean, shot.sensor))
         self._judged = _judged_pixels(shot)
 
-    def finish(self, planes: FloatArray) -> FloatArray:
-        """Give sRGB values (3, h, w) of white-balanced camera planes of the capture."""
-        light = self._shot.light
-        raised = recover_highlights(planes, light.gains)
-        even = divide_illumination(raised, 0, self._psf, light.window)
-        even /= np.float32(self._shot.exposure)
-        return encode_srgb(apply_matrix(self._matrix, even))
+    def finish(self, picture: FloatArray) -> FloatArray:
+        """Give sRGB values (3, h, w) of linear Rec.709, at the brightness of the scene."""
+        return encode_srgb(picture / self._exposure)
 
-    def errors(self, planes: FloatArray) -> NDArray[np.float64]:
-        """Give (h, w) squared errors of planes, the mean over the colours."""
-        error = self.finish(planes).astype(np.float64) - self.sharp
+    def errors(self, picture: FloatArray) -> NDArray[np.float64]:
+        """Give (h, w) squared errors of linear Rec.709, the mean over the colours."""
+        error = self.finish(picture).astype(np.float64) - self.sharp
         return np.asarray(np.square(error).mean(axis=0))
 
     def rate(
@@ -201,12 +206,15 @@ def worst_patch(error: NDArray[np.float64]) -> tuple[int, int]:
 
 
 def _judged_pixels(shot: Shot) -> NDArray[np.bool_]:
-    """Give (h, w), true where pictures are compared."""
+    """Give (h, w) of the picture, true where pictures are compared."""
     capture, border = shot.capture, shot.border_px
     judged = np.ones((capture.height, capture.width), dtype=bool)
     if shot.away_from_clipped:
-        judged &= ~near(capture.saturated_rows(0, capture.height), CLIPPED_REACH_PX)
+        clipped = capture.saturated_rows(0, capture.height)
+        any_clipped = np.logical_or.reduce(clipped.reshape(-1, *judged.shape))
+        judged &= ~near(any_clipped, CLIPPED_REACH_PX)
     if border:
         judged[:border] = judged[-border:] = False
         judged[:, :border] = judged[:, -border:] = False
-    return judged
+    scale = shot.scene.scale
+    return judged.repeat(scale, axis=0).repeat(scale, axis=1)

@@ -5,11 +5,14 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Final
 
 from camkit.report.journal import append_journal, read_journal
 from camkit.report.stress.scenario import Scenario
-from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge, Outcome, Verdict
+from camkit.report.stress.verdict import Examiner, Outcome, SweptScene, Verdict
+
+JOURNAL_VERSION: Final = 2
+"""Raised when the same bundle and methods give other points than before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,10 +48,10 @@ class Sweep:
     """
 
     scenarios: tuple[Scenario, ...]
-    scenes: tuple[Scene, ...]
+    scenes: tuple[SweptScene, ...]
     quick: bool = False
 
-    def tasks(self) -> list[tuple[Scenario, float, Scene]]:
+    def tasks(self) -> list[tuple[Scenario, float, SweptScene]]:
         """Give scenario, value and scene of every point, scenario by scenario."""
         return [
             (scenario, value, scene)
@@ -58,12 +61,12 @@ class Sweep:
         ]
 
 
-def run_sweep(sweep: Sweep, judge: Judge, journal: Path | None) -> Iterator[Point]:
+def run_sweep(sweep: Sweep, judge: Examiner, journal: Path | None) -> Iterator[Point]:
     """Measure what the journal does not hold yet, and give all points of the sweep in order.
 
     Args:
         sweep: What is to be measured.
-        judge: The rig and its calibration.
+        judge: Restores and judges.
         journal: One JSON line per finished point; None keeps none.
 
     Raises:
@@ -81,11 +84,9 @@ def run_sweep(sweep: Sweep, judge: Judge, journal: Path | None) -> Iterator[Poin
         yield point
 
 
-def sweep_identity(judge: Judge) -> str:
-    """Give a short hash of the bundles and methods that decide the points of a journal."""
-    rig = judge.rig
-    before = None if rig.before is None else rig.before.sha256
-    parts = [rig.bundle.sha256, before, rig.methods]
+def sweep_identity(judge: Examiner) -> str:
+    """Give a short hash of what decides the points of a journal."""
+    parts = [JOURNAL_VERSION, *judge.identity]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
 

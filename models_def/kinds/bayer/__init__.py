@@ -5,11 +5,11 @@ psf_bank, lens_bank    kernels of the frozen PSF and of fabricated copies
 material               both, as samples need them
 samples                scenes photographed, filtered and stabilised
 validation             what a run is chosen by
-training               all of it as the trainer asks for it: TRAINING
+training               all of it as the trainer asks for it: PART
 fine_tuning/           afterwards: discriminators, features, real pairs: REFINING
 """
 
 from camkit.models_def.kinds.bayer.fine_tuning.refinement import REFINING
-from camkit.models_def.kinds.bayer.training import TRAINING
+from camkit.models_def.kinds.bayer.training import PART
 
-__all__ = ["REFINING", "TRAINING"]
+__all__ = ["PART", "REFINING"]

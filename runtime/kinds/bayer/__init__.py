@@ -12,7 +12,7 @@ from camkit.runtime.array_capture import capture_of_array
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.kind import Gains, RuntimePart
 from camkit.runtime.raw import read_capture
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate, write_capture
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate, write_capture
 
 
 def read(file: Path, mosaic: MosaicOptions | None, _manifest: Manifest | None) -> Capture:

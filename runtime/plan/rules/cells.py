@@ -19,7 +19,7 @@ from camkit.runtime.plan.decision import (
 from camkit.runtime.plan.estimate import tier_work_of
 from camkit.runtime.plan.loss import CellLosses, read_loss_model
 from camkit.runtime.plan.tiers import FloatGrid, choose_tiers
-from camkit.runtime.plan.ways import known_planes, known_stand_in
+from camkit.runtime.plan.ways import known_stand_in
 
 ORDER: Final = 20
 
@@ -38,7 +38,7 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     if case.loss_db <= 0:
         return work, Decision(what="cells", choice="all full", reason="no loss may be spent")
     manifest = case.bundle.manifest
-    if not all(known_stand_in(s, known_planes(manifest)) for s in manifest.stages_of(Network)):
+    if not all(known_stand_in(s, manifest.all_planes) for s in manifest.stages_of(Network)):
         reason = "no plane stands in where the network does not run"
         return work, Decision(what="cells", choice="all full", reason=reason)
     losses = model.predict(case.scene)

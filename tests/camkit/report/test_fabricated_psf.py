@@ -11,7 +11,7 @@ from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.report import fabricated_psf as fabricated
 from camkit.report.fabricated_psf import fabricated_psf, lens_text
-from tests.bundle_factory import tiny_camera, tiny_manifest, tiny_members, tiny_psf
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, tiny_sensor
 
 LENS = (Path(__file__).resolve().parents[3] / "models_def/prescriptions/duet.toml").read_text()
 
@@ -24,8 +24,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
         "psf.safetensors": psf_to_bytes(tiny_psf()),
         "prescription.toml": LENS.encode(),
     }
-    camera = tiny_camera().model_copy(update={"width_px": 320, "height_px": 240})
-    write_bundle(path, tiny_manifest().model_copy(update={"camera": camera}), members)
+    write_bundle(path, tiny_manifest(sensor=tiny_sensor(320, 240)), members)
     return open_bundle(path)
 
 

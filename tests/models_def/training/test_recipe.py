@@ -122,16 +122,16 @@ def test_the_first_part_that_differs_is_named():
 
 
 def test_a_recipe_of_an_unknown_kind_is_refused():
-    with pytest.raises(UnsupportedError, match="no kind of camera 'toy'"):
-        to_recipe(TABLE)
+    with pytest.raises(UnsupportedError, match="no kind of camera 'nobody'"):
+        to_recipe(TABLE | {"kind": "nobody"})
 
 
 def test_what_a_kind_does_not_bring_is_said(monkeypatch):
     from camkit.models_def.kinds import bayer
 
-    monkeypatch.delattr(bayer, "TRAINING")
+    monkeypatch.delattr(bayer, "PART")
     monkeypatch.delattr(bayer, "REFINING")
-    with pytest.raises(UnsupportedError, match="cannot be trained"):
+    with pytest.raises(ContractError, match="must define PART"):
         training_kind("bayer")
     with pytest.raises(UnsupportedError, match="not fine-tuned"):
         refining_kind("bayer")

@@ -7,7 +7,12 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.material import BayerMaterial
-from camkit.models_def.training.checkpoint import load_network, read_checkpoint, write_checkpoint
+from camkit.models_def.training.checkpoint import (
+    load_network,
+    read_checkpoint,
+    recipe_of,
+    write_checkpoint,
+)
 from camkit.models_def.training.log import plot_logs, read_log
 from camkit.models_def.training.trainer import TrainOptions, train
 from tests.gaussian_bank import gaussian_bank
@@ -136,6 +141,18 @@ def test_damaged_checkpoints_are_refused(tmp_path, whole):
     torch.save({"format": 1, "step": 3}, path)
     with pytest.raises(ContractError, match="wrong entries"):
         read_checkpoint(path)
+
+
+def test_checkpoints_of_before_are_read_with_their_camera_and_without_a_role(tmp_path, whole):
+    """They carry their recipe as text, with the names of their day."""
+    table = torch.load(whole.checkpoint, weights_only=True)
+    del table["role"], table["lens_toml"]
+    table["recipe_toml"] = table["recipe_toml"].replace("[sensor", "[camera")
+    torch.save(table, tmp_path / "old.pt")
+    old, saved = read_checkpoint(tmp_path / "old.pt"), read_checkpoint(whole.checkpoint)
+    assert (old.role, old.lens_toml) == ("restore", "")
+    assert recipe_of(old) == recipe_of(saved)
+    assert load_network(old).state_dict().keys() == saved.average.keys()
 
 
 def test_interrupted_write_keeps_the_old_checkpoint(tmp_path, whole, monkeypatch):

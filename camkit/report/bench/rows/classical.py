@@ -1,21 +1,28 @@
-"""Classical methods on the blocks and PSFs of a bundle, tuned and padded by the runtime."""
+"""The methods of a bundle without networks, such as the classical ones on its blocks and PSFs."""
 
-from camkit.bundle.manifest import Wiener
+from typing import Final
+
 from camkit.report.bench.row_maker import RowMaker
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
+from camkit.runtime.plan.decision import DEVELOP, Work
+from camkit.runtime.plan.ways import offered_methods, planned
+from camkit.runtime.stage_finder import all_methods, stage_module
 
-METHODS = ("wiener", "rl", "admm-tv")
+METHODS: Final = tuple(m for m in all_methods() if m not in stage_module("network").METHODS)
 
 
 def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Trial], list[Skip]]:
     """Give every method once, on the first number of threads asked for."""
     if entrant.is_reference:
         return [], []
-    wanted = [m for m in METHODS if axes.methods is None or m in axes.methods]
-    if entrant.bundle.manifest.stage(Wiener) is None:
-        return [], [Skip(f"{entrant.label} {m}", "the bundle has no Wiener bank") for m in wanted]
+    manifest = entrant.bundle.manifest
+    offered = [
+        method
+        for method in offered_methods(manifest.stages, manifest.all_planes)
+        if method != DEVELOP and not planned(manifest.stages, Work(method=method)).networks
+    ]
     threads = ground.base_threads(axes)
-    return [
+    trials = [
         Trial(
             camera=entrant.camera,
             bundle=entrant.label,
@@ -25,8 +32,12 @@ def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Tria
             threads=threads,
             base_threads=threads,
         )
-        for method in wanted
-    ], []
+        for method in offered
+        if axes.methods is None or method in axes.methods
+    ]
+    lacking = [m for m in axes.methods or () if m in METHODS and m not in offered]
+    reason = "no stage of the bundle has this method"
+    return trials, [Skip(f"{entrant.label} {method}", reason) for method in lacking]
 
 
 ROWS = RowMaker(name="classical", methods=METHODS, trials=make_trials)

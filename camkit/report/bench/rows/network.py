@@ -1,5 +1,6 @@
 """The networks of a bundle: sizes, modes, precisions, providers, threads and tiles."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -16,14 +17,16 @@ from camkit.report.bench.trial import (
     Vary,
     spread_out,
 )
+from camkit.runtime.stage_finder import stage_module
 
+METHODS: Final[tuple[str, ...]] = stage_module("network").METHODS
 WHOLE_SHARE: Final = 0.7
 """Of the free memory that one window over the whole picture may take."""
 
 
 def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Trial], list[Skip]]:
     """Give all trials of a bundle; a reference gets its sizes in their base trial only."""
-    held = [size for size in KNOWN["sizes"] if size in entrant.bundle.manifest.networks]
+    held = list(entrant.bundle.manifest.sizes)
     sizes = [size for size in axes.sizes or held if size in held]
     skips = [
         Skip(f"{entrant.label} {size}", f"the bundle holds {', '.join(held) or 'no network'}")
@@ -35,7 +38,7 @@ def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Tria
     base_size = BASE_SIZE if BASE_SIZE in sizes else (*sizes, "")[0]
     trials = []
     for size in sizes:
-        facts = entrant.bundle.network_facts(size)
+        facts = _facts(entrant, size)
         for trial in _trials_of(entrant, size, axes, ground, vary=size == base_size):
             reason = _obstacle(trial, facts, ground)
             if reason is None:
@@ -48,8 +51,7 @@ def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Tria
 def _trials_of(
     entrant: Entrant, size: str, axes: Axes, ground: Ground, *, vary: bool
 ) -> list[Trial]:
-    facts = entrant.bundle.network_facts(size)
-    half = ("fp16",) if facts.fp16_member is not None else ()
+    half = ("fp16",) if _has_fp16(_facts(entrant, size)) else ()
     one = (1,) if ground.threads > 1 else ()
     varied = [
         Vary("mode", axes.modes or KNOWN["modes"], axes.modes is not None),
@@ -64,7 +66,7 @@ def _trials_of(
         bundle=entrant.label,
         path=entrant.bundle.path,
         maker=ROWS.name,
-        method="net",
+        method=METHODS[0],
         size=size,
         threads=threads,
         base_threads=threads,
@@ -72,11 +74,21 @@ def _trials_of(
     return list(spread_out(base, varied, vary=vary and axes.vary))
 
 
-def _obstacle(trial: Trial, facts: NetworkFacts, ground: Ground) -> str | None:
+def _facts(entrant: Entrant, size: str) -> list[NetworkFacts]:
+    """Give the facts of one size of every network of a bundle."""
+    networks = entrant.bundle.manifest.networks
+    return [entrant.bundle.network_facts(role, size) for role in networks]
+
+
+def _has_fp16(facts: Sequence[NetworkFacts]) -> bool:
+    return all(one.fp16_member is not None for one in facts)
+
+
+def _obstacle(trial: Trial, facts: Sequence[NetworkFacts], ground: Ground) -> str | None:
     """Say why a trial cannot be measured here; None if it can."""
-    if trial.dtype == "fp16" and facts.fp16_member is None:
+    if trial.dtype == "fp16" and not _has_fp16(facts):
         return "the bundle holds no fp16 graph of this size"
-    if trial.mode == "fast" and not facts.halo_error:
+    if trial.mode == "fast" and not all(one.halo_error for one in facts):
         return "the bundle holds no measured halo"
     if trial.threads > ground.threads:
         return f"this process may use {ground.threads} threads"
@@ -92,4 +104,4 @@ def _with_memory(trial: Trial, ground: Ground) -> Trial:
     return replace(trial, max_mem_bytes=max(int(WHOLE_SHARE * ground.free_bytes), 400_000_000))
 
 
-ROWS = RowMaker(name="network", methods=("net",), trials=make_trials)
+ROWS = RowMaker(name="network", methods=METHODS, trials=make_trials)

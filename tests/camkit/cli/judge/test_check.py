@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from camkit.cli.exit_code import ExitCode
-from camkit.runtime.check import LAYERS
+from camkit.runtime.proof.check import LAYERS
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "data" / "example-1.0.camkit"
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camkit.bundle.manifest import Manifest
+from camkit.bundle.manifest import Manifest, manifest_to_bytes, read_manifest
 from camkit.bundle.reader import open_bundle
 from camkit.cli.exit_code import ExitCode
 
@@ -87,14 +87,18 @@ def _object_faults(
     return found
 
 
-def test_the_schema_describes_the_example_of_format_1_0_and_nothing_more(camkit_command) -> None:
+def test_the_schema_describes_the_example_brought_up_to_date_and_nothing_more(
+    camkit_command,
+) -> None:
     schema = json.loads(camkit_command("info", "--schema").out)
     assert set(schema["properties"]) == set(Manifest.model_fields)
     with ZipFile(EXAMPLE) as archive:
-        manifest = json.loads(archive.read("manifest.json"))
+        old = archive.read("manifest.json")
+    manifest = json.loads(manifest_to_bytes(read_manifest(old)))
     assert _faults(manifest, schema, schema) == []
+    assert _faults(json.loads(old), schema, schema)
     assert _faults(manifest | {"surprise": 1}, schema, schema)
-    assert _faults(manifest | {"camera": {}}, schema, schema)
+    assert _faults(manifest | {"sensor": {"type": "film"}}, schema, schema)
     assert _faults(manifest | {"networks": {"XL": {}}}, schema, schema)
 
 

@@ -78,7 +78,7 @@ def test_a_failed_file_is_told_on_stderr(captures, camkit_command) -> None:
         (["--max-mem", "much"], "memory"),
         (["--max-mem", "1k"], "at least"),
         (["--assume", "nothing"], "centre, scale"),
-        (["--size", "XL"], "S, M, L"),
+        (["--size", "XL"], "holds size(s) M; asked for XL"),
         (["--size", "S"], "holds size"),
         (["--method", "magic"], "admm-tv"),
         (["--mode", "slow"], "exact"),

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from camkit.bundle.golden import GoldenArrays, golden_to_bytes
+from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
@@ -26,7 +26,7 @@ from camkit.report.bench.known_captures import golden_captures, picture_captures
 from camkit.report.bench.metric import registered_metrics
 from camkit.report.bench.trial import Trial
 from camkit.report.quality import Shot, judge
-from tests.bundle_factory import tiny_manifest, tiny_members
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_sensor
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
 from tools.comparison.photograph import bundle_restorer, finish_planes, photograph
@@ -123,18 +123,19 @@ def test_golden_cases_are_judged_against_their_stored_truth(tmp_path: Path) -> N
         GoldenCase(name="large", iso=100, origin_px=(8, 6)),
         GoldenCase(name="small", iso=100),
     )
-    camera = tiny_manifest().camera.model_copy(update={"width_px": 320, "height_px": 240})
     members = tiny_members() | {
         "golden.safetensors": golden_to_bytes({"large": arrays, "small": small})
     }
     path = tmp_path / "g.camkit"
-    manifest = tiny_manifest().model_copy(update={"camera": camera, "golden": cases})
+    manifest = tiny_manifest(sensor=tiny_sensor(320, 240), golden=cases)
     write_bundle(path, manifest, members)
     bundle = open_bundle(path)
     (known,) = golden_captures(bundle)
     assert (known.picture, known.origin_px, known.undistort) == ("large", (8, 6), True)
-    np.testing.assert_allclose(decode_srgb(known.sharp), arrays.reference, atol=1e-5)
-    assert Restorers(bundle, threads=1).restore(None, known).shape == (3, 96, 128)
+    stored = arrays.reference.astype(np.float16).astype(np.float32)  # as bundles store it
+    np.testing.assert_allclose(decode_srgb(known.truths[IMAGE]), stored, atol=1e-5)
+    restored = Restorers(bundle, threads=1).restore(None, known)
+    assert restored[IMAGE].shape == (3, 96, 128)
 
 
 def test_a_picture_too_small_to_be_judged_is_refused(bundle: Bundle, tmp_path: Path) -> None:

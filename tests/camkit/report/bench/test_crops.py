@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.bundle.golden import IMAGE
 from camkit.colorimetry import decode_srgb, encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.bench.accuracy import INPUT
@@ -35,7 +36,7 @@ def make_capture(sharp: FloatArray, name: str = "a") -> KnownCapture:
         white_balance=None,
         origin_px=(0, 0),
         undistort=False,
-        sharp=sharp,
+        truths={IMAGE: sharp},
     )
 
 

@@ -9,10 +9,11 @@ import pytest
 from camkit.bundle.facts import HaloError
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, UnsupportedError
-from camkit.report.bench.discovery import discover
+from camkit.report.bench.line_up import make_trials
 from camkit.report.bench.metric import registered_metrics
-from camkit.report.bench.row_maker import make_trials, row_makers
+from camkit.report.bench.row_maker import row_makers
 from camkit.report.bench.trial import Axes, Entrant, Ground
+from camkit.report.discovery import discover
 from tests.wide_bundle import write_wide_bundle
 
 GROUND = Ground(threads=2, providers=("cpu",), free_bytes=10**10)
@@ -73,10 +74,10 @@ def test_more_threads_than_there_are_make_no_row(bundle: Bundle) -> None:
 
 
 def test_a_measured_halo_and_a_second_provider_make_their_rows(bundle: Bundle) -> None:
-    facts = bundle.network_facts("M").model_copy(
+    facts = bundle.network_facts("restore", "M").model_copy(
         update={"halo_error": (HaloError(halo_px=2, max_abs=0.0, psnr_db=None),)}
     )
-    manifest = bundle.manifest.model_copy(update={"networks": {"M": facts}})
+    manifest = bundle.manifest.model_copy(update={"networks": {"restore": {"M": facts}}})
     ground = replace(GROUND, providers=("cpu", "cuda"), threads=1)
     made, skips = labels(replace(bundle, manifest=manifest), Axes(methods=("net",)), ground)
     assert made == ["M", "M fast", "M whole", "M cuda"]

@@ -59,7 +59,6 @@ def test_axes_asked_for_are_multiplied_and_others_varied_one_at_a_time() -> None
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("sizes", ("XL",)),
         ("modes", ("slow",)),
         ("dtypes", ("int8",)),
         ("providers", ("abacus",)),

@@ -15,8 +15,8 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 
 @pytest.fixture(scope="session")
-def scene() -> Scene:
-    return stress_scenes(1, (320, 240))[0]
+def scene(bundle: Bundle) -> Scene:
+    return stress_scenes(bundle, 1)[0]
 
 
 @pytest.fixture(scope="session")

@@ -9,14 +9,14 @@ from camkit.bundle.reader import Bundle
 from camkit.report.stress.consistency import Scale, calibrate, judged_pixels, near, residual
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, photograph
 from camkit.runtime.geometry.illumination import illumination_band
+from camkit.runtime.twin.exposure import Setting
 
 
 @pytest.fixture
 def truth(bundle: Bundle, scene: Scene, judge: Judge):
     light = judge.rig.light(scene)
-    shot = photograph(light, bundle.manifest.camera, Setting(iso=400))
+    shot = judge.rig.record(scene, light, Setting(iso=400))
     shade = illumination_band(bundle.psf, light.window, 0, light.clean.shape[1])
     return shot, light.clean * shade
 
@@ -29,7 +29,7 @@ def test_the_truth_explains_its_capture_at_any_noise(
     kernel = judge.rig.lens.kernels_at(0.3, 0.2)
     lens = replace(judge.rig.lens, kernels_at=lambda *_: kernel)
     light = judge.rig.light(scene, lens)
-    shot = photograph(light, bundle.manifest.camera, Setting(iso=iso))
+    shot = judge.rig.record(scene, light, Setting(iso=iso))
     shade = illumination_band(bundle.psf, light.window, 0, light.clean.shape[1])
     found = residual(light.clean * shade, shot, lens)
     assert found is not None
@@ -76,7 +76,7 @@ def test_where_contrast_cannot_explain_the_nominal_it_is_the_unit(truth, judge: 
 
 def test_what_clipped_is_not_judged(bundle: Bundle, scene: Scene, judge: Judge) -> None:
     light = judge.rig.light(scene)
-    bright = photograph(light, bundle.manifest.camera, Setting(exposure=1000.0))
+    bright = judge.rig.record(scene, light, Setting(exposure=1000.0))
     assert judged_pixels(bright).mean() < 0.1
     assert residual(light.clean, bright, judge.rig.lens) is None
 

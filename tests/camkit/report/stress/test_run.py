@@ -16,8 +16,9 @@ from camkit.report.stress.curve import curve_of
 from camkit.report.stress.measured_ranges import OPEN_HIGH, OPEN_LOW, measured_ranges
 from camkit.report.stress.run import StressOptions, run_stress, write_envelope
 from camkit.report.stress.scenario import Scenario, choose
-from camkit.report.stress.score import Judge, Outcome, Verdict
+from camkit.report.stress.score import Judge
 from camkit.report.stress.sweep import Point, read_points
+from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from tests.wide_bundle import write_wide_bundle
@@ -80,8 +81,8 @@ def test_networks_of_another_bundle_are_shown_beside(folder: Path) -> None:
     options = StressOptions(scenarios=choose("fp16_range,bit_depth"), scenes=1, quick=True)
     row = run_stress(bundle, options, before=bundle).rows[1]
     assert row["psnr_db"]["M"] == row["psnr_db"]["M before"]
-    other = bundle.manifest.camera.model_copy(update={"full_well_e": 1.0})
-    stranger = replace(bundle, manifest=bundle.manifest.model_copy(update={"camera": other}))
+    other = bundle.manifest.sensor.model_copy(update={"full_well_e": 1.0})
+    stranger = replace(bundle, manifest=bundle.manifest.model_copy(update={"sensor": other}))
     with pytest.raises(ContractError, match="one camera"):
         run_stress(bundle, options, before=stranger)
 
@@ -153,7 +154,7 @@ def _curve(scenario: Scenario, gains: tuple[float | None, ...], scale: float):
         for value, gain in zip(scenario.values, gains, strict=True)
         for j in range(2)
     ]
-    return curve_of(scenario, points)
+    return curve_of(scenario, points, ("input", "wiener"))
 
 
 def test_ranges_end_where_a_method_broke_or_testing_ended() -> None:

@@ -5,7 +5,8 @@ from dataclasses import replace
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Shot, crop_light
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.light import crop_light
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
@@ -13,7 +14,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     height = round(value)
     width = min(height + height // 2, scene.size_px[0]) | 1 if height < 400 else scene.size_px[0]
     light = crop_light(rig.light(scene), (width, min(height, scene.size_px[1])))
-    shot = rig.record(light)
+    shot = rig.record(scene, light)
     return replace(shot, border_px=0)
 
 

@@ -7,8 +7,9 @@ import numpy as np
 from camkit.contracts import FloatArray
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge, Verdict, see
-from camkit.report.stress.twin import Shot
+from camkit.report.stress.score import Judge, see
+from camkit.report.stress.shot import Shot
+from camkit.report.stress.verdict import Verdict
 
 MOST_MTF = 1.1
 """Contrast above the scene's own is invented."""
@@ -21,10 +22,9 @@ def grating(scene: Scene, cycles_per_px: float) -> Scene:
     height, width = scene.linear.shape[1:]
     angle = np.pi * (scene.number % 8) / 8
     y, x = np.mgrid[:height, :width]
-    phase = 2 * np.pi * cycles_per_px * (np.cos(angle) * x + np.sin(angle) * y)
+    phase = 2 * np.pi * cycles_per_px / scene.scale * (np.cos(angle) * x + np.sin(angle) * y)
     wave = (MEAN * (1 + CONTRAST * np.sin(phase))).astype(np.float32)
-    name = f"grating/{cycles_per_px:g}/{scene.name}"
-    return Scene(name=name, number=scene.number, linear=np.stack([wave] * 3))
+    return scene.showing(np.stack([wave] * 3), f"grating/{cycles_per_px:g}/{scene.name}")
 
 
 def modulation(plane: FloatArray, truth: FloatArray) -> float:
@@ -37,9 +37,7 @@ def modulation(plane: FloatArray, truth: FloatArray) -> float:
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
-    chart = grating(scene, value)
-    light = replace(rig.light(chart, rig.lens), scene=scene)
-    return rig.record(light)
+    return rig.record(scene, rig.light(grating(scene, value), rig.lens))
 
 
 def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:
@@ -47,7 +45,8 @@ def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:
     restored = rig.restore(shot)
     outcomes = judge.judge(shot, restored, with_chi2=False)
     for method, planes in restored.planes.items():
-        mtf = modulation(planes[1], shot.light.clean[1])
+        middle = len(planes) // 2
+        mtf = modulation(planes[middle], shot.light.clean[middle])
         fault = f"MTF {mtf:.2f}: contrast that is not in the scene" if mtf > MOST_MTF else None
         outcomes[method] = replace(
             outcomes[method], fault=outcomes[method].fault or fault, extra={"mtf": mtf}

@@ -4,33 +4,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from camkit.report.stress.rig import Rig
-from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scenario import Scenario, has_networks
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge, Verdict
-from camkit.report.stress.twin import Shot
+from camkit.report.stress.score import Judge
+from camkit.report.stress.verdict import Verdict
 
 WHOLE = 1024.0
 
 
-def _shot(rig: Rig, scene: Scene) -> Shot:
-    return rig.shoot(scene)
-
-
 def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:
     rig = judge.rig
-    shot = _shot(rig, scene)
-    verdict, restored = judge.score(shot), rig.restore(shot)
+    shot = rig.shoot(scene)
+    verdict, whole = judge.score(shot), rig.restore(shot).pictures
+    if value >= WHOLE:
+        return verdict
     outcomes = dict(verdict.outcomes)
-    planes, _, noise = rig.front(shot.capture)
-    for network in rig.networks:
-        whole = restored.planes.get(network.name)
-        if whole is None or value >= WHOLE:
+    tiled = rig.choosing(tile_px=round(value)).restore(shot).pictures
+    for name in (method.name for method in rig.networks):
+        if name not in whole or name not in tiled:
             continue
-        tiled = network.run(planes, restored.planes["wiener"], noise, tile_px=round(value))
-        seam = float(np.abs(tiled - whole).max())
-        outcomes[network.name] = replace(
-            outcomes[network.name],
+        seam = float(np.abs(tiled[name] - whole[name]).max())
+        outcomes[name] = replace(
+            outcomes[name],
             fault=f"a seam of {seam:.3g}" if seam > 0 else None,
             extra={"seam_max_abs": seam},
         )
@@ -46,6 +41,7 @@ SCENARIO = Scenario(
     nominal=WHOLE,
     quick=(160.0, WHOLE),
     measure=_measure,
+    applies=has_networks,
     log=True,
     note="1024 is the untiled picture; any difference between tiled and whole is a break.",
 )

@@ -1,9 +1,10 @@
 """A decentred lens: its axis meets the sensor beside the middle."""
 
-from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scenario import Scenario, varies_over_field
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Shot, with_axis_moved
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.light import with_axis_moved
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
@@ -21,5 +22,6 @@ SCENARIO = Scenario(
     nominal=0.0,
     quick=(0.0, 1.0),
     shoot=_shoot,
+    applies=varies_over_field,
     note="The PSFs move, distortion and illumination stay.",
 )

@@ -10,8 +10,10 @@ from camkit.contracts import FloatArray, FrozenPsf
 from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Lens, Shot
-from camkit.runtime.bank.psf import color_kernels, kernel_at
+from camkit.report.stress.shot import Shot
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.twin.light import Lens
+from camkit.runtime.twin.truth import light_sensor
 from camkit.units import MM_PER_M, to_mm
 
 FOCUS_WITHIN_PER_M = 0.01
@@ -21,6 +23,8 @@ def _applies(bundle: Bundle) -> str | None:
     psf = bundle.stress_psf()
     if psf is None:
         return "it holds no stress_psf.safetensors"
+    if psf.symmetry != "radial":
+        return "its stress PSF is not that of a lens of revolution"
     if psf.depths_mm.size < 2 or _off_focus_per_m(bundle, psf).min() > FOCUS_WITHIN_PER_M:
         return "its stress PSF does not hold its focus and something beside it"
     return photographs(bundle)
@@ -53,10 +57,10 @@ def _at_known_field(scene: Scene, bundle: Bundle) -> tuple[Scene, float]:
     Returns:
         The scene and the height of that field in millimetres.
     """
-    psf, camera = bundle.stress_psf(), bundle.manifest.camera
+    psf, sensor = bundle.stress_psf(), bundle.manifest.sensor
     assert psf is not None
-    free_px = np.hypot(camera.width_px - scene.size_px[0], camera.height_px - scene.size_px[1])
-    reach_mm = max(to_mm(camera.pixel_pitch_um) * float(free_px) / 2, 1e-9)
+    free_px = np.hypot(sensor.width_px - scene.size_px[0], sensor.height_px - scene.size_px[1])
+    reach_mm = max(to_mm(sensor.pixel_pitch_um) * float(free_px) / 2, 1e-9)
     within = psf.field_heights_mm[psf.field_heights_mm <= reach_mm]
     height_mm = float(within[scene.number % within.size])
     return replace(scene, share=height_mm / reach_mm), height_mm
@@ -66,22 +70,23 @@ def _lens_at(bundle: Bundle, inverse_m: float, height_mm: float) -> Lens:
     """Give the lens for one object distance, with the kernels of one field all around it."""
     psf = bundle.stress_psf()
     assert psf is not None
-    response = bundle.manifest.camera.channel_response.to_arrays()
+    response = light_sensor(bundle.manifest).response_arrays()
     depth_mm = MM_PER_M / inverse_m if inverse_m else np.inf
     within_mm = float(np.clip(depth_mm, psf.depths_mm[0], psf.depths_mm[-1]))  # inverse was rounded
     kernels = color_kernels(psf, *response, depth_mm=within_mm)
 
     def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
         scale = height_mm / max(np.hypot(x_mm, y_mm), 1e-9)
-        return kernel_at(kernels, psf.field_heights_mm, scale * x_mm, scale * y_mm)
+        return kernels.at(scale * x_mm, scale * y_mm)
 
-    return Lens(psf=bundle.psf, kernels_at=kernels_at, margin_px=kernels.shape[-1] // 2)
+    margin_px = max(kernels.kernels.shape[-2:]) // 2
+    return Lens(psf=bundle.psf, kernels_at=kernels_at, margin_px=margin_px)
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     placed, height_mm = _at_known_field(scene, rig.bundle)
-    return rig.record(rig.light(placed, _lens_at(rig.bundle, value, height_mm)))
+    return rig.shoot(placed, _lens_at(rig.bundle, value, height_mm))
 
 
 SCENARIO = Scenario(

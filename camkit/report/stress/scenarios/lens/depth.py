@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from camkit.bundle.reader import PSF, Bundle
+from camkit.bundle.reader import Bundle
 from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Shot, lens_at
+from camkit.report.stress.shot import Shot
 from camkit.units import MM_PER_M
 
 FAR_M = 1000.0
@@ -14,7 +14,7 @@ FAR_M = 1000.0
 
 
 def _applies(bundle: Bundle) -> str | None:
-    if PSF not in bundle.names or bundle.psf.depths_mm.size < 2:
+    if bundle.manifest.optics is None or bundle.psf.depths_mm.size < 2:
         return "its PSF knows no several depths"
     return photographs(bundle)
 
@@ -31,7 +31,7 @@ def depths_of(bundle: Bundle) -> Scenario:
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
-    return rig.shoot(scene, lens_at(rig.bundle, value * MM_PER_M))
+    return rig.shoot(scene, rig.lens_at(value * MM_PER_M))
 
 
 SCENARIO = Scenario(

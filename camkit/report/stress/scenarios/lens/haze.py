@@ -6,16 +6,19 @@ from camkit.contracts import FloatArray
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Shot, with_kernels
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.light import with_kernels
 
 HAZE_SIGMA_PX = 15.0
 
 
 def add_haze(kernels: FloatArray, share: float) -> FloatArray:
-    """Give (c, k, k) kernels that lose a share of their light to a Gaussian haze."""
-    half = kernels.shape[-1] // 2
-    line = np.exp(-0.5 * (np.arange(-half, half + 1) / HAZE_SIGMA_PX) ** 2)
-    haze = np.outer(line, line) / line.sum() ** 2
+    """Give (c, h, w) kernels that lose a share of their light to a Gaussian haze."""
+    down, across = (
+        np.exp(-0.5 * (np.arange(-(side // 2), side // 2 + 1) / HAZE_SIGMA_PX) ** 2)
+        for side in kernels.shape[-2:]
+    )
+    haze = np.outer(down, across) / (down.sum() * across.sum())
     return np.asarray((1 - share) * kernels + share * haze, dtype=np.float32)
 
 

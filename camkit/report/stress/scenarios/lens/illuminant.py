@@ -6,17 +6,25 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.reader import Bundle
 from camkit.report.stress.rig import Rig
-from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Lens, Shot
-from camkit.runtime.bank.psf import color_kernels, kernel_at
+from camkit.report.stress.shot import Shot
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.twin.light import Lens
 
 Spectrum = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 SECOND_RADIATION_UM_K = 14387.77
 """hc / k (CODATA 2018)."""
 GRID_UM = np.linspace(0.40, 0.70, 301)
+
+
+def _applies(bundle: Bundle) -> str | None:
+    if bundle.manifest.optics is not None and bundle.psf.wavelengths_um.size < 2:
+        return "its PSF knows one wavelength"
+    return photographs(bundle)
 
 
 def planck(kelvin: float) -> Spectrum:
@@ -56,26 +64,23 @@ LIGHTS: dict[str, Spectrum] = {
 
 def lens_under(rig: Rig, spectrum: Spectrum) -> Lens:
     """Give the lens and white balance under a light, the frozen response being that at 1."""
-    wavelengths_um, response = rig.bundle.manifest.camera.channel_response.to_arrays()
+    wavelengths_um, response = rig.sensor.response_arrays()
     fine = np.stack([np.interp(GRID_UM, wavelengths_um, r, 0, 0) for r in response])
     lit = fine * spectrum(GRID_UM)
     kernels = color_kernels(rig.bundle.psf, GRID_UM, lit, depth_mm=rig.bundle.reference_depth_mm)
-    heights_mm = rig.bundle.psf.field_heights_mm
-    red, green, blue = fine.sum(axis=1) / lit.sum(axis=1)
+    gains = fine.sum(axis=1) / lit.sum(axis=1)
+    middle = gains[gains.size // 2]
     return replace(
-        rig.lens,
-        kernels_at=lambda x, y: kernel_at(kernels, heights_mm, x, y),
-        gains=(float(red / green), 1.0, float(blue / green)),
+        rig.lens, kernels_at=kernels.at, gains=tuple(float(gain / middle) for gain in gains)
     )
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     lens = lens_under(rig, list(LIGHTS.values())[round(value)])
-    r, g, b = rig.light(scene).gains
-    red, _, blue = lens.gains or (1.0, 1.0, 1.0)
-    light = rig.light(scene, replace(lens, gains=(r * red, g, b * blue)))
-    return rig.record(light)
+    usual = rig.light(scene).gains
+    gains = tuple(a * b for a, b in zip(usual, lens.gains or usual, strict=True))
+    return rig.shoot(scene, replace(lens, gains=gains))
 
 
 SCENARIO = Scenario(
@@ -87,6 +92,7 @@ SCENARIO = Scenario(
     nominal=0.0,
     quick=(0.0, 6.0),
     shoot=_shoot,
+    applies=_applies,
     labels=tuple(LIGHTS),
     note="Kernels and white balance change, the colours of the scene stay: colour errors of the "
     "matrix are another matter. The lights have no order; a break point names the first.",

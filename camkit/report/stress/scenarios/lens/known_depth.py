@@ -6,9 +6,16 @@ from camkit.bundle.reader import Bundle
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scenarios.lens import depth
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge, Verdict, see
-from camkit.report.stress.twin import lens_at
+from camkit.report.stress.score import Judge, see
+from camkit.report.stress.verdict import Verdict
+from camkit.runtime.job.choices import known_options
 from camkit.units import MM_PER_M
+
+
+def _applies(bundle: Bundle) -> str | None:
+    if "depth_m" not in known_options(bundle.manifest.stages):
+        return "no stage of it asks for a depth"
+    return depth.SCENARIO.applies(bundle)
 
 
 def depths_of(bundle: Bundle) -> Scenario:
@@ -18,9 +25,9 @@ def depths_of(bundle: Bundle) -> Scenario:
 
 
 def _measure(judge: Judge, scene: Scene, value: float) -> Verdict:
-    rig, depth_mm = judge.rig, value * MM_PER_M
-    shot = rig.shoot(scene, lens_at(rig.bundle, depth_mm))
-    restored = rig.told(depth_mm).restore(shot)
+    rig = judge.rig
+    shot = rig.shoot(scene, rig.lens_at(value * MM_PER_M))
+    restored = rig.choosing(depth_m=value).restore(shot)
     return Verdict(outcomes=judge.judge(shot, restored, with_chi2=False), seen=see(rig, shot))
 
 
@@ -30,6 +37,7 @@ SCENARIO = replace(
     title="Depth of the scene, known",
     shoot=None,
     measure=_measure,
+    applies=_applies,
     fit=depths_of,
     note="The whole scene lies at one depth, and the methods have the kernels of it. chi^2 is not "
     "judged: it would be calibrated at every depth anew. 1000 m stands for infinity.",

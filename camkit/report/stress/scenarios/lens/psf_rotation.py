@@ -2,14 +2,12 @@
 
 import numpy as np
 
+from camkit.report.stress.kernel_change import transform_kernels
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import (
-    Shot,
-    transform_kernels,
-    with_kernels,
-)
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.light import with_kernels
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:

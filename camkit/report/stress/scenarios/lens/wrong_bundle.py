@@ -3,15 +3,16 @@
 import numpy as np
 
 from camkit.contracts import FloatArray
-from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scenario import Scenario, varies_over_field
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Lens, Shot
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.light import Lens
 
 
 def other_lens(lens: Lens, share: float) -> Lens:
     """Give a lens that does in the middle what this one does in the corner, by a share."""
-    corner_mm = float(lens.psf.field_heights_mm[-1])
+    corner_mm = float(lens.psf.field_heights_mm.max())
 
     def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
         height_mm = float(np.hypot(x_mm, y_mm))
@@ -38,6 +39,7 @@ SCENARIO = Scenario(
     nominal=0.0,
     quick=(0.0, 100.0),
     shoot=_shoot,
+    applies=varies_over_field,
     note="The other lens does in the middle what this one does in the corner, turned by 180 "
     "degrees; below 100 % light goes both ways.",
 )

@@ -6,13 +6,12 @@ from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scenarios.sensor.saturated_area import with_discs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Shot
+from camkit.report.stress.shot import Shot
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
-    light = replace(rig.light(with_discs(scene, value, 1), rig.lens), scene=scene)
-    shot = rig.record(light)
+    shot = rig.record(scene, rig.light(with_discs(scene, value, 1), rig.lens))
     return replace(shot, away_from_clipped=True)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Shot, spoil
+from camkit.report.stress.shot import Shot, spoil
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:

@@ -5,7 +5,8 @@ import numpy as np
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.exposure import Setting
 
 COLOUR = (0.9, 0.5, 0.4)
 
@@ -13,7 +14,7 @@ COLOUR = (0.9, 0.5, 0.4)
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     field = np.ones_like(scene.linear) * np.array(COLOUR, np.float32)[:, None, None]
-    flat = Scene(name=f"flat/{scene.name}", number=scene.number, linear=field)
+    flat = scene.showing(field, f"flat/{scene.name}")
     setting = Setting(exposure=2.0**value)
     return rig.shoot(flat, setting=setting)
 

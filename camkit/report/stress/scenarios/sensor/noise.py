@@ -3,7 +3,8 @@
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
-from camkit.report.stress.twin import Setting, Shot
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.exposure import Setting
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:

@@ -14,8 +14,8 @@ from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.raw import read_capture
-from camkit.runtime.simulate import Simulation, SimulationOptions, simulate, write_capture
 from camkit.runtime.twin.exposure import sample_mosaic
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate, write_capture
 from tests.bundle_factory import tiny_sensor
 from tests.camera_factory import delta_psf, make_psf, make_sensor, whole_window
 from tests.deep_bundle import deep_psf

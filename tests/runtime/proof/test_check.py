@@ -18,8 +18,8 @@ from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.check import LAYERS, CheckReport, check_bundle
-from camkit.runtime.golden_run import case_work
+from camkit.runtime.proof.check import LAYERS, CheckReport, check_bundle
+from camkit.runtime.proof.golden_run import case_work
 from tests.bundle_factory import (
     make_model,
     make_weight,
@@ -288,7 +288,7 @@ def test_network_that_sees_all_is_not_promised_to_tile(tmp_path: Path) -> None:
 
 def test_tiled_and_whole_that_differ_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # A halo one stride too short, as a wrong walk would give it.
-    from camkit.runtime import proofs
+    from camkit.runtime.proof import layers as proofs
 
     real = proofs.plan_windows
 
@@ -304,8 +304,8 @@ def test_tiled_and_whole_that_differ_fail(tmp_path: Path, monkeypatch: pytest.Mo
 def test_probe_that_reaches_further_than_stated_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from camkit.runtime import proofs
     from camkit.runtime.network.probe import ProbedReach
+    from camkit.runtime.proof import layers as proofs
 
     far = ProbedReach(radius_px=9, halo_px=9)
     monkeypatch.setattr(proofs, "perturbation_reach", lambda *_, **__: far)

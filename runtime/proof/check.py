@@ -23,7 +23,7 @@ from camkit.bundle.reader import Bundle, open_bundle, read_container_manifest
 from camkit.contracts import depth_name
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.network.graph import check_graph
-from camkit.runtime.proofs import GoldenRun, prove_golden, prove_range, prove_tiling
+from camkit.runtime.proof.layers import GoldenRun, prove_golden, prove_range, prove_tiling
 
 LAYERS: Final = ("schema", "hash", "graph", "golden", "tiling", "range")
 Status = Literal["pass", "fail", "skip"]

@@ -32,6 +32,7 @@ class SimulationOptions:
         seed: Seed of the noise; the same seed gives the same capture.
         origin_px: (x, y) of the picture on the sensor, both even on a mosaic; None centres it.
         exposure: Factor on the scene.
+        scale: Samples of the scene along a side of a pixel, see `LightOptions`.
         depth_mm: Object distance; may only be left out where the PSF has one depth.
         distort: Apply the radial distortion.
         vignette: Apply the relative illumination.
@@ -43,6 +44,7 @@ class SimulationOptions:
     seed: int = 0
     origin_px: tuple[int, int] | None = None
     exposure: float = 1.0
+    scale: int = 1
     depth_mm: float | None = None
     distort: bool = True
     vignette: bool = True
@@ -59,8 +61,8 @@ class Simulation:
 
     Attributes:
         samples: (h, w) mosaic or (c, h, w) planes, uint16 DN, black level included.
-        clean: (c, h, w) float32 in sensor geometry, white-balanced camera space, without blur,
-            vignetting, noise and clipping.
+        clean: (c, s h, s w) float32 in sensor geometry, white-balanced camera space, without blur,
+            vignetting, noise and clipping, with the `scale` s of the scene.
         white_balance: Gains of the scene light, one per channel, G = 1.
         window: Where the picture lies on the sensor.
         iso: Sensitivity.
@@ -81,8 +83,9 @@ def simulate(
     """Photograph a scene with a camera that exists as data only.
 
     Args:
-        scene: (3, h, w) float32 linear Rec.709 in ideal geometry, >= 0, 1.0 = white; may exceed 1.
-            At most as large as the sensor; a smaller one is a crop of it.
+        scene: (3, s h, s w) float32 linear Rec.709 in ideal geometry, >= 0, 1.0 = white; may
+            exceed 1; s is the `scale` of the options. At most as large as the sensor; a smaller one
+            is a crop of it.
         sensor: Of the bundle: a mosaic, or planes.
         psf: Frozen PSF of the optics.
         options: Sensitivity, seed, placement and which effects to apply.
@@ -94,7 +97,7 @@ def simulate(
     """
     if isinstance(sensor, SpadSensor):
         raise UnsupportedError("this twin has no sensor that counts photons")
-    window = scene_window(scene, sensor, options.origin_px)
+    window = scene_window(scene, sensor, options.origin_px, scale=options.scale)
     light = light_of(
         scene,
         sensor,
@@ -102,6 +105,7 @@ def simulate(
         window,
         LightOptions(
             exposure=options.exposure,
+            scale=options.scale,
             distort=options.distort,
             vignette=options.vignette,
             workers=options.workers,

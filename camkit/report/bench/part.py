@@ -1,0 +1,25 @@
+"""What `camkit bench` asks of a kind of camera."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from camkit.bundle.reader import Bundle
+from camkit.contracts import FloatArray, FrozenPsf
+from camkit.report.bench.metric import Metric
+from camkit.report.bench.row_maker import RowMaker
+from camkit.report.quality import Exposed, Shot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchPart:
+    """A kind of camera in the bench.
+
+    Attributes:
+        photograph: (place and noise, sharp picture (3, h, w), bundle, lens) -> capture and truth.
+        rows: Row makers of its own; one called as a common maker stands in its place.
+        metrics: Of its own, beside the common ones; the kind names those that count.
+    """
+
+    photograph: Callable[[Shot, FloatArray, Bundle, FrozenPsf], Exposed]
+    rows: tuple[RowMaker, ...] = ()
+    metrics: tuple[Metric, ...] = ()

@@ -1,0 +1,23 @@
+"""What reports know of a kind of camera.
+
+A kind's part of the reports (`camkit.report.kinds.NAME`, or the `report` of its own package)
+defines `PART`, a `ReportPart`. The tools find it by `camkit.report.kind_finder`.
+"""
+
+from dataclasses import dataclass
+
+from camkit.report.bench.part import BenchPart
+from camkit.report.stress.part import StressPart
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportPart:
+    """A kind of camera in reports.
+
+    Attributes:
+        bench: For `camkit bench`: captures with a known truth, rows and metrics of its own.
+        stress: For `camkit stress`: scenes, how captures are judged, scenarios of its own.
+    """
+
+    bench: BenchPart
+    stress: StressPart

@@ -1,0 +1,35 @@
+"""Where reports find what they ask of a kind of camera, without knowing any."""
+
+from typing import TypeVar
+
+from camkit.bundle.manifest import Manifest
+from camkit.errors import ContractError
+from camkit.kinds import find_kind
+
+_T = TypeVar("_T")
+
+
+def find_part(kind: str, tool: str, expected: type[_T]) -> _T:
+    """Give what one tool asks of a kind: a field of the `ReportPart` called PART of its module.
+
+    Args:
+        kind: Name of the kind.
+        tool: Name of the field.
+        expected: Type of the field.
+
+    Raises:
+        UnsupportedError: If there is no such kind, or reports know nothing of it.
+        ContractError: If its module defines no such part.
+    """
+    module = find_kind(kind).part("report")
+    part = getattr(getattr(module, "PART", None), tool, None)
+    if not isinstance(part, expected):
+        raise ContractError(
+            f"{module.__name__} must define PART as a ReportPart with a {expected.__name__}"
+        )
+    return part
+
+
+def camera_of(manifest: Manifest) -> tuple[object, ...]:
+    """Give what two bundles of one camera have in common."""
+    return manifest.kind, manifest.sensor

@@ -1,0 +1,26 @@
+"""What `camkit stress` asks of a kind of camera."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from camkit.bundle.reader import Bundle
+from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.verdict import Examiner
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StressPart:
+    """A kind of camera under stress.
+
+    Attributes:
+        scenes: (bundle, how many, folder of pictures or None) -> what is photographed, named.
+        examiner: (bundle, sizes of its networks, another bundle to compare with or None) -> what
+            restores captures and judges what came out.
+        scenarios: Of its own, beside those that serve every camera.
+    """
+
+    scenes: Callable[[Bundle, int, Path | None], tuple[Any, ...]]
+    examiner: Callable[[Bundle, tuple[str, ...], Bundle | None], Examiner]
+    scenarios: tuple[Scenario, ...] = ()

@@ -1,0 +1,1 @@
+"""A bundle proves what it says about itself."""

@@ -1,0 +1,90 @@
+"""What a perfect camera would have shown: the truth beside a capture, as a bundle's picture is.
+
+clean planes of the twin -> ideal geometry, if the picture has it -> linear Rec.709
+"""
+
+import numpy as np
+
+from camkit.bundle.golden import IMAGE
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.reader import Bundle
+from camkit.bundle.sensor import RGB, ColorSensor, SpadSensor
+from camkit.colorimetry import apply_matrix, rec709_from_camera
+from camkit.contracts import FloatArray
+from camkit.errors import UnsupportedError
+from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.rows import ArrayRows
+from camkit.runtime.twin.simulate import Simulation
+
+
+def light_sensor(manifest: Manifest) -> ColorSensor:
+    """Give the sensor of a camera that the twin can photograph with.
+
+    Raises:
+        UnsupportedError: If it counts photons.
+    """
+    if isinstance(manifest.sensor, SpadSensor):
+        raise UnsupportedError(f"bundle {manifest.name} counts photons; this twin sends light")
+    return manifest.sensor
+
+
+def picture_scale(manifest: Manifest) -> int:
+    """Give the samples of a bundle's picture along a side of a pixel of its sensor.
+
+    Raises:
+        UnsupportedError: If it makes no picture, or one whose samples are not whole shares of a
+            pixel.
+    """
+    if IMAGE not in manifest.products:
+        made = ", ".join(manifest.products)
+        raise UnsupportedError(f"bundle {manifest.name} makes {made}, and no product {IMAGE!r}")
+    ratio = manifest.planes[manifest.products[IMAGE]].grid.pitch_ratio
+    scale = max(round(1 / ratio), 1)
+    if scale * ratio != 1:
+        raise UnsupportedError(
+            f"bundle {manifest.name} makes pictures with {ratio:g} pixels from sample to sample; "
+            "the twin knows their truth for whole shares of a pixel only"
+        )
+    return scale
+
+
+def true_picture(clean: FloatArray, sensor: ColorSensor) -> FloatArray:
+    """Give linear Rec.709 (3, h, w) of clean planes of the twin.
+
+    Args:
+        clean: (c, h, w) float32, white-balanced channels of the sensor.
+        sensor: What the channels are.
+
+    Raises:
+        UnsupportedError: If they are neither colours nor grey.
+    """
+    if sensor.color_matrix is not None:
+        matrix = np.array(sensor.color_matrix, dtype=np.float64)
+        return apply_matrix(rec709_from_camera(matrix), clean)
+    if clean.shape[0] not in (1, len(RGB)):
+        raise UnsupportedError(f"{clean.shape[0]} channels without a colour matrix have no colour")
+    return clean if clean.shape[0] == len(RGB) else np.repeat(clean, len(RGB), axis=0)
+
+
+def ideal_picture(simulation: Simulation, bundle: Bundle) -> FloatArray:
+    """Give what the product `image` would show of a scene if nothing were lost.
+
+    Args:
+        simulation: Photographed with `picture_scale` samples of the scene along a side of a pixel.
+        bundle: Of the camera.
+
+    Returns:
+        (3, h, w) float32 linear Rec.709 in the geometry of the picture.
+
+    Raises:
+        UnsupportedError: As `light_sensor` and `true_picture`.
+    """
+    manifest, clean = bundle.manifest, simulation.clean
+    plane = manifest.planes[manifest.products[IMAGE]]
+    if not plane.grid.warped:
+        window = simulation.window.resampled(
+            plane.grid.pitch_ratio, (clean.shape[2], clean.shape[1])
+        )
+        bands = undistort_bands(ArrayRows(clean), bundle.psf.distortion, window)
+        clean = np.concatenate(list(bands), axis=1)
+    return true_picture(clean, light_sensor(manifest))
