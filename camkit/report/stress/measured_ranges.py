@@ -4,7 +4,7 @@ A scenario bounds some quantities of `camkit.runtime.envelope`. Over its sound v
 nominal outwards, the quantity took a range. Where the scenario broke beyond an end, that end holds
 for all scenarios; an end beyond which none broke is the farthest that was tested.
 
-To be sound here is to help: to beat the input and the Wiener bank without a fault. chi^2 is left
+To be sound here is to help: to beat the methods without networks, without a fault. chi^2 is left
 to the report: where a clipped light leaves glare unexplained, the Wiener bank, to which a capture
 outside the ranges falls back, explains it no better.
 """
@@ -51,11 +51,12 @@ def measured_ranges(curves: Iterable[Curve], method: str) -> dict[str, Range]:
 
     Returns:
         Quantity -> range. A quantity that broke at its nominal value is left out: there is no
-        range in which the method helps, and every capture would be outside.
+        range in which the method helps, and every capture would be outside. So is all of a camera
+        that offers nothing simpler: no help was shown where there was nothing to beat.
     """
     found: dict[str, list[tuple[str, Seen]]] = {}
     for curve in curves:
-        if method not in curve.methods:
+        if method not in curve.methods or not curve.rivals:
             continue
         for quantity, end in curve.scenario.bounds.items():
             seen = _seen(curve, quantity, method)

@@ -1,0 +1,56 @@
+"""Makers and metrics of a camera: those that serve every camera, and those of its kind."""
+
+from pathlib import Path
+
+import pytest
+
+from camkit.bundle.reader import Bundle
+from camkit.errors import UnsupportedError
+from camkit.kinds import Kind
+from camkit.report.bench import line_up
+from camkit.report.bench.line_up import make_trials, makers_of, metrics_of
+from camkit.report.bench.trial import Axes, Entrant, Ground
+from camkit.report.kinds import bayer
+from tests.plain_bundle import SIZES, write_bankless_bundle, write_networkless_bundle
+from tests.wide_bundle import write_wide_bundle
+
+GROUND = Ground(threads=1, providers=("cpu",), free_bytes=10**10)
+
+
+def labels(bundle: Bundle, axes: Axes) -> tuple[list[str], list[str]]:
+    name = bundle.manifest.name
+    trials, skips = make_trials([Entrant(label=name, bundle=bundle, camera=name)], axes, GROUND)
+    return [trial.label for trial in trials], [f"{s.what}: {s.reason}" for s in skips]
+
+
+def test_a_row_of_the_kind_stands_in_place_of_the_common_one(tmp_path: Path) -> None:
+    manifest = write_wide_bundle(tmp_path).manifest
+    makers = {maker.name: maker for maker in makers_of(manifest)}
+    assert list(makers) == ["classical", "develop", "network"]
+    assert makers["develop"] is bayer.PART.bench.rows[0]
+
+
+def test_the_kind_names_its_metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    manifest = write_wide_bundle(tmp_path).manifest
+    assert [metric.name for metric in metrics_of(manifest)] == ["picture"]
+    blind = manifest.model_copy(update={"products": {"depth_m": "picture"}})
+    assert metrics_of(blind) == ()
+    kind = Kind(name="bayer", title="", sensor="bayer", stages=(), metrics=("taste",))
+    monkeypatch.setattr(line_up, "find_kind", lambda _name: kind)
+    with pytest.raises(UnsupportedError, match="judged by taste; reports know picture"):
+        metrics_of(manifest)
+
+
+def test_without_a_bank_there_are_the_networks_in_its_own_sizes(tmp_path: Path) -> None:
+    bundle = write_bankless_bundle(tmp_path)
+    made, skips = labels(bundle, Axes(vary=False))
+    assert made == ["develop", *SIZES]
+    assert not skips
+    _, skips = labels(bundle, Axes(methods=("wiener",)))
+    assert skips == ["bankless wiener: no stage of the bundle has this method"]
+
+
+def test_without_networks_there_is_the_bank(tmp_path: Path) -> None:
+    made, skips = labels(write_networkless_bundle(tmp_path), Axes())
+    assert made == ["wiener", "rl", "admm-tv", "develop"]
+    assert not skips
