@@ -51,8 +51,8 @@ def capture_of_array(
         raise ContractError(f"the bundle takes {sensor.inputs[0]}; got an (h, w) mosaic")
     if image.dtype not in (np.uint8, np.uint16, np.float32):
         raise ContractError(f"expected uint8, uint16 or float32 samples; got {image.dtype}")
-    in_levels = is_mosaic or not np.issubdtype(image.dtype, np.floating)
-    in_levels = is_mosaic or (in_levels and not isinstance(sensor, BayerSensor))
+    is_float = np.issubdtype(image.dtype, np.floating)
+    in_levels = is_mosaic or not (is_float or isinstance(sensor, BayerSensor))
     black = sensor.black_level if in_levels else 0.0
     matrix = sensor.color_matrix
     extent = sensor.extent

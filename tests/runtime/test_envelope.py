@@ -35,6 +35,26 @@ def _capture(samples: np.ndarray, *, planes: bool = False) -> Capture:
 
 def test_the_noise_at_grey_is_shot_and_read_noise_together() -> None:
     assert grey_noise(NOISE) == pytest.approx(np.sqrt(0.18e-4 + 1e-6), rel=1e-12)
+    for channels, seen in ((1, 0), (2, 1), (3, 1), (5, 2)):
+        noise = NoiseModel(
+            shot=tuple(1e-4 * (c + 1) for c in range(channels)), read_variance=(0.0,) * channels
+        )
+        expected = np.sqrt(0.18e-4 * (seen + 1))
+        assert grey_noise(noise) == pytest.approx(expected), "the middle one, green of three"
+
+
+@pytest.mark.parametrize("channels", [1, 5])
+def test_planes_of_any_number_of_channels_are_seen(channels: int) -> None:
+    capture = Capture(
+        samples=np.full((channels, 40, 50), 0.4, np.float32),
+        cfa=None,
+        black_level=np.zeros(channels, np.float32),
+        white_level=1.0,
+    )
+    noise = NoiseModel(shot=(1e-4,) * channels, read_variance=(1e-6,) * channels)
+    seen = observe(capture, noise)
+    assert seen["signal_level"] == pytest.approx(0.4)
+    assert seen["grey_noise"] == pytest.approx(grey_noise(noise))
 
 
 @pytest.mark.parametrize("height", [1, 7, 40, 900])

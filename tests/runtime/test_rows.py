@@ -154,3 +154,25 @@ def test_no_band_is_held_while_the_next_one_is_made() -> None:
         assert band.shape == (3, 16, 16)
         del band
     assert len(held) == 2
+
+
+def test_for_a_reader_that_is_gone_nothing_is_kept() -> None:
+    picture = _picture(20)
+    rolling = RollingRows((2, 20, 3), _bands(picture, [2] * 10))
+    reader, slow = rolling.reader(), rolling.reader()
+    reader.read(0, 12)
+    reader.read(10, 12)
+    assert len(rolling._kept) == 6, "the slow one may still want them"
+    del slow
+    np.testing.assert_array_equal(reader.read(10, 14), picture[:, 10:14])
+    assert len(rolling._kept) <= 2
+
+
+def test_a_reader_that_is_gone_holds_up_nobody_who_reads_on() -> None:
+    picture = _picture(20)
+    rolling = RollingRows((2, 20, 3), _bands(picture, [2] * 10))
+    first, second = rolling.reader(), rolling.reader()
+    first.read(0, 20)
+    del first
+    for top in range(0, 20, 4):
+        np.testing.assert_array_equal(second.read(top, top + 4), picture[:, top : top + 4])

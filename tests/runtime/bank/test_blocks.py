@@ -6,9 +6,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
-from camkit.runtime.bank.blocks import BlockBank, mirror_otf, plan_spans, taper_edges, to_otf
+from camkit.runtime.bank.blocks import (
+    BlockBank,
+    LocalPsf,
+    mirror_otf,
+    plan_spans,
+    taper_edges,
+    to_otf,
+)
+from camkit.runtime.bank.psf import FieldKernels, color_kernels
+from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RollingRows
-from tests.psf_factory import coma_kernels, gaussian_kernel, local_psf, psnr_db, texture
+from tests.psf_factory import (
+    PITCH_UM,
+    coma_kernels,
+    gaussian_kernel,
+    grid_psf,
+    local_psf,
+    psnr_db,
+    streak_kernel,
+    texture,
+    uniform_psf,
+)
 
 SIZES = st.integers(1, 300)
 
@@ -59,6 +78,28 @@ def test_otf_is_the_transform_of_the_kernel_about_its_centre():
         for col in range(kw):
             block[:, (row - kh // 2) % 40, (col - kw // 2) % 40] = kernel[:, row, col]
     np.testing.assert_allclose(to_otf(kernel, 40), np.fft.rfft2(block), atol=1e-6)
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 75.0, 200.0])
+@pytest.mark.parametrize("channels", [1, 2, 5])
+def test_a_product_with_the_otf_is_direct_convolution(turn_deg, channels):
+    """Light falls on the side to which the streak points, on a block that is periodic."""
+    kernels = np.stack([streak_kernel(turn_deg + 20 * c, 6, 7) for c in range(channels)])
+    picture = np.random.default_rng(0).random((channels, 32, 32), dtype=np.float32)
+    direct = np.zeros((channels, 32, 32))
+    for dy in range(-7, 8):
+        for dx in range(-7, 8):
+            weight = kernels[:, dy + 7, dx + 7, None, None]
+            direct += weight * np.roll(picture, (dy, dx), axis=(1, 2))
+    product = np.fft.irfft2(np.fft.rfft2(picture) * to_otf(kernels, 32), s=(32, 32))
+    np.testing.assert_allclose(product, direct, atol=2e-6)
+
+
+def test_the_otf_of_a_rectangular_kernel_is_about_its_own_centre():
+    kernel = np.zeros((1, 3, 9), np.float32)
+    kernel[0, 0, 8] = 1
+    product = np.fft.irfft2(to_otf(kernel, 16), s=(16, 16))
+    assert np.unravel_index(product.argmax(), product.shape) == (0, 15, 4)
 
 
 @pytest.mark.parametrize("flip_x", [False, True])
@@ -159,6 +200,86 @@ def test_one_psf_for_all_places_is_mirrored_in_no_quadrant():
     wanted = to_otf(kernels[-1], 64)
     assert np.abs(wanted - mirror_otf(wanted, flip_x=False, flip_y=True)).max() > 1e-2
     assert all(np.abs(otf - wanted).max() < 1e-6 for otf in seen)
+
+
+def _streaks(symmetry, channels):
+    """Give fields of streaks: one, or four in four corners."""
+    at_mm = np.array([-0.4, 0.4])
+    turned = np.stack([streak_kernel(turn) for turn in (20.0, 110.0, 200.0, 290.0)])
+    psf = {
+        "uniform": uniform_psf(turned[0]),
+        "grid": grid_psf(turned.reshape(2, 2, 21, 21), at_mm, at_mm),
+    }[symmetry]
+    return color_kernels(psf, np.array([0.5, 0.6]), np.ones((channels, 2)))
+
+
+def _whole_sensor(width, height, axis_px=None):
+    return SensorWindow(
+        size_px=(width, height),
+        origin_px=(0, 0),
+        sensor_size_px=(width, height),
+        pitch_um=PITCH_UM,
+        axis_px=axis_px,
+    )
+
+
+@pytest.mark.parametrize("symmetry", ["uniform", "grid"])
+@pytest.mark.parametrize("channels", [1, 4])
+@pytest.mark.parametrize("axis_px", [None, (20.0, 150.0)])
+def test_every_block_gets_the_streak_of_its_own_place_and_no_mirror_image(
+    symmetry, channels, axis_px
+):
+    fields, window = _streaks(symmetry, channels), _whole_sensor(160, 160, axis_px)
+    seen = []
+
+    def keep_otf(block):
+        seen.append(block.otf)
+        return block.samples
+
+    bank = BlockBank(LocalPsf(kernels=fields, window=window), keep_otf, block_px=64, overlap_px=32)
+    bank.restore_array(np.zeros((channels, 160, 160), np.float32))
+    centres = [span.centre for span in plan_spans(160, 64, 32)]
+    places = [window.to_mm(x, y) for y in centres for x in centres]
+    wanted = [to_otf(fields.at(float(x_mm), float(y_mm)), 64) for x_mm, y_mm in places]
+    assert len(seen) == len(wanted)
+    np.testing.assert_allclose(seen, wanted, atol=1e-6)
+
+
+@given(st.integers(1, 80), st.integers(1, 80), st.integers(1, 40), st.integers(1, 5))
+@settings(deadline=None, max_examples=15)
+def test_bits_of_a_grid_do_not_depend_on_threads_or_on_how_rows_arrive(h, w, band_rows, channels):
+    planes = np.random.default_rng(h * w).random((channels, h, w), dtype=np.float32)
+    window = SensorWindow(
+        size_px=(w, h), origin_px=(3, 5), sensor_size_px=(200, 200), pitch_um=PITCH_UM
+    )
+    psf = LocalPsf(kernels=_streaks("grid", channels), window=window)
+    layout = {"block_px": 48, "overlap_px": 16}
+
+    def sharpen(block):
+        return 2 * block.samples - np.roll(block.samples, 1, axis=2) * block.otf.real[0, 0, 1]
+
+    whole = BlockBank(psf, sharpen, **layout).restore_array(planes)
+    bands = (planes[:, top : top + band_rows] for top in range(0, h, band_rows))
+    bank = BlockBank(psf, sharpen, threads=2, **layout)
+    source = RollingRows(planes.shape, bands).reader()
+    np.testing.assert_array_equal(np.concatenate(list(bank.restore_bands(source)), axis=1), whole)
+
+
+def test_without_an_axis_blocks_have_the_bits_of_one_in_the_middle():
+    planes = texture(90, 130)
+    kernels, heights_mm = coma_kernels(radius_px=6)
+    fields = FieldKernels(kernels=kernels, field_heights_mm=heights_mm)
+    made = [
+        BlockBank(
+            LocalPsf(kernels=fields, window=_whole_sensor(130, 90, axis_px)),
+            lambda block: block.samples * block.otf.real[0, 0, 1],
+            block_px=48,
+            overlap_px=16,
+        ).restore_array(planes)
+        for axis_px in (None, (64.5, 44.5), (60.0, 44.5))
+    ]
+    np.testing.assert_array_equal(made[0], made[1])
+    assert (made[0] != made[2]).any()
 
 
 def test_saturated_samples_reach_the_block_they_lie_in():

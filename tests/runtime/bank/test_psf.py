@@ -3,10 +3,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from tests.deep_bundle import deep_psf
-from tests.psf_factory import coma_kernels, frozen_psf
+from tests.psf_factory import coma_kernels, frozen_psf, grid_psf, streak_kernel, uniform_psf
 
 KERNELS, HEIGHTS_MM = coma_kernels()
 FLAT = np.ones((3, 2))
@@ -211,3 +212,148 @@ def test_a_ratio_of_one_changes_nothing() -> None:
 def test_a_ratio_of_zero_is_refused() -> None:
     with pytest.raises(ContractError, match="> 0"):
         _gaussian(9, 1.0).scaled(0.0)
+
+
+# ------------------------------------------------------------------------------- other symmetries
+
+PLACES_MM = [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (-0.7, 0.4), (5.0, 5.0)]
+SEEN_UM = np.array([0.5, 0.6])
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0, 200.0])
+def test_a_uniform_kernel_is_neither_symmetrised_nor_turned_nor_mirrored(turn_deg: float) -> None:
+    streak = streak_kernel(turn_deg)
+    assert np.abs(streak - streak[:, ::-1]).max() > 0.01
+    fields = color_kernels(uniform_psf(streak), SEEN_UM, np.ones((2, 2)))
+    assert not fields.turns
+    for place_mm in PLACES_MM:
+        np.testing.assert_allclose(fields.at(*place_mm), [streak, streak], atol=1e-7)
+
+
+def test_only_a_radial_psf_of_several_fields_turns() -> None:
+    response = np.array([0.4, 0.7]), FLAT
+    round_psf = frozen_psf(KERNELS, HEIGHTS_MM, [0.45, 0.55, 0.65])
+    assert color_kernels(round_psf, *response).turns
+    one = frozen_psf(KERNELS[-1:], np.zeros(1), [0.45, 0.55, 0.65])
+    assert not color_kernels(one, *response).turns
+    assert not color_kernels(_grid()[0], *response).turns
+
+
+GRID_X_MM = np.array([-1.5, -0.5, 2.0])
+GRID_Y_MM = np.array([-1.0, 0.25])
+
+
+def _grid() -> tuple[FrozenPsf, np.ndarray]:
+    streaks = np.stack([streak_kernel(60.0 * n) for n in range(6)]).reshape(2, 3, 21, 21)
+    return grid_psf(streaks, GRID_X_MM, GRID_Y_MM), streaks
+
+
+def _grid_fields() -> tuple[FieldKernels, np.ndarray]:
+    psf, streaks = _grid()
+    return color_kernels(psf, SEEN_UM, np.ones((1, 2))), streaks
+
+
+def test_at_its_places_a_grid_gives_the_stored_kernels() -> None:
+    fields, streaks = _grid_fields()
+    for row, y_mm in enumerate(GRID_Y_MM):
+        for column, x_mm in enumerate(GRID_X_MM):
+            found = fields.at(x_mm, y_mm)[0]
+            np.testing.assert_allclose(found, streaks[row, column], atol=1e-7)
+
+
+@given(st.floats(0, 1), st.floats(0, 1), st.sampled_from([0, 1]))
+@settings(deadline=None, max_examples=30)
+def test_between_its_places_a_grid_blends_the_four_neighbours_bilinearly(
+    across: float, down: float, column: int
+) -> None:
+    fields, streaks = _grid_fields()
+    x_mm = GRID_X_MM[column] + across * np.diff(GRID_X_MM)[column]
+    y_mm = GRID_Y_MM[0] + down * np.diff(GRID_Y_MM)[0]
+    (a, b), (c, d) = streaks[:, column : column + 2]
+    wanted = (1 - down) * ((1 - across) * a + across * b) + down * ((1 - across) * c + across * d)
+    np.testing.assert_allclose(fields.at(x_mm, y_mm)[0], wanted, atol=1e-7)
+
+
+@given(st.floats(-50, 50), st.floats(-50, 50))
+@settings(deadline=None, max_examples=30)
+def test_beyond_its_rim_a_grid_holds(x_mm: float, y_mm: float) -> None:
+    fields, _ = _grid_fields()
+    inside = (
+        float(np.clip(x_mm, GRID_X_MM[0], GRID_X_MM[-1])),
+        float(np.clip(y_mm, GRID_Y_MM[0], GRID_Y_MM[-1])),
+    )
+    np.testing.assert_array_equal(fields.at(x_mm, y_mm), fields.at(*inside))
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 3), (2, 1)])
+def test_a_grid_of_one_row_or_column_blends_along_the_other(rows: int, columns: int) -> None:
+    _, streaks = _grid()
+    psf = grid_psf(streaks[:rows, :columns].copy(), GRID_X_MM[:columns], GRID_Y_MM[:rows])
+    fields = color_kernels(psf, SEEN_UM, np.ones((1, 2)))
+
+    def shares(at_mm: float, places_mm: np.ndarray) -> np.ndarray:
+        number = np.interp(at_mm, places_mm, np.arange(places_mm.size))
+        return np.maximum(1 - np.abs(np.arange(places_mm.size) - number), 0)
+
+    for x_mm, y_mm in PLACES_MM:
+        down, across = shares(y_mm, GRID_Y_MM[:rows]), shares(x_mm, GRID_X_MM[:columns])
+        wanted = np.einsum("r,c,rchw->hw", down, across, streaks[:rows, :columns])
+        np.testing.assert_allclose(fields.at(x_mm, y_mm)[0], wanted, atol=1e-7)
+
+
+def test_scaling_keeps_where_the_fields_are_and_which_way_streaks_point() -> None:
+    fields, _ = _grid_fields()
+    larger = fields.scaled(1.5)
+    assert larger.symmetry == "grid"
+    for x_mm, y_mm in PLACES_MM:
+        before, after = (np.array(centroid(f.at(x_mm, y_mm))) for f in (fields, larger))
+        np.testing.assert_allclose(after, 1.5 * before, atol=0.15)
+
+
+def test_rectangular_kernels_are_scaled_along_both_sides() -> None:
+    wide = np.zeros((1, 1, 5, 21), np.float32)
+    wide[0, 0, 2, 10:] = np.arange(11, 0, -1)
+    wide /= wide.sum()
+    fields = FieldKernels(kernels=wide, field_heights_mm=np.zeros(1), symmetry="uniform")
+    for ratio in (0.5, 2.0):
+        scaled = fields.scaled(ratio).kernels
+        assert scaled.shape[2:] == (2 * round(2 * ratio) + 1, 2 * round(10 * ratio) + 1)
+        half = scaled.shape[-1] // 2
+        offset = (scaled[0, 0].sum(axis=0) * np.arange(-half, half + 1)).sum()
+        before = (wide[0, 0].sum(axis=0) * np.arange(-10, 11)).sum()
+        assert offset == pytest.approx(ratio * before, rel=0.1)
+
+
+@pytest.mark.parametrize("channels", [1, 2, 7])
+@pytest.mark.parametrize("kind", ["radial", "uniform", "grid"])
+def test_any_number_of_channels_has_kernels(kind: str, channels: int) -> None:
+    psf = {
+        "radial": frozen_psf(KERNELS, HEIGHTS_MM, [0.45, 0.55, 0.65]),
+        "uniform": uniform_psf(streak_kernel(10.0), (0.5, 0.6)),
+        "grid": _grid()[0],
+    }[kind]
+    seen_um, response = np.array([0.42, 0.5, 0.6, 0.68]), np.random.default_rng(0)
+    weights = response.random((channels, 4))
+    kernels = color_kernels(psf, seen_um, weights).at(0.3, -0.4)
+    assert kernels.shape[0] == channels
+    np.testing.assert_allclose(kernels.sum(axis=(-2, -1)), 1, atol=1e-5)
+    for channel in range(channels):
+        alone = color_kernels(psf, seen_um, weights[channel][None]).at(0.3, -0.4)
+        np.testing.assert_allclose(alone[0], kernels[channel], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"symmetry": "uniform"}, "uniform kernels are of one field"),
+        ({"symmetry": "grid"}, "a position for each"),
+        (
+            {"symmetry": "grid", "grid_x_mm": GRID_X_MM, "grid_y_mm": GRID_Y_MM},
+            "a position for each",
+        ),
+        ({"grid_x_mm": np.arange(5.0), "grid_y_mm": np.zeros(1)}, "and nothing else"),
+    ],
+)
+def test_fields_that_are_not_what_they_say_are_refused(changes: dict, message: str) -> None:
+    with pytest.raises(ContractError, match=message):
+        FieldKernels(kernels=KERNELS, field_heights_mm=HEIGHTS_MM, **changes)

@@ -7,19 +7,33 @@ from hypothesis import strategies as st
 from camkit.bundle.stages import Wiener
 from camkit.contracts import NoiseModel
 from camkit.runtime.bank.baselines import restoration_bank
-from camkit.runtime.bank.blocks import Block, BlockBank, plan_spans, taper_edges, to_otf
+from camkit.runtime.bank.blocks import (
+    Block,
+    BlockBank,
+    LocalPsf,
+    plan_spans,
+    taper_edges,
+    to_otf,
+)
+from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.bank.richardson_lucy import apply_transfer
 from camkit.runtime.bank.wiener import CORNER_FREQUENCY, KERNEL_ERROR, wiener_filter
+from camkit.runtime.geometry.sensor_window import SensorWindow
 from tests.psf_factory import (
     ISO_100,
+    PITCH_UM,
     QUIET,
+    blur_directly,
     blur_periodic,
     coma_kernels,
     disc_kernel,
     gaussian_kernel,
+    grid_psf,
     local_psf,
     psnr_db,
+    streak_kernel,
     texture,
+    uniform_psf,
     with_noise,
 )
 
@@ -128,6 +142,64 @@ def test_a_varying_blur_is_undone_by_turned_kernels_only():
     wrong = restoration_bank(averaged, tight, ISO_100).restore_array(planes)
     assert psnr_db(restored, scene, 10) > psnr_db(planes, scene, 10) + 1.5
     assert psnr_db(restored, scene, 10) > psnr_db(wrong, scene, 10) + 1.5
+
+
+@pytest.mark.parametrize("method", ["wiener", "rl", "admm-tv"])
+@pytest.mark.parametrize("symmetry", ["uniform", "grid"])
+def test_streaks_of_direct_convolution_are_undone_by_their_own_kernels_only(symmetry, method):
+    """Every pixel scatters the streak of its place; the mirror image of it restores nothing."""
+    size = 64
+    at_mm = np.array([-0.2, 0.2])
+    turned = np.stack([streak_kernel(turn, 7, 8) for turn in (15.0, 40.0, 65.0, 90.0)])
+    window = SensorWindow(
+        size_px=(size, size),
+        origin_px=(0, 0),
+        sensor_size_px=(size, size),
+        pitch_um=PITCH_UM,
+        axis_px=(30.0, 35.0),
+    )
+
+    def local(kernels):
+        psf = uniform_psf(kernels[0])
+        if symmetry == "grid":
+            psf = grid_psf(kernels.reshape(2, 2, 17, 17), at_mm, at_mm)
+        fields = color_kernels(psf, np.array([0.5, 0.6]), np.ones((2, 2)))
+        return LocalPsf(kernels=fields, window=window)
+
+    scene = texture(size, size, seed=3)[:2]
+    noise = NoiseModel(shot=ISO_100.shot[:2], read_variance=ISO_100.read_variance[:2])
+    right, mirrored = local(turned), local(np.ascontiguousarray(turned[:, ::-1, ::-1]))
+    planes = with_noise(blur_directly(scene, right), noise, np.random.default_rng(0))
+    tight = SMALL.model_copy(update={"block_px": 48, "overlap_px": 24})
+    found_db, wrong_db = (
+        psnr_db(restoration_bank(psf, tight, noise, method=method).restore_array(planes), scene, 8)
+        for psf in (right, mirrored)
+    )
+    assert found_db > psnr_db(planes, scene, 8) + 1.5
+    assert found_db > wrong_db + 4
+
+
+@pytest.mark.parametrize("method", ["wiener", "admm-tv"])
+@pytest.mark.parametrize("channels", [1, 2, 5])
+def test_every_channel_is_restored_as_if_alone(channels, method):
+    """Not so Richardson-Lucy: the channels of a block share its number of rounds."""
+    kernels = np.stack([streak_kernel(50.0 * c, 5, 6) for c in range(channels)])
+    planes = np.resize(texture(60, 70, seed=1), (channels, 60, 70))
+    noise = NoiseModel(
+        shot=tuple(np.linspace(1e-5, 1e-4, channels)), read_variance=(1e-8,) * channels
+    )
+    saturated = planes > 0.65
+    aware = SMALL.model_copy(update={"clip_iterations": 2})
+
+    def restored(which):
+        psf = local_psf(kernels[which][None], np.zeros(1), (70, 60))
+        part = NoiseModel(shot=noise.shot[which], read_variance=noise.read_variance[which])
+        bank = restoration_bank(psf, aware, part, method=method)
+        return bank.restore_array(planes[which], saturated[which])
+
+    together = restored(slice(None))
+    for c in range(channels):
+        np.testing.assert_allclose(together[c], restored(slice(c, c + 1))[0], atol=1e-5)
 
 
 def test_more_noise_is_restored_more_gently():

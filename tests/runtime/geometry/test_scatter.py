@@ -104,6 +104,60 @@ def test_full_convolution_has_all_the_light() -> None:
     np.testing.assert_allclose(full.sum(axis=(1, 2)), block.sum(axis=(1, 2)), rtol=1e-5)
 
 
+@pytest.mark.parametrize("channels", [1, 2, 6])
+def test_every_channel_is_blurred_by_its_own_kernel_as_if_alone(channels: int) -> None:
+    rng = np.random.default_rng(3)
+    picture = rng.random((channels, 40 + 2 * MARGIN, 60 + 2 * MARGIN), dtype=np.float32)
+    spread = rng.random((channels, 9, 9), dtype=np.float32)
+    spread /= spread.sum(axis=(1, 2), keepdims=True)
+    place = window(60, 40)
+    found = scatter(picture, lambda *_: spread, place, margin_px=MARGIN, step_px=16)
+    for c in range(channels):
+        alone = scatter(
+            picture[c : c + 1],
+            lambda *_, c=c: spread[c : c + 1],
+            place,
+            margin_px=MARGIN,
+            step_px=16,
+        )
+        np.testing.assert_allclose(found[c], alone[0], atol=FFT_ERROR)
+        expected = scipy.signal.convolve2d(picture[c], spread[c], mode="valid")
+        np.testing.assert_allclose(found[c], expected, atol=FFT_ERROR)
+
+
+@pytest.mark.parametrize("sides", [(1, 9), (9, 1), (3, 7), (9, 5)])
+def test_a_rectangular_kernel_is_a_plain_convolution_too(sides: tuple[int, int]) -> None:
+    spread = np.random.default_rng(0).random((1, *sides), dtype=np.float32)
+    spread /= spread.sum()
+    picture = planes(30, 41)[:1]
+    found = scatter(picture, lambda *_: spread, window(41, 30), margin_px=MARGIN, step_px=16)
+    expected = scipy.signal.convolve2d(picture[0], spread[0], mode="same")
+    inner = expected[MARGIN:-MARGIN, MARGIN:-MARGIN]
+    np.testing.assert_allclose(found[0], inner, atol=FFT_ERROR)
+
+
+def test_blocks_ask_for_the_kernels_of_their_places_from_the_axis() -> None:
+    asked: dict[str, list[tuple[float, float]]] = {"plain": [], "moved": []}
+    size = 2 * 64 - 2 * MARGIN
+    for name, axis_px in (("plain", None), ("moved", (10.0, -50.0))):
+
+        def at(x_mm: float, y_mm: float, name: str = name) -> FloatArray:
+            asked[name].append((x_mm, y_mm))
+            return kernel()
+
+        place = SensorWindow(
+            size_px=(size, size),
+            origin_px=(0, 0),
+            sensor_size_px=(size, size),
+            pitch_um=10.0,
+            axis_px=axis_px,
+        )
+        scatter(planes(size, size), at, place, margin_px=MARGIN, step_px=64)
+    middle = (size - 1) / 2
+    shift_mm = (np.array([middle, middle]) - [10.0, -50.0]) * 0.01
+    np.testing.assert_allclose(asked["moved"], np.array(asked["plain"]) + shift_mm, atol=1e-12)
+
+
 def test_planes_without_the_margin_are_refused() -> None:
     with pytest.raises(ContractError, match="planes must be"):
         scatter(

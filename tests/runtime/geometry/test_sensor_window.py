@@ -49,3 +49,37 @@ def test_centred_origin_falls_on_the_cfa_cell() -> None:
 def test_impossible_window_is_refused(changes: dict[str, object]) -> None:
     with pytest.raises(ContractError):
         window(**changes)
+
+
+def test_the_axis_lies_where_it_is_said_to() -> None:
+    beside = window(axis_px=(10.0, 35.5))
+    assert beside.known_axis_px == (10.0, 35.5)
+    x_mm, y_mm = beside.to_mm(10.0, 35.5)
+    assert (float(x_mm), float(y_mm)) == (0.0, 0.0)
+    np.testing.assert_allclose(beside.centre_mm, [(29.5 - 10) * 0.01, (19.5 - 35.5) * 0.01])
+    assert beside.corner_radius_mm == pytest.approx(np.hypot(59 - 10, 35.5) * 0.01)
+    crop = window(size_px=(10, 8), origin_px=(20.5, 12.5), axis_px=(10.0, 35.5))
+    x, y = np.arange(10.0), np.linspace(0, 7, 10)
+    np.testing.assert_allclose(crop.to_px(*crop.to_mm(x, y)), (x, y), atol=1e-12)
+    np.testing.assert_allclose(crop.to_mm(x, y), beside.to_mm(x + 20.5, y + 12.5))
+
+
+def test_no_axis_gives_the_bits_of_one_in_the_middle() -> None:
+    x, y = np.meshgrid(np.arange(60), np.arange(40))
+    for origin_px in ((0, 0), (7, 11), (3.5, 2.5)):
+        plain, stated = (
+            window(origin_px=origin_px, axis_px=axis_px) for axis_px in (None, (29.5, 19.5))
+        )
+        np.testing.assert_array_equal(plain.to_mm(x, y), stated.to_mm(x, y))
+        np.testing.assert_array_equal(plain.centre_mm, stated.centre_mm)
+        assert plain.corner_radius_mm == stated.corner_radius_mm
+
+
+def test_an_origin_may_fall_on_any_pixel_where_there_is_no_mosaic() -> None:
+    assert centred_origin((11, 7), (60, 40), multiple=1) == (24, 16)
+    assert centred_origin((11, 7), (61, 42), multiple=1) == (25, 17)
+
+
+def test_an_axis_that_is_nowhere_is_refused() -> None:
+    with pytest.raises(ContractError, match="axis must be finite"):
+        window(axis_px=(float("inf"), 0.0))

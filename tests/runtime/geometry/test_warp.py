@@ -153,6 +153,63 @@ def test_margin_continues_the_same_picture() -> None:
     np.testing.assert_allclose(wide[:, 9:-9, 9:-9], inner, atol=0.01)
 
 
+@pytest.mark.parametrize("channels", [1, 2, 5])
+def test_every_channel_is_moved_by_its_own_model_as_if_alone(channels: int) -> None:
+    rows = [(1.0 + 0.002 * c, -0.05, 0.0, 0.0) for c in range(channels)]
+    model = RadialDistortion(coefficients=np.array(rows), radius_mm=RADIUS_MM)
+    place = window((120, 90), (900, 600))
+    picture = np.random.default_rng(0).random((channels, 90, 120), dtype=np.float32)
+    warp = Warp(model, place, to_sensor=False)
+    assert warp.channels == channels
+    together = undistort(picture, model, place, 32)
+    there = distort_array(picture, model, place)
+    middle = rows[channels // 2]  # the channel by which pictures are centred
+    for c in range(channels):
+        pair = RadialDistortion(coefficients=np.array([rows[c], middle]), radius_mm=RADIUS_MM)
+        double = np.stack([picture[c]] * 2)
+        np.testing.assert_array_equal(together[c], undistort(double, pair, place, 32)[0])
+        np.testing.assert_array_equal(there[c], distort_array(double, pair, place)[0])
+
+
+def test_channels_of_one_model_share_their_map() -> None:
+    rows = [(1.0, -0.05, 0.0, 0.0)] * 2 + [(1.01, -0.05, 0.0, 0.0)]
+    warp = Warp(distortion(*rows), window((64, 64)), to_sensor=False)
+    assert [warp.shares_map(c) for c in range(3)] == [False, True, False]
+
+
+def test_pictures_move_about_the_axis_wherever_it_is() -> None:
+    """A point on the axis stays but for the shift of the middle; all move along its radius."""
+    axis_px = (400.0, 800.0)
+    place = SensorWindow(
+        size_px=SENSOR, origin_px=(0, 0), sensor_size_px=SENSOR, pitch_um=PITCH_UM, axis_px=axis_px
+    )
+    weak = distortion((1.0, -0.02, 0.0, 0.0))
+    warp = Warp(weak, place, to_sensor=True)
+    middle = np.array([(SENSOR[0] - 1) / 2, (SENSOR[1] - 1) / 2])
+    np.testing.assert_allclose(warp.positions(1, *map(np.asarray, middle)), middle, atol=1e-6)
+    on_axis = warp.positions(1, *(np.asarray(p) for p in axis_px))
+    shift = on_axis - axis_px
+    assert np.hypot(*shift) > 1
+    for angle in (0.3, 2.0, 4.5):
+        away = 150 * np.array([np.cos(angle), np.sin(angle)])
+        there = warp.positions(1, *(np.asarray(p) for p in axis_px + away)) - axis_px - shift
+        np.testing.assert_allclose(there / np.hypot(*there), away / 150, atol=1e-9)
+
+
+def test_no_axis_gives_the_bits_of_one_in_the_middle() -> None:
+    picture = np.random.default_rng(0).random((3, 90, 120), dtype=np.float32)
+    plain = window((120, 90), (900, 600))
+    stated = SensorWindow(
+        size_px=(120, 90),
+        origin_px=(900, 600),
+        sensor_size_px=SENSOR,
+        pitch_um=PITCH_UM,
+        axis_px=((SENSOR[0] - 1) / 2, (SENSOR[1] - 1) / 2),
+    )
+    np.testing.assert_array_equal(*(undistort(picture, BARREL, p, 32) for p in (plain, stated)))
+    np.testing.assert_array_equal(*(distort_array(picture, BARREL, p) for p in (plain, stated)))
+
+
 def test_folding_model_is_refused_before_any_row() -> None:
     folding = distortion((1.0, -0.5, 0, 0))
     picture = np.zeros((3, SENSOR[1], SENSOR[0]), dtype=np.float32)
@@ -163,6 +220,8 @@ def test_folding_model_is_refused_before_any_row() -> None:
 def test_sizes_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ContractError, match="picture must be"):
         distort_array(np.zeros((3, 4, 5), np.float32), IDENTITY, window((4, 4)))
+    with pytest.raises(ContractError, match=r"picture must be \(3, 4, 4\)"):
+        distort_array(np.zeros((4, 4, 4), np.float32), IDENTITY, window((4, 4)))
     rows = ArrayRows(np.zeros((3, 4, 4), np.float32))
     with pytest.raises(ContractError, match="multiple of 8"):
         next(undistort_bands(rows, IDENTITY, window((4, 4)), band_rows=20))

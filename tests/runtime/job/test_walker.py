@@ -202,6 +202,43 @@ def test_for_a_branch_that_nobody_reads_nothing_is_kept(tmp_path: Path) -> None:
     assert sum(band.shape[1] for _, band in rolling._kept) < 200
 
 
+# ------------------------------------------------------------------------------- kept planes
+
+
+@pytest.mark.parametrize("plane", ["capture", "light", "rgb", "restored", "clean", "picture"])
+def test_from_a_plane_that_is_kept_on_the_walk_gives_the_same_bits(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch, plane: str
+) -> None:
+    wanted = start(bundle, _broken()).fill()
+    first = start(bundle, _broken())
+    kept = first.keep(plane)
+    ran = _ran(monkeypatch, *(stage.type for stage in bundle.manifest.stages))
+    pipeline = Pipeline(bundle, Options(threads=2))
+    again = pipeline.start(_broken(), known={plane: kept})
+    np.testing.assert_array_equal(again.fill(), wanted)
+    types = [stage.type for stage in bundle.manifest.stages]
+    giver = next((n for n, s in enumerate(bundle.manifest.stages) if plane in s.gives), -1)
+    if plane in ("rgb", "clean", "picture"):  # nothing behind them takes an earlier plane
+        masks = ["linearise", "repair"] if plane == "rgb" else []  # the bank takes the mask too
+        assert ran == masks + types[giver + 1 :]
+    assert read_all(first.rows_of(plane)).tobytes() == read_all(kept.rows()).tobytes()
+
+
+def test_a_kept_plane_may_be_read_by_many_and_is_changed_by_none(bundle: Bundle) -> None:
+    made = start(bundle, _broken())
+    kept = read_all(made.keep("clean").rows()).copy()
+    pictures = [made.fill() for _ in range(2)]
+    np.testing.assert_array_equal(*pictures)
+    np.testing.assert_array_equal(read_all(made.rows_of("clean")), kept)
+
+
+def test_what_is_kept_for_a_plane_left_out_is_the_plane_that_stands_in(bundle: Bundle) -> None:
+    made = start(bundle, _broken(), method="wiener")
+    kept = made.keep("clean")
+    np.testing.assert_array_equal(read_all(kept.rows()), read_all(made.rows_of("restored")))
+    np.testing.assert_array_equal(made.fill(), start(bundle, _broken(), method="wiener").fill())
+
+
 # ------------------------------------------------------------------------------- left out
 
 

@@ -15,6 +15,7 @@ from onnx import helper
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.network import engine as engine_module
 from camkit.runtime.network.engine import NetworkEngine, available_threads, largest_activations
+from tests.planes_bundle import finer_model, finer_network
 from tests.small_network import small_network
 
 
@@ -241,3 +242,40 @@ def test_a_provider_that_does_not_start_is_an_error_and_no_silent_cpu(
     # what the first provider does not know falls to the next, in true float32
     cuda = ("CUDAExecutionProvider", {"use_tf32": "0"})
     assert asked == ["TensorrtExecutionProvider", cuda, "CPUExecutionProvider"]
+
+
+@pytest.mark.parametrize("scale", [1, 2, 3])
+@pytest.mark.parametrize(("channels", "outputs"), [(1, 1), (6, 3), (4, 5)])
+def test_any_channels_and_scale_run_and_land_in_the_given_buffer(
+    channels: int, outputs: int, scale: int
+) -> None:
+    engine = NetworkEngine(finer_network(channels, outputs, scale=scale), threads=1, scale=scale)
+    assert (engine.channels, engine.outputs, engine.scale) == (channels, outputs, scale)
+    window = np.random.default_rng(0).random((1, channels, 16, 24)).astype(np.float32)
+    out = np.full((1, outputs, 16 * scale, 24 * scale), np.nan, np.float32)
+    assert engine.run(window, out) is out
+    assert np.isfinite(out).all()
+    assert np.array_equal(out, engine.run(window))
+    with pytest.raises(ContractError, match="out must be"):
+        engine.run(window, np.empty((1, outputs, 16 * scale + 1, 24 * scale), np.float32))
+    with pytest.raises(ContractError, match=rf"window must be float32 \(1, {channels}, h, w\)"):
+        engine.run(np.zeros((1, channels + 1, 16, 24), np.float32))
+
+
+def test_a_scale_that_the_network_does_not_have_is_refused_at_its_first_window() -> None:
+    engine = NetworkEngine(finer_network(1, 1, scale=2), threads=1, scale=1)
+    with pytest.raises(ContractError, match="cannot run on a window"):
+        engine.run(np.zeros((1, 1, 16, 24), np.float32))
+    with pytest.raises(ContractError, match="threads and scale must be >= 1"):
+        NetworkEngine(finer_network(1, 1), threads=1, scale=0)
+
+
+def test_a_finer_output_is_what_the_nodes_say() -> None:
+    """DepthToSpace puts the samples of a pixel where it lies, row by row."""
+    model = finer_model(1, 1, scale=2)
+    picture = np.zeros((1, 1, 32, 32), np.float32)
+    picture[0, 0, 16, 20] = 1
+    made = NetworkEngine(model.SerializeToString(), threads=1, scale=2).run(picture)[0, 0]
+    rows, columns = np.nonzero(made > 1e-6)
+    assert 32 - 8 <= rows.min() <= 32 <= rows.max() <= 33 + 8
+    assert 40 - 8 <= columns.min() <= 40 <= columns.max() <= 41 + 8

@@ -17,6 +17,7 @@ from camkit.errors import BundleError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import check_graph, inspect_graph, parse_graph, with_node_outputs
 from tests.bundle_factory import make_model, make_weight, tiny_facts, tiny_model, tiny_network
+from tests.planes_bundle import facts_of, finer_model, finer_network
 
 Mutation = Callable[[onnx.ModelProto], object]
 NODE = helper.make_node
@@ -607,6 +608,93 @@ def test_walk_never_reaches_less_than_the_probe(
     found = inspect_graph(_bytes(model))
     assert found.stride_px == 2 ** len(levels)
     assert _probe(model, found.stride_px, 64) <= found.receptive_field_radius_px
+
+
+# ---------------------------------------------------------------------------- finer outputs
+
+
+def _finer_probe(model: onnx.ModelProto, stride: int, side: int, scale: int) -> int:
+    """Measure the reach on the lattice of a network with `scale` samples along a pixel's side."""
+    engine = NetworkEngine(_bytes(model), threads=1, scale=scale)
+    base = np.random.default_rng(1).uniform(1, 2, (1, engine.channels, side, side))
+    base = base.astype(np.float32)
+    still = engine.run(base)
+    reach, middle = 0, side // 2 // stride * stride
+    for offset in range(stride):
+        changed = base.copy()
+        changed[0, :, middle + offset, middle + offset] += 10
+        moved = np.argwhere((engine.run(changed) != still).any(axis=(0, 1))) // scale
+        for index in moved.ravel():
+            tile, pixel = index // stride * stride, middle + offset
+            reach = max(reach, tile - pixel, pixel - (tile + stride - 1))
+    return reach
+
+
+THICK = ("Conv", {}, (make_weight(27, 3, 1, 1),))
+TRIPLE = ("DepthToSpace", {"blocksize": 3}, ())
+FINER: dict[str, tuple[onnx.ModelProto, int, int, int]] = {
+    # model, stride, scale, reach
+    "3x3 then shuffled": (_chain(_conv(3), WIDEN, SHUFFLE), 1, 2, 1),
+    "shuffled then 3x3": (_chain(WIDEN, SHUFFLE, _conv(3)), 1, 2, 1),
+    "shuffled then 5x5": (_chain(WIDEN, SHUFFLE, _conv(5)), 1, 2, 1),
+    "shuffled then 7x7": (_chain(WIDEN, SHUFFLE, _conv(7)), 1, 2, 2),
+    "three times as fine, 3x3": (_chain(THICK, TRIPLE, _conv(3)), 1, 3, 1),
+    "transposed 2x2": (_chain(UP), 1, 2, 0),
+    "transposed 4x4": (_chain(WIDE_UP), 1, 2, 1),
+    "nearest resize": (
+        _chain(
+            _resize("nearest", coordinate_transformation_mode="asymmetric", nearest_mode="floor")
+        ),
+        1,
+        2,
+        0,
+    ),
+    "bilinear resize": (_chain(_resize("linear")), 1, 2, 1),
+    "down once and up twice": (
+        _chain(_conv(3, strides=[2, 2]), WIDEN, SHUFFLE, WIDEN, SHUFFLE),
+        2,
+        2,
+        1,
+    ),
+    "of the tests": (finer_model(3, 3, scale=2), 2, 2, 3),
+    "of the tests, three times": (finer_model(3, 3, scale=3), 2, 3, 3),
+}
+
+
+@pytest.mark.parametrize(("model", "stride", "scale", "reach"), FINER.values(), ids=FINER.keys())
+def test_reach_and_scale_of_finer_outputs_are_those_by_hand_and_by_probe(
+    model: onnx.ModelProto, stride: int, scale: int, reach: int
+) -> None:
+    found = inspect_graph(_bytes(model))
+    assert (found.stride_px, found.output_scale) == (stride, scale)
+    assert found.receptive_field_radius_px == reach
+    assert _finer_probe(model, stride, 32, scale) == reach
+
+
+def test_costs_of_a_finer_network_are_counted_per_pixel_of_its_input() -> None:
+    model = _chain(_conv(3), WIDEN, SHUFFLE, _conv(3))
+    found = inspect_graph(_bytes(model))
+    assert found.mac_per_pixel == 81 + 36 + 4 * 81
+    # At the last convolution: 3 channels in and 3 out, on four samples for each pixel.
+    assert found.bytes_per_pixel == 4 * (12 + 12)
+
+
+def test_sides_that_grow_unlike_each_other_are_refused() -> None:
+    scales = np.array([1, 1, 2, 3], np.float32)
+    resize = ("Resize", {"mode": "nearest"}, (ONES[:0], scales))
+    with pytest.raises(BundleError, match="both multiplied by one whole number"):
+        inspect_graph(_bytes(_chain(resize)))
+
+
+def test_a_finer_graph_is_held_against_what_the_manifest_says() -> None:
+    data = finer_network(4, 3, scale=2)
+    inputs = [Port(name="a", channels=1), Port(name="b", channels=3)]
+    outputs = [Port(name="near", channels=1, scale=2), Port(name="far", channels=2, scale=2)]
+    facts = facts_of(data, inputs, outputs)
+    assert check_graph(data, facts).output_scale == facts.output_scale == 2
+    coarse = tuple(port.model_copy(update={"scale": 3}) for port in outputs)
+    with pytest.raises(BundleError, match="output scale of the graph is 2, the manifest says 3"):
+        check_graph(data, facts.model_copy(update={"outputs": coarse}))
 
 
 # ---------------------------------------------------------------------------- other outputs

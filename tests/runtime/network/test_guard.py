@@ -82,3 +82,44 @@ def test_the_bound_grows_with_the_input() -> None:
         for sign in (1, -1):
             with pytest.raises(ContractError, match="beyond"):
                 guard.check(sign * 1.01 * inside, given, lambda: "tile")
+
+
+def _fine_bands(planes: np.ndarray, guard: TileGuard, scale: int = 2) -> np.ndarray:
+    """Run a 'network' that repeats the capture to twice its size and spoils samples above 2."""
+
+    def run(window: np.ndarray) -> np.ndarray:
+        out = window[:, :3].repeat(scale, axis=2).repeat(scale, axis=3)
+        out[out > 2] = np.nan
+        return out
+
+    plan = plan_windows(*planes.shape[1:], TileLimits(stride_px=2, halo_px=0, tile_px=16))
+    bands = infer_bands(run, ArrayRows(planes), plan, guard=guard, scale=scale)
+    return np.concatenate(list(bands), axis=1)
+
+
+def test_a_bad_tile_of_a_finer_output_is_named_by_its_place_in_the_input() -> None:
+    planes, guard = _planes(), TileGuard(fallback=True)
+    np.testing.assert_array_equal(
+        _fine_bands(planes, guard), planes[:3].repeat(2, axis=1).repeat(2, axis=2)
+    )
+    planes[1, 20, 5] = 3.0
+    with pytest.raises(ContractError, match=r"pixels x 0..16, y 16..32") as caught:
+        _fine_bands(planes, TileGuard(fallback=True))
+    assert "--on-unsafe" not in str(caught.value), "nothing stands in for twice the samples"
+
+
+def test_the_factor_of_the_bundle_widens_the_bound() -> None:
+    given = np.full((6, 4, 4), 0.5, np.float32)
+    bright = np.full((3, 8, 8), 100.0, np.float32)
+    assert TileGuard(fallback=False, factor=256.0).check(bright, given, lambda: "t") is bright
+    with pytest.raises(ContractError, match="beyond"):
+        TileGuard(fallback=False).check(bright, given, lambda: "t")
+
+
+@pytest.mark.parametrize("stand_in", [slice(0, 1), slice(2, 6)])
+def test_any_channels_of_the_input_may_stand_in(stand_in: slice) -> None:
+    given = np.random.default_rng(0).random((6, 4, 4)).astype(np.float32)
+    guard = TileGuard(fallback=True, stand_in=stand_in)
+    bad = np.full((stand_in.stop - stand_in.start, 4, 4), np.inf, np.float32)
+    np.testing.assert_array_equal(guard.check(bad, given, lambda: "tile"), given[stand_in])
+    assert guard.replaced == ["tile: NaN or inf"]

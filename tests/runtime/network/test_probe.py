@@ -7,6 +7,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.probe import halo_error_curve, perturbation_reach
+from tests.planes_bundle import finer_network
 from tests.small_network import HALO_PX, STRIDE_PX, small_network
 
 RNG = np.random.default_rng
@@ -63,3 +64,21 @@ def test_sample_without_a_seam_is_refused(engine: NetworkEngine) -> None:
     sample = np.zeros((6, 100, 128), np.float32)
     with pytest.raises(ContractError, match="larger than a tile"):
         halo_error_curve(engine.run, sample, (8,), stride_px=STRIDE_PX)
+
+
+@pytest.mark.parametrize("scale", [1, 2, 3])
+@pytest.mark.parametrize("channels", [1, 5])
+def test_reach_of_a_finer_output_is_told_in_pixels_of_the_input(scale: int, channels: int) -> None:
+    engine = NetworkEngine(finer_network(channels, 2, scale=scale), threads=1, scale=scale)
+    reach = perturbation_reach(engine.run, 32, RNG(0), stride_px=2, channels=channels, scale=scale)
+    assert reach.halo_px == 3
+    assert 3 <= reach.radius_px <= 4
+
+
+def test_halo_of_a_finer_output_costs_what_its_seams_show() -> None:
+    engine = NetworkEngine(finer_network(3, 3, scale=2), threads=1, scale=2)
+    sample = RNG(1).random((3, 70, 66)).astype(np.float32)
+    curve = halo_error_curve(engine.run, sample, (0, 2, 3), stride_px=2, scale=2, tile_px=32)
+    assert [cost.halo_px for cost in curve] == [0, 2, 4]
+    assert curve[0].max_abs > curve[1].max_abs > 0
+    assert (curve[2].max_abs, curve[2].psnr_db) == (0.0, None)

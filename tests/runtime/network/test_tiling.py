@@ -13,6 +13,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.tiling import (
+    BANDS_HELD,
     Cancelled,
     PixelCost,
     Span,
@@ -22,6 +23,7 @@ from camkit.runtime.network.tiling import (
     plan_windows,
 )
 from camkit.runtime.rows import ArrayRows
+from tests.planes_bundle import finer_network
 from tests.small_network import HALO_PX, STRIDE_PX, small_network
 
 ENGINES = {n: NetworkEngine(small_network(), threads=n) for n in (1, 2)}
@@ -309,3 +311,73 @@ def test_plan_for_another_size_is_refused() -> None:
     plan = plan_windows(20, 30, LIMITS)
     with pytest.raises(ContractError, match="plan is for 30x20, the picture 20x30"):
         next(infer_bands(ENGINES[1].run, ArrayRows(_picture(30, 20)), plan))
+
+
+# ---------------------------------------------------------------------------- finer outputs
+
+FINER = {s: NetworkEngine(finer_network(4, 3, scale=s), threads=1, scale=s) for s in (1, 2, 3)}
+
+
+def _infer_finer(scale: int, picture: FloatArray, **changes: object) -> FloatArray:
+    limits = _limits(stride_px=2, halo_px=3, **changes)
+    plan = plan_windows(picture.shape[1], picture.shape[2], limits)
+    bands = infer_bands(FINER[scale].run, ArrayRows(picture), plan, scale=scale)
+    return np.concatenate(list(bands), axis=1)
+
+
+@given(
+    height=st.integers(1, 90),
+    width=st.integers(1, 90),
+    tile=st.integers(1, 40),
+    scale=st.sampled_from([1, 2, 3]),
+)
+@settings(max_examples=40, deadline=None)
+def test_tiled_equals_whole_bit_for_bit_at_any_scale(
+    height: int, width: int, tile: int, scale: int
+) -> None:
+    picture = np.random.default_rng(tile).random((4, height, width)).astype(np.float32)
+    whole = _infer_finer(scale, picture, whole=True)
+    assert whole.shape == (3, scale * height, scale * width)
+    padded = np.pad(picture, ((0, 0), (0, height % 2), (0, width % 2)), mode="edge")
+    untiled = FINER[scale].run(padded[None])[0, :, : scale * height, : scale * width]
+    assert np.array_equal(whole, untiled)
+    assert np.array_equal(_infer_finer(scale, picture, tile_px=tile), whole)
+
+
+def test_a_halo_below_the_reach_does_differ_at_twice_the_size() -> None:
+    picture = np.random.default_rng(0).random((4, 80, 80)).astype(np.float32)
+    whole = _infer_finer(2, picture, whole=True)
+    limits = _limits(stride_px=2, halo_px=0, tile_px=32)
+    plan = plan_windows(80, 80, limits)
+    bands = infer_bands(FINER[2].run, ArrayRows(picture), plan, scale=2)
+    assert not np.array_equal(np.concatenate(list(bands), axis=1), whole)
+
+
+def test_memory_counts_inputs_outputs_and_the_size_of_the_result() -> None:
+    plan = plan_windows(400, 600, _limits(tile_px=128))
+    area = plan.window_height_px * plan.window_width_px
+
+    def needed(**changes: float) -> int:
+        return plan.needed_bytes(PixelCost(**({"arena_bytes": 100.0} | changes)))  # type: ignore[arg-type]
+
+    base = needed(channels=1, outputs=1, scale=1)
+    row = 4 * plan.padded_width_px
+    band = max(span.stop_px - span.start_px for span in plan.rows)
+    one_input = 4 * area + row * plan.window_height_px
+    assert needed(channels=2, outputs=1) - base == one_input
+    one_output = 4 * area + row * BANDS_HELD * band
+    assert needed(channels=1, outputs=2) - base == one_output
+    assert needed(channels=1, outputs=1, scale=2) - base == 3 * one_output
+    assert needed(channels=1, outputs=1, scale=3) == needed(channels=1, outputs=9)
+
+
+def test_a_larger_result_is_planned_in_smaller_windows() -> None:
+    cap = 60 * 10**6
+    areas = []
+    for scale in (1, 2, 4):
+        cost = PixelCost(arena_bytes=100.0, channels=3, outputs=3, scale=scale)
+        limits = _limits(cost=cost, max_bytes=cap)
+        plan = plan_windows(1000, 1500, limits)
+        assert plan.needed_bytes(cost) <= cap
+        areas.append(plan.window_height_px * plan.window_width_px)
+    assert areas[0] > areas[1] > areas[2]

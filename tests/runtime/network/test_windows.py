@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from camkit.bundle.facts import HaloError
+from camkit.bundle.facts import HaloError, Port
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.windows import (
     NetworkWindows,
     SizedNetwork,
@@ -15,6 +16,7 @@ from camkit.runtime.network.windows import (
 )
 from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import tiny_facts, tiny_forward
+from tests.planes_bundle import facts_of, finer_network
 
 SIZE_PX = (64, 96)
 CURVE = tuple(
@@ -114,3 +116,48 @@ def test_no_windows_at_all_are_refused_when_they_should_run() -> None:
     assert (empty.window_mp(), empty.needed_bytes(), empty.to_json()) == ({}, 0, {})
     with pytest.raises(ContractError, match="tiles or cells"):
         empty.bands(ArrayRows(_picture()))
+
+
+def _finer(channels: int, outputs: int, scale: int) -> SizedNetwork:
+    data = finer_network(channels, outputs, scale=scale)
+    ports = [Port(name="a", channels=channels)], [Port(name="b", channels=outputs, scale=scale)]
+    engine = NetworkEngine(data, threads=1, scale=scale)
+    return SizedNetwork(size="M", run=engine.run, facts=facts_of(data, *ports))
+
+
+@pytest.mark.parametrize(("channels", "outputs", "scale"), [(1, 1, 1), (4, 2, 2), (2, 5, 3)])
+def test_windows_of_any_channels_and_scale_give_the_whole_and_say_their_memory(
+    channels: int, outputs: int, scale: int
+) -> None:
+    network = _finer(channels, outputs, scale)
+    cost = network.cost
+    assert (cost.channels, cost.outputs, cost.scale) == (channels, outputs, scale)
+    assert cost.out_values == outputs * scale**2
+    picture = np.random.default_rng(0).random((channels, *SIZE_PX), dtype=np.float32)
+    whole, tiled = (
+        plan_network(SIZE_PX, [network], _limits(**changes))
+        for changes in ({"mode": "whole"}, {"tile_px": 16})
+    )
+    made = [np.concatenate(list(w.bands(ArrayRows(picture))), axis=1) for w in (whole, tiled)]
+    assert made[0].shape == (outputs, scale * SIZE_PX[0], scale * SIZE_PX[1])
+    np.testing.assert_array_equal(*made)
+    assert tiled.tiles is not None
+    assert tiled.needed_bytes() == tiled.tiles.needed_bytes(cost)
+    assert whole.needed_bytes() >= made[0].nbytes
+
+
+def test_cells_without_planes_that_stand_in_are_refused() -> None:
+    labels = np.array([[1, 0, 1], [0, 0, 1]])
+    windows = plan_network(SIZE_PX, [_network()], _limits(), labels)
+    with pytest.raises(ContractError, match="stand in where no network runs"):
+        windows.bands(ArrayRows(_picture()))
+
+
+def test_any_channels_of_the_input_stand_in_for_a_cell() -> None:
+    labels = np.array([[1, 0, 0], [1, 0, 0]])
+    windows = plan_network(SIZE_PX, [_finer(5, 2, 1)], _limits(), labels)
+    picture = np.random.default_rng(0).random((5, *SIZE_PX), dtype=np.float32)
+    bands = list(windows.bands(ArrayRows(picture), stand_in=slice(1, 3)))
+    made = np.concatenate(bands, axis=1)
+    np.testing.assert_array_equal(made[:, :, 32:], picture[1:3, :, 32:])
+    assert (made[:, :, :16] != picture[1:3, :, :16]).any()

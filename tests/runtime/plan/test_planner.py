@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Linearise, Network
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.contracts import FloatArray
 from camkit.runtime.job.reconstruction import Reconstruction
@@ -15,9 +17,12 @@ from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import FULL, WIENER
 from camkit.runtime.plan.estimate import estimate_seconds
+from camkit.runtime.plan.loss import plan_entries
 from camkit.runtime.plan.planner import Plan, default_size, make_plan, needs_scene
 from camkit.runtime.plan.speed import Speed
+from tests.job_factory import made_planes, start
 from tests.plan_factory import MODEL, half_textured_mosaic, write_planned_bundle
+from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 
 SPEED = Speed(
     network_s_per_mp={(DEFAULT_ROLE, "M"): 2.0, (DEFAULT_ROLE, "S"): 1.0},
@@ -175,3 +180,27 @@ def test_estimate_comes_with_the_decisions(bundle: Bundle) -> None:
     compared = estimate.compare(2 * estimate.seconds, estimate.peak_mb)
     assert compared["seconds_ratio"] == pytest.approx(2.0, abs=0.01)
     assert compared["peak_ratio"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_where_nothing_stands_in_for_a_network_it_gets_every_cell(tmp_path: Path) -> None:
+    """A network that makes the picture finer is not left out of flat cells, however draft."""
+    data = finer_network(1, 1, scale=2)
+    port = Port(name="a", channels=1)
+    fine = port.model_copy(update={"scale": 2})
+    stages = (
+        Linearise(gives=("light",)),
+        Network(takes=("light",), gives=("large",), transform="none"),
+    )
+    camera = write_planes_bundle(
+        tmp_path,
+        stages,
+        sensor=planes_sensor(size_px=(512, 512)),
+        networks={DEFAULT_ROLE: (facts_of(data, [port], [fine]), data)},
+        plan=plan_entries(MODEL, adaptive_cost_db=0.05, draft_cost_db=0.3),
+    )
+    flat = made_planes(samples=np.full((1, 512, 512), 0.3, np.float32))
+    work = start(camera, flat, quality="adaptive")
+    assert work.labels is None
+    reasons = {d["what"]: d["reason"] for d in work.record["decisions"]}
+    assert reasons["cells"] == "no plane stands in where the network does not run"
+    assert work.fill().shape == (1, 1024, 1024)

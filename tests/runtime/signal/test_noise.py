@@ -52,6 +52,19 @@ def test_noise_of_planes_is_measured_too():
     assert 0.75 < noise.shot[0] / shot < 1.25
 
 
+@pytest.mark.parametrize("channels", [1, 2, 6])
+def test_noise_of_any_number_of_planes_is_one_line_for_all(channels):
+    scenes = np.stack([smooth_scene(256, 384, s) for s in range(channels)])
+    linear, shot = noisy(scenes, 800)
+    samples = np.clip(np.round(linear * 3839 + 256), 0, 4095).astype(np.uint16)
+    black = np.full(channels, 256, dtype=np.float32)
+    capture = Capture(samples=samples, cfa=None, black_level=black, white_level=4095.0)
+    noise = measure_noise(capture)
+    assert len(noise.shot) == len(noise.read_variance) == channels
+    assert len(set(noise.shot)) == 1
+    assert 0.75 < noise.shot[0] / shot < 1.25
+
+
 def test_a_clipped_half_does_not_bias_the_measurement():
     linear, shot = noisy(smooth_scene(512, 768), 800)
     linear[:, 384:] = 1.2
@@ -60,6 +73,13 @@ def test_a_clipped_half_does_not_bias_the_measurement():
 
 def test_a_picture_too_small_to_measure_gets_the_stated_default():
     assert measure_noise(capture_of(np.full((16, 16), 0.5))) == fallback_noise()
+    five = Capture(
+        samples=np.full((5, 16, 16), 0.5, np.float32),
+        cfa=None,
+        black_level=np.zeros(5, np.float32),
+        white_level=1.0,
+    )
+    assert measure_noise(five) == fallback_noise(5)
 
 
 def test_invalid_samples_are_replaced_by_their_own_colour():
@@ -135,6 +155,12 @@ def test_planes_are_repaired_one_by_one():
     assert mask.sum() == 2
     assert mask[1, 4, 4]
     assert mask[2, 0, 0]
+    for channels in (1, 5):
+        many = np.repeat(planes[1][None], channels, axis=0)
+        many[-1, 2, 7] = np.inf
+        sound, broken = repair_planes(many)
+        np.testing.assert_array_equal(sound, np.float32(0.3))
+        assert broken.sum() == channels + 1
 
 
 def test_a_mosaic_must_be_flat():

@@ -61,6 +61,36 @@ def test_stacked_rows_are_their_sources_stabilised_one_below_the_other(threads):
     np.testing.assert_array_equal(rows.read(3, 67), np.concatenate(expected))
 
 
+@pytest.mark.parametrize("channels", [1, 2, 7])
+def test_any_number_of_channels_is_stabilised_each_by_its_own_noise(channels):
+    rng = np.random.default_rng(5)
+    noise = NoiseModel(
+        shot=tuple(rng.uniform(1e-5, 1e-4, channels)),
+        read_variance=tuple(rng.uniform(1e-8, 1e-6, channels)),
+    )
+    planes = rng.random((channels, 9, 13), dtype=np.float32)
+    stable = stabilise(planes, noise)
+    np.testing.assert_allclose(unstabilise(stable, noise), planes, atol=4e-6)
+    for c in range(channels):
+        alone = NoiseModel(shot=noise.shot[c : c + 1], read_variance=noise.read_variance[c : c + 1])
+        np.testing.assert_array_equal(stabilise(planes[c : c + 1], alone)[0], stable[c])
+    with pytest.raises(ContractError, match=rf"planes must be \({channels}, h, w\)"):
+        stabilise(np.ones((channels + 1, 2, 2), np.float32), noise)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_any_planes_are_stacked_and_without_noises_as_they_are(threads):
+    rng = np.random.default_rng(6)
+    parts = [rng.random((c, 70, 900), dtype=np.float32) for c in (1, 4, 2)]
+    rows = StackedRows([ArrayRows(part) for part in parts], None, threads=threads)
+    assert rows.shape == (7, 70, 900)
+    np.testing.assert_array_equal(rows.read(3, 67), np.concatenate(parts)[:, 3:67])
+    noises = [NoiseModel(shot=(1e-4,) * c, read_variance=(1e-7,) * c) for c in (1, 4, 2)]
+    stable = StackedRows([ArrayRows(part) for part in parts], noises, threads=threads)
+    wanted = [stabilise(part, noise) for part, noise in zip(parts, noises, strict=True)]
+    np.testing.assert_array_equal(stable.read(0, 70), np.concatenate(wanted))
+
+
 def test_stacked_rows_need_sources_of_one_size():
     with pytest.raises(ContractError, match="one size"):
         StackedRows([ArrayRows(np.zeros((3, 4, w), np.float32)) for w in (4, 5)], [NOISE, NOISE])

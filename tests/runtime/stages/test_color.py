@@ -1,10 +1,12 @@
 """Whose colour matrix, and what the picture is in."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle, open_bundle
-from camkit.bundle.stages import Color
+from camkit.bundle.stages import Color, Linearise
 from camkit.runtime.color import color_stage, to_output
 from tests.bundle_factory import tiny_sensor, write_tiny_bundle
 from tests.job_factory import (
@@ -17,6 +19,7 @@ from tests.job_factory import (
     start,
     stream_of,
 )
+from tests.planes_bundle import planes_sensor, write_planes_bundle
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +60,10 @@ def test_rows_are_those_of_the_whole_in_the_colour_asked_for(step: int) -> None:
     np.testing.assert_array_equal(read_all(picture.rows(), step), wanted)
 
 
-def test_one_channel_becomes_grey() -> None:
+def test_one_channel_becomes_grey(tmp_path: Path) -> None:
+    stages = (Linearise(gives=("light",)), Color(takes=("light",)))
+    camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor(size_px=None))
     light = np.random.default_rng(0).random((1, 20, 9), dtype=np.float32)
-    capture = made_planes(samples=light)
-    (picture,) = run_stage(Color(), made_job(capture), stream_of(light))
-    assert picture.shape == (3, 20, 9)
-    np.testing.assert_allclose(read_all(picture.rows()), np.repeat(light, 3, axis=0), rtol=1e-6)
+    made = start(camera, made_planes(samples=light))
+    assert made.shape == (3, 20, 9)
+    np.testing.assert_allclose(made.fill(), np.repeat(light, 3, axis=0), rtol=1e-6)

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Linearise
 from camkit.runtime.capture import Capture
 from tests.job_factory import captured, made_job, made_mosaic, made_planes, read_all, run_stage
+from tests.planes_bundle import planes_sensor, write_planes_bundle
 
 
 def _clipping_mosaic() -> Capture:
@@ -20,15 +22,21 @@ def _planes() -> Capture:
     return made_planes(samples=samples, black_level=black, white_level=255.0)
 
 
-CAPTURES = [_clipping_mosaic(), _planes()]
+@pytest.fixture(scope="module")
+def four(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    """Give a camera of four channels."""
+    sensor = planes_sensor(("A", "B", "C", "D"), size_px=None)
+    stages = (Linearise(gives=("light",)),)
+    return write_planes_bundle(tmp_path_factory.mktemp("four"), stages, sensor=sensor)
 
 
-@pytest.mark.parametrize("capture", CAPTURES, ids=["mosaic", "planes"])
+@pytest.mark.parametrize("kind", ["mosaic", "planes"])
 @pytest.mark.parametrize(("threads", "step"), [(1, 9), (2, 33), (3, 70)])
 def test_rows_are_the_light_of_the_capture_wherever_reading_begins(
-    capture: Capture, threads: int, step: int
+    four: Bundle, kind: str, threads: int, step: int
 ) -> None:
-    job = made_job(capture, threads=threads)
+    capture = _clipping_mosaic() if kind == "mosaic" else _planes()
+    job = made_job(capture, four if kind == "planes" else None, threads=threads)
     light, mask = run_stage(Linearise(), job, captured(capture))
     assert (light.plane.domain, mask.plane.domain) == ("linear", "mask")
     wanted = np.broadcast_to(capture.linear_rows(0, 70), light.shape)

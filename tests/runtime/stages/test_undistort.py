@@ -1,0 +1,75 @@
+"""The distortion undone, band by band as in the whole, about the optical axis."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.sensor import Extent
+from camkit.bundle.stages import Linearise, Undistort
+from camkit.contracts import RadialDistortion
+from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.rows import ArrayRows
+from tests.bundle_factory import PITCH_UM, write_tiny_bundle
+from tests.job_factory import (
+    made_job,
+    made_mosaic,
+    made_planes,
+    read_all,
+    run_stage,
+    start,
+    stream_of,
+)
+from tests.planes_bundle import planes_sensor, write_planes_bundle
+from tests.psf_factory import streak_kernel, uniform_psf
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
+
+
+def test_bands_are_those_of_the_whole_in_ideal_geometry(bundle: Bundle) -> None:
+    light = np.random.default_rng(0).random((3, 64, 96), dtype=np.float32)
+    job = made_job(made_mosaic(), bundle, threads=2)
+    (straight,) = run_stage(Undistort(), job, stream_of(light))
+    assert not straight.plane.grid.warped
+    bands = undistort_bands(ArrayRows(light), bundle.psf.distortion, job.placement.window)
+    np.testing.assert_array_equal(
+        read_all(straight.rows(), 13), np.concatenate(list(bands), axis=1)
+    )
+
+
+@pytest.mark.parametrize("channels", [("Y",), tuple("abcde")])
+def test_pixels_move_away_from_the_axis_wherever_it_meets_the_sensor(
+    tmp_path: Path, channels: tuple[str, ...]
+) -> None:
+    """Undoing a barrel moves what lies right of the axis further right, and left further left."""
+    count = len(channels)
+    barrel = RadialDistortion(
+        coefficients=np.tile([1.0, -0.04, 0.0, 0.0], (count, 1)), radius_mm=0.35
+    )
+    psf = replace(uniform_psf(streak_kernel(0.0), channels=count), distortion=barrel)
+    extent = {"width_px": 96, "height_px": 64, "pixel_pitch_um": PITCH_UM}
+    y, x = np.mgrid[0:64, 0:96].astype(np.float32)
+    moved = {}
+    for axis_px in (None, (20.0, 31.5), (75.0, 31.5)):
+        sensor = planes_sensor(
+            channels, extent=Extent.model_validate(extent | {"optical_centre_px": axis_px})
+        )
+        stages = (Linearise(gives=("light",)), Undistort(takes=("light",)))
+        camera = write_planes_bundle(
+            tmp_path, stages, sensor=sensor, psf=replace(psf, pixel_pitch_um=PITCH_UM)
+        )
+        spot = np.exp(-((x - 60) ** 2 + (y - 31.5) ** 2) / 8)
+        made = start(camera, made_planes(samples=np.stack([spot] * count)))
+        found = made.fill()
+        centre = (found * x).sum(axis=(1, 2)) / found.sum(axis=(1, 2))
+        np.testing.assert_allclose(centre, centre[0], atol=1e-4)
+        moved[axis_px] = float(centre[0]) - 60
+    # the picture is centred on the middle of the window; beside the axis it is stretched more
+    assert moved[None] > 0.02
+    assert moved[20.0, 31.5] > moved[None]
+    assert moved[75.0, 31.5] != pytest.approx(moved[20.0, 31.5], abs=0.02)

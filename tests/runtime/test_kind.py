@@ -1,0 +1,73 @@
+"""What the runtime knows of a kind of camera is found by its name, and must be a part."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from camkit import kinds
+from camkit.errors import ContractError, UnsupportedError
+from camkit.kinds import KINDS
+from camkit.runtime.kind import RuntimePart, runtime_part
+
+PACKAGE = "camkit_kind_of_runtime_test"
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_of_camkit_is_read_and_photographed(name: str) -> None:
+    part = runtime_part(name)
+    assert isinstance(part, RuntimePart)
+    assert part.suffix.startswith(".")
+
+
+def test_a_kind_that_is_not_there_is_refused() -> None:
+    with pytest.raises(UnsupportedError, match="there is no kind of camera 'dream'; there are"):
+        runtime_part("dream")
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Give the folder of an installed kind, whose part of the runtime a test writes."""
+    folder = tmp_path / PACKAGE
+    folder.mkdir()
+    (folder / "__init__.py").write_text(
+        "from camkit.kinds import Kind\n"
+        f"MINE = Kind(name='mine', title='', sensor='planes', stages=(), metrics=(), "
+        f"home='{PACKAGE}')\n",
+        encoding="utf-8",
+    )
+    facts = tmp_path / f"{PACKAGE}-1.0.dist-info"
+    facts.mkdir()
+    (facts / "METADATA").write_text(f"Name: {PACKAGE}\nVersion: 1.0\n", encoding="utf-8")
+    (facts / "entry_points.txt").write_text(
+        f"[{kinds.GROUP}]\nmine = {PACKAGE}:MINE\n", encoding="utf-8"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    kinds._installed.cache_clear()
+    yield folder
+    kinds._installed.cache_clear()
+    for name in [name for name in sys.modules if name.split(".")[0] == PACKAGE]:
+        del sys.modules[name]
+
+
+def test_an_installed_kind_brings_its_own_part(package: Path) -> None:
+    (package / "runtime.py").write_text(
+        "from camkit.runtime.kinds.bayer import PART as BAYER\n"
+        "from dataclasses import replace\n"
+        "PART = replace(BAYER, suffix='.mine')\n",
+        encoding="utf-8",
+    )
+    assert runtime_part("mine").suffix == ".mine"
+
+
+def test_a_kind_without_a_part_of_the_runtime_says_what_to_add(package: Path) -> None:
+    with pytest.raises(UnsupportedError, match=f"add the package {PACKAGE}.runtime"):
+        runtime_part("mine")
+
+
+@pytest.mark.parametrize("text", ["", "PART = 'a word'\n"])
+def test_a_module_without_a_part_is_named(package: Path, text: str) -> None:
+    (package / "runtime.py").write_text(text, encoding="utf-8")
+    with pytest.raises(ContractError, match=rf"{PACKAGE}\.runtime must define PART"):
+        runtime_part("mine")
