@@ -5,8 +5,8 @@ from typing import Any
 
 from camkit.report.bench.accuracy import INPUT, Scores
 from camkit.report.bench.metric import registered_metrics
-from camkit.report.bench.process_run import Run
 from camkit.report.bench.row import Facts
+from camkit.report.bench.timed.process_run import Run
 from camkit.report.bench.trial import Trial
 
 

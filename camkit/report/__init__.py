@@ -2,6 +2,9 @@
 
     fabricated_psf   lenses with fabrication errors, traced afresh and densely
     quality          where a picture is placed, how it is captured and scored
+    discovery        modules of a folder that register themselves
+    kind, kind_finder   what reports ask of a kind of camera, and where they find it
+    kinds/           the kinds that come with camkit
     journal          what a long run has finished, which may be resumed
     bench/           speed against accuracy
     stress/          where methods fail

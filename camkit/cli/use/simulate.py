@@ -1,7 +1,7 @@
-"""`camkit simulate`: the digital twin, a sharp scene to a real Bayer DNG."""
+"""`camkit simulate`: the digital twin, a sharp scene to a capture such as a Bayer DNG."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,13 +9,16 @@ from camkit.cli.choices import Debug, DepthM, Overwrite
 from camkit.errors import ContractError
 from camkit.units import MM_PER_M
 
+if TYPE_CHECKING:
+    from camkit.bundle.reader import Bundle
+
 
 def simulate(
     scene: Annotated[
         str, typer.Argument(help="A picture (8/16-bit sRGB, or linear EXR) or procedural:SEED.")
     ],
     bundle: Annotated[str, typer.Option(help="Bundle NAME or PATH of the camera.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The DNG to write.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The capture to write, such as a DNG.")],
     iso: Annotated[float, typer.Option(help="ISO speed of the capture.")] = 100.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     origin_px: Annotated[
@@ -29,7 +32,7 @@ def simulate(
     overwrite: Overwrite = False,
     _debug: Debug = False,
 ) -> None:
-    """Photograph a scene with the bundle's camera: blur, vignetting, mosaic, noise, saturation."""
+    """Photograph a scene with the bundle's camera: blur, vignetting, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
     from camkit.contracts import depth_name
     from camkit.runtime.kind import runtime_part
@@ -51,7 +54,7 @@ def simulate(
         seed=seed,
         origin_px=None if origin_px is None else _pair(origin_px, "--origin-px"),
         exposure=exposure,
-        depth_mm=opened.reference_depth_mm if depth_m is None else depth_m * MM_PER_M,
+        depth_mm=_depth_mm(opened) if depth_m is None else depth_m * MM_PER_M,
         workers=available_threads(None),
     )
     simulation = part.simulate(_scene(scene, size), opened, options)
@@ -60,6 +63,11 @@ def simulate(
     height, width = simulation.samples.shape[-2:]
     depth = "" if simulation.depth_mm is None else f", {depth_name(simulation.depth_mm)} away"
     typer.echo(f"{out}: {width}x{height}, ISO {iso:g}{depth}")
+
+
+def _depth_mm(bundle: "Bundle") -> float | None:
+    """Give the distance of focus; None for a camera that states no optics."""
+    return None if bundle.manifest.optics is None else bundle.reference_depth_mm
 
 
 def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def]  # numpy stays lazy

@@ -2,13 +2,11 @@
 
 settings        what a caller may ask for
 trial           one way to do the work, and the axes along which trials vary
-discovery       modules of a folder that register themselves
 row_maker       what makes the rows of one sort
 rows/           which trials a bundle gives; a new sort of row is one new file
-timed_capture   the capture that is timed
-process_run     a fresh process watched: seconds, memory of its tree, load of others
-worker          that process, as any user's program
-timing          order of the rounds; median, quantiles and noise of the seconds
+part            what a kind of camera brings: how it photographs, rows, metrics
+line_up         the makers and metrics of a camera, and all trials
+timed/          one capture through fresh processes, watched: seconds, memory, noise
 machine, gemm   what the machine is, and the fastest it multiplies
 known_captures  captures with a known truth
 metric          the type of a metric

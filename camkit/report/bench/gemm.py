@@ -9,7 +9,7 @@ import time
 from typing import Final
 
 from camkit.errors import UnsupportedError
-from camkit.report.bench.process_run import child_environment
+from camkit.report.bench.timed.process_run import child_environment
 
 SIDE: Final = 768
 """Side of the matrices: a product is long enough to be peak, short enough to be undisturbed."""

@@ -14,8 +14,8 @@ from camkit.report.bench.accuracy import (
     standard_error_of_gain,
 )
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.process_run import Run
-from camkit.report.bench.timing import Spread, is_noisy, paired_ratio, quantile, spread_of
+from camkit.report.bench.timed.process_run import Run
+from camkit.report.bench.timed.timing import Spread, is_noisy, paired_ratio, quantile, spread_of
 from camkit.report.bench.trial import Trial
 
 Row = dict[str, Any]

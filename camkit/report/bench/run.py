@@ -16,11 +16,11 @@ from camkit.report.bench.known_captures import ISOS, KnownCapture, golden_captur
 from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.process_run import Job, Run, run_job
 from camkit.report.bench.row import Facts, Row, make_row
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
-from camkit.report.bench.timed_capture import SCENE_TEXT, timed_capture
-from camkit.report.bench.timing import interleaved
+from camkit.report.bench.timed.capture import SCENE_TEXT, timed_capture
+from camkit.report.bench.timed.process_run import Job, Run, run_job
+from camkit.report.bench.timed.timing import interleaved
 from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
 from camkit.report.kind_finder import camera_of
 from camkit.report.quality import FIELD_SHARES, list_set

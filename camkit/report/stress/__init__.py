@@ -3,12 +3,15 @@
 In the order of the work:
 
     scene         sharp pictures that no training has seen, and their places on the sensor
-    twin          the digital twin with a changed lens, light, exposure, noise or sensor
-    rig           every method on one capture, the Wiener bank computed once
+    shot          a capture beside the truth, and samples of it spoiled
+    kernel_change kernels enlarged and turned
+    rig           light through a lens, and every method on one capture, by the pipeline itself
     consistency   chi^2 per pixel of a restoration, blurred again, against the capture
-    score         PSNR in sensor geometry, and everything else that is judged
+    verdict       what a sweep asks of any kind of camera
+    score         the judge of cameras that photograph: PSNR in sensor geometry, and all else
     scenario      what a scenario is, and how `scenarios/` is discovered
     scenarios/    one file per scenario
+    part          what a kind of camera brings: scenes, examiner, scenarios
     sweep, curve  values x scenes, journalled so that a run may be resumed
     break_point   where a method stops helping, with its confidence
     measured_ranges   what the runtime may rely on: the `envelope` of the bundle
@@ -16,5 +19,5 @@ In the order of the work:
     chart, patch, page   curves, and one HTML page with the worst patches
     run           all of it
 
-Torch is not needed.
+The digital twin is that of the runtime (`camkit.runtime.twin`). Torch is not needed.
 """

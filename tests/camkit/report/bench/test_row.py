@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from camkit.report.bench.process_run import Run
 from camkit.report.bench.row import make_row
+from camkit.report.bench.timed.process_run import Run
 from tests.bench_factory import make_facts, make_run, make_trial
 
 PROMISED = {

@@ -10,7 +10,7 @@ from camkit.errors import BundleError, ContractError
 from camkit.report.bench.output import write_bench
 from camkit.report.bench.run import open_entrants, run_bench
 from camkit.report.bench.settings import Settings
-from camkit.report.bench.timed_capture import timed_capture
+from camkit.report.bench.timed.capture import timed_capture
 from camkit.report.bench.trial import Axes
 from tests.bundle_factory import write_tiny_bundle
 from tests.psf_factory import texture

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from camkit.report.bench import process_run
-from camkit.report.bench.process_run import Job, TreeWatch, run_job, tree_rss_mb
+from camkit.report.bench.timed import process_run
+from camkit.report.bench.timed.process_run import Job, TreeWatch, run_job, tree_rss_mb
 from tests.capture_factory import write_tiny_captures
 
 CHILD = "data = bytearray(80_000_000); print('up', flush=True); input()"

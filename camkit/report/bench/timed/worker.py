@@ -1,6 +1,6 @@
 """The process whose time and memory are measured: files to pictures, as any user's program.
 
-    python -m camkit.report.bench.worker JOB     JOB is the JSON of a `process_run.Job`
+    python -m camkit.report.bench.timed.worker JOB     JOB is the JSON of a `process_run.Job`
 
 Prints one JSON line per file as soon as its picture lies on the disk. The first file pays for
 imports, bundle and session; the later ones find them ready. A slow file is the last one.

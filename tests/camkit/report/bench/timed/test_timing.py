@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
-from camkit.report.bench.timing import (
+from camkit.report.bench.timed.timing import (
     interleaved,
     is_noisy,
     paired_ratio,

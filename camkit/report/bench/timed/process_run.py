@@ -88,7 +88,7 @@ class Run:
 
 def run_job(job: Job) -> Run:
     """Run a job in a fresh process, which is ended with all its children if we are interrupted."""
-    command = [sys.executable, "-P", "-m", "camkit.report.bench.worker", job.to_json()]
+    command = [sys.executable, "-P", "-m", "camkit.report.bench.timed.worker", job.to_json()]
     with tempfile.TemporaryFile() as complaints:
         before, began = _busy_s(), time.perf_counter()
         with subprocess.Popen(
