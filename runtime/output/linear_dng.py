@@ -37,8 +37,10 @@ class LinearDngWriter(PictureWriter):
         if picture.color.space != "camera" or picture.orientation != 1:
             raise ContractError("a DNG takes upright camera RGB; choose --color camera")
         origin = picture.origin
-        self._gains = origin.white_balance
-        red, green, blue = origin.white_balance
+        gains = origin.white_balance
+        # one channel comes as three planes of grey
+        self._gains = gains * 3 if len(gains) == 1 else gains
+        red, green, blue = self._gains
         self._tags = DngTags(
             cfa=None,
             black=BLACK,

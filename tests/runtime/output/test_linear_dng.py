@@ -1,12 +1,13 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from camkit.errors import ContractError
-from camkit.runtime.capture import Capture
 from camkit.runtime.color import color_stage
 from camkit.runtime.output.linear_dng import LinearDngWriter
+from camkit.runtime.output.origin import Origin
 from camkit.runtime.output.picture_writer import PictureFormat
 from camkit.runtime.raw import read_capture
 from tests.camera_factory import COLOR_MATRIX
@@ -15,37 +16,28 @@ GAINS = (2.0, 1.0, 1.5)
 STEP = 1 / (65535 - 1024)
 
 
-def source(orientation: int = 1) -> Capture:
-    return Capture(
-        samples=np.zeros((40, 50), np.uint16),
-        cfa="RGGB",
-        black_level=np.zeros((2, 2), np.float32),
-        white_level=4095.0,
-        white_balance=GAINS,
-        color_matrix=np.array(COLOR_MATRIX),
-        orientation=orientation,
-        iso=800.0,
-        exposure_time_s=0.01,
-        noise=None,
-        origin_px=None,
-        sensor_size_px=None,
-        pixel_pitch_um=None,
-        bundle_name=None,
-        camera="test camera",
-        sha256=None,
-        notes=(),
-    )
+ORIGIN = Origin(
+    camera="test camera",
+    iso=800.0,
+    exposure_time_s=0.01,
+    orientation=6,
+    white_balance=GAINS,
+    color_matrix=np.array(COLOR_MATRIX),
+)
 
 
 def test_planes_come_back_without_white_balance(tmp_path: Path) -> None:
     planes = np.random.default_rng(0).uniform(-0.01, 1, (3, 40, 50)).astype(np.float32)
-    facts = PictureFormat(width=50, height=40, color=color_stage(np.array(COLOR_MATRIX), "camera"))
-    with LinearDngWriter(tmp_path / "a.dng", facts, source(6), GAINS) as writer:
+    stage = color_stage(np.array(COLOR_MATRIX), "camera")
+    facts = PictureFormat(width=50, height=40, color=stage, origin=ORIGIN)
+    with LinearDngWriter(tmp_path / "a.dng", facts) as writer:
         writer.write(planes[:, :13])
         writer.write(planes[:, 13:])
     found = read_capture(tmp_path / "a.dng", isolate=False)
-    assert found.orientation == 6
-    assert found.iso == 800
+    assert (found.orientation, found.iso, found.exposure_time_s) == (6, 800, 0.01)
+    assert "test camera" in found.camera
+    assert found.color_matrix is not None
+    np.testing.assert_allclose(found.color_matrix, COLOR_MATRIX, atol=1e-4)
     assert found.white_balance is not None
     np.testing.assert_allclose(found.white_balance, GAINS, rtol=1e-5)
     linear = found.linear_rows(0, 40) * np.array(GAINS)[:, None, None]
@@ -59,14 +51,24 @@ def test_other_colour_or_turned_bands_are_refused(
     stage = color_stage(None, output)  # type: ignore[arg-type]
     facts = PictureFormat(width=3, height=2, color=stage, orientation=orientation)
     with pytest.raises(ContractError, match="camera RGB"):
-        LinearDngWriter(tmp_path / "a.dng", facts, source(), GAINS)
+        LinearDngWriter(tmp_path / "a.dng", facts)
 
 
 def test_error_leaves_no_file(tmp_path: Path) -> None:
     facts = PictureFormat(width=3, height=2, color=color_stage(None, "camera"))
     with (
         pytest.raises(ContractError),
-        LinearDngWriter(tmp_path / "a.dng", facts, source(), GAINS) as writer,
+        LinearDngWriter(tmp_path / "a.dng", facts) as writer,
     ):
         writer.write(np.full((3, 2, 3), np.nan, np.float32))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_one_channel_is_written_as_three_planes_of_grey(tmp_path: Path) -> None:
+    origin = replace(ORIGIN, white_balance=(1.0,), color_matrix=None)
+    facts = PictureFormat(width=50, height=40, color=color_stage(None, "camera"), origin=origin)
+    grey = np.random.default_rng(0).random((1, 40, 50), dtype=np.float32).repeat(3, axis=0)
+    with LinearDngWriter(tmp_path / "a.dng", facts) as writer:
+        writer.write(grey)
+    found = read_capture(tmp_path / "a.dng", isolate=False)
+    np.testing.assert_allclose(found.linear_rows(0, 40), grey, atol=0.51 * STEP)

@@ -8,7 +8,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import color_stage
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter, turn
-from camkit.runtime.output.writer import open_writer
+from camkit.runtime.output.writer import SUFFIXES, open_writer
 
 STAGE = color_stage(None)
 
@@ -106,15 +106,22 @@ def test_impossible_format_is_refused(changes: dict[str, object]) -> None:
         collector(**changes)
 
 
-@pytest.mark.parametrize("kind", ["exr", "tiff", "png"])
+@pytest.mark.parametrize("kind", SUFFIXES)
 def test_every_format_has_a_writer(tmp_path: Path, kind: str) -> None:
-    facts = PictureFormat(width=5, height=4, color=STAGE)
-    with open_writer(tmp_path / "a", kind, facts) as writer:  # type: ignore[arg-type]
+    color = color_stage(None, "camera") if kind == "dng" else STAGE
+    facts = PictureFormat(width=5, height=4, color=color)
+    with open_writer(tmp_path / "a", kind, facts) as writer:
         writer.write(planes() / 60)
     assert (tmp_path / "a").stat().st_size > 100
 
 
 def test_unknown_format_is_refused(tmp_path: Path) -> None:
     facts = PictureFormat(width=5, height=4, color=STAGE)
-    with pytest.raises(ContractError, match="exr, tiff or png"):
-        open_writer(tmp_path / "a", "bmp", facts)  # type: ignore[arg-type]
+    with pytest.raises(ContractError, match="exr, tiff, png, dng for image; got 'bmp'"):
+        open_writer(tmp_path / "a", "bmp", facts)
+
+
+def test_a_product_that_nothing_writes_is_refused(tmp_path: Path) -> None:
+    facts = PictureFormat(width=5, height=4, color=STAGE)
+    with pytest.raises(ContractError, match="nothing writes 'depth'; there are image"):
+        open_writer(tmp_path / "a", "exr", facts, product="depth")

@@ -14,7 +14,7 @@ from camkit.contracts import FloatArray, FrozenPsf
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from tests.bundle_factory import PITCH_UM, write_tiny_bundle
 from tests.deep_bundle import write_deep_bundle
 from tests.job_factory import (
