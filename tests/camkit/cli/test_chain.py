@@ -14,7 +14,7 @@ from camkit.models_def.optics.lens_file.lens_file import write_lens
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.training.kind import read_recipe
-from tests.models_def.training.conftest import RECIPE
+from tests.bayer_recipe import RECIPE
 
 PRESCRIPTION = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
 SMALL = {
