@@ -1,0 +1,43 @@
+"""A bundle of format 1.0 is written anew in 2.0: the same members, the same pictures."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.bundle.golden import golden_from_bytes
+from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
+from camkit.errors import ParityError
+from camkit.runtime.proof.check import CheckReport, Layer
+from tools import repack
+
+EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example-1.0.camkit"
+
+
+def test_the_newest_format_is_written_and_nothing_is_lost(tmp_path: Path) -> None:
+    new = tmp_path / "new.camkit"
+    assert repack.repack(EXAMPLE, new) == new.stat().st_size
+    before, after = open_bundle(EXAMPLE), open_bundle(new)
+    assert after.manifest.format_version == "2.0"
+    assert after.manifest.model_copy(update={"members": {}}) == before.manifest.model_copy(
+        update={"members": {}}
+    )
+    for name in set(before.names) - {GOLDEN, MANIFEST}:
+        assert after.member(name) == before.member(name)
+    old, found = (golden_from_bytes(bundle.member(GOLDEN)) for bundle in (before, after))
+    assert old.keys() == found.keys()
+    for name, case in old.items():
+        np.testing.assert_array_equal(found[name].capture, case.capture)
+        np.testing.assert_allclose(found[name].reference, case.reference, rtol=5e-4, atol=1e-6)
+    again = tmp_path / "again.camkit"
+    repack.repack(new, again)
+    assert again.read_bytes() == new.read_bytes()
+
+
+def test_what_fails_its_check_gets_no_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    layer = Layer(name="golden", status="fail", message="another picture")
+    failed = CheckReport(path=EXAMPLE, layers=(layer,))
+    monkeypatch.setattr(repack, "check_bundle", lambda *_, **__: failed)
+    with pytest.raises(ParityError, match="fails its check: fail  golden  another picture"):
+        repack.repack(EXAMPLE, tmp_path / "new.camkit")
+    assert not list(tmp_path.iterdir())
