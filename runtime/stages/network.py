@@ -24,6 +24,7 @@ from camkit.runtime.network.windows import (
 from camkit.runtime.plan.decision import Case, Work
 from camkit.runtime.plan.estimate import network_seconds, role_window_mp
 from camkit.runtime.plan.speed import Speed
+from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
 from camkit.runtime.scene import CELL_PX
 from camkit.runtime.signal.stabilise import StackedRows, unstabilise
@@ -53,7 +54,8 @@ def prepare(entry: Network, job: Job) -> StageWork:
 def _falls_back(job: Job) -> bool:
     """Compare the capture with the bundle's envelope; tell whether the network is left out."""
     bundle, options = job.known_bundle, job.options
-    if bundle.manifest.envelope is None or options.method not in (None, *METHODS):
+    asked = planned(bundle.manifest.stages, Work(method=options.method))
+    if bundle.manifest.envelope is None or not asked.networks:
         return False
     with job.clock.stage("envelope"):
         seen = observe(job.capture, job.noise)

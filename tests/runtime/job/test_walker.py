@@ -10,7 +10,7 @@ import pytest
 
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle, open_bundle
-from camkit.bundle.stages import Color, Linearise, Network
+from camkit.bundle.stages import Color, Linearise, Network, Repair, Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
@@ -25,12 +25,13 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import PLAIN
 from camkit.runtime.rows import Rows
 from camkit.runtime.signal.demosaic import apply_gains, demosaic
-from camkit.runtime.signal.noise import repair_mosaic
+from camkit.runtime.signal.noise import repair_mosaic, repair_planes
 from camkit.runtime.stage_finder import stage_module
-from tests.bundle_factory import write_tiny_bundle
+from tests.bundle_factory import PITCH_UM, write_tiny_bundle
 from tests.job_factory import OWN_BALANCE, SHAPE, made_mosaic, made_planes, read_all, start
 from tests.plan_factory import half_textured_mosaic, write_planned_bundle
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
+from tests.psf_factory import streak_kernel, uniform_psf
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +121,50 @@ def test_planes_with_several_takers_give_each_the_same_bits(
     assert {"linearise", "network first", "network second", "network join", "color"} <= set(
         made.seconds
     )
+
+
+def test_light_that_is_repaired_and_taken_as_it_is_gives_the_same_bits(tmp_path: Path) -> None:
+    """Rows that roll: the repair, its mask and the bank read what a network reads later."""
+    data = finer_network(2, 1, scale=1)
+    ports = [Port(name="a", channels=1), Port(name="b", channels=1)]
+    stages = (
+        Linearise(),
+        Repair(),
+        Wiener(
+            takes=("sound", "unknown"),
+            block_px=64,
+            overlap_px=24,
+            prior_scale=1e-3,
+            prior_exponent=2.0,
+            clip_iterations=2,
+        ),
+        Network(takes=("light", "restored"), gives=("clean",), transform="none"),
+        Color(takes=("clean",)),
+    )
+    psf = replace(uniform_psf(streak_kernel(20.0)), pixel_pitch_um=PITCH_UM)
+    camera = write_planes_bundle(
+        tmp_path,
+        stages,
+        sensor=planes_sensor(size_px=(96, 400)),
+        psf=psf,
+        networks={"restore": (facts_of(data, ports, ports[:1]), data)},
+    )
+    samples = np.random.default_rng(0).integers(300, 500, (1, 400, 96)).astype(np.uint16)
+    samples[0, 9::20, 11::20] = 1000
+    samples[0, 130:140, 30:40] = 1023
+    capture = made_planes(samples=samples, black_level=np.full(1, 64, "f4"), white_level=1023.0)
+    made = start(camera, capture, tile_px=64)
+    picture = made.fill()
+    light, restored = (read_all(made.rows_of(name)) for name in ("light", "restored"))
+    engine = NetworkEngine(data, threads=1)
+    wanted = engine.run(np.concatenate([light, restored])[None])[0]
+    np.testing.assert_array_equal(picture, np.repeat(wanted, 3, axis=0))
+    sound, broken = repair_planes(capture.linear_rows(0, 400))
+    np.testing.assert_array_equal(read_all(made.rows_of("sound"), 37), sound)
+    clipped = capture.saturated_rows(0, 400)
+    np.testing.assert_array_equal(read_all(made.rows_of("unknown"), 37), clipped & ~broken)
+    assert made.warnings == (f"{np.count_nonzero(broken)} dead or invalid pixels were repaired",)
+    assert made.clipped_fraction == clipped.mean()
 
 
 def test_memory_is_shared_among_networks_within_the_cap(tmp_path: Path) -> None:

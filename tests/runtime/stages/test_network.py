@@ -10,16 +10,23 @@ import pytest
 from camkit.bundle.facts import Port
 from camkit.bundle.manifest import Range
 from camkit.bundle.reader import Bundle, open_bundle
-from camkit.bundle.stages import Color, Linearise, Network
+from camkit.bundle.stages import Color, Linearise, Network, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.signal.stabilise import stabilise, unstabilise
 from camkit.runtime.stages.network import given_rows
-from tests.bundle_factory import tiny_manifest, tiny_members, tiny_network, write_tiny_bundle
+from tests.bundle_factory import (
+    PITCH_UM,
+    tiny_manifest,
+    tiny_members,
+    tiny_network,
+    write_tiny_bundle,
+)
 from tests.job_factory import made_job, made_mosaic, made_planes, read_all, start, stream_of
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
+from tests.psf_factory import streak_kernel, uniform_psf
 
 SIZES = {"odd": (61, 95), "whole cells": (64, 96), "one row": (1, 96), "one pixel": (1, 1)}
 
@@ -294,6 +301,35 @@ def test_a_capture_outside_the_envelope_is_told_once_however_many_networks(
     np.testing.assert_array_equal(back.fill(), capture.samples)
     with pytest.raises(ContractError, match="outside the range"):
         start(camera, capture, on_unsafe="fail")
+
+
+def test_a_network_before_the_bank_runs_with_it_and_is_held_against_the_envelope(
+    tmp_path: Path,
+) -> None:
+    data = finer_network(1, 1, scale=1)
+    port = Port(name="a", channels=1)
+    stages = (
+        Linearise(gives=("light",)),
+        Network(takes=("light",), gives=("calm",)),
+        Wiener(takes=("calm",), block_px=32, overlap_px=8, prior_scale=1e-3, prior_exponent=2.0),
+    )
+    psf = replace(uniform_psf(streak_kernel(0.0, 3, 4)), pixel_pitch_um=PITCH_UM)
+    camera = write_planes_bundle(
+        tmp_path,
+        stages,
+        sensor=planes_sensor(),
+        psf=psf,
+        networks={"restore": (facts_of(data, [port], [port]), data)},
+        envelope={"side_px": Range(low=1000, high=9000)},
+    )
+    capture = made_planes(samples=_light(1))
+    for method in (None, "wiener", "rl"):
+        made = start(camera, capture, method=method)
+        assert "envelope" in made.record
+        assert made.size == "M"
+    back = start(camera, capture, on_unsafe="fallback")
+    assert (back.size, back.job.work.method) == (None, "develop")
+    np.testing.assert_array_equal(back.fill(), capture.samples)
 
 
 def test_where_no_network_runs_the_envelope_is_not_looked_at(bundle: Bundle) -> None:

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.sensor import Extent
-from camkit.bundle.stages import Linearise, Undistort
+from camkit.bundle.stages import Linearise, Network, Undistort
 from camkit.contracts import RadialDistortion
-from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.geometry.warp import Warp, undistort_bands
 from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import PITCH_UM, write_tiny_bundle
 from tests.job_factory import (
@@ -22,7 +23,7 @@ from tests.job_factory import (
     start,
     stream_of,
 )
-from tests.planes_bundle import planes_sensor, write_planes_bundle
+from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 from tests.psf_factory import streak_kernel, uniform_psf
 
 
@@ -73,3 +74,37 @@ def test_pixels_move_away_from_the_axis_wherever_it_meets_the_sensor(
     assert moved[None] > 0.02
     assert moved[20.0, 31.5] > moved[None]
     assert moved[75.0, 31.5] != pytest.approx(moved[20.0, 31.5], abs=0.02)
+
+
+def test_a_finer_plane_is_moved_by_the_same_share_of_a_pixel(tmp_path: Path) -> None:
+    data = finer_network(1, 1, scale=2)
+    ports = [Port(name="a", channels=1)], [Port(name="b", channels=1, scale=2)]
+    stages = (
+        Linearise(gives=("light",)),
+        Network(takes=("light",), gives=("large",), transform="none"),
+        Undistort(takes=("large",)),
+    )
+    barrel = RadialDistortion(coefficients=np.array([[1.0, -0.04, 0.0, 0.0]]), radius_mm=0.35)
+    psf = replace(uniform_psf(streak_kernel(0.0)), distortion=barrel, pixel_pitch_um=PITCH_UM)
+    sensor = planes_sensor(
+        extent=Extent(
+            width_px=96, height_px=64, pixel_pitch_um=PITCH_UM, optical_centre_px=(30.0, 20.0)
+        )
+    )
+    camera = write_planes_bundle(
+        tmp_path,
+        stages,
+        sensor=sensor,
+        psf=psf,
+        networks={"restore": (facts_of(data, *ports), data)},
+    )
+    made = start(camera, made_planes(samples=np.full((1, 64, 96), 0.3, np.float32)))
+    window = made.job.placement.window
+    fine = made.job.window_of(camera.manifest.planes["large"])
+    x, y = np.meshgrid(np.linspace(0, 95, 7), np.linspace(0, 63, 5))
+    coarse_warp, fine_warp = (Warp(barrel, w, to_sensor=False) for w in (window, fine))
+    found = fine_warp.positions(0, 2 * x + 0.5, 2 * y + 0.5)
+    np.testing.assert_allclose((found - 0.5) / 2, coarse_warp.positions(0, x, y), atol=1e-6)
+    large = read_all(made.rows_of("large"))
+    bands = undistort_bands(ArrayRows(large), barrel, fine)
+    np.testing.assert_array_equal(made.fill(), np.concatenate(list(bands), axis=1))
