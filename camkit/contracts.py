@@ -1,4 +1,4 @@
-"""What design time and use time agree on: CFA, noise, frozen PSF, radial distortion.
+"""What design time and use time agree on: CFA, inputs, noise, frozen PSF, radial distortion.
 
 Signals are linear with 1.0 = white level (after black subtraction). Arrays are [y, x], pixel
 centres at integers. Sensor positions are in millimetres from the optical axis, +x to the right
@@ -17,6 +17,12 @@ from camkit.units import MM_PER_M
 
 CfaPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 CFA_PATTERNS: Final[tuple[CfaPattern, ...]] = get_args(CfaPattern)
+
+InputContract = Literal[
+    "raw_bayer_v1", "linear_rgb_v1", "linear_planes_v1", "spad_counts_v1", "spad_histogram_v1"
+]
+"""raw_bayer_v1: (h, w) mosaic in DN; linear_rgb_v1: (3, h, w) and linear_planes_v1: (c, h, w)
+linear, 1.0 = white level; spad_counts_v1: (h, w) and spad_histogram_v1: (t, h, w) photons."""
 
 Symmetry = Literal["radial", "uniform", "grid"]
 

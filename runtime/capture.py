@@ -10,8 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.sensor import InputContract
-from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, NoiseModel
+from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.memory import mapping_of
 

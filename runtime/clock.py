@@ -50,6 +50,7 @@ class StageClock:
             if band is None:
                 return
             yield band
+            del band  # nothing may hold a band while the next one is made
 
     def _charge(self) -> None:
         now, cpu = time.perf_counter(), time.process_time()

@@ -181,6 +181,7 @@ def _warp_bands(
         run_slices(fill, bottom - top, threads=threads, lattice=LATTICE_PX)
         del fill  # it holds rows that nobody needs while the next band is waited for
         yield band
+        del band
 
 
 def _warp_rows(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from camkit.bundle.plane import Plane
 from camkit.errors import ContractError
 from camkit.runtime.clock import StageClock, TimedRows
-from camkit.runtime.rows import PiecedRows, RollingRows, Rows, RowSource, read_bands
+from camkit.runtime.rows import PiecedRows, RollingRows, RowReader, Rows, RowSource, read_bands
 
 Shape = tuple[int, int, int]
 
@@ -51,6 +51,8 @@ class Stream:
 
     def pieced(self) -> PiecedRows:
         """Give the rows as they lie, each kept until it is read."""
+        if isinstance(self.source, RowReader):
+            return self.source
         return RollingRows(self.shape, self.bands()).reader()
 
     def bands(self) -> Iterator[Rows]:

@@ -352,3 +352,10 @@ def test_the_child_finds_a_checkout_that_is_not_installed(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", "elsewhere")
     found = raw._child_environment()["PYTHONPATH"].split(os.pathsep)
     assert found[0] == "elsewhere"
+
+
+def test_the_decoder_starts_without_what_it_does_not_need() -> None:
+    """A process is started for every file: what it imports is paid for every file."""
+    code = "import sys, camkit.runtime.raw_worker\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & {"pydantic", "onnxruntime", "scipy", "cv2", "typer"}
