@@ -108,10 +108,17 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
     camera = _camera(parts)
     members = _members(parts, _lens_of(parts, camera.checkpoints))
     with tempfile.TemporaryDirectory() as folder:
+        torch_networks = {
+            (role, size): load_network(checkpoint)
+            for role, sizes in camera.checkpoints.items()
+            for size, checkpoint in sizes.items()
+        }
         drafts = _each(
             camera.checkpoints,
-            lambda role, size, checkpoint: draft_network(
-                f"{role}_{size}", load_network(checkpoint), camera.kind.layout(camera.recipe, role)
+            lambda role, size: draft_network(
+                f"{role}_{size}",
+                torch_networks[role, size],
+                camera.kind.layout(camera.recipe, role),
             ),
         )
         manifest = _manifest(camera, parts, drafts)
@@ -120,8 +127,8 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         windows = _windows(first, cases)
         networks = _each(
             camera.checkpoints,
-            lambda role, size, checkpoint: measure_network(
-                drafts[role][size], load_network(checkpoint), windows[role, size]
+            lambda role, size: measure_network(
+                drafts[role][size], torch_networks[role, size], windows[role, size]
             ),
         )
         members |= _models(networks)
@@ -210,11 +217,8 @@ def _by_role(roles: tuple[str, ...], paths: tuple[Path, ...], given: list[Checkp
     }
 
 
-def _each(found: Found, make: Callable[[str, str, Checkpoint], ExportedNetwork]) -> Networks:
-    return {
-        role: {size: make(role, size, checkpoint) for size, checkpoint in sizes.items()}
-        for role, sizes in found.items()
-    }
+def _each(found: Found, make: Callable[[str, str], ExportedNetwork]) -> Networks:
+    return {role: {size: make(role, size) for size in sizes} for role, sizes in found.items()}
 
 
 def _models(networks: Networks) -> dict[str, bytes]:

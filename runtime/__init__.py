@@ -8,7 +8,7 @@
     color, output/                     camera colour to files and sidecars
 
     rows, slices, clock, memory        how stages pull rows, and what each costs
-    scene, plan/                       what a capture holds; no more work than it needs
+    content, plan/                     what a capture holds; no more work than it needs
     envelope                           is a capture inside the bundle's measured ranges?
     options, job/                      one capture: what is decided, then the stages joined
     pipeline, development, batch       one capture in memory, one file, many files

@@ -80,14 +80,14 @@ def _is_result(path: Path) -> bool:
     return record is not None and Path(str(record["output"])).name == path.name
 
 
-def plan_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptions) -> list[Task]:
+def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptions) -> list[Task]:
     """Decide bundle and output of every input, and refuse what cannot be before any work.
 
     Raises:
         ContractError: If two inputs would give one output, an output exists (and neither resume
             nor overwrite was asked for), or no input names a bundle.
     """
-    tasks = [_plan_task(source, bundle, write) for source in sources]
+    tasks = [_make_task(source, bundle, write) for source in sources]
     _refuse_clashes(tasks)
     refused = [t for t in tasks if t.refusal is not None]
     if tasks and bundle is None and len(refused) == len(tasks):
@@ -105,7 +105,7 @@ def plan_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptio
     return tasks
 
 
-def _plan_task(source: Path, bundle: str | None, write: WriteOptions) -> Task:
+def _make_task(source: Path, bundle: str | None, write: WriteOptions) -> Task:
     target = write.out_dir / f"{source.stem}{write.suffix}"
     chosen = bundle
     refusal = None
@@ -159,12 +159,12 @@ def process(
         One result per input, in their order; failures carry their message.
 
     Raises:
-        ContractError: For what can be refused before any work (see `plan_tasks`).
+        ContractError: For what can be refused before any work (see `list_tasks`).
         BundleError: If the named bundle is refused.
     """
     options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
     listed = [files] if isinstance(files, str | Path) else list(files)
-    tasks = plan_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
+    tasks = list_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
     if write.format == "dng":
         if options.color == "acescg":
             raise ContractError("a DNG holds camera RGB; leave --color out or say camera")
@@ -174,10 +174,10 @@ def process(
         pipelines.get(str(bundle))
     write.out_dir.mkdir(parents=True, exist_ok=True)
 
-    plan = _Plan(write=write, mosaic=mosaic, progress=progress, cancel=cancel)
+    common = _Common(write=write, mosaic=mosaic, progress=progress, cancel=cancel)
 
     def run(task: Task) -> FileResult:
-        result = _run_task(task, pipelines, plan)
+        result = _run_task(task, pipelines, common)
         if on_result is not None:
             on_result(result)
         return result
@@ -230,7 +230,7 @@ def _shared(options: Options, jobs: int) -> Options:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Plan:
+class _Common:
     """What all tasks of a run share."""
 
     write: WriteOptions
@@ -255,24 +255,24 @@ class _Pipelines:
             return self._made[bundle]
 
 
-def _run_task(task: Task, pipelines: _Pipelines, plan: _Plan) -> FileResult:
+def _run_task(task: Task, pipelines: _Pipelines, common: _Common) -> FileResult:
     if task.refusal is not None:
         return FileResult.failure(task.source, None, task.refusal)
     named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
-    write = plan.write
+    write = common.write
     try:
         pipeline = pipelines.get(task.bundle)
-        if write.resume and proved_done(task.source, task.target, pipeline, write, plan.mosaic):
+        if write.resume and proved_done(task.source, task.target, pipeline, write, common.mosaic):
             return FileResult.skip(task.source, task.target, pipeline)
-        tick = None if plan.progress is None else _tick(plan.progress, task.source)
+        tick = None if common.progress is None else _tick(common.progress, task.source)
         return develop_file(
             task.source,
             task.target,
             pipeline,
             write,
-            mosaic=plan.mosaic,
+            mosaic=common.mosaic,
             progress=tick,
-            cancel=plan.cancel,
+            cancel=common.cancel,
         )
     except Cancelled:
         raise

@@ -7,7 +7,7 @@ defines `PART`, a `RuntimePart`.
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
@@ -16,10 +16,26 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.kinds import find_kind
+from camkit.runtime.array_capture import capture_of_array
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.twin.simulate import Simulation, SimulationOptions
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph
 
-Gains = tuple[float, float, float]
+
+class FromArray(Protocol):
+    """Gives an array in memory the meaning of a capture; see `capture_of_array`."""
+
+    def __call__(
+        self,
+        image: NDArray[Any],
+        manifest: Manifest,
+        /,
+        *,
+        iso: float | None = None,
+        white_balance: tuple[float, float, float] | None = None,
+        origin_px: tuple[int, int] | None = None,
+    ) -> Capture:
+        """Give the capture."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,19 +44,17 @@ class RuntimePart:
 
     Attributes:
         read: (file, how to read a headerless mosaic, manifest or None) -> capture.
-        from_array: (array, manifest, iso, white balance, origin) -> capture.
-        simulate: (scene (3, h, w) linear Rec.709, bundle, options) -> what the camera records.
         write: (file, simulation, bundle): the capture as a file that `read` reads.
         suffix: Of the files that `write` writes, with its dot.
+        from_array: An array as a capture.
+        simulate: (scene (3, h, w) linear Rec.709, bundle, options) -> what the camera records.
     """
 
     read: Callable[[Path, MosaicOptions | None, Manifest | None], Capture]
-    from_array: Callable[
-        [NDArray[Any], Manifest, float | None, Gains | None, tuple[int, int] | None], Capture
-    ]
-    simulate: Callable[[FloatArray, Bundle, SimulationOptions], Simulation]
     write: Callable[[Path, Simulation, Bundle], None]
     suffix: str
+    from_array: FromArray = capture_of_array
+    simulate: Callable[[FloatArray, Bundle, SimulationOptions], Simulation] = photograph
 
 
 def runtime_part(kind: str) -> RuntimePart:

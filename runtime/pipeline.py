@@ -295,7 +295,9 @@ class Pipeline:
         if self.bundle is None:
             raise ContractError("process_array needs a bundle: it says what the numbers mean")
         manifest = self.bundle.manifest
-        return self._part.from_array(image, manifest, iso, white_balance, origin_px)
+        return self._part.from_array(
+            image, manifest, iso=iso, white_balance=white_balance, origin_px=origin_px
+        )
 
 
 def load(

@@ -3,7 +3,7 @@
 A module defines
 
     prepare(entry, job) -> StageWork     what the stage does to one capture; cheap, before any row
-    seconds(entry, case, work, speed)    what it will take, for the plan
+    seconds(entry, subject, work, speed)    what it will take, for the plan
     METHODS                              names of its ways, as `--method` takes them; may be empty
     OPTIONS                              fields of `Options` that mean something to it
     is_left_out(options)                 optional: whether the caller wants it left out

@@ -12,8 +12,8 @@ from camkit.bundle.stages import Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import RadialDistortion
+from camkit.runtime.content import CELL_PX, Content
 from camkit.runtime.plan.loss import LossModel, plan_entries
-from camkit.runtime.scene import CELL_PX, Scene
 from tests.bundle_factory import (
     tiny_facts,
     tiny_manifest,
@@ -39,12 +39,12 @@ MODEL = LossModel(
 )
 
 
-def made_scene(
+def made_content(
     detail: NDArray[np.float64], *, noise: float = 1e-5, field: float = 0.0, clipped: float = 0.0
-) -> Scene:
-    """Give a scene of whole cells with this detail."""
+) -> Content:
+    """Give content of whole cells with this detail."""
     like = np.ones_like(detail)
-    return Scene(
+    return Content(
         height_px=CELL_PX * detail.shape[0],
         width_px=CELL_PX * detail.shape[1],
         sensor_share=1.0,

@@ -20,7 +20,7 @@ import numpy as np
 from camkit.bundle.reader import built_in_bundles, find_bundle, open_bundle
 from camkit.cli.judge.doctor import examine
 from camkit.runtime.network.engine import NetworkEngine, available_threads
-from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.network.windows import SizedNetwork
 from camkit.runtime.rows import ArrayRows
 
@@ -106,15 +106,15 @@ def _tiling_error(network: SizedNetwork, height: int, width: int) -> tuple[int, 
     shape = (facts.input_channels, height, width)
     planes = ArrayRows(np.random.default_rng(0).uniform(0, 3, shape).astype(np.float32))
     limits = TileLimits(stride_px=facts.stride_px, halo_px=facts.reach_px, cost=network.cost)
-    plan = plan_windows(height, width, limits)
+    layout = lay_windows(height, width, limits)
     whole = TileLimits(stride_px=facts.stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True)
-    one_plan, scale = plan_windows(height, width, whole), facts.output_scale
-    (one,) = infer_bands(network.run, planes, one_plan, scale=scale)
+    one_layout, scale = lay_windows(height, width, whole), facts.output_scale
+    (one,) = infer_bands(network.run, planes, one_layout, scale=scale)
     worst, top = 0.0, 0
-    for band in infer_bands(network.run, planes, plan, scale=scale):
+    for band in infer_bands(network.run, planes, layout, scale=scale):
         difference = np.abs(band - one[:, top : top + band.shape[1]])
         worst, top = max(worst, float(difference.max())), top + band.shape[1]
-    return plan.window_count, worst
+    return layout.window_count, worst
 
 
 def measure_raws(arguments: argparse.Namespace) -> None:

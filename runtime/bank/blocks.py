@@ -99,7 +99,7 @@ class Span:
 PlainBlock = Callable[[Span, Span], bool]
 
 
-def plan_spans(size_px: int, block_px: int, overlap_px: int) -> tuple[Span, ...]:
+def lay_spans(size_px: int, block_px: int, overlap_px: int) -> tuple[Span, ...]:
     """Cover an axis with blocks, centred, the least number that leaves a mirrored border.
 
     Args:
@@ -278,8 +278,8 @@ class BlockBank:
         self._block_px = block_px
         self._guard_px = overlap_px // 4
         self._threads = threads
-        self._columns = plan_spans(psf.window.size_px[0], block_px, overlap_px)
-        self._rows = plan_spans(psf.window.size_px[1], block_px, overlap_px)
+        self._columns = lay_spans(psf.window.size_px[0], block_px, overlap_px)
+        self._rows = lay_spans(psf.window.size_px[1], block_px, overlap_px)
 
     def restore_array(
         self, planes: FloatArray, saturated: NDArray[np.bool_] | None = None
@@ -297,7 +297,7 @@ class BlockBank:
         """Restore a picture from top to bottom.
 
         Args:
-            source: (c, h, w) rows, linear, of the size the bank was planned for.
+            source: (c, h, w) rows, linear, of the size the bank was laid out for.
             saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (c, rows, w);
                 asked after those rows were read.
             plain: Tells which blocks, given as (row span, column span), stay as they are.

@@ -23,7 +23,7 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.options import Options
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.rows import RowSource
 from camkit.runtime.signal.noise import measure_noise
 
@@ -44,7 +44,7 @@ class Job:
         falls_back: The capture lies outside what the bundle was shown to help with, and the caller
             wants no network then.
         work: What was planned; set before any stage runs.
-        case: What was planned for; None before, and without a bundle.
+        subject: What was planned for; None before, and without a bundle.
         windows: Role -> the windows of its network, once they are planned.
         probe: Gives the rows of a plane by name, made for the asking stage alone and equal to those
             that it will be given; to be called when the first row is asked for, set by the walker.
@@ -72,7 +72,7 @@ class Job:
         self.color: ColorStage | None = None
         self.falls_back = False
         self.work = Work()
-        self.case: Case | None = None
+        self.subject: Subject | None = None
         self.windows: dict[str, NetworkWindows] = {}
         self.probe: Callable[[str], RowSource] | None = None
         self.known = dict(known or {})
@@ -103,7 +103,7 @@ class Job:
         """Give the same job for a walk whose counts and notes nobody hears."""
         other = Job(self.setup, self.capture, cancel=self.cancel, known=self.known)
         other.record = dict(self.record)
-        other.work, other.case, other.falls_back = self.work, self.case, self.falls_back
+        other.work, other.subject, other.falls_back = self.work, self.subject, self.falls_back
         for name in ("placement", "noise"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]

@@ -18,6 +18,7 @@ from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
+from camkit.runtime.content import Content, measure_content
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.setup import DEVELOPMENT, Setup
 from camkit.runtime.job.stream import Stream
@@ -25,13 +26,12 @@ from camkit.runtime.job.walker import Walk
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.output.origin import Origin
-from camkit.runtime.plan.decision import DEVELOP, Case, Labels, Work
+from camkit.runtime.plan.decision import DEVELOP, Labels, Subject, Work
 from camkit.runtime.plan.estimate import Estimate, estimate_seconds, stage_seconds
-from camkit.runtime.plan.planner import Plan, make_plan, needs_scene
+from camkit.runtime.plan.planner import Plan, make_plan, needs_content
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import without_networks
 from camkit.runtime.rows import Rows, RowSource
-from camkit.runtime.scene import Scene, measure_scene
 from camkit.runtime.stage_finder import stage_module
 
 BEFORE_STAGES: Final = ("noise", "envelope", "scene")
@@ -238,16 +238,16 @@ class Reconstruction:
         made = self.plan
         if made is None:
             return None
-        if made.case.scene is None:
-            made = replace(made, case=replace(made.case, scene=self._measure_scene()))
+        if made.subject.content is None:
+            made = replace(made, subject=replace(made.subject, content=self._measure_content()))
         speed = self._setup.speed(made.sizes())
         self.record["decisions"] = [decision.to_json() for decision in made.decisions(speed)]
         window_mp = {role: windows.window_mp() for role, windows in self.windows.items()}
-        taken = stage_seconds(made.case, made.work, speed, window_mp or None)
+        taken = stage_seconds(made.subject, made.work, speed, window_mp or None)
         for stage, expected_s in zip(self.record["stages"].values(), taken, strict=True):
             stage["expected_s"] = round(expected_s, 4)
         estimate = Estimate(
-            seconds=estimate_seconds(made.case, made.work, speed, window_mp or None),
+            seconds=estimate_seconds(made.subject, made.work, speed, window_mp or None),
             peak_mb=self._walk.needed_bytes() / 1e6,
         )
         self.record["estimate"] = estimate.to_json()
@@ -268,26 +268,26 @@ class Reconstruction:
                     "cannot be left out; say --on-unsafe warn"
                 )
             options = replace(options, method=below.method)
-        case = Case(
+        subject = Subject(
             bundle=bundle,
             options=options,
             height_px=self.capture.height,
             width_px=self.capture.width,
             placement=job.placement,
-            scene=self._measure_scene() if needs_scene(options) else None,
+            content=self._measure_content() if needs_content(options) else None,
         )
-        plan = make_plan(case, lambda: self._setup.speed(bundle.manifest.sizes))
+        plan = make_plan(subject, lambda: self._setup.speed(bundle.manifest.sizes))
         if plan.note:
             job.notes.append(plan.note)
-        job.case, job.work = plan.case, plan.work
+        job.subject, job.work = plan.subject, plan.work
         self.record["quality"] = options.quality
         self.record["decisions"] = [decision.to_json() for decision in plan.decisions()]
         return plan
 
-    def _measure_scene(self) -> Scene:
+    def _measure_content(self) -> Content:
         job = self.job
         noise = job.noise.with_gains(job.white_balance)
         with job.clock.stage("scene"):
-            scene = measure_scene(self.capture, noise, job.white_balance, job.placement.window)
-        self.record["scene"] = scene.to_json()
-        return scene
+            content = measure_content(self.capture, noise, job.white_balance, job.placement.window)
+        self.record["scene"] = content.to_json()
+        return content

@@ -68,7 +68,7 @@ class CellNetwork:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellLimits:
-    """What a plan must respect.
+    """What a layout must respect.
 
     Attributes:
         cell_px: Side of a lattice cell.
@@ -103,7 +103,7 @@ class CellWindow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CellPlan:
+class CellLayout:
     """Windows for the cells of a picture.
 
     Attributes:
@@ -156,13 +156,13 @@ class CellPlan:
         return sum(w.area_px for ws in self.strips for w in ws if w.network == network)
 
 
-def plan_cells(
+def lay_cells(
     size_px: tuple[int, int],
     labels: Labels,
     networks: Sequence[CellNetwork],
     limits: CellLimits,
-) -> CellPlan:
-    """Plan the windows for the chosen cells, the least computation that fits in the cap.
+) -> CellLayout:
+    """Lay the windows for the chosen cells, the least computation that fits in the cap.
 
     Args:
         size_px: (height, width) of the picture.
@@ -196,7 +196,7 @@ def plan_cells(
             )
         ]
         strips.append(tuple(windows))
-    return CellPlan(
+    return CellLayout(
         size_px=size_px,
         padded_px=padded,
         cell_px=cell,
@@ -210,7 +210,7 @@ def plan_cells(
 def infer_cells(
     networks: Sequence[CellNetwork],
     source: RowSource,
-    plan: CellPlan,
+    layout: CellLayout,
     *,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
@@ -220,9 +220,9 @@ def infer_cells(
     """Run the networks on their cells and yield the rows of the picture from top to bottom.
 
     Args:
-        networks: Those of the plan.
+        networks: Those of the layout.
         source: (c, h, w) picture as the networks take it; rows are read once.
-        plan: From `plan_cells`.
+        layout: From `lay_cells`.
         progress: Called as progress(done, total) after each window.
         cancel: Asked before each window.
         guard: Looks at every window; None refuses NaN and inf only.
@@ -232,31 +232,32 @@ def infer_cells(
         (k, rows, w) float32, consecutive.
 
     Raises:
-        ContractError: If plan and source differ in size, or a network gives NaN or inf.
+        ContractError: If layout and source differ in size, or a network gives NaN or inf.
         Cancelled: If `cancel` said so.
     """
     _, height, width = source.shape
-    if (height, width) != plan.size_px:
-        raise ContractError(f"the plan is for {plan.size_px}, the picture {height, width}")
-    buffer = RowBuffer(source, plan.buffer_rows, plan.padded_px)
+    if (height, width) != layout.size_px:
+        raise ContractError(f"the layout is for {layout.size_px}, the picture {height, width}")
+    buffer = RowBuffer(source, layout.buffer_rows, layout.padded_px)
     done = 0
-    for number, windows in enumerate(plan.strips):
-        top = number * plan.strip_cells * plan.cell_px
-        bottom = min(top + plan.strip_cells * plan.cell_px, height)
-        first = max(0, min(top - plan.halo_px, plan.padded_px[0] - plan.buffer_rows))
+    for number, windows in enumerate(layout.strips):
+        top = number * layout.strip_cells * layout.cell_px
+        bottom = min(top + layout.strip_cells * layout.cell_px, height)
+        first = max(0, min(top - layout.halo_px, layout.padded_px[0] - layout.buffer_rows))
         held = buffer.move_to(first)
         band = held[stand_in, top - first : bottom - first, :width].copy()
         for window in windows:
             if is_cancelled(cancel):
-                raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
+                raise Cancelled(f"stopped on request after {done} of {layout.window_count} windows")
             y0, x0, y1, x1 = window.pixels
             given = np.ascontiguousarray(held[None, :, y0 - first : y1 - first, x0:x1])
             made = _checked(networks[window.network].run(given), given, window, guard)
-            _place(made, window, plan, band, top)
+            _place(made, window, layout, band, top)
             done += 1
             if progress is not None:
-                progress(done, plan.window_count)
+                progress(done, layout.window_count)
         yield band
+        del band  # the rows of the next windows are made before their band is
 
 
 def _checked(
@@ -280,16 +281,16 @@ def _describe(window: CellWindow) -> str:
 
 
 def _place(
-    made: FloatArray, window: CellWindow, plan: CellPlan, band: FloatArray, band_top: int
+    made: FloatArray, window: CellWindow, layout: CellLayout, band: FloatArray, band_top: int
 ) -> None:
     """Put the cells of a window into the band, with a ramp where a neighbour has no network."""
     top, left, bottom, right = window.cells
-    cell, (height, width) = plan.cell_px, plan.size_px
+    cell, (height, width) = layout.cell_px, layout.size_px
     origin_y, origin_x = window.pixels[:2]
-    active = np.pad(plan.labels > 0, 1, mode="edge")
+    active = np.pad(layout.labels > 0, 1, mode="edge")
     for i in range(top, bottom):
         for j in range(left, right):
-            if plan.labels[i, j] != window.network + 1:
+            if layout.labels[i, j] != window.network + 1:
                 continue
             y0, x0 = i * cell, j * cell
             y1, x1 = min(y0 + cell, height), min(x0 + cell, width)

@@ -13,7 +13,7 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.network.tiling import Run, TileLimits, infer_bands, plan_windows
+from camkit.runtime.network.tiling import Run, TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 
 _KICK: Final = 1e3  # far beyond the base, so that it survives rounding after many layers
@@ -168,5 +168,5 @@ def halo_error_curve(
 
 def _infer(run: Run, sample: FloatArray, limits: TileLimits, scale: int) -> FloatArray:
     _, height, width = sample.shape
-    plan = plan_windows(height, width, limits)
-    return np.concatenate(list(infer_bands(run, ArrayRows(sample), plan, scale=scale)), axis=1)
+    layout = lay_windows(height, width, limits)
+    return np.concatenate(list(infer_bands(run, ArrayRows(sample), layout, scale=scale)), axis=1)

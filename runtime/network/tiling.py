@@ -8,7 +8,7 @@ One axis of a picture of n pixels, padded once at its far side to n' (a multiple
           [.halo.:======= kept ======:.halo.]                window 1, at p1 - halo
                               [.halo.:===== kept ======]     window 2, shifted inward to end at n'
 
-All windows of a plan have one size and never reach past the padded picture, so the zeros that the
+All windows of a layout have one size and never reach past the padded picture, so the zeros that the
 network's convolutions see lie at the picture's border only, as in the untiled run; each kept pixel
 is at least `halo` away from every inner window border. With halo >= the network's reach, origins on
 the lattice of its stride and kernels that sum alike wherever a pixel lies, kept pixels equal those
@@ -71,7 +71,7 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TilePlan:
+class TileLayout:
     """Windows that cover a picture; see the drawing above.
 
     Attributes:
@@ -157,10 +157,10 @@ def _needed_bytes(
     return arena + row_bytes * (cost.channels * window[0] + cost.out_values * BANDS_HELD * band)
 
 
-def _check_axis(spans: tuple[Span, ...], window: int, plan: TilePlan) -> None:
-    lattice = {plan.halo_px, window} | {v for s in spans for v in (s.origin_px, s.start_px)}
-    if any(v % plan.stride_px for v in lattice):
-        raise ContractError(f"halo, window and origins must be multiples of {plan.stride_px}")
+def _check_axis(spans: tuple[Span, ...], window: int, layout: TileLayout) -> None:
+    lattice = {layout.halo_px, window} | {v for s in spans for v in (s.origin_px, s.start_px)}
+    if any(v % layout.stride_px for v in lattice):
+        raise ContractError(f"halo, window and origins must be multiples of {layout.stride_px}")
     edges = [(a.stop_px, b.start_px) for a, b in pairwise(spans)]
     if any(a != b for a, b in edges) or any(s.start_px >= s.stop_px for s in spans):
         raise ContractError("windows must keep every pixel once, in order")
@@ -192,14 +192,14 @@ def _equal_window(size: int, count: int, halo: int, stride: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TileLimits:
-    """What a plan must respect.
+    """What a layout must respect.
 
     Attributes:
         stride_px: Total stride of the network, >= 1.
         halo_px: Its reach, or less in fast mode; rounded up to the stride.
         cost: What the network holds per pixel.
         max_bytes: Cap on one window with its arena, the row buffer and one output band together.
-        tile_px: Force output tiles of this size (tests); None lets the planner choose.
+        tile_px: Force output tiles of this size (tests); None leaves it free.
         whole: One window whatever the size.
     """
 
@@ -220,8 +220,8 @@ class TileLimits:
             raise ContractError(f"tile_px must be >= 1; got {self.tile_px}")
 
 
-def plan_windows(height_px: int, width_px: int, limits: TileLimits) -> TilePlan:
-    """Plan the windows of a picture: the least computation that fits in the memory cap.
+def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout:
+    """Lay the windows of a picture: the least computation that fits in the memory cap.
 
     Args:
         height_px: Rows of the picture, >= 1.
@@ -229,7 +229,7 @@ def plan_windows(height_px: int, width_px: int, limits: TileLimits) -> TilePlan:
         limits: Stride, halo and memory.
 
     Returns:
-        The plan; it depends on nothing but the arguments.
+        The layout; it depends on nothing but the arguments.
 
     Raises:
         ContractError: If a side is < 1 or the cap is too small for the smallest windows.
@@ -243,7 +243,7 @@ def plan_windows(height_px: int, width_px: int, limits: TileLimits) -> TilePlan:
         window = min(size[0], tile), min(size[1], tile)
     else:
         window = _least_work(size, halo, limits)
-    return TilePlan(
+    return TileLayout(
         height_px=height_px,
         width_px=width_px,
         stride_px=stride,
@@ -293,7 +293,7 @@ def _equal_windows(size: int, halo: int, stride: int) -> set[int]:
 def infer_bands(
     run: Run,
     source: RowSource,
-    plan: TilePlan,
+    layout: TileLayout,
     *,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
@@ -303,9 +303,9 @@ def infer_bands(
     """Run a network over a picture and yield its rows from top to bottom.
 
     Args:
-        run: (1, c, h, w) float32 -> (1, k, s h, s w) float32, for the plan's window size.
+        run: (1, c, h, w) float32 -> (1, k, s h, s w) float32, for the layout's window size.
         source: (c, h, w) picture; each of its rows is read once.
-        plan: From `plan_windows`, for the size of the source.
+        layout: From `lay_windows`, for the size of the source.
         progress: Called as progress(done, total) after each window.
         cancel: Asked before each window.
         guard: Looks at every tile; None refuses NaN and inf only.
@@ -315,25 +315,25 @@ def infer_bands(
         (k, s rows, s w) float32 bands, consecutive, together the whole picture.
 
     Raises:
-        ContractError: If plan and source differ in size, or the network gives NaN or inf.
+        ContractError: If layout and source differ in size, or the network gives NaN or inf.
         Cancelled: If `cancel` said so.
     """
     channels, height, width = source.shape
-    if (height, width) != (plan.height_px, plan.width_px):
+    if (height, width) != (layout.height_px, layout.width_px):
         raise ContractError(
-            f"the plan is for {plan.width_px}x{plan.height_px}, the picture {width}x{height}"
+            f"the layout is for {layout.width_px}x{layout.height_px}, the picture {width}x{height}"
         )
-    shape = (1, channels, plan.window_height_px, plan.window_width_px)
-    window = np.empty(shape, np.float32) if len(plan.columns) > 1 else None
-    padded = plan.padded_height_px, plan.padded_width_px
-    buffer = RowBuffer(source, plan.window_height_px, padded)
+    shape = (1, channels, layout.window_height_px, layout.window_width_px)
+    window = np.empty(shape, np.float32) if len(layout.columns) > 1 else None
+    padded = layout.padded_height_px, layout.padded_width_px
+    buffer = RowBuffer(source, layout.window_height_px, padded)
     done = 0
-    for i, row in enumerate(plan.rows):
+    for i, row in enumerate(layout.rows):
         held = buffer.move_to(row.origin_px)
         band: FloatArray | None = None
-        for j, column in enumerate(plan.columns):
+        for j, column in enumerate(layout.columns):
             if is_cancelled(cancel):
-                raise Cancelled(f"stopped on request after {done} of {plan.window_count} windows")
+                raise Cancelled(f"stopped on request after {done} of {layout.window_count} windows")
             filled = _filled(window, held, column.origin_px)
             kept = _kept(run(filled), row, column, (height, width), scale)
             if guard is not None:
@@ -346,9 +346,10 @@ def infer_bands(
             band[:, :, scale * column.start_px : scale * min(column.stop_px, width)] = kept
             done += 1
             if progress is not None:
-                progress(done, plan.window_count)
+                progress(done, layout.window_count)
         assert band is not None
         yield band
+        del band  # the rows of the next windows are made before their band is
 
 
 def _filled(window: FloatArray | None, held: FloatArray, left: int) -> FloatArray:

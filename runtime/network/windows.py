@@ -1,4 +1,4 @@
-"""The windows of the networks of one capture: planned within the memory cap, then run.
+"""The windows of the networks of one capture: laid within the memory cap, then run.
 
     networks, size, memory [, labels] -> NetworkWindows -> bands
 
@@ -14,12 +14,12 @@ from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.cell_windows import (
+    CellLayout,
     CellLimits,
     CellNetwork,
-    CellPlan,
     Labels,
     infer_cells,
-    plan_cells,
+    lay_cells,
 )
 from camkit.runtime.network.guard import TileGuard
 from camkit.runtime.network.tiling import (
@@ -27,10 +27,10 @@ from camkit.runtime.network.tiling import (
     PixelCost,
     Progress,
     Run,
+    TileLayout,
     TileLimits,
-    TilePlan,
     infer_bands,
-    plan_windows,
+    lay_windows,
 )
 from camkit.runtime.options import Mode
 from camkit.runtime.rows import RowSource
@@ -94,15 +94,15 @@ class NetworkWindows:
     """Windows of one capture, ready to run.
 
     Attributes:
-        networks: Those of the plan.
+        networks: Those of the layout.
         tiles: One network everywhere; None with cells.
         cells: Networks on their cells; None with tiles.
         mode: Of the windows.
     """
 
     networks: tuple[SizedNetwork, ...]
-    tiles: TilePlan | None
-    cells: CellPlan | None
+    tiles: TileLayout | None
+    cells: CellLayout | None
     mode: Mode
 
     def bands(
@@ -149,8 +149,8 @@ class NetworkWindows:
     def window_mp(self) -> dict[str, float]:
         """Give size -> megapixels computed, halos included."""
         if self.tiles is not None:
-            plan = self.tiles
-            area = plan.window_count * plan.window_height_px * plan.window_width_px
+            layout = self.tiles
+            area = layout.window_count * layout.window_height_px * layout.window_width_px
             return {self.networks[0].size: area / 1e6}
         if self.cells is None:
             return {}
@@ -186,13 +186,13 @@ class NetworkWindows:
         }
 
 
-def plan_network(
+def lay_network(
     size_px: tuple[int, int],
     networks: Sequence[SizedNetwork],
     limits: WindowLimits,
     labels: Labels | None = None,
 ) -> NetworkWindows:
-    """Plan the windows of a capture.
+    """Lay the windows of a capture.
 
     Args:
         size_px: (height, width).
@@ -204,7 +204,7 @@ def plan_network(
         ContractError: If the cap is too small.
     """
     try:
-        return _plan_windows(size_px, networks, limits, labels)
+        return _lay_windows(size_px, networks, limits, labels)
     except ContractError as error:
         raise ContractError(
             f"of the cap of {limits.cap_bytes // 10**6} MB everything but the network takes "
@@ -212,7 +212,7 @@ def plan_network(
         ) from error
 
 
-def _plan_windows(
+def _lay_windows(
     size_px: tuple[int, int],
     networks: Sequence[SizedNetwork],
     limits: WindowLimits,
@@ -220,7 +220,7 @@ def _plan_windows(
 ) -> NetworkWindows:
     height, width = size_px
     if labels is not None and limits.mode != "whole":
-        cells = plan_cells(
+        cells = lay_cells(
             size_px,
             labels,
             _cell_networks(networks, limits.mode),
@@ -236,7 +236,7 @@ def _plan_windows(
         tile_px=limits.tile_px,
         whole=limits.mode == "whole",
     )
-    tiles = plan_windows(height, width, tile_limits)
+    tiles = lay_windows(height, width, tile_limits)
     return NetworkWindows(networks=tuple(networks), tiles=tiles, cells=None, mode=limits.mode)
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from camkit.runtime.bank.blocks import PlainBlock, Span
+from camkit.runtime.content import CELL_PX
 from camkit.runtime.plan.decision import PLAIN, Labels
-from camkit.runtime.scene import CELL_PX
 
 
 def plain_blocks(labels: Labels, reach_px: int) -> PlainBlock | None:

@@ -10,9 +10,9 @@ from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
 from camkit.errors import ContractError
+from camkit.runtime.content import Content
 from camkit.runtime.geometry.placement import Placement
 from camkit.runtime.options import Mode, Options
-from camkit.runtime.scene import Scene
 
 Labels = NDArray[np.int8]
 
@@ -28,8 +28,8 @@ TIER_NAMES: Final = ("plain", "wiener", "small", "full")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
-    """What rules may look at.
+class Subject:
+    """What a plan is made for, and what its rules may look at.
 
     Attributes:
         bundle: The camera.
@@ -37,7 +37,7 @@ class Case:
         height_px: Rows of the capture.
         width_px: Columns of the capture.
         placement: Where the capture lies on the sensor.
-        scene: What was measured; None where nothing may be skipped.
+        content: What was measured; None where nothing may be skipped.
         loss_db: Predicted loss that the rules may spend, in dB against `exact`.
     """
 
@@ -46,7 +46,7 @@ class Case:
     height_px: int
     width_px: int
     placement: Placement
-    scene: Scene | None = None
+    content: Content | None = None
     loss_db: float = 0.0
 
     @property

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from camkit.bundle.stages import Network
-from camkit.runtime.plan.decision import FULL, SMALL, Case, Work
+from camkit.runtime.plan.decision import FULL, SMALL, Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import TierWork, work_shares
 from camkit.runtime.plan.ways import LEFT_OUT, ways_of
@@ -45,25 +45,31 @@ class Estimate:
 
 
 def estimate_seconds(
-    case: Case, work: Work, speed: Speed, window_mp: Mapping[str, Mapping[str, float]] | None = None
+    subject: Subject,
+    work: Work,
+    speed: Speed,
+    window_mp: Mapping[str, Mapping[str, float]] | None = None,
 ) -> float:
     """Give the seconds of a piece of work; see `stage_seconds`."""
-    files = FILE_SHARE * speed.rest_s_per_mp * case.megapixels
-    return files + sum(stage_seconds(case, work, speed, window_mp))
+    files = FILE_SHARE * speed.rest_s_per_mp * subject.megapixels
+    return files + sum(stage_seconds(subject, work, speed, window_mp))
 
 
 def stage_seconds(
-    case: Case, work: Work, speed: Speed, window_mp: Mapping[str, Mapping[str, float]] | None = None
+    subject: Subject,
+    work: Work,
+    speed: Speed,
+    window_mp: Mapping[str, Mapping[str, float]] | None = None,
 ) -> tuple[float, ...]:
     """Give the seconds of every stage of a piece of work, 0 for what is left out.
 
     Args:
-        case: The capture.
+        subject: The capture.
         work: What will be done.
         speed: How fast the machine is.
         window_mp: Role -> size -> megapixels that its windows compute, once they are planned.
     """
-    stages = case.bundle.manifest.stages
+    stages = subject.bundle.manifest.stages
     taken: list[float] = []
     for stage, way in zip(stages, ways_of(stages, work), strict=True):
         windows = None
@@ -74,7 +80,7 @@ def stage_seconds(
         elif isinstance(stage, Network) and windows is not None:
             taken.append(network_seconds(stage.role, windows, speed))
         else:
-            taken.append(stage_module(stage.type).seconds(stage, case, work, speed))
+            taken.append(stage_module(stage.type).seconds(stage, subject, work, speed))
     return tuple(taken)
 
 
@@ -83,15 +89,15 @@ def network_seconds(role: str, window_mp: Mapping[str, float], speed: Speed) -> 
     return sum(speed.network_s_per_mp[role, size] * mp for size, mp in window_mp.items())
 
 
-def nominal_window_mp(case: Case, work: Work) -> dict[str, float]:
+def nominal_window_mp(subject: Subject, work: Work) -> dict[str, float]:
     """Give size -> megapixels computed by the one network of a camera, from the lattice alone."""
-    computed = case.megapixels * WINDOW_OVERLAP
+    computed = subject.megapixels * WINDOW_OVERLAP
     if not work.networks:
         return {}
-    if work.labels is None or case.scene is None:
+    if work.labels is None or subject.content is None:
         return {work.size: computed}
-    areas = case.scene.cell_px
-    tier_work = tier_work_of(case, work)
+    areas = subject.content.cell_px
+    tier_work = tier_work_of(subject, work)
     found = {}
     for tier, size in ((FULL, work.size), (SMALL, work.small)):
         if size is None or not (work.labels == tier).any():
@@ -105,21 +111,21 @@ def nominal_window_mp(case: Case, work: Work) -> dict[str, float]:
     return found
 
 
-def role_window_mp(role: str, case: Case, work: Work) -> dict[str, float]:
+def role_window_mp(role: str, subject: Subject, work: Work) -> dict[str, float]:
     """Give size -> megapixels computed by the network of a role, on the grid of what it takes."""
-    if case.role is not None:
-        return nominal_window_mp(case, work)
-    manifest = case.bundle.manifest
+    if subject.role is not None:
+        return nominal_window_mp(subject, work)
+    manifest = subject.bundle.manifest
     stage = next(s for s in manifest.stages_of(Network) if s.role == role)
     taken = manifest.planes.get(stage.takes[0])
     finer = 1.0 if taken is None else taken.grid.pitch_ratio**-2
-    return {work.size: case.megapixels * WINDOW_OVERLAP * finer}
+    return {work.size: subject.megapixels * WINDOW_OVERLAP * finer}
 
 
-def tier_work_of(case: Case, work: Work) -> TierWork:
+def tier_work_of(subject: Subject, work: Work) -> TierWork:
     """Give what the tiers of a piece of work cost, from the bundle's facts."""
-    full = case.facts(work.size)
-    small = None if work.small is None else case.facts(work.small)
+    full = subject.facts(work.size)
+    small = None if work.small is None else subject.facts(work.small)
     return TierWork(
         full_mac=full.mac_per_pixel,
         full_halo_px=full.reach_px,

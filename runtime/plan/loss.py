@@ -1,7 +1,7 @@
-"""What a lattice cell would lose, predicted from the scene by the bundle's calibration.
+"""What a lattice cell would lose, predicted from its content by the bundle's calibration.
 
-    error = exp(level + detail * log(scene.blurred_detail) + noise * log(scene.noise)
-                + field * scene.field)
+    error = exp(level + detail * log(content.blurred_detail) + noise * log(content.noise)
+                + field * content.field)
 
 One such line per target stands in the manifest's `plan` as four entries TARGET.TERM: `exact` is the
 squared error that size M leaves (sRGB values), every other target what is added to it when a cell
@@ -17,7 +17,7 @@ import numpy as np
 
 from camkit.bundle.manifest import Threshold
 from camkit.errors import ContractError
-from camkit.runtime.scene import CellArray, Scene
+from camkit.runtime.content import CellArray, Content
 
 TERMS: Final = ("level", "detail", "noise", "field")
 EXACT: Final = "exact"
@@ -69,10 +69,10 @@ class LossModel:
         if not np.isfinite([*values, self.adaptive_db, self.draft_db]).all():
             raise ContractError("a loss model must be finite")
 
-    def predict(self, scene: Scene) -> CellLosses:
+    def predict(self, content: Content) -> CellLosses:
         """Give the predicted errors of every cell."""
-        area = scene.cell_px
-        made = {name: area * _line(line, scene) for name, line in self.lines.items()}
+        area = content.cell_px
+        made = {name: area * _line(line, content) for name, line in self.lines.items()}
         exact = made.pop(EXACT)
         return CellLosses(exact=exact, extra=made)
 
@@ -81,10 +81,10 @@ class LossModel:
         return self.adaptive_db * max_error_db / (WORST_OVER_MEAN * 0.1)
 
 
-def _line(line: tuple[float, float, float, float], scene: Scene) -> CellArray:
+def _line(line: tuple[float, float, float, float], content: Content) -> CellArray:
     level, detail, noise, field = line
-    exponent = level + detail * np.log(scene.blurred_detail) + noise * np.log(scene.noise)
-    return np.asarray(np.exp(np.clip(exponent + field * scene.field, -60, 20)))
+    exponent = level + detail * np.log(content.blurred_detail) + noise * np.log(content.noise)
+    return np.asarray(np.exp(np.clip(exponent + field * content.field, -60, 20)))
 
 
 def read_loss_model(plan: Mapping[str, Threshold] | None) -> LossModel | None:

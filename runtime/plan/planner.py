@@ -13,7 +13,7 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
 from camkit.runtime.options import Options
-from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.decision import Decision, Subject, Work
 from camkit.runtime.plan.estimate import estimate_seconds, tier_work_of
 from camkit.runtime.plan.loss import LossModel, read_loss_model
 from camkit.runtime.plan.rule import apply_rules
@@ -37,13 +37,13 @@ class Plan:
     """What will be done to a capture, and why.
 
     Attributes:
-        case: What the rules looked at.
+        subject: What the rules looked at.
         work: The result.
         steps: (work before, decision, work after) of every rule.
         note: What the caller should be warned of; empty if nothing.
     """
 
-    case: Case
+    subject: Subject
     work: Work
     steps: tuple[tuple[Work, Decision, Work], ...]
     note: str = ""
@@ -57,7 +57,7 @@ class Plan:
         """Name the networks whose speed the savings need."""
         works = [self.work, *(w for before, _, after in self.steps for w in (before, after))]
         named = {size for work in works for size in (work.size, work.small)}
-        return [s for s in self.case.bundle.manifest.sizes if s in named | {REFERENCE}]
+        return [s for s in self.subject.bundle.manifest.sizes if s in named | {REFERENCE}]
 
     def decisions(self, speed: Speed | None = None) -> list[Decision]:
         """Give the decisions; with a speed, with the seconds they save."""
@@ -75,8 +75,8 @@ class Plan:
             before = replace(before, size=REFERENCE)
         if before is after:
             return 0.0
-        return estimate_seconds(self.case, before, speed) - estimate_seconds(
-            self.case, after, speed
+        return estimate_seconds(self.subject, before, speed) - estimate_seconds(
+            self.subject, after, speed
         )
 
 
@@ -94,34 +94,34 @@ def default_size(bundle: Bundle, options: Options) -> str:
     return REFERENCE if REFERENCE in sizes or len(sizes) > 1 else sizes[0]
 
 
-def needs_scene(options: Options) -> bool:
+def needs_content(options: Options) -> bool:
     """Tell whether the choice depends on the capture."""
     budgets = options.max_seconds is not None or options.max_error_db is not None
     return budgets or options.quality in {"adaptive", "draft"}
 
 
-def make_plan(case: Case, speed: Callable[[], Speed]) -> Plan:
+def make_plan(subject: Subject, speed: Callable[[], Speed]) -> Plan:
     """Decide what to do.
 
     Args:
-        case: The capture; its scene must be measured where `needs_scene`.
+        subject: The capture; its content must be measured where `needs_content`.
         speed: Gives how fast the machine is; only called for --max-seconds.
     """
-    options = case.options
-    model = read_loss_model(case.bundle.manifest.plan)
-    work = asked_work(case.bundle, options)
+    options = subject.options
+    model = read_loss_model(subject.bundle.manifest.plan)
+    work = asked_work(subject.bundle, options)
     if not work.networks:
-        return _ruled(case, work)
+        return _ruled(subject, work)
     if options.max_seconds is not None:
-        return _within_seconds(case, work, model, speed())
+        return _within_seconds(subject, work, model, speed())
     if options.max_error_db is not None:
-        return _within_error(case, work, model)
+        return _within_error(subject, work, model)
     if model is None or options.quality in {"exact", "best"}:
-        return _ruled(case, work)
+        return _ruled(subject, work)
     spend = model.adaptive_db if options.quality == "adaptive" else model.draft_db
     if options.quality == "draft":
-        spend += size_cost_db(case, work.size)
-    return _ruled(replace(case, loss_db=spend), work)
+        spend += size_cost_db(subject, work.size)
+    return _ruled(replace(subject, loss_db=spend), work)
 
 
 def asked_work(bundle: Bundle, options: Options) -> Work:
@@ -146,64 +146,64 @@ def asked_work(bundle: Bundle, options: Options) -> Work:
     return planned(stages, work)
 
 
-def _ruled(case: Case, work: Work, note: str = "") -> Plan:
-    steps = apply_rules(case, work)
+def _ruled(subject: Subject, work: Work, note: str = "") -> Plan:
+    steps = apply_rules(subject, work)
     last = steps[-1][2] if steps else work
-    return Plan(case=case, work=last, steps=tuple(steps), note=note)
+    return Plan(subject=subject, work=last, steps=tuple(steps), note=note)
 
 
-def _sizes(case: Case) -> list[str]:
+def _sizes(subject: Subject) -> list[str]:
     """Give the sizes to choose from, from the best on; never above the reference."""
-    if case.options.size is not None:
-        return [case.options.size]
-    sizes = list(case.bundle.manifest.sizes[::-1])
+    if subject.options.size is not None:
+        return [subject.options.size]
+    sizes = list(subject.bundle.manifest.sizes[::-1])
     return sizes[sizes.index(REFERENCE) :] if REFERENCE in sizes else sizes
 
 
-def _within_error(case: Case, work: Work, model: LossModel | None) -> Plan:
+def _within_error(subject: Subject, work: Work, model: LossModel | None) -> Plan:
     """Give the cheapest plan whose predicted loss stays below the limit."""
-    limit = case.options.max_error_db
+    limit = subject.options.max_error_db
     if limit is None or model is None:
-        return _ruled(case, work, "the bundle carries no calibrated plan: nothing is skipped")
+        return _ruled(subject, work, "the bundle carries no calibrated plan: nothing is skipped")
     spend = model.budget_db(limit)
     plans = [
-        _ruled(replace(case, loss_db=spend), replace(work, size=size))
-        for size in _sizes(case)
-        if size == _sizes(case)[0] or size_cost_db(case, size) <= spend
+        _ruled(replace(subject, loss_db=spend), replace(work, size=size))
+        for size in _sizes(subject)
+        if size == _sizes(subject)[0] or size_cost_db(subject, size) <= spend
     ]
     return min(plans, key=_nominal_work)
 
 
 def _nominal_work(plan: Plan) -> float:
     """Give the work of the networks and the bank of a plan, in multiplications per pixel."""
-    tiers = tier_work_of(plan.case, plan.work)
+    tiers = tier_work_of(plan.subject, plan.work)
     per_px = tiers.per_px()
-    if plan.work.labels is None or plan.case.scene is None:
+    if plan.work.labels is None or plan.subject.content is None:
         return float(per_px[3])
-    bank, network = work_shares(plan.work.labels, plan.case.scene.cell_px, tiers)
+    bank, network = work_shares(plan.work.labels, plan.subject.content.cell_px, tiers)
     return float(bank * per_px[1] + network * (per_px[3] - per_px[1]))
 
 
-def _within_seconds(case: Case, work: Work, model: LossModel | None, speed: Speed) -> Plan:
+def _within_seconds(subject: Subject, work: Work, model: LossModel | None, speed: Speed) -> Plan:
     """Give the first plan of the ladder that fits the time."""
-    limit = case.options.max_seconds
+    limit = subject.options.max_seconds
     if limit is None:
         raise ContractError("a plan within a time needs max_seconds")
     unit = 0.0 if model is None else model.adaptive_db
-    most_db = case.options.max_error_db
+    most_db = subject.options.max_error_db
     plans = []
-    for size in _sizes(case):
+    for size in _sizes(subject):
         for factor in LADDER if model is not None else LADDER[:1]:
-            spend = 0.0 if factor == 0 else size_cost_db(case, size) + factor * unit
-            plans.append(_ruled(replace(case, loss_db=spend), replace(work, size=size)))
+            spend = 0.0 if factor == 0 else size_cost_db(subject, size) + factor * unit
+            plans.append(_ruled(replace(subject, loss_db=spend), replace(work, size=size)))
 
     def seconds(plan: Plan) -> float:
-        return estimate_seconds(plan.case, plan.work, speed)
+        return estimate_seconds(plan.subject, plan.work, speed)
 
     # The bank alone is the last resort: what it costs is not bounded by any prediction.
-    last = without_networks(case.bundle.manifest, work)
+    last = without_networks(subject.bundle.manifest, work)
     ordered = sorted(plans, key=lambda plan: plan.cost_db)
-    ordered += [] if last is None else [_ruled(case, last)]
+    ordered += [] if last is None else [_ruled(subject, last)]
     cheapest = min(plans, key=seconds) if last is None else ordered[-1]
     chosen = next((plan for plan in ordered if seconds(plan) <= limit), cheapest)
     note = ""

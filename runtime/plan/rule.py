@@ -8,9 +8,9 @@ from importlib import import_module
 
 from camkit.errors import ContractError
 from camkit.runtime.plan import rules
-from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.decision import Decision, Subject, Work
 
-Decide = Callable[[Case, Work], tuple[Work, Decision | None]]
+Decide = Callable[[Subject, Work], tuple[Work, Decision | None]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,11 +46,11 @@ def find_rules() -> tuple[Rule, ...]:
     return tuple(sorted(found, key=lambda rule: (rule.order, rule.name)))
 
 
-def apply_rules(case: Case, work: Work) -> list[tuple[Work, Decision, Work]]:
+def apply_rules(subject: Subject, work: Work) -> list[tuple[Work, Decision, Work]]:
     """Apply all rules; give (work before, decision, work after) of those that apply."""
     steps = []
     for rule in find_rules():
-        after, decision = rule.decide(case, work)
+        after, decision = rule.decide(subject, work)
         if decision is not None:
             steps.append((work, decision, after))
         work = after

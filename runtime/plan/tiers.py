@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError
+from camkit.runtime.content import CELL_PX, CellArray
 from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER, Labels
-from camkit.runtime.scene import CELL_PX, CellArray
 
 BANK_MAC: Final = 11_000.0
 """Work of the bank per pixel, in multiplications of a network that take as long (measured)."""

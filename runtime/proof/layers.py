@@ -21,7 +21,7 @@ from camkit.errors import BundleError, ParityError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.probe import perturbation_reach
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
-from camkit.runtime.network.tiling import TileLimits, TilePlan, infer_bands, plan_windows
+from camkit.runtime.network.tiling import TileLayout, TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 
 _SEED: Final = 7
@@ -166,8 +166,8 @@ def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray,
     pads = [(0, 0), (0, max(0, height - sample.shape[1])), (0, max(0, width - sample.shape[2]))]
     picture = np.pad(sample, pads, mode="symmetric")[:, :height, :width]
     limits = TileLimits(stride_px=stride, halo_px=halo, max_bytes=sys.maxsize, whole=True)
-    whole = plan_windows(height, width, limits)
-    tiled = plan_windows(height, width, replace(limits, whole=False, tile_px=_TILE_PX))
+    whole = lay_windows(height, width, limits)
+    tiled = lay_windows(height, width, replace(limits, whole=False, tile_px=_TILE_PX))
     difference = _infer(engine, picture, tiled) - _infer(engine, picture, whole)
     if difference.any():
         raise ParityError(
@@ -177,9 +177,9 @@ def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray,
     return tiled.window_count
 
 
-def _infer(engine: NetworkEngine, picture: FloatArray, plan: TilePlan) -> FloatArray:
+def _infer(engine: NetworkEngine, picture: FloatArray, layout: TileLayout) -> FloatArray:
     rows = ArrayRows(np.ascontiguousarray(picture))
-    bands = infer_bands(engine.run, rows, plan, scale=engine.scale)
+    bands = infer_bands(engine.run, rows, layout, scale=engine.scale)
     return np.concatenate(list(bands), axis=1)
 
 

@@ -14,7 +14,7 @@ from camkit.runtime.color import ColorStage, color_stage, to_output
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, read_bands
 
@@ -49,9 +49,9 @@ def _converted(bands: Iterator[Rows], color: ColorStage) -> Iterator[FloatArray]
         yield to_output(wide, color)
 
 
-def seconds(_entry: Color, case: Case, _work: Work, speed: Speed) -> float:
+def seconds(_entry: Color, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
 def _color_matrix(job: Job) -> Matrix | None:

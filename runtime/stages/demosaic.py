@@ -11,7 +11,7 @@ from camkit.contracts import CfaPattern
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.signal.demosaic import (
@@ -45,9 +45,9 @@ def prepare(entry: Demosaic, job: Job) -> StageWork:
     return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width)
 
 
-def seconds(_entry: Demosaic, case: Case, _work: Work, speed: Speed) -> float:
+def seconds(_entry: Demosaic, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
 class ColorRows:

@@ -11,7 +11,7 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.memory import release_pages
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows
 from camkit.runtime.slices import run_slices
@@ -44,9 +44,9 @@ def _renamed(stream: Stream, source: "LinearRows | MaskRows", domain: str, type_
     return Stream(plane=plane, shape=source.shape, gains=stream.gains, source=source)
 
 
-def seconds(_entry: Linearise, case: Case, _work: Work, speed: Speed) -> float:
+def seconds(_entry: Linearise, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
 class LinearRows:

@@ -10,6 +10,7 @@ import numpy as np
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.content import CELL_PX
 from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
@@ -19,14 +20,13 @@ from camkit.runtime.network.windows import (
     NetworkWindows,
     SizedNetwork,
     WindowLimits,
-    plan_network,
+    lay_network,
 )
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.estimate import network_seconds, role_window_mp
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
-from camkit.runtime.scene import CELL_PX
 from camkit.runtime.signal.stabilise import StackedRows, unstabilise
 
 METHODS: Final = ("net",)
@@ -68,9 +68,9 @@ def _falls_back(job: Job) -> bool:
     return falls_back
 
 
-def seconds(entry: Network, case: Case, work: Work, speed: Speed) -> float:
+def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return network_seconds(entry.role, role_window_mp(entry.role, case, work), speed)
+    return network_seconds(entry.role, role_window_mp(entry.role, subject, work), speed)
 
 
 def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
@@ -112,7 +112,7 @@ class _NetworkStage:
             for size in work.sizes()
         ]
         taken = bundle.manifest.planes[entry.takes[0]]
-        self._windows = plan_network(job.grid_px(taken), networks, limits, work.network_labels())
+        self._windows = lay_network(job.grid_px(taken), networks, limits, work.network_labels())
         job.windows[entry.role] = self._windows
         tiles = {role: windows.to_json() for role, windows in job.windows.items()}
         one = len(bundle.manifest.networks) == 1

@@ -9,7 +9,7 @@ from camkit.runtime.color import recover_highlights
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import changed_bands
 
@@ -35,6 +35,6 @@ def prepare(_entry: RaiseClipped, job: Job) -> StageWork:
     return StageWork(run=run)
 
 
-def seconds(_entry: RaiseClipped, case: Case, _work: Work, speed: Speed) -> float:
+def seconds(_entry: RaiseClipped, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels

@@ -11,7 +11,7 @@ from camkit.bundle.stages import Repair
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.signal.noise import REPAIR_MARGIN_PX, repair_mosaic, repair_planes
@@ -48,9 +48,9 @@ def prepare(entry: Repair, job: Job) -> StageWork:
     return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width, warnings=warnings)
 
 
-def seconds(_entry: Repair, case: Case, _work: Work, speed: Speed) -> float:
+def seconds(_entry: Repair, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
 class SoundRows:

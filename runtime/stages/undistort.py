@@ -10,7 +10,7 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.options import Options
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 
 METHODS: Final[tuple[str, ...]] = ()
@@ -42,6 +42,6 @@ def prepare(entry: Undistort, job: Job) -> StageWork:
     return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width)
 
 
-def seconds(_entry: Undistort, case: Case, _work: Work, speed: Speed) -> float:
+def seconds(_entry: Undistort, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels

@@ -12,7 +12,7 @@ from camkit.contracts import CfaPattern
 from camkit.runtime.job.job import Gains, Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.signal.demosaic import apply_gains, shift_rows
@@ -38,9 +38,9 @@ def prepare(_entry: WhiteBalance, job: Job) -> StageWork:
     return StageWork(run=run)
 
 
-def seconds(_entry: WhiteBalance, case: Case, _work: Work, speed: Speed) -> float:
+def seconds(_entry: WhiteBalance, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return REST_SHARE * speed.rest_s_per_mp * case.megapixels
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
 def _choose(job: Job) -> Gains:

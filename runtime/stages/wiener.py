@@ -8,13 +8,13 @@ import numpy as np
 from camkit.bundle.stages import Wiener
 from camkit.contracts import depth_name
 from camkit.runtime.bank.baselines import restoration_bank
-from camkit.runtime.bank.blocks import BlockBank, LocalPsf, PlainBlock, plan_spans
+from camkit.runtime.bank.blocks import BlockBank, LocalPsf, PlainBlock, lay_spans
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.plan.blocks import plain_blocks, plain_share
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 
 METHODS: Final = ("wiener", "rl", "admm-tv")
@@ -68,22 +68,22 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
 
 def _plain(job: Job) -> PlainBlock | None:
     """Give the test for blocks that nothing but plain cells read; None without any."""
-    work, case = job.work, job.case
-    if work.labels is None or case is None:
+    work, subject = job.work, job.subject
+    if work.labels is None or subject is None:
         return None
-    reach = max((case.facts(size).reach_px for size in work.sizes()), default=0)
+    reach = max((subject.facts(size).reach_px for size in work.sizes()), default=0)
     return plain_blocks(work.labels, reach)
 
 
-def seconds(entry: Wiener, case: Case, work: Work, speed: Speed) -> float:
+def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    rows = plan_spans(case.height_px, entry.block_px, entry.overlap_px)
-    columns = plan_spans(case.width_px, entry.block_px, entry.overlap_px)
+    rows = lay_spans(subject.height_px, entry.block_px, entry.overlap_px)
+    columns = lay_spans(subject.width_px, entry.block_px, entry.overlap_px)
     blocks = float(len(rows) * len(columns))
     if work.labels is not None:
-        reach = max((case.facts(size).reach_px for size in work.sizes()), default=0)
+        reach = max((subject.facts(size).reach_px for size in work.sizes()), default=0)
         blocks *= 1 - plain_share(work.labels, reach, rows, columns)
-    if case.scene is not None and entry.clip_iterations:
-        clipped = float(np.mean(case.scene.clipped > 0))
+    if subject.content is not None and entry.clip_iterations:
+        clipped = float(np.mean(subject.content.clipped > 0))
         blocks *= 1 + (CLIPPED_BLOCK - 1) * min(1.0, clipped * (entry.block_px / 256) ** 2)
     return blocks * speed.block_s * BLOCK_SET_UP / speed.threads

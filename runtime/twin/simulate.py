@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
@@ -120,6 +121,11 @@ def simulate(
         iso=options.iso,
         depth_mm=options.depth_mm if psf.depths_mm.size > 1 else None,
     )
+
+
+def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) -> Simulation:
+    """Photograph a scene with sensor and optics of a bundle; see `simulate`."""
+    return simulate(scene, bundle.manifest.sensor, bundle.psf, options)
 
 
 def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_name: str) -> None:

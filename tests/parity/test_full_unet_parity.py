@@ -9,7 +9,7 @@ from camkit.export.onnx_graph import to_onnx
 from camkit.models_def.networks.full_unet import FullConfig, FullUnet
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
-from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 
 REACH_PX = 446
@@ -37,7 +37,7 @@ def test_tiled_equals_whole_bit_for_bit(exported: bytes) -> None:
     results = []
     for tile_px in (64, None):
         limits = TileLimits(stride_px=64, halo_px=REACH_PX, max_bytes=2**40, tile_px=tile_px)
-        plan = plan_windows(60, 1600, limits)
-        assert (plan.window_count > 1) == (tile_px is not None)
-        results.append(np.concatenate([*infer_bands(engine.run, ArrayRows(picture), plan)], 1))
+        layout = lay_windows(60, 1600, limits)
+        assert (layout.window_count > 1) == (tile_px is not None)
+        results.append(np.concatenate([*infer_bands(engine.run, ArrayRows(picture), layout)], 1))
     assert np.array_equal(*results)

@@ -13,7 +13,7 @@ from camkit.models_def.networks.catalog import build_network
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.probe import perturbation_reach
-from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 
 # lattice halo in px: what exact tiling needs; full_unet has its own file
@@ -37,8 +37,8 @@ def _picture(height: int, width: int) -> FloatArray:
 
 
 def _infer(engine: NetworkEngine, picture: FloatArray, limits: TileLimits) -> FloatArray:
-    plan = plan_windows(picture.shape[1], picture.shape[2], limits)
-    return np.concatenate(list(infer_bands(engine.run, ArrayRows(picture), plan)), axis=1)
+    layout = lay_windows(picture.shape[1], picture.shape[2], limits)
+    return np.concatenate(list(infer_bands(engine.run, ArrayRows(picture), layout)), axis=1)
 
 
 def _limits(name: str, **changes: object) -> TileLimits:
@@ -93,7 +93,7 @@ def test_24_megapixels_tiled_equal_whole(name: str) -> None:
     picture = _picture(4000, 6000)
     whole = _infer(NetworkEngine(model, threads=2), picture, _limits(name, whole=True))
     limits = _limits(name, max_bytes=480 * 10**6)
-    assert plan_windows(4000, 6000, limits).window_count > 10
+    assert lay_windows(4000, 6000, limits).window_count > 10
     engine = NetworkEngine(model, threads=2)
     assert np.array_equal(_infer(engine, picture, limits), whole)
 

@@ -21,7 +21,7 @@ TYPES = sorted(entry.model_fields["type"].default for entry in get_args(UNION))
 @pytest.mark.parametrize("name", TYPES)
 def test_every_stage_that_a_bundle_may_list_has_a_module_that_says_all(name: str) -> None:
     module = stage_module(name)
-    for function, named in (("prepare", "entry job"), ("seconds", "entry case work speed")):
+    for function, named in (("prepare", "entry job"), ("seconds", "entry subject work speed")):
         takes = inspect.signature(getattr(module, function)).parameters
         assert [name.lstrip("_") for name in takes] == named.split()
     assert isinstance(module.METHODS, tuple)

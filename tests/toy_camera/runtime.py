@@ -9,18 +9,15 @@ from typing import Any, Final
 
 import numpy as np
 import tifffile
-from numpy.typing import NDArray
 
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.array_capture import capture_of_array
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.kind import Gains, RuntimePart
+from camkit.runtime.kind import RuntimePart
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.raw import file_sha256
-from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation
 from camkit.runtime.twin.truth import light_sensor
 
 NAME: Final = "toy"
@@ -50,24 +47,6 @@ def read(file: Path, mosaic: MosaicOptions | None, _manifest: Manifest | None) -
     )
 
 
-def from_array(
-    image: NDArray[Any],
-    manifest: Manifest,
-    iso: float | None,
-    white_balance: Gains | None,
-    origin_px: tuple[int, int] | None,
-) -> Capture:
-    """Take (1, h, w) for a capture."""
-    return capture_of_array(
-        image, manifest, iso=iso, white_balance=white_balance, origin_px=origin_px
-    )
-
-
-def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) -> Simulation:
-    """Photograph a scene through the streaks."""
-    return simulate(scene, bundle.manifest.sensor, bundle.psf, options)
-
-
 def write(path: Path, simulation: Simulation, bundle: Bundle) -> None:
     """Write what `read` reads."""
     sensor, window = light_sensor(bundle.manifest), simulation.window
@@ -89,6 +68,4 @@ def write(path: Path, simulation: Simulation, bundle: Bundle) -> None:
         )
 
 
-PART: Final = RuntimePart(
-    read=read, from_array=from_array, simulate=photograph, write=write, suffix=".tif"
-)
+PART: Final = RuntimePart(read=read, write=write, suffix=".tif")

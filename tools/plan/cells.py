@@ -1,7 +1,7 @@
 """What every lattice cell of a simulated capture would lose with less than the exact result.
 
-    picture -> capture -> scene, and per cell the squared sRGB error of exact, bank, development and
-                          every other size of network
+    picture -> capture -> content, and per cell the squared sRGB error of exact, bank, development
+                           and every other size of network
 
 The captures go through the bundle's own PSF; `tools/plan_report.py` fits the loss model to them.
 """
@@ -16,13 +16,13 @@ from camkit.bundle.reader import Bundle
 from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.quality import BORDER_PX, FIELD_SHARES, QUADRANTS, crop_origin
+from camkit.runtime.content import CELL_PX, CellArray, Content, lattice_shape, measure_content
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.plan.loss import EXACT
 from camkit.runtime.plan.rules.size import REFERENCE
-from camkit.runtime.scene import CELL_PX, CellArray, Scene, lattice_shape, measure_scene
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from tools.capture.simulated import captured, color_sensor, rec709_of
 
@@ -36,13 +36,13 @@ class CaptureCells:
 
     Attributes:
         name: Picture and ISO.
-        scene: What the runtime sees of it.
+        content: What the runtime sees of it.
         pixels: (row, column) pixels that count; a border of BORDER_PX does not.
         errors: Target -> (row, column) squared sRGB error summed over pixels and colours / 3.
     """
 
     name: str
-    scene: Scene
+    content: Content
     pixels: CellArray
     errors: dict[str, CellArray]
 
@@ -130,10 +130,10 @@ def measure_cells(
         errors[target] = cell_errors(start(pipeline, simulation).fill(None), sharp)
     noise = color_sensor(bundle).noise_at(simulation.iso).with_gains(simulation.white_balance)
     capture = captured(targets[PLAIN_TARGET], simulation)
-    scene = measure_scene(capture, noise, simulation.white_balance, simulation.window)
+    content = measure_content(capture, noise, simulation.white_balance, simulation.window)
     return CaptureCells(
         name=name,
-        scene=scene,
+        content=content,
         pixels=cell_sums(np.ones(sharp.shape[1:], np.float32)),
         errors=errors,
     )

@@ -90,8 +90,13 @@ def _counted(capture: CaptureCells) -> np.ndarray:
 
 
 def _design(capture: CaptureCells, mask: np.ndarray) -> np.ndarray:
-    scene = capture.scene
-    terms = (np.ones(scene.shape), np.log(scene.blurred_detail), np.log(scene.noise), scene.field)
+    content = capture.content
+    terms = (
+        np.ones(content.shape),
+        np.log(content.blurred_detail),
+        np.log(content.noise),
+        content.field,
+    )
     return np.stack([term[mask] for term in terms], axis=1)
 
 
@@ -135,9 +140,9 @@ def true_loss_db(
     capture: CaptureCells, model: LossModel, work: TierWork, small: str | None, loss_db: float
 ) -> float:
     """Give what a capture really loses when the model may spend `loss_db`."""
-    losses = model.predict(capture.scene)
+    losses = model.predict(capture.content)
     grid = _grid(losses, small)
-    labels = choose_tiers(capture.scene.cell_px, grid, losses.allowed(loss_db), work)
+    labels = choose_tiers(capture.content.cell_px, grid, losses.allowed(loss_db), work)
     if labels is None:
         return 0.0
     measured = np.stack(
@@ -168,7 +173,7 @@ def saving_of_the_all_knowing(
         exact=exact,
         extra={name: np.maximum(error - exact, 0) for name, error in capture.errors.items()},
     )
-    area = capture.scene.cell_px
+    area = capture.content.cell_px
     labels = choose_tiers(area, _grid(known, small), known.allowed(loss_db), work)
     if labels is None:
         return 0.0

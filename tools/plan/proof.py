@@ -12,7 +12,7 @@ import numpy as np
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
-from camkit.runtime.bank.blocks import plan_spans
+from camkit.runtime.bank.blocks import lay_spans
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options, Quality
 from camkit.runtime.pipeline import Pipeline
@@ -134,7 +134,7 @@ def _counted_seconds(bundle: Bundle, work: Reconstruction, speed: Speed) -> floa
     )
     if stage is not None:
         rows, columns = (
-            plan_spans(side, stage.block_px, stage.overlap_px)
+            lay_spans(side, stage.block_px, stage.overlap_px)
             for side in (work.capture.height, work.capture.width)
         )
         share = 0.0

@@ -6,7 +6,7 @@ from typing import Literal
 from camkit.bundle.entry import Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_count, need_domain
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, one_linear
 
 
 class Demosaic(StageEntry):
@@ -20,8 +20,7 @@ class Demosaic(StageEntry):
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the three planes."""
         del parts
-        need_count(taken, 1)
-        need_domain(taken[0], "linear")
-        if taken[0].channels != MOSAIC:
+        plane = one_linear(taken)
+        if plane.channels != MOSAIC:
             raise JoinError("it takes a mosaic")
-        return (taken[0].model_copy(update={"channels": RGB}),)
+        return (plane.model_copy(update={"channels": RGB}),)

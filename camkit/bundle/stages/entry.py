@@ -92,3 +92,14 @@ def need_rows(plane: Plane) -> None:
     """
     if plane.axes != "y x":
         raise JoinError(f"it takes pictures (y x), not planes over {plane.axes}")
+
+
+def one_linear(taken: Sequence[Plane]) -> Plane:
+    """Give the one linear plane that a stage takes.
+
+    Raises:
+        JoinError: If it is given none, several or one of another domain.
+    """
+    need_count(taken, 1)
+    need_domain(taken[0], "linear")
+    return taken[0]

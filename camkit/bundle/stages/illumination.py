@@ -5,14 +5,7 @@ from typing import Literal
 
 from camkit.bundle.entry import Word
 from camkit.bundle.plane import Plane
-from camkit.bundle.stages.entry import (
-    JoinError,
-    Parts,
-    StageEntry,
-    need_count,
-    need_domain,
-    need_rows,
-)
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_rows, one_linear
 
 
 class Illumination(StageEntry):
@@ -24,10 +17,9 @@ class Illumination(StageEntry):
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give a plane of the kind taken."""
-        need_count(taken, 1)
-        need_domain(taken[0], "linear")
-        need_rows(taken[0])
+        plane = one_linear(taken)
+        need_rows(plane)
         parts.need_optics("it divides by the illumination of optics")
-        if not taken[0].grid.warped:
+        if not plane.grid.warped:
             raise JoinError("it works in the geometry of the sensor, before any undistortion")
-        return (taken[0],)
+        return (plane,)

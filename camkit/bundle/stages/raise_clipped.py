@@ -6,7 +6,7 @@ from typing import Literal
 from camkit.bundle.entry import Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import RGB
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_count, need_domain
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, one_linear
 
 
 class RaiseClipped(StageEntry):
@@ -19,8 +19,7 @@ class RaiseClipped(StageEntry):
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give a plane of the kind taken."""
         del parts
-        need_count(taken, 1)
-        need_domain(taken[0], "linear")
-        if taken[0].channels != RGB:
+        plane = one_linear(taken)
+        if plane.channels != RGB:
             raise JoinError("it takes red, green and blue")
-        return (taken[0],)
+        return (plane,)

@@ -6,14 +6,7 @@ from typing import Literal
 from camkit.bundle.entry import Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC
-from camkit.bundle.stages.entry import (
-    JoinError,
-    Parts,
-    StageEntry,
-    need_count,
-    need_domain,
-    need_rows,
-)
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_rows, one_linear
 
 
 class Undistort(StageEntry):
@@ -25,21 +18,16 @@ class Undistort(StageEntry):
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the plane in ideal geometry."""
-        need_count(taken, 1)
-        need_domain(taken[0], "linear")
-        need_rows(taken[0])
+        plane = one_linear(taken)
+        need_rows(plane)
         parts.need_optics("it undoes the distortion of optics")
-        if not taken[0].grid.warped:
+        if not plane.grid.warped:
             raise JoinError("it takes the geometry of the sensor; this plane is undistorted")
-        if taken[0].channels == MOSAIC:
+        if plane.channels == MOSAIC:
             raise JoinError("a mosaic cannot be moved")
-        if len(taken[0].channels) != len(parts.sensor.channels):
+        if len(plane.channels) != len(parts.sensor.channels):
             raise JoinError(
                 f"the distortion is known for {', '.join(parts.sensor.channels)}, not for "
-                f"{', '.join(taken[0].channels)}"
+                f"{', '.join(plane.channels)}"
             )
-        return (
-            taken[0].model_copy(
-                update={"grid": taken[0].grid.model_copy(update={"warped": False})}
-            ),
-        )
+        return (plane.model_copy(update={"grid": plane.grid.model_copy(update={"warped": False})}),)

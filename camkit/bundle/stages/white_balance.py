@@ -6,7 +6,7 @@ from typing import Literal
 from camkit.bundle.entry import Word
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_count, need_domain
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, one_linear
 
 
 class WhiteBalance(StageEntry):
@@ -18,8 +18,7 @@ class WhiteBalance(StageEntry):
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give a plane of the kind taken."""
-        need_count(taken, 1)
-        need_domain(taken[0], "linear")
-        if parts.sensor.channels != RGB or taken[0].channels not in (MOSAIC, RGB):
+        plane = one_linear(taken)
+        if parts.sensor.channels != RGB or plane.channels not in (MOSAIC, RGB):
             raise JoinError("it balances red, green and blue, which these planes are not")
-        return (taken[0],)
+        return (plane,)

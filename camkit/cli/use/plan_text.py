@@ -31,12 +31,12 @@ def print_plans(
     Raises:
         BundleError: If the bundle that was named is refused.
     """
-    from camkit.runtime.batch import plan_tasks
+    from camkit.runtime.batch import list_tasks
     from camkit.runtime.pipeline import load
 
     made: dict[str, Pipeline] = {}
     done = True
-    for task in plan_tasks(sources, bundle=bundle, write=write):
+    for task in list_tasks(sources, bundle=bundle, write=write):
         facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
         try:
             if task.refusal is not None:

@@ -185,7 +185,9 @@ class Rig:
         samples = expose(light, self.sensor, chosen)
         x, y = (int(v) for v in light.window.origin_px)
         balance = stated_balance(light.gains)
-        made = self._from_array(samples, self.bundle.manifest, chosen.iso, balance, (x, y))
+        made = self._from_array(
+            samples, self.bundle.manifest, iso=chosen.iso, white_balance=balance, origin_px=(x, y)
+        )
         black, white = levels_of(self.sensor, chosen)
         capture = replace(
             made, black_level=np.full_like(made.black_level, black), white_level=white

@@ -1,4 +1,4 @@
-"""One module per rule: ORDER and `decide(case, work) -> (work, decision or None)`.
+"""One module per rule: ORDER and `decide(subject, work) -> (work, decision or None)`.
 
 size           which network
 cells          which lattice cells get it, a smaller one, the bank alone, or nothing

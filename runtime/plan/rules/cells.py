@@ -12,8 +12,8 @@ from camkit.runtime.plan.decision import (
     SMALL,
     TIER_NAMES,
     WIENER,
-    Case,
     Decision,
+    Subject,
     Work,
 )
 from camkit.runtime.plan.estimate import tier_work_of
@@ -24,49 +24,51 @@ from camkit.runtime.plan.ways import known_stand_in
 ORDER: Final = 20
 
 
-def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Share the cells among the tiers within the loss that may be spent."""
-    if not work.networks or case.role is None:
+    if not work.networks or subject.role is None:
         return work, None
-    model = read_loss_model(case.bundle.manifest.plan)
-    if case.scene is None:
-        reason = f"quality {case.options.quality} skips nothing"
+    model = read_loss_model(subject.bundle.manifest.plan)
+    if subject.content is None:
+        reason = f"quality {subject.options.quality} skips nothing"
         return work, Decision(what="cells", choice="all full", reason=reason)
     if model is None:
         reason = "the bundle carries no calibrated plan (tools/plan_report.py calibrate writes it)"
         return work, Decision(what="cells", choice="all full", reason=reason)
-    if case.loss_db <= 0:
+    if subject.loss_db <= 0:
         return work, Decision(what="cells", choice="all full", reason="no loss may be spent")
-    manifest = case.bundle.manifest
+    manifest = subject.bundle.manifest
     if not all(known_stand_in(s, manifest.all_planes) for s in manifest.stages_of(Network)):
         reason = "no plane stands in where the network does not run"
         return work, Decision(what="cells", choice="all full", reason=reason)
-    losses = model.predict(case.scene)
-    small = _smaller(case, work, losses)
+    losses = model.predict(subject.content)
+    small = _smaller(subject, work, losses)
     with_small = replace(work, small=small)
-    grid = _losses(losses, work.size, small, case.scene.shape)
+    grid = _losses(losses, work.size, small, subject.content.shape)
     base = losses.extra.get(work.size)
     spent = 0.0 if base is None else float(base.sum())
-    allowed = losses.allowed(case.loss_db) - spent
+    allowed = losses.allowed(subject.loss_db) - spent
     labels = None
     if allowed > 0:
-        labels = choose_tiers(case.scene.cell_px, grid, allowed, tier_work_of(case, with_small))
+        labels = choose_tiers(
+            subject.content.cell_px, grid, allowed, tier_work_of(subject, with_small)
+        )
     if labels is None:
-        reason = f"nothing can be skipped within {case.loss_db:.3f} dB"
+        reason = f"nothing can be skipped within {subject.loss_db:.3f} dB"
         return work, Decision(what="cells", choice="all full", reason=reason)
     added = float(np.take_along_axis(grid, labels[None].astype(np.intp), axis=0).sum())
     counts = [f"{int((labels == t).sum())} {TIER_NAMES[t]}" for t in (FULL, SMALL, WIENER, PLAIN)]
     return replace(with_small, labels=labels), Decision(
         what="cells",
         choice=", ".join(c for c in counts if not c.startswith("0 ")),
-        reason=f"flat, dark or out of focus; predicted within {case.loss_db:.3f} dB",
+        reason=f"flat, dark or out of focus; predicted within {subject.loss_db:.3f} dB",
         cost_db=losses.loss_db(spent + added) - losses.loss_db(spent),
     )
 
 
-def _smaller(case: Case, work: Work, losses: CellLosses) -> str | None:
+def _smaller(subject: Subject, work: Work, losses: CellLosses) -> str | None:
     """Give the smallest calibrated size below the one in use."""
-    manifest = case.bundle.manifest
+    manifest = subject.bundle.manifest
     mac = {size: manifest.mac_per_pixel(size) for size in manifest.sizes}
     known = [size for size in mac if size in losses.extra and mac[size] < mac[work.size]]
     return min(known, key=lambda size: mac[size]) if known else None

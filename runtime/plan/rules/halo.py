@@ -2,20 +2,20 @@
 
 from typing import Final
 
-from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.decision import Decision, Subject, Work
 
 ORDER: Final = 50
 
 
-def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Keep the network's reach unless the caller chose otherwise.
 
     With less, pixels near a window's border would depend on where the windows lie, that is on tile
     size and memory cap; for a few percent of the network's time that promise is not given up.
     """
-    if not work.networks or case.role is None:
+    if not work.networks or subject.role is None:
         return work, None
-    facts = case.facts(work.size)
+    facts = subject.facts(work.size)
     shorter = [e for e in facts.halo_error if e.psnr_db is not None and e.psnr_db >= 80.0]
     if work.mode != "exact":
         reason = f"--mode {work.mode} says so"

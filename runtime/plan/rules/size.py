@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.decision import Decision, Subject, Work
 from camkit.runtime.plan.loss import read_loss_model
 
 ORDER: Final = 10
@@ -10,11 +10,11 @@ REFERENCE: Final = "M"
 """The size that `exact` takes and losses are measured against."""
 
 
-def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Report the size that quality, budgets or --size asked for, and what it costs."""
     if not work.networks:
         return work, None
-    options = case.options
+    options = subject.options
     if options.size is not None:
         reason = "--size says so"
     elif options.max_seconds is not None or options.max_error_db is not None:
@@ -22,15 +22,15 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     else:
         reason = f"quality {options.quality}"
     return work, Decision(
-        what="size", choice=work.size, reason=reason, cost_db=size_cost_db(case, work.size)
+        what="size", choice=work.size, reason=reason, cost_db=size_cost_db(subject, work.size)
     )
 
 
-def size_cost_db(case: Case, size: str) -> float:
+def size_cost_db(subject: Subject, size: str) -> float:
     """Give the predicted loss of a size on this capture; 0 where nothing was calibrated."""
-    model = read_loss_model(case.bundle.manifest.plan)
-    if model is None or case.scene is None or size == REFERENCE:
+    model = read_loss_model(subject.bundle.manifest.plan)
+    if model is None or subject.content is None or size == REFERENCE:
         return 0.0
-    losses = model.predict(case.scene)
+    losses = model.predict(subject.content)
     extra = losses.extra.get(size)
     return 0.0 if extra is None else losses.loss_db(float(extra.sum()))

@@ -7,22 +7,22 @@ import numpy as np
 
 from camkit.bundle.stages import Undistort
 from camkit.runtime.geometry.warp import Warp
-from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.decision import Decision, Subject, Work
 
 ORDER: Final = 60
 LEAST_SHIFT_PX: Final = 0.5
 _NODES: Final = 33
 
 
-def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Skip undistortion that would move no pixel by half a pixel."""
-    stage = case.bundle.manifest.stage(Undistort)
+    stage = subject.bundle.manifest.stage(Undistort)
     if stage is None or stage.type in work.left_out:
         return work, None
-    if case.scene is None:
-        reason = f"quality {case.options.quality} skips nothing"
+    if subject.content is None:
+        reason = f"quality {subject.options.quality} skips nothing"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
-    shift_px = largest_shift_px(case)
+    shift_px = largest_shift_px(subject)
     if shift_px >= LEAST_SHIFT_PX:
         reason = f"pixels move by up to {shift_px:.1f} px"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
@@ -34,11 +34,11 @@ def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
     )
 
 
-def largest_shift_px(case: Case) -> float:
+def largest_shift_px(subject: Subject) -> float:
     """Give how far undistortion moves a pixel of the capture at most."""
-    warp = Warp(case.bundle.psf.distortion, case.placement.window, to_sensor=False)
+    warp = Warp(subject.bundle.psf.distortion, subject.placement.window, to_sensor=False)
     x, y = np.meshgrid(
-        np.linspace(0, case.width_px - 1, _NODES), np.linspace(0, case.height_px - 1, _NODES)
+        np.linspace(0, subject.width_px - 1, _NODES), np.linspace(0, subject.height_px - 1, _NODES)
     )
     moved = [
         np.hypot(*np.moveaxis(warp.positions(c, x, y) - np.stack([x, y], -1), -1, 0))

@@ -3,16 +3,16 @@
 from typing import Final
 
 from camkit.bundle.stages import Wiener
-from camkit.runtime.plan.decision import Case, Decision, Work
+from camkit.runtime.plan.decision import Decision, Subject, Work
 
 ORDER: Final = 40
 
 
-def decide(case: Case, work: Work) -> tuple[Work, Decision | None]:
+def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Keep all: they are folded into one kernel per colour once, so fewer would save nothing."""
-    if case.bundle.manifest.stage(Wiener) is None:
+    if subject.bundle.manifest.stage(Wiener) is None:
         return work, None
-    count = case.bundle.psf.wavelengths_um.size
+    count = subject.bundle.psf.wavelengths_um.size
     return work, Decision(
         what="wavelengths",
         choice=f"all {count}",

@@ -9,8 +9,8 @@ from camkit.errors import ContractError
 from camkit.runtime.bank.blocks import (
     BlockBank,
     LocalPsf,
+    lay_spans,
     mirror_otf,
-    plan_spans,
     taper_edges,
     to_otf,
 )
@@ -40,7 +40,7 @@ def keep(block):
 @settings(deadline=None, max_examples=60)
 def test_windows_sum_to_one_and_only_neighbours_overlap(size_px, layout):
     total = np.zeros(size_px)
-    spans = plan_spans(size_px, *layout)
+    spans = lay_spans(size_px, *layout)
     for span in spans:
         assert span.index.min() >= 0
         assert span.index.max() < size_px
@@ -51,14 +51,14 @@ def test_windows_sum_to_one_and_only_neighbours_overlap(size_px, layout):
 @given(SIZES)
 @settings(deadline=None, max_examples=30)
 def test_block_samples_inside_the_picture_are_those_of_the_picture(size_px):
-    for span in plan_spans(size_px, 32, 10):
+    for span in lay_spans(size_px, 32, 10):
         at = np.arange(span.start, span.start + 32)
         inside = (at >= 0) & (at < size_px)
         np.testing.assert_array_equal(span.index[inside], at[inside])
 
 
 def test_the_grid_is_centred_on_the_sensor():
-    spans = plan_spans(6000, 512, 160)
+    spans = lay_spans(6000, 512, 160)
     centres = np.array([s.centre for s in spans])
     np.testing.assert_array_equal(centres + centres[::-1], 5999)
     assert len(spans) == 17
@@ -67,7 +67,7 @@ def test_the_grid_is_centred_on_the_sensor():
 @pytest.mark.parametrize("layout", [(0, 32, 10), (100, 32, 17), (100, 0, 0), (100, 32, -1)])
 def test_a_grid_that_cannot_be_is_refused(layout):
     with pytest.raises(ContractError, match="blocks need"):
-        plan_spans(*layout)
+        lay_spans(*layout)
 
 
 def test_otf_is_the_transform_of_the_kernel_about_its_centre():
@@ -238,7 +238,7 @@ def test_every_block_gets_the_streak_of_its_own_place_and_no_mirror_image(
 
     bank = BlockBank(LocalPsf(kernels=fields, window=window), keep_otf, block_px=64, overlap_px=32)
     bank.restore_array(np.zeros((channels, 160, 160), np.float32))
-    centres = [span.centre for span in plan_spans(160, 64, 32)]
+    centres = [span.centre for span in lay_spans(160, 64, 32)]
     places = [window.to_mm(x, y) for y in centres for x in centres]
     wanted = [to_otf(fields.at(float(x_mm), float(y_mm)), 64) for x_mm, y_mm in places]
     assert len(seen) == len(wanted)

@@ -11,7 +11,7 @@ from camkit.runtime.bank.blocks import (
     Block,
     BlockBank,
     LocalPsf,
-    plan_spans,
+    lay_spans,
     taper_edges,
     to_otf,
 )
@@ -78,8 +78,8 @@ def reference(planes, psf, noise):
     ramp = np.sin(np.pi / 2 * np.minimum(ramp, ramp[::-1])) ** 2
     f = np.fft.fftfreq(64)
     rise = (f[:, None] ** 2 + f**2 + CORNER_FREQUENCY**2) ** (SMALL.prior_exponent / 2)
-    for row in plan_spans(h, 64, 24):
-        for col in plan_spans(w, 64, 24):
+    for row in lay_spans(h, 64, 24):
+        for col in lay_spans(w, 64, 24):
             kernel = psf.kernels.at(*psf.position_mm(col.centre, row.centre))
             half = kernel.shape[-1] // 2
             for c in range(3):

@@ -7,18 +7,13 @@ import numpy as np
 import pytest
 
 from camkit.bundle.plane import Grid
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
-from tests.bundle_factory import tiny_sensor, write_tiny_bundle
+from tests.bundle_factory import tiny_sensor
 from tests.job_factory import OWN_BALANCE, SHAPE, made_job, made_mosaic, made_planes, start
 from tests.planes_bundle import planes_sensor, write_planes_bundle
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def test_a_capture_that_states_everything_leaves_nothing_to_note(bundle: Bundle) -> None:

@@ -9,17 +9,11 @@ from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Linearise, Network, Repair
 from camkit.errors import ContractError
-from tests.bundle_factory import write_tiny_bundle
 from tests.job_factory import made_mosaic, made_planes, start
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 
 STAGES = ["linearise", "repair", "white_balance", "demosaic", "wiener", "network"]
 STAGES += ["raise_clipped", "illumination", "undistort", "color"]
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +59,7 @@ def test_a_classical_method_plans_no_windows(bundle: Bundle) -> None:
 
 def test_without_a_bundle_nothing_is_planned() -> None:
     made = start(None, made_mosaic())
-    assert made.plan is made.size is made.labels is made.explain() is made.job.case is None
+    assert made.plan is made.size is made.labels is made.explain() is made.job.subject is None
     assert made.windows == {}
     assert "noise" not in made.record
     assert made.products == {"image": "picture"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.facts import Port
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise, Network, Repair, Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
@@ -27,16 +27,11 @@ from camkit.runtime.rows import Rows
 from camkit.runtime.signal.demosaic import apply_gains, demosaic
 from camkit.runtime.signal.noise import repair_mosaic, repair_planes
 from camkit.runtime.stage_finder import stage_module
-from tests.bundle_factory import PITCH_UM, write_tiny_bundle
+from tests.bundle_factory import PITCH_UM
 from tests.job_factory import OWN_BALANCE, SHAPE, made_mosaic, made_planes, read_all, start
 from tests.plan_factory import half_textured_mosaic, write_planned_bundle
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 from tests.psf_factory import streak_kernel, uniform_psf
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def _broken() -> Capture:

@@ -3,22 +3,15 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.kinds import BAYER
 from camkit.runtime.kind import runtime_part
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import SimulationOptions
-from tests.bundle_factory import write_tiny_bundle
 
 PART = runtime_part(BAYER.name)
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def test_what_is_photographed_and_written_is_read_again(bundle: Bundle, tmp_path: Path) -> None:
@@ -29,7 +22,9 @@ def test_what_is_photographed_and_written_is_read_again(bundle: Bundle, tmp_path
     read = PART.read(path, None, bundle.manifest)
     np.testing.assert_array_equal(read.samples, taken.samples)
     assert (read.bundle_name, read.iso) == ("tiny", 400)
-    again = PART.from_array(taken.samples, bundle.manifest, 400.0, read.white_balance, None)
+    again = PART.from_array(
+        taken.samples, bundle.manifest, iso=400.0, white_balance=read.white_balance
+    )
     np.testing.assert_array_equal(again.samples, read.samples)
     assert (again.cfa, again.white_level) == (read.cfa, read.white_level)
 

@@ -5,7 +5,7 @@ import pytest
 
 from camkit.errors import ContractError
 from camkit.runtime.network.guard import BOUND_FACTOR, BOUND_OFFSET, TileGuard
-from camkit.runtime.network.tiling import TileLimits, infer_bands, plan_windows
+from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 
 RNG = np.random.default_rng
@@ -26,8 +26,8 @@ def _bands(planes: np.ndarray, spoil: float, guard: TileGuard | None) -> np.ndar
         return out
 
     limits = TileLimits(stride_px=2, halo_px=0, tile_px=16)
-    plan = plan_windows(planes.shape[1], planes.shape[2], limits)
-    bands = infer_bands(run, ArrayRows(planes), plan, guard=guard)
+    layout = lay_windows(planes.shape[1], planes.shape[2], limits)
+    bands = infer_bands(run, ArrayRows(planes), layout, guard=guard)
     return np.concatenate(list(bands), axis=1)
 
 
@@ -92,8 +92,8 @@ def _fine_bands(planes: np.ndarray, guard: TileGuard, scale: int = 2) -> np.ndar
         out[out > 2] = np.nan
         return out
 
-    plan = plan_windows(*planes.shape[1:], TileLimits(stride_px=2, halo_px=0, tile_px=16))
-    bands = infer_bands(run, ArrayRows(planes), plan, guard=guard, scale=scale)
+    layout = lay_windows(*planes.shape[1:], TileLimits(stride_px=2, halo_px=0, tile_px=16))
+    bands = infer_bands(run, ArrayRows(planes), layout, guard=guard, scale=scale)
     return np.concatenate(list(bands), axis=1)
 
 

@@ -17,10 +17,10 @@ from camkit.runtime.network.tiling import (
     Cancelled,
     PixelCost,
     Span,
+    TileLayout,
     TileLimits,
-    TilePlan,
     infer_bands,
-    plan_windows,
+    lay_windows,
 )
 from camkit.runtime.rows import ArrayRows
 from tests.planes_bundle import finer_network
@@ -44,14 +44,14 @@ def _picture(height: int, width: int, seed: int = 0) -> FloatArray:
 def _infer(
     run: Callable[[FloatArray], FloatArray], picture: FloatArray, limits: TileLimits
 ) -> FloatArray:
-    plan = plan_windows(picture.shape[1], picture.shape[2], limits)
-    return np.concatenate(list(infer_bands(run, ArrayRows(picture), plan)), axis=1)
+    layout = lay_windows(picture.shape[1], picture.shape[2], limits)
+    return np.concatenate(list(infer_bands(run, ArrayRows(picture), layout)), axis=1)
 
 
-def _assert_sound(plan: TilePlan) -> None:
+def _assert_sound(layout: TileLayout) -> None:
     axes = (
-        (plan.rows, plan.window_height_px, plan.padded_height_px),
-        (plan.columns, plan.window_width_px, plan.padded_width_px),
+        (layout.rows, layout.window_height_px, layout.padded_height_px),
+        (layout.columns, layout.window_width_px, layout.padded_width_px),
     )
     for spans, window, padded in axes:
         assert spans[0].start_px == 0
@@ -61,9 +61,9 @@ def _assert_sound(plan: TilePlan) -> None:
         for span in spans:
             end = span.origin_px + window
             assert 0 <= span.origin_px <= span.start_px < span.stop_px <= end <= padded
-            assert span.origin_px % plan.stride_px == span.start_px % plan.stride_px == 0
-            assert span.origin_px == 0 or span.start_px - span.origin_px >= plan.halo_px
-            assert end == padded or end - span.stop_px >= plan.halo_px
+            assert span.origin_px % layout.stride_px == span.start_px % layout.stride_px == 0
+            assert span.origin_px == 0 or span.start_px - span.origin_px >= layout.halo_px
+            assert end == padded or end - span.stop_px >= layout.halo_px
 
 
 sides = st.integers(1, 9000)
@@ -82,34 +82,34 @@ def test_plan_keeps_every_pixel_once_with_its_halo_within_memory(
 ) -> None:
     limits = TileLimits(stride_px=stride, halo_px=halo, max_bytes=megabytes * 10**6)
     try:
-        plan = plan_windows(height, width, limits)
+        layout = lay_windows(height, width, limits)
     except ContractError as error:
         assert "need at least" in str(error)  # noqa: PT017 - both outcomes are in order
         return
-    _assert_sound(plan)
-    assert plan.halo_px >= halo
-    assert plan.needed_bytes(limits.cost) <= limits.max_bytes
+    _assert_sound(layout)
+    assert layout.halo_px >= halo
+    assert layout.needed_bytes(limits.cost) <= limits.max_bytes
 
 
 @given(height=sides, width=sides, halo=st.integers(0, 140), tile=st.integers(1, 2000))
 @settings(max_examples=60, deadline=None)
 def test_forced_tiles_keep_every_pixel_once(height: int, width: int, halo: int, tile: int) -> None:
     limits = TileLimits(stride_px=16, halo_px=halo, tile_px=tile)
-    _assert_sound(plan_windows(height, width, limits))
+    _assert_sound(lay_windows(height, width, limits))
 
 
 def test_plan_of_24_megapixels_wastes_less_than_half() -> None:
     cost = PixelCost(arena_bytes=183)
     limits = TileLimits(stride_px=16, halo_px=94, cost=cost, max_bytes=560 * 10**6)
-    plan = plan_windows(4000, 6000, limits)
-    assert plan.work_ratio < 1.45
-    assert plan.needed_bytes(cost) <= 560 * 10**6
+    layout = lay_windows(4000, 6000, limits)
+    assert layout.work_ratio < 1.45
+    assert layout.needed_bytes(cost) <= 560 * 10**6
 
 
 def test_more_memory_never_means_more_work() -> None:
     caps = [m * 10**6 for m in (250, 400, 600, 900, 1500, 6000)]
     ratios = [
-        plan_windows(4000, 6000, TileLimits(stride_px=16, halo_px=96, max_bytes=cap)).work_ratio
+        lay_windows(4000, 6000, TileLimits(stride_px=16, halo_px=96, max_bytes=cap)).work_ratio
         for cap in caps
     ]
     assert ratios == sorted(ratios, reverse=True)
@@ -117,18 +117,18 @@ def test_more_memory_never_means_more_work() -> None:
 
 
 def test_small_picture_is_one_window() -> None:
-    plan = plan_windows(31, 17, LIMITS)
-    assert (plan.window_count, plan.window_height_px, plan.window_width_px) == (1, 32, 20)
+    layout = lay_windows(31, 17, LIMITS)
+    assert (layout.window_count, layout.window_height_px, layout.window_width_px) == (1, 32, 20)
 
 
 def test_whole_is_one_window_of_the_padded_picture() -> None:
-    plan = plan_windows(3999, 1001, _limits(whole=True, max_bytes=ROOMY))
-    assert (plan.window_count, plan.window_height_px, plan.window_width_px) == (1, 4000, 1004)
+    layout = lay_windows(3999, 1001, _limits(whole=True, max_bytes=ROOMY))
+    assert (layout.window_count, layout.window_height_px, layout.window_width_px) == (1, 4000, 1004)
 
 
 def test_cap_too_small_names_what_is_needed() -> None:
     with pytest.raises(ContractError, match=r"need at least \d+ MiB .* got 1 MiB: raise --max-mem"):
-        plan_windows(4000, 6000, _limits(max_bytes=2**20))
+        lay_windows(4000, 6000, _limits(max_bytes=2**20))
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_limits_out_of_range_are_refused(changes: dict[str, object]) -> None:
 @pytest.mark.parametrize(("height", "width"), [(0, 5), (5, 0)])
 def test_empty_picture_is_refused(height: int, width: int) -> None:
     with pytest.raises(ContractError, match="at least 1x1"):
-        plan_windows(height, width, LIMITS)
+        lay_windows(height, width, LIMITS)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_empty_picture_is_refused(height: int, width: int) -> None:
 )
 def test_plan_with_a_gap_or_off_the_lattice_cannot_be_made(spans: tuple[Span, ...]) -> None:
     with pytest.raises(ContractError, match="must"):
-        TilePlan(
+        TileLayout(
             height_px=20,
             width_px=20,
             stride_px=4,
@@ -207,7 +207,7 @@ def test_planned_windows_equal_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     picture = _picture(500, 700)
     whole = _infer(ENGINES[1].run, picture, _limits(whole=True, max_bytes=ROOMY))
     limits = _limits(max_bytes=12 * 10**6)
-    assert plan_windows(500, 700, limits).window_count > 4
+    assert lay_windows(500, 700, limits).window_count > 4
     assert np.array_equal(_infer(ENGINES[1].run, picture, limits), whole)
 
 
@@ -232,15 +232,15 @@ class _Watched(ArrayRows):
 
 def test_every_row_is_read_once_from_top_to_bottom_and_no_earlier_than_needed() -> None:
     source = _Watched(_picture(333, 50))
-    plan = plan_windows(333, 50, _limits(tile_px=64))
-    bands = infer_bands(lambda w: w[:, 3:], source, plan)
+    layout = lay_windows(333, 50, _limits(tile_px=64))
+    bands = infer_bands(lambda w: w[:, 3:], source, layout)
     next(bands)
-    assert source.reads[-1][1] == plan.window_height_px
+    assert source.reads[-1][1] == layout.window_height_px
     rest = list(bands)
     assert source.reads[0][0] == 0
     assert source.reads[-1][1] == 333
     assert all(a[1] == b[0] for a, b in pairwise(source.reads))
-    assert len(rest) == len(plan.rows) - 1
+    assert len(rest) == len(layout.rows) - 1
 
 
 @given(height=st.integers(1, 300), width=st.integers(1, 100), tile=st.integers(1, 90))
@@ -264,16 +264,16 @@ def test_far_sides_are_padded_with_the_edge() -> None:
 
 
 def test_progress_counts_every_window() -> None:
-    plan = plan_windows(200, 200, _limits(tile_px=64))
+    layout = lay_windows(200, 200, _limits(tile_px=64))
     calls: list[tuple[int, int]] = []
     bands = infer_bands(
         lambda w: w[:, 3:],
         ArrayRows(_picture(200, 200)),
-        plan,
+        layout,
         progress=lambda done, total: calls.append((done, total)),
     )
     list(bands)
-    assert calls == [(i + 1, plan.window_count) for i in range(plan.window_count)]
+    assert calls == [(i + 1, layout.window_count) for i in range(layout.window_count)]
 
 
 @pytest.mark.parametrize("kind", ["event", "function"])
@@ -285,11 +285,11 @@ def test_cancel_stops_before_the_next_window(kind: str) -> None:
         if count == 2:
             flag.set()
 
-    plan = plan_windows(200, 200, _limits(tile_px=64))
+    layout = lay_windows(200, 200, _limits(tile_px=64))
     bands = infer_bands(
         lambda w: w[:, 3:],
         ArrayRows(_picture(200, 200)),
-        plan,
+        layout,
         progress=progress,
         cancel=flag if kind == "event" else flag.is_set,
     )
@@ -308,9 +308,9 @@ def test_value_that_is_not_finite_names_its_tile(value: float) -> None:
 
 
 def test_plan_for_another_size_is_refused() -> None:
-    plan = plan_windows(20, 30, LIMITS)
-    with pytest.raises(ContractError, match="plan is for 30x20, the picture 20x30"):
-        next(infer_bands(ENGINES[1].run, ArrayRows(_picture(30, 20)), plan))
+    layout = lay_windows(20, 30, LIMITS)
+    with pytest.raises(ContractError, match="layout is for 30x20, the picture 20x30"):
+        next(infer_bands(ENGINES[1].run, ArrayRows(_picture(30, 20)), layout))
 
 
 # ---------------------------------------------------------------------------- finer outputs
@@ -320,8 +320,8 @@ FINER = {s: NetworkEngine(finer_network(4, 3, scale=s), threads=1, scale=s) for 
 
 def _infer_finer(scale: int, picture: FloatArray, **changes: object) -> FloatArray:
     limits = _limits(stride_px=2, halo_px=3, **changes)
-    plan = plan_windows(picture.shape[1], picture.shape[2], limits)
-    bands = infer_bands(FINER[scale].run, ArrayRows(picture), plan, scale=scale)
+    layout = lay_windows(picture.shape[1], picture.shape[2], limits)
+    bands = infer_bands(FINER[scale].run, ArrayRows(picture), layout, scale=scale)
     return np.concatenate(list(bands), axis=1)
 
 
@@ -348,22 +348,22 @@ def test_a_halo_below_the_reach_does_differ_at_twice_the_size() -> None:
     picture = np.random.default_rng(0).random((4, 80, 80)).astype(np.float32)
     whole = _infer_finer(2, picture, whole=True)
     limits = _limits(stride_px=2, halo_px=0, tile_px=32)
-    plan = plan_windows(80, 80, limits)
-    bands = infer_bands(FINER[2].run, ArrayRows(picture), plan, scale=2)
+    layout = lay_windows(80, 80, limits)
+    bands = infer_bands(FINER[2].run, ArrayRows(picture), layout, scale=2)
     assert not np.array_equal(np.concatenate(list(bands), axis=1), whole)
 
 
 def test_memory_counts_inputs_outputs_and_the_size_of_the_result() -> None:
-    plan = plan_windows(400, 600, _limits(tile_px=128))
-    area = plan.window_height_px * plan.window_width_px
+    layout = lay_windows(400, 600, _limits(tile_px=128))
+    area = layout.window_height_px * layout.window_width_px
 
     def needed(**changes: float) -> int:
-        return plan.needed_bytes(PixelCost(**({"arena_bytes": 100.0} | changes)))  # type: ignore[arg-type]
+        return layout.needed_bytes(PixelCost(**({"arena_bytes": 100.0} | changes)))  # type: ignore[arg-type]
 
     base = needed(channels=1, outputs=1, scale=1)
-    row = 4 * plan.padded_width_px
-    band = max(span.stop_px - span.start_px for span in plan.rows)
-    one_input = 4 * area + row * plan.window_height_px
+    row = 4 * layout.padded_width_px
+    band = max(span.stop_px - span.start_px for span in layout.rows)
+    one_input = 4 * area + row * layout.window_height_px
     assert needed(channels=2, outputs=1) - base == one_input
     one_output = 4 * area + row * BANDS_HELD * band
     assert needed(channels=1, outputs=2) - base == one_output
@@ -377,7 +377,7 @@ def test_a_larger_result_is_planned_in_smaller_windows() -> None:
     for scale in (1, 2, 4):
         cost = PixelCost(arena_bytes=100.0, channels=3, outputs=3, scale=scale)
         limits = _limits(cost=cost, max_bytes=cap)
-        plan = plan_windows(1000, 1500, limits)
-        assert plan.needed_bytes(cost) <= cap
-        areas.append(plan.window_height_px * plan.window_width_px)
+        layout = lay_windows(1000, 1500, limits)
+        assert layout.needed_bytes(cost) <= cap
+        areas.append(layout.window_height_px * layout.window_width_px)
     assert areas[0] > areas[1] > areas[2]

@@ -12,7 +12,7 @@ from camkit.runtime.network.windows import (
     SizedNetwork,
     WindowLimits,
     fast_halo_px,
-    plan_network,
+    lay_network,
 )
 from camkit.runtime.rows import ArrayRows
 from tests.bundle_factory import tiny_facts, tiny_forward
@@ -64,12 +64,12 @@ def test_fast_without_a_curve_is_refused() -> None:
 
 def test_a_cap_below_what_is_spent_names_both() -> None:
     with pytest.raises(ContractError, match=r"cap of 500 MB .* takes 600 MB"):
-        plan_network(SIZE_PX, [_network()], _limits(cap_bytes=5 * 10**8, spent_bytes=6 * 10**8))
+        lay_network(SIZE_PX, [_network()], _limits(cap_bytes=5 * 10**8, spent_bytes=6 * 10**8))
 
 
 def test_whole_is_one_window_and_exact_windows_overlap_by_the_halo() -> None:
-    whole = plan_network(SIZE_PX, [_network()], _limits(mode="whole"))
-    tiled = plan_network(SIZE_PX, [_network()], _limits(tile_px=32))
+    whole = lay_network(SIZE_PX, [_network()], _limits(mode="whole"))
+    tiled = lay_network(SIZE_PX, [_network()], _limits(tile_px=32))
     pixels_mp = SIZE_PX[0] * SIZE_PX[1] / 1e6
     assert whole.to_json() == {"mode": "whole", "halo_px": 4, "windows": 1, "work_ratio": 1.0}
     assert whole.window_mp() == {"M": pytest.approx(pixels_mp)}
@@ -81,12 +81,12 @@ def test_whole_is_one_window_and_exact_windows_overlap_by_the_halo() -> None:
 
 
 def test_tiles_and_cells_of_one_network_give_the_whole_picture() -> None:
-    whole = _result(plan_network(SIZE_PX, [_network()], _limits(mode="whole")))
+    whole = _result(lay_network(SIZE_PX, [_network()], _limits(mode="whole")))
     np.testing.assert_allclose(whole, tiny_forward(_picture()), rtol=1e-6)
-    tiled = plan_network(SIZE_PX, [_network()], _limits(tile_px=32))
+    tiled = lay_network(SIZE_PX, [_network()], _limits(tile_px=32))
     np.testing.assert_allclose(_result(tiled), whole, rtol=1e-6)
     everywhere = np.ones((2, 3), np.int64)
-    cells = plan_network(SIZE_PX, [_network()], _limits(), everywhere)
+    cells = lay_network(SIZE_PX, [_network()], _limits(), everywhere)
     assert cells.tiles is None
     np.testing.assert_allclose(_result(cells), whole, rtol=1e-6)
 
@@ -94,7 +94,7 @@ def test_tiles_and_cells_of_one_network_give_the_whole_picture() -> None:
 def test_labels_say_where_which_network_runs_and_zero_leaves_the_planes_that_stand_in() -> None:
     labels = np.array([[0, 0, 1], [0, 0, 2]])
     networks = [_network("M"), _network("S", bytes_per_pixel=12.0)]
-    windows = plan_network(SIZE_PX, networks, _limits(), labels)
+    windows = lay_network(SIZE_PX, networks, _limits(), labels)
     np.testing.assert_array_equal(_result(windows)[:, :, :32], _picture()[3:, :, :32])
     facts = windows.to_json()
     assert facts["windows"] == 2
@@ -106,7 +106,7 @@ def test_labels_say_where_which_network_runs_and_zero_leaves_the_planes_that_sta
 
 def test_whole_mode_ignores_labels() -> None:
     labels = np.zeros((2, 3), np.int64)
-    windows = plan_network(SIZE_PX, [_network()], _limits(mode="whole"), labels)
+    windows = lay_network(SIZE_PX, [_network()], _limits(mode="whole"), labels)
     assert windows.cells is None
     assert windows.to_json()["windows"] == 1
 
@@ -135,7 +135,7 @@ def test_windows_of_any_channels_and_scale_give_the_whole_and_say_their_memory(
     assert cost.out_values == outputs * scale**2
     picture = np.random.default_rng(0).random((channels, *SIZE_PX), dtype=np.float32)
     whole, tiled = (
-        plan_network(SIZE_PX, [network], _limits(**changes))
+        lay_network(SIZE_PX, [network], _limits(**changes))
         for changes in ({"mode": "whole"}, {"tile_px": 16})
     )
     made = [np.concatenate(list(w.bands(ArrayRows(picture))), axis=1) for w in (whole, tiled)]
@@ -148,14 +148,14 @@ def test_windows_of_any_channels_and_scale_give_the_whole_and_say_their_memory(
 
 def test_cells_without_planes_that_stand_in_are_refused() -> None:
     labels = np.array([[1, 0, 1], [0, 0, 1]])
-    windows = plan_network(SIZE_PX, [_network()], _limits(), labels)
+    windows = lay_network(SIZE_PX, [_network()], _limits(), labels)
     with pytest.raises(ContractError, match="stand in where no network runs"):
         windows.bands(ArrayRows(_picture()))
 
 
 def test_any_channels_of_the_input_stand_in_for_a_cell() -> None:
     labels = np.array([[1, 0, 0], [1, 0, 0]])
-    windows = plan_network(SIZE_PX, [_finer(5, 2, 1)], _limits(), labels)
+    windows = lay_network(SIZE_PX, [_finer(5, 2, 1)], _limits(), labels)
     picture = np.random.default_rng(0).random((5, *SIZE_PX), dtype=np.float32)
     bands = list(windows.bands(ArrayRows(picture), stand_in=slice(1, 3)))
     made = np.concatenate(bands, axis=1)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from camkit.runtime.bank.blocks import plan_spans
+from camkit.runtime.bank.blocks import lay_spans
+from camkit.runtime.content import CELL_PX
 from camkit.runtime.plan.blocks import plain_blocks, plain_share
 from camkit.runtime.plan.decision import FULL, PLAIN, WIENER
-from camkit.runtime.scene import CELL_PX
 
 
 def test_a_block_is_plain_when_all_cells_it_reaches_are() -> None:
@@ -13,7 +13,7 @@ def test_a_block_is_plain_when_all_cells_it_reaches_are() -> None:
     labels[:, 4:] = FULL
     test = plain_blocks(labels, 96)
     assert test is not None
-    rows, columns = (plan_spans(n * CELL_PX, 256, 64) for n in (4, 6))
+    rows, columns = (lay_spans(n * CELL_PX, 256, 64) for n in (4, 6))
     for column in columns:
         reach = column.start + column.inner.stop + 96
         assert test(rows[1], column) == (reach <= 4 * CELL_PX)
@@ -24,6 +24,6 @@ def test_no_plain_cell_means_no_plain_block() -> None:
 
 
 def test_share_counts_blocks() -> None:
-    spans = plan_spans(4 * CELL_PX, 256, 64)
+    spans = lay_spans(4 * CELL_PX, 256, 64)
     assert plain_share(np.full((4, 4), PLAIN, np.int8), 0, spans, spans) == 1.0
     assert plain_share(np.full((4, 4), FULL, np.int8), 0, spans, spans) == 0.0

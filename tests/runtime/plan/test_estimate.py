@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from camkit.bundle.facts import Port
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise, Network
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.estimate import (
     FILE_SHARE,
     WINDOW_OVERLAP,
@@ -21,7 +21,6 @@ from camkit.runtime.plan.estimate import (
 )
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.stage_finder import stage_module
-from tests.bundle_factory import write_tiny_bundle
 from tests.job_factory import made_mosaic, made_planes, start
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 
@@ -34,38 +33,36 @@ SPEED = Speed(
 
 
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
-
-
-@pytest.fixture(scope="module")
-def case(bundle: Bundle) -> Case:
+def subject(bundle: Bundle) -> Subject:
     made = start(bundle, made_mosaic()).plan
     assert made is not None
-    return made.case
+    return made.subject
 
 
-def test_seconds_are_those_of_the_stages_and_of_the_files(case: Case) -> None:
-    taken = stage_seconds(case, Work(), SPEED)
-    stages = case.bundle.manifest.stages
-    alone = [stage_module(s.type).seconds(s, case, Work(), SPEED) for s in stages]
+def test_seconds_are_those_of_the_stages_and_of_the_files(subject: Subject) -> None:
+    taken = stage_seconds(subject, Work(), SPEED)
+    stages = subject.bundle.manifest.stages
+    alone = [stage_module(s.type).seconds(s, subject, Work(), SPEED) for s in stages]
     assert taken == tuple(alone)
     assert min(taken) > 0
-    files = FILE_SHARE * SPEED.rest_s_per_mp * case.megapixels
-    assert estimate_seconds(case, Work(), SPEED) == pytest.approx(sum(taken) + files)
-    assert taken[5] == pytest.approx(3.0 * WINDOW_OVERLAP * case.megapixels)
+    files = FILE_SHARE * SPEED.rest_s_per_mp * subject.megapixels
+    assert estimate_seconds(subject, Work(), SPEED) == pytest.approx(sum(taken) + files)
+    assert taken[5] == pytest.approx(3.0 * WINDOW_OVERLAP * subject.megapixels)
 
 
-def test_what_is_left_out_takes_no_time(case: Case) -> None:
+def test_what_is_left_out_takes_no_time(subject: Subject) -> None:
     work = Work(method="wiener", networks=False, left_out=frozenset({"undistort"}))
-    usual, less = stage_seconds(case, Work(), SPEED), stage_seconds(case, work, SPEED)
+    usual, less = stage_seconds(subject, Work(), SPEED), stage_seconds(subject, work, SPEED)
     assert [n for n, seconds in enumerate(less) if seconds == 0] == [5, 8]
     assert all(a == b for n, (a, b) in enumerate(zip(usual, less, strict=True)) if n not in (5, 8))
 
 
-def test_windows_that_are_planned_count_as_they_are(case: Case) -> None:
+def test_windows_that_are_planned_count_as_they_are(subject: Subject) -> None:
     planned = {"restore": {"M": 0.5}}
-    usual, exact = stage_seconds(case, Work(), SPEED), stage_seconds(case, Work(), SPEED, planned)
+    usual, exact = (
+        stage_seconds(subject, Work(), SPEED),
+        stage_seconds(subject, Work(), SPEED, planned),
+    )
     assert exact[5] == network_seconds("restore", {"M": 0.5}, SPEED) == 1.5
     assert exact[:5] + exact[6:] == usual[:5] + usual[6:]
 
@@ -91,12 +88,12 @@ def test_networks_of_several_roles_count_on_the_grid_of_what_they_take(tmp_path:
     )
     made = start(camera, made_planes(samples=np.full((1, 64, 96), 0.3, np.float32)))
     assert made.plan is not None
-    case, work = made.plan.case, made.plan.work
-    assert case.role is None
-    coarse = role_window_mp("enlarge", case, work)["M"]
+    subject, work = made.plan.subject, made.plan.work
+    assert subject.role is None
+    coarse = role_window_mp("enlarge", subject, work)["M"]
     assert coarse == pytest.approx(64 * 96 / 1e6 * WINDOW_OVERLAP)
-    assert role_window_mp("clean", case, work)["M"] == pytest.approx(4 * coarse)
-    taken = stage_seconds(case, work, SPEED)
+    assert role_window_mp("clean", subject, work)["M"] == pytest.approx(4 * coarse)
+    taken = stage_seconds(subject, work, SPEED)
     assert taken[1:3] == pytest.approx((7.0 * coarse, 5.0 * 4 * coarse))
     estimate = made.explain()
     assert estimate is not None

@@ -6,7 +6,7 @@ import pytest
 from camkit.bundle.manifest import Threshold
 from camkit.errors import ContractError
 from camkit.runtime.plan.loss import LossModel, plan_entries, read_loss_model
-from tests.plan_factory import made_scene
+from tests.plan_factory import made_content
 
 MODEL = LossModel(
     lines={"exact": (0.5, 1.0, 0.25, 2.0), "wiener": (-1.0, 0.5, 0.5, 0.0)},
@@ -22,8 +22,8 @@ def test_model_survives_the_manifest() -> None:
 
 
 def test_error_of_a_cell_is_its_line() -> None:
-    scene = made_scene(detail=np.array([[1e-3, 1e-5]]), noise=1e-6, field=0.5)
-    losses = MODEL.predict(scene)
+    content = made_content(detail=np.array([[1e-3, 1e-5]]), noise=1e-6, field=0.5)
+    losses = MODEL.predict(content)
     seen = np.log([1.3e-3, 1e-5 + 0.3e-3])
     closed = 256 * 256 * np.exp(0.5 + seen + 0.25 * np.log(1e-6) + 2 * 0.5)
     np.testing.assert_allclose(losses.exact[0], closed, rtol=1e-9)
@@ -31,7 +31,7 @@ def test_error_of_a_cell_is_its_line() -> None:
 
 
 def test_allowed_error_is_the_loss_in_decibels() -> None:
-    losses = MODEL.predict(made_scene(detail=np.full((2, 2), 1e-3)))
+    losses = MODEL.predict(made_content(detail=np.full((2, 2), 1e-3)))
     assert losses.loss_db(losses.allowed(0.3)) == pytest.approx(0.3)
     assert losses.loss_db(0.0) == 0.0
 

@@ -18,7 +18,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import FULL, WIENER
 from camkit.runtime.plan.estimate import estimate_seconds
 from camkit.runtime.plan.loss import plan_entries
-from camkit.runtime.plan.planner import Plan, default_size, make_plan, needs_scene
+from camkit.runtime.plan.planner import Plan, default_size, make_plan, needs_content
 from camkit.runtime.plan.speed import Speed
 from tests.job_factory import made_planes, start
 from tests.plan_factory import MODEL, half_textured_mosaic, write_planned_bundle
@@ -43,11 +43,11 @@ def plan_with(bundle: Bundle) -> Callable[..., Plan]:
     """Give a function from options to the plan of the half textured capture."""
     made = _start(bundle, quality="adaptive").plan
     assert made is not None
-    case = made.case
+    subject = made.subject
 
     def plan(**choices: object) -> Plan:
         options = Options(**choices)  # type: ignore[arg-type]
-        return make_plan(replace(case, options=options, loss_db=0.0), lambda: SPEED)
+        return make_plan(replace(subject, options=options, loss_db=0.0), lambda: SPEED)
 
     return plan
 
@@ -101,7 +101,7 @@ def test_size_wins_over_budgets(plan_with: Callable[..., Plan]) -> None:
 
 def test_a_generous_error_means_less_work(plan_with: Callable[..., Plan]) -> None:
     seconds = [
-        estimate_seconds(plan.case, plan.work, SPEED)
+        estimate_seconds(plan.subject, plan.work, SPEED)
         for plan in (plan_with(max_error_db=limit) for limit in (0.01, 0.3, 5.0))
     ]
     assert seconds[0] >= seconds[1] > seconds[2]
@@ -146,11 +146,11 @@ def test_without_calibration_nothing_is_skipped(tmp_path: Path) -> None:
 
 
 def test_only_choices_that_depend_on_the_capture_measure_it() -> None:
-    assert not needs_scene(Options())
-    assert not needs_scene(Options(quality="best"))
-    assert needs_scene(Options(quality="draft"))
-    assert needs_scene(Options(max_seconds=1.0))
-    assert needs_scene(Options(max_error_db=1.0))
+    assert not needs_content(Options())
+    assert not needs_content(Options(quality="best"))
+    assert needs_content(Options(quality="draft"))
+    assert needs_content(Options(max_seconds=1.0))
+    assert needs_content(Options(max_error_db=1.0))
 
 
 def test_result_is_the_same_for_every_tile_memory_and_thread_count(bundle: Bundle) -> None:

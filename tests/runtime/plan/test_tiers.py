@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from camkit.errors import ContractError
+from camkit.runtime.content import CELL_PX
 from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER
 from camkit.runtime.plan.tiers import TierWork, choose_tiers, total_work, work_shares
-from camkit.runtime.scene import CELL_PX
 
 WORK = TierWork(full_mac=16_000, full_halo_px=96, small_mac=4_000, small_halo_px=64)
 NO_HALO = replace(WORK, full_halo_px=0, small_halo_px=0)

@@ -290,12 +290,12 @@ def test_tiled_and_whole_that_differ_fail(tmp_path: Path, monkeypatch: pytest.Mo
     # A halo one stride too short, as a wrong walk would give it.
     from camkit.runtime.proof import layers as proofs
 
-    real = proofs.plan_windows
+    real = proofs.lay_windows
 
-    def short(height_px: int, width_px: int, limits: proofs.TileLimits) -> proofs.TilePlan:
+    def short(height_px: int, width_px: int, limits: proofs.TileLimits) -> proofs.TileLayout:
         return real(height_px, width_px, proofs.replace(limits, halo_px=0))
 
-    monkeypatch.setattr(proofs, "plan_windows", short)
+    monkeypatch.setattr(proofs, "lay_windows", short)
     report = check_bundle(write_tiny_bundle(tmp_path), "tiling")
     assert "tiled differs from whole" in _message(report, "tiling")
     assert not report.passed

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Linearise
 from camkit.runtime.color import color_stage, to_output
-from tests.bundle_factory import tiny_sensor, write_tiny_bundle
+from tests.bundle_factory import tiny_sensor
 from tests.job_factory import (
     OWN_MATRIX,
     made_job,
@@ -20,11 +20,6 @@ from tests.job_factory import (
     stream_of,
 )
 from tests.planes_bundle import planes_sensor, write_planes_bundle
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def test_the_files_own_matrix_wins_over_the_bundles(bundle: Bundle) -> None:

@@ -8,12 +8,12 @@ import pytest
 
 from camkit.bundle.facts import Port
 from camkit.bundle.plane import Grid
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent
 from camkit.bundle.stages import Illumination, Linearise, Network
 from camkit.contracts import FrozenPsf
 from camkit.runtime.geometry.illumination import divide_illumination, illumination_band
-from tests.bundle_factory import PITCH_UM, write_tiny_bundle
+from tests.bundle_factory import PITCH_UM
 from tests.job_factory import (
     made_job,
     made_mosaic,
@@ -25,11 +25,6 @@ from tests.job_factory import (
 )
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 from tests.psf_factory import grid_psf, streak_kernel, uniform_psf
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def test_bands_are_divided_as_the_whole(bundle: Bundle) -> None:

@@ -22,18 +22,12 @@ from tests.bundle_factory import (
     tiny_manifest,
     tiny_members,
     tiny_network,
-    write_tiny_bundle,
 )
 from tests.job_factory import made_job, made_mosaic, made_planes, read_all, start, stream_of
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 from tests.psf_factory import streak_kernel, uniform_psf
 
 SIZES = {"odd": (61, 95), "whole cells": (64, 96), "one row": (1, 96), "one pixel": (1, 1)}
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def _light(channels: int, size: tuple[int, int] = (64, 96), seed: int = 0) -> FloatArray:

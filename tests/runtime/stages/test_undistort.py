@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from camkit.bundle.facts import Port
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent
 from camkit.bundle.stages import Linearise, Network, Undistort
 from camkit.contracts import RadialDistortion
 from camkit.runtime.geometry.warp import Warp, undistort_bands
 from camkit.runtime.rows import ArrayRows
-from tests.bundle_factory import PITCH_UM, write_tiny_bundle
+from tests.bundle_factory import PITCH_UM
 from tests.job_factory import (
     made_job,
     made_mosaic,
@@ -25,11 +25,6 @@ from tests.job_factory import (
 )
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 from tests.psf_factory import streak_kernel, uniform_psf
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def test_bands_are_those_of_the_whole_in_ideal_geometry(bundle: Bundle) -> None:

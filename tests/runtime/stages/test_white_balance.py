@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import WhiteBalance
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import CFA_PATTERNS, CfaPattern
 from camkit.runtime.signal.demosaic import apply_gains
-from tests.bundle_factory import tiny_sensor, write_tiny_bundle
+from tests.bundle_factory import tiny_sensor
 from tests.job_factory import (
     OWN_BALANCE,
     made_job,
@@ -19,11 +19,6 @@ from tests.job_factory import (
     start,
     stream_of,
 )
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 def test_the_captures_own_white_balance_is_taken(bundle: Bundle) -> None:

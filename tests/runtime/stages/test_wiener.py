@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.facts import Port
-from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent, PlanesSensor
 from camkit.bundle.stages import Linearise, Network, Wiener
 from camkit.contracts import FloatArray, FrozenPsf
@@ -15,7 +15,7 @@ from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.twin.simulate import SimulationOptions, simulate
-from tests.bundle_factory import PITCH_UM, write_tiny_bundle
+from tests.bundle_factory import PITCH_UM
 from tests.deep_bundle import write_deep_bundle
 from tests.job_factory import (
     OWN_BALANCE,
@@ -32,11 +32,6 @@ from tests.psf_factory import grid_psf, psnr_db, streak_kernel, texture, uniform
 
 BANK = {"block_px": 64, "overlap_px": 24, "prior_scale": 3e-4, "prior_exponent": 2.5}
 METHODS = ("wiener", "rl", "admm-tv")
-
-
-@pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    return open_bundle(write_tiny_bundle(tmp_path_factory.mktemp("bundle")))
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -8,7 +8,7 @@ import pytest
 from camkit.errors import ContractError
 from camkit.report.quality import BORDER_PX
 from camkit.runtime.plan.tiers import TierWork
-from tests.plan_factory import made_scene
+from tests.plan_factory import made_content
 from tools.plan.cells import CaptureCells, cell_sums
 from tools.plan.fit import (
     MEAN_DB,
@@ -31,21 +31,25 @@ def _captures(count: int, *, spread: float = 0.0) -> list[CaptureCells]:
     rng = np.random.default_rng(0)
     made = []
     for number in range(count):
-        scene = made_scene(
+        content = made_content(
             np.exp(rng.uniform(-12, -4, (4, 5))),
             noise=float(np.exp(rng.uniform(-12, -8))),
             field=float(rng.uniform(0, 1)),
         )
-        area = scene.cell_px
+        area = content.cell_px
         errors = {}
         for target, (level, detail, noise, field) in TARGETS.items():
-            exponent = level + detail * np.log(scene.blurred_detail) + noise * np.log(scene.noise)
+            exponent = (
+                level + detail * np.log(content.blurred_detail) + noise * np.log(content.noise)
+            )
             errors[target] = area * np.exp(
-                exponent + field * scene.field + spread * rng.standard_normal(area.shape)
+                exponent + field * content.field + spread * rng.standard_normal(area.shape)
             )
         for target in ("wiener", "plain", "S"):
             errors[target] = errors[target] + errors["exact"]
-        made.append(CaptureCells(name=f"capture {number}", scene=scene, pixels=area, errors=errors))
+        made.append(
+            CaptureCells(name=f"capture {number}", content=content, pixels=area, errors=errors)
+        )
     return made
 
 
@@ -83,9 +87,9 @@ def test_too_few_cells_are_refused() -> None:
 
 
 def _tiny() -> list[CaptureCells]:
-    scene = made_scene(np.full((1, 2), 1e-3))
-    errors = dict.fromkeys(TARGETS, scene.cell_px * 0.001)
-    return [CaptureCells(name="tiny", scene=scene, pixels=scene.cell_px, errors=errors)]
+    content = made_content(np.full((1, 2), 1e-3))
+    errors = dict.fromkeys(TARGETS, content.cell_px * 0.001)
+    return [CaptureCells(name="tiny", content=content, pixels=content.cell_px, errors=errors)]
 
 
 def test_cells_are_summed_without_the_border() -> None:

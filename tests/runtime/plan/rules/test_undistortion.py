@@ -9,9 +9,9 @@ from camkit.bundle.reader import Bundle
 from camkit.runtime.geometry.placement import place
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.plan.decision import Case, Work
+from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.rules.undistortion import decide, largest_shift_px
-from tests.plan_factory import RADIUS_MM, made_scene, write_planned_bundle
+from tests.plan_factory import RADIUS_MM, made_content, write_planned_bundle
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
     return write_planned_bundle(tmp_path_factory.mktemp("planned"))
 
 
-def _case(bundle: Bundle, side_px: int) -> Case:
+def _subject(bundle: Bundle, side_px: int) -> Subject:
     pipeline = Pipeline(bundle, Options(method="wiener"))
     origin = (1024 - side_px) // 4 * 2, (768 - side_px) // 4 * 2
     capture = pipeline.capture_of(
@@ -28,25 +28,25 @@ def _case(bundle: Bundle, side_px: int) -> Case:
     )
     cells = side_px // 256
     placement = place(capture, bundle.manifest.sensor.extent, None)
-    return Case(
+    return Subject(
         bundle=bundle,
         options=Options(quality="adaptive"),
         height_px=side_px,
         width_px=side_px,
         placement=placement,
-        scene=made_scene(np.full((cells, cells), 1e-3)),
+        content=made_content(np.full((cells, cells), 1e-3)),
     )
 
 
 def test_shift_is_that_of_the_radial_model(bundle: Bundle) -> None:
-    case = _case(bundle, 768)
+    subject = _subject(bundle, 768)
     corner_mm = np.hypot(383.5, 383.5) * 6e-3
     closed = corner_mm * 0.01 * (corner_mm / RADIUS_MM) ** 2 / 6e-3
-    assert largest_shift_px(case) == pytest.approx(closed, rel=0.05)
+    assert largest_shift_px(subject) == pytest.approx(closed, rel=0.05)
 
 
 def test_a_small_crop_in_the_middle_is_not_warped(bundle: Bundle) -> None:
-    small, large = _case(bundle, 256), _case(bundle, 768)
+    small, large = _subject(bundle, 256), _subject(bundle, 768)
     assert largest_shift_px(small) < 0.5 < largest_shift_px(large)
     work, decision = decide(small, Work())
     assert work.left_out == {"undistort"}
@@ -56,6 +56,6 @@ def test_a_small_crop_in_the_middle_is_not_warped(bundle: Bundle) -> None:
 
 
 def test_exact_skips_nothing_and_no_undistortion_stays_none(bundle: Bundle) -> None:
-    small = _case(bundle, 256)
-    assert not decide(replace(small, scene=None), Work())[0].left_out
+    small = _subject(bundle, 256)
+    assert not decide(replace(small, content=None), Work())[0].left_out
     assert decide(small, Work(left_out=frozenset({"undistort"})))[1] is None

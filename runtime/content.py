@@ -42,7 +42,7 @@ CellArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class Content:
     """A capture on the lattice.
 
     Attributes:
@@ -73,7 +73,7 @@ class Scene:
             if got.shape != wanted or not np.isfinite(got).all():
                 raise ContractError(f"{name} must be finite {wanted} cells; got {got.shape}")
         if (self.detail <= 0).any() or (self.noise <= 0).any():
-            raise ContractError("detail and noise of a scene must be > 0")
+            raise ContractError("detail and noise must be > 0")
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -123,12 +123,12 @@ def cell_area_px(height_px: int, width_px: int) -> CellArray:
     return np.asarray(rows[:, None] * columns)
 
 
-def measure_scene(
+def measure_content(
     capture: Capture,
     noise: NoiseModel,
     white_balance: tuple[float, ...],
     window: SensorWindow,
-) -> Scene:
+) -> Content:
     """Measure a capture on the lattice.
 
     Args:
@@ -152,7 +152,7 @@ def measure_scene(
     level, detail, expected, clipped = sums.means()
     noise_steps = np.maximum(expected, LEAST_NOISE)
     least = np.maximum(TELLABLE * noise_steps, LEAST_DETAIL)
-    return Scene(
+    return Content(
         height_px=capture.height,
         width_px=capture.width,
         sensor_share=capture.height * capture.width / (width_px * height_px),
