@@ -1,12 +1,14 @@
 """Measure what docs/results/measurements.md states, and print the tables as Markdown.
 
 python -m tools.measure speed CAPTURE.dng [--runs 3] [--sizes S,M]
+python -m tools.measure trees CAPTURE.dng --other CHECKOUT [--runs 9] [--sizes S,M]
 python -m tools.measure tiling [--bundle duet]
 python -m tools.measure raws FOLDER --out-dir out/raws
 """
 
 import argparse
 import json
+import os
 import platform
 import statistics
 import subprocess
@@ -17,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+import camkit
 from camkit.bundle.reader import built_in_bundles, find_bundle, open_bundle
 from camkit.cli.judge.doctor import examine
 from camkit.runtime.network.engine import NetworkEngine, available_threads
@@ -38,6 +41,12 @@ def main() -> None:
     speed.add_argument("--bundle", default="duet")
     speed.add_argument("--runs", type=int, default=3)
     speed.add_argument("--sizes", default="S,M")
+    trees = commands.add_parser("trees")
+    trees.add_argument("capture", type=Path)
+    trees.add_argument("--other", type=Path, required=True)
+    trees.add_argument("--bundle", default="duet")
+    trees.add_argument("--runs", type=int, default=9)
+    trees.add_argument("--sizes", default="S,M")
     tiling = commands.add_parser("tiling")
     tiling.add_argument("--bundle", default=None)
     tiling.add_argument("--width", type=int, default=6000)
@@ -48,9 +57,12 @@ def main() -> None:
     arguments = parser.parse_args()
     machine = examine()
     print(f"Machine: {machine['processor']}, {machine['threads']} threads, {platform.system()}\n")
-    {"speed": measure_speed, "tiling": measure_tiling, "raws": measure_raws}[arguments.command](
-        arguments
-    )
+    {
+        "speed": measure_speed,
+        "trees": measure_trees,
+        "tiling": measure_tiling,
+        "raws": measure_raws,
+    }[arguments.command](arguments)
 
 
 def measure_speed(arguments: argparse.Namespace) -> None:
@@ -60,16 +72,10 @@ def measure_speed(arguments: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(arguments.runs):
             for size in sizes:
-                command = [
-                    *(sys.executable, "-m", "camkit", "process", str(arguments.capture)),
-                    *("--bundle", arguments.bundle, "--size", size, "--json", "--overwrite"),
-                    *("--out-dir", folder),
-                ]
-                done = subprocess.run(command, capture_output=True, text=True, check=True)
-                result = json.loads(done.stdout)
+                result = _process(arguments, size, folder)
                 found[size].append({**result["seconds"], "peak_mb": result["peak_rss_mb"]})
     stages = [name for name in found[sizes[0]][0] if name != "peak_mb"]
-    print("| size | " + " | ".join(stages) + " | all | neither network nor FFT | peak MB |")
+    print("| size | " + " | ".join(stages) + " | all | neither network nor bank | peak MB |")
     print("|" + "---|" * (len(stages) + 4))
     for size, runs in found.items():
         median = {key: statistics.median(run[key] for run in runs) for key in runs[0]}
@@ -78,6 +84,51 @@ def measure_speed(arguments: argparse.Namespace) -> None:
         cells = [f"{median[name]:.2f}" for name in stages]
         cells += [f"{statistics.median(totals):.1f}", f"{statistics.median(rest):.1f}"]
         print(f"| {size} | " + " | ".join(cells) + f" | {median['peak_mb']:.0f} |")
+
+
+def _process(
+    arguments: argparse.Namespace, size: str, folder: str, tree: Path | None = None
+) -> dict[str, Any]:
+    """Develop the capture in a fresh process; `tree` names another checkout than this one."""
+    command = [
+        *(sys.executable, "-m", "camkit", "process", str(arguments.capture.resolve())),
+        *("--bundle", arguments.bundle, "--size", size, "--json", "--overwrite"),
+        *("--out-dir", folder),
+    ]
+    environment = None if tree is None else {**os.environ, "PYTHONPATH": str(tree.resolve())}
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=True, cwd=tree, env=environment
+    )
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+def measure_trees(arguments: argparse.Namespace) -> None:
+    """Compare `camkit process` of this checkout and another, each with its own bundle, in turn."""
+    trees = {"other": arguments.other, "this": Path(camkit.__file__).parents[1]}
+    print("| size | CPU s, other | this | median of ratios | peak MB, other | this |")
+    print("|" + "---|" * 6)
+    with tempfile.TemporaryDirectory() as folder:
+        for size in arguments.sizes.split(","):
+            cpu_s: dict[str, list[float]] = {name: [] for name in trees}
+            peak_mb: dict[str, list[float]] = {name: [] for name in trees}
+            for run in range(arguments.runs):
+                for name in list(trees)[:: -1 if run % 2 else 1]:
+                    before = os.times()
+                    result = _process(arguments, size, folder, trees[name])
+                    after = os.times()
+                    cpu_s[name].append(
+                        after.children_user
+                        + after.children_system
+                        - before.children_user
+                        - before.children_system
+                    )
+                    peak_mb[name].append(result["peak_rss_mb"])
+            ratios = [new / old for old, new in zip(cpu_s["other"], cpu_s["this"], strict=True)]
+            cells = [f"{statistics.median(cpu_s[name]):.1f}" for name in trees]
+            cells += [f"{statistics.median(ratios):.3f}"]
+            cells += [f"{statistics.median(peak_mb[name]):.0f}" for name in trees]
+            print(f"| {size} | " + " | ".join(cells) + " |")
 
 
 def measure_tiling(arguments: argparse.Namespace) -> None:

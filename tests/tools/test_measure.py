@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+import camkit
 from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.tiny_design import run_tool
@@ -29,6 +30,19 @@ def test_speed_gives_a_row_of_seconds_for_every_size(
     assert {"decode", "wiener", "network", "write"} <= set(head)
     assert len(row) == len(head)
     assert float(row[-1]) > 10
+
+
+def test_another_checkout_takes_its_turn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle = write_tiny_captures(tmp_path, ["a"])
+    size = ("--bundle", bundle, "--runs", 1, "--sizes", "M")
+    other = ("--other", Path(camkit.__file__).parents[1])
+    run_tool(monkeypatch, "measure", "trees", tmp_path / "a.dng", *other, *size)
+    head, _, row = rows(capsys.readouterr().out)
+    assert (len(row), row[0], head[3]) == (len(head), "M", "median of ratios")
+    assert 0.2 < float(row[3]) < 5
+    assert all(float(cell) > 0.1 for cell in row[1:])
 
 
 def test_tiling_differs_from_the_whole_by_nothing(
