@@ -106,7 +106,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         BundleError: If the parts contradict each other.
     """
     camera = _camera(parts)
-    members = _members(parts, _lens_of(parts, camera.checkpoints))
+    members = _members(parts, camera, _lens_of(parts, camera.checkpoints))
     with tempfile.TemporaryDirectory() as folder:
         torch_networks = {
             (role, size): load_network(checkpoint)
@@ -165,6 +165,7 @@ class _Camera:
     checkpoints: Found
     psf: FrozenPsf
     freeze: Mapping[str, Any]
+    plan: dict[str, Threshold] | None
 
 
 def _camera(parts: Parts) -> _Camera:
@@ -187,6 +188,7 @@ def _camera(parts: Parts) -> _Camera:
         checkpoints=_by_role(kind.roles, parts.checkpoints, checkpoints),
         psf=read_psf(parts.psf),
         freeze=_freeze_facts(parts),
+        plan=_plan_entries(parts),
     )
 
 
@@ -269,13 +271,12 @@ def _check_lens(lens: Lens, psf: FrozenPsf, path: Path) -> None:
         )
 
 
-def _members(parts: Parts, lens: Lens | None) -> dict[str, bytes]:
-    psf = read_psf(parts.psf)
-    members = {PSF: psf_to_bytes(psf)}
+def _members(parts: Parts, camera: _Camera, lens: Lens | None) -> dict[str, bytes]:
+    members = {PSF: psf_to_bytes(camera.psf)}
     if parts.stress_psf is not None:
         members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
     if lens is not None:
-        _check_lens(lens, psf, parts.psf)
+        _check_lens(lens, camera.psf, parts.psf)
         # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
         members[PRESCRIPTION] = format_prescription(lens).encode()
     return members
@@ -309,7 +310,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
         products={IMAGE: stages[-1].gives[0], **design.products},
         networks=facts,
         freeze=dict(camera.freeze),
-        plan=_plan_entries(parts),
+        plan=camera.plan,
         exported_with={name: metadata.version(name) for name in PACKAGES},
     )
 

@@ -1,6 +1,7 @@
 """A checkpoint becomes a bundle that proves itself, or nothing is written."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import torch
 
 from camkit.bundle.golden import IMAGE, golden_from_bytes
 from camkit.bundle.psf_file import write_psf
-from camkit.bundle.reader import GOLDEN, open_bundle
+from camkit.bundle.reader import GOLDEN, Bundle, open_bundle
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, ParityError
 from camkit.export import assemble
@@ -24,6 +25,7 @@ from camkit.runtime.proof.golden_run import case_work
 from tests.plan_factory import MODEL
 
 _MEASURED: dict[str, ExportedNetwork] = {}
+ENTRIES = plan_entries(MODEL, adaptive_cost_db=0.05, draft_cost_db=0.3)
 
 RECIPE = """
 name = "small"
@@ -108,8 +110,8 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Parts:
     return Parts(checkpoints=(folder / "s.pt",), psf=folder / "psf.safetensors")
 
 
-@pytest.fixture(autouse=True)
-def _measure_each_network_once(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(autouse=True, scope="module")
+def _measure_each_network_once() -> Iterator[None]:
     """The facts of the one network of these tests are measured in the first of them."""
     honest = assemble.measure_network
 
@@ -119,14 +121,27 @@ def _measure_each_network_once(monkeypatch: pytest.MonkeyPatch) -> None:
             _MEASURED[name] = honest(draft, network, windows)
         return _MEASURED[name]
 
-    monkeypatch.setattr(assemble, "measure_network", remembered)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assemble, "measure_network", remembered)
+        yield
+
+
+@pytest.fixture(scope="module")
+def exported(
+    parts: Parts, tmp_path_factory: pytest.TempPathFactory, _measure_each_network_once: None
+) -> tuple[dict[str, Any], Bundle]:
+    """What export says, and the bundle: with a calibration."""
+    folder = tmp_path_factory.mktemp("exported")
+    text = json.dumps({name: entry.model_dump() for name, entry in ENTRIES.items()})
+    (folder / "plan.json").write_text(text, encoding="utf-8")
+    report = export_bundle(replace(parts, plan=folder / "plan.json"), folder / "small.camkit")
+    return report, open_bundle(folder / "small.camkit")
 
 
 def test_an_exported_bundle_states_measured_facts_and_repeats_its_golden_cases(
-    parts: Parts, tmp_path: Path
+    exported: tuple[dict[str, Any], Bundle],
 ) -> None:
-    report = export_bundle(parts, tmp_path / "small.camkit")
-    bundle = open_bundle(tmp_path / "small.camkit")
+    report, bundle = exported
     facts = bundle.network_facts("restore", "S")
     assert facts.reach_px <= 64
     assert facts.halo_error[-1].max_abs == 0
@@ -138,7 +153,7 @@ def test_an_exported_bundle_states_measured_facts_and_repeats_its_golden_cases(
         again = case_work(bundle, case, arrays[case.name], "S").fill()
         stored = arrays[case.name].outputs[IMAGE]["S"]
         np.testing.assert_array_equal(again.astype(np.float16), stored.astype(np.float16))
-    assert report["bytes"] == (tmp_path / "small.camkit").stat().st_size
+    assert report["bytes"] == Path(report["bundle"]).stat().st_size
     assert b"95 % energy" in bundle.member("card.md")
 
 
@@ -197,12 +212,10 @@ def test_no_checkpoint_is_refused(parts: Parts, tmp_path: Path) -> None:
         export_bundle(replace(parts, checkpoints=()), tmp_path / "x.camkit")
 
 
-def test_a_calibration_becomes_the_plan_of_the_bundle(parts: Parts, tmp_path: Path) -> None:
-    entries = plan_entries(MODEL, adaptive_cost_db=0.05, draft_cost_db=0.3)
-    text = json.dumps({name: entry.model_dump() for name, entry in entries.items()})
-    (tmp_path / "plan.json").write_text(text, encoding="utf-8")
-    export_bundle(replace(parts, plan=tmp_path / "plan.json"), tmp_path / "planned.camkit")
-    assert open_bundle(tmp_path / "planned.camkit").manifest.plan == entries
+def test_a_calibration_becomes_the_plan_of_the_bundle(
+    exported: tuple[dict[str, Any], Bundle],
+) -> None:
+    assert exported[1].manifest.plan == ENTRIES
 
 
 @pytest.mark.parametrize("text", ["no JSON", "[]", '{"exact.level": 3}'])

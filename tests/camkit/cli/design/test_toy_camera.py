@@ -14,6 +14,7 @@ import pytest
 
 from camkit.bundle.golden import IMAGE, golden_from_bytes
 from camkit.bundle.reader import GOLDEN, open_bundle
+from camkit.cli.app import run
 from camkit.errors import ContractError
 from camkit.export.assemble import Parts, export_bundle
 from camkit.models_def.training.checkpoint import read_checkpoint, write_checkpoint
@@ -38,13 +39,18 @@ def checkpoints(tmp_path_factory: pytest.TempPathFactory, toy_installed: None) -
     ]
 
 
+@pytest.fixture(scope="module")
+def exported(checkpoints: list[Path]) -> Path:
+    """The camera as a bundle, by the command."""
+    path = checkpoints[0].parent / "toy.camkit"
+    assert run(["export", *map(str, checkpoints), "-o", str(path)]) == 0
+    return path
+
+
 def test_it_is_exported_proved_and_processes_what_it_photographs(
-    checkpoints: list[Path], tmp_path: Path, camkit_command: Any
+    exported: Path, tmp_path: Path, camkit_command: Any
 ) -> None:
-    path = tmp_path / "toy.camkit"
-    outcome = camkit_command("export", *checkpoints, "-o", path)
-    assert outcome.code == 0, outcome.err
-    bundle = open_bundle(path)
+    path, bundle = exported, open_bundle(exported)
     manifest = bundle.manifest
     assert (manifest.kind, manifest.sizes, set(manifest.networks)) == ("toy", ("S",), set(ROLES))
     assert manifest.optics is not None
@@ -66,10 +72,8 @@ def test_it_is_exported_proved_and_processes_what_it_photographs(
     assert (tmp_path / "out" / "shot.exr").is_file()
 
 
-def test_the_golden_picture_is_that_of_the_scene(checkpoints: list[Path], tmp_path: Path) -> None:
-    path = tmp_path / "toy.camkit"
-    export_bundle(Parts(checkpoints=tuple(checkpoints), psf=checkpoints[0].parent / PSF_NAME), path)
-    typical = golden_from_bytes(open_bundle(path).member(GOLDEN))["typical"]
+def test_the_golden_picture_is_that_of_the_scene(exported: Path) -> None:
+    typical = golden_from_bytes(open_bundle(exported).member(GOLDEN))["typical"]
     inside = np.s_[:, 24:-24, 24:-24]
     gap = typical.outputs[IMAGE]["S"][inside] - typical.reference[inside]
     assert np.sqrt(np.mean(gap**2)) < 0.5 * typical.reference[inside].std()
