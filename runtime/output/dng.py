@@ -167,17 +167,23 @@ def _write(
     extra: list[ExtraTag],
     tags: DngTags,
 ) -> None:
-    tifffile.imwrite(
-        path,
-        samples,
-        photometric=photometric,
-        planarconfig="contig" if samples.ndim == 3 else None,
-        subfiletype=0,
-        description=tags.description or None,
-        metadata=None,
-        software=False,
-        extratags=[*extra, *_common_tags(tags)],
-    )
+    try:
+        tifffile.imwrite(
+            path,
+            samples,
+            photometric=photometric,
+            planarconfig="contig" if samples.ndim == 3 else None,
+            subfiletype=0,
+            description=tags.description or None,
+            metadata=None,
+            software=False,
+            extratags=[*extra, *_common_tags(tags)],
+        )
+    except OSError as error:
+        if error.errno is not None:
+            raise
+        # NumPy says how many samples it wrote of how many, and nothing of the disk.
+        raise OSError(f"the disk is full, or no file may be so large ({error})") from error
 
 
 def _common_tags(tags: DngTags) -> list[ExtraTag]:

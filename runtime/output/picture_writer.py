@@ -67,6 +67,7 @@ class PictureWriter(ABC):
         self.picture = picture
         self._rows = 0
         self._held: list[Codes] = []
+        self._failure: Exception | None = None
 
     @abstractmethod
     def encode(self, band: FloatArray) -> Codes:
@@ -102,14 +103,16 @@ class PictureWriter(ABC):
 
         Raises:
             ContractError: If the band does not fit the picture or holds NaN or inf.
+            OSError: If the file cannot be written; every later band raises the same error and
+                touches nothing, since OpenEXR never returns from a call after a failed one.
         """
-        self._check(band)
-        self._rows += band.shape[1]
-        coded = self.encode(band)
-        if self.picture.orientation == UPRIGHT:
-            self.store(coded)
-        else:
-            self._held.append(coded)
+        if self._failure is not None:
+            raise self._failure
+        try:
+            self._append(band)
+        except Exception as error:
+            self._failure = error
+            raise
 
     @final
     def close(self) -> None:
@@ -125,6 +128,15 @@ class PictureWriter(ABC):
             self._held.clear()
             self.store(np.ascontiguousarray(turn(whole, self.picture.orientation)))
         self.finish()
+
+    def _append(self, band: FloatArray) -> None:
+        self._check(band)
+        self._rows += band.shape[1]
+        coded = self.encode(band)
+        if self.picture.orientation == UPRIGHT:
+            self.store(coded)
+        else:
+            self._held.append(coded)
 
     def _check(self, band: FloatArray) -> None:
         width, left = self.picture.width, self.picture.height - self._rows

@@ -125,3 +125,19 @@ def test_a_product_that_nothing_writes_is_refused(tmp_path: Path) -> None:
     facts = PictureFormat(width=5, height=4, color=STAGE)
     with pytest.raises(ContractError, match="nothing writes 'depth'; there are image"):
         open_writer(tmp_path / "a", "exr", facts, product="depth")
+
+
+def test_after_an_error_nothing_is_written_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenEXR never returns from a call after a failed one."""
+    writer = collector()
+    calls: list[int] = []
+
+    def fail(rows: Codes) -> None:
+        calls.append(rows.shape[1])
+        raise OSError("disk full")
+
+    monkeypatch.setattr(writer, "store", fail)
+    for _ in range(3):
+        with pytest.raises(OSError, match="disk full"):
+            writer.write(planes()[:, :2])
+    assert calls == [2]
