@@ -13,7 +13,7 @@ demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 
 test: check  ## set-up with everything, gate, tests with branch coverage
 	$(DEV)/bin/python -m coverage erase
-	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto
+	OMP_NUM_THREADS=1 $(DEV)/bin/python -m coverage run -m pytest -q -n auto --dist loadfile
 	$(DEV)/bin/python -m coverage combine -q
 	$(DEV)/bin/python -m tools.coverage_gate
 
