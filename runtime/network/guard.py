@@ -4,13 +4,18 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 
 BOUND_FACTOR: Final = 4.0
 BOUND_OFFSET: Final = 1.0
 """An output may reach BOUND_FACTOR times its tile's largest input plus this, in stabilised units:
 sixteen times the light. A restored lamp stays far below; networks that explode go far beyond."""
+DARK_SPREADS: Final = 16.0
+"""What a tile without any light may be given: so many times the noise at black, in electrons."""
+
+Bound = Callable[[float], tuple[float, float]]
+"""The largest input of a tile -> least and largest output that is believed; grows with it."""
 
 _SPARSE: Final = 16
 _HINT: Final = (
@@ -27,7 +32,7 @@ class TileGuard:
     """
 
     def __init__(
-        self, *, fallback: bool, stand_in: slice | None = None, factor: float = BOUND_FACTOR
+        self, *, fallback: bool, stand_in: slice | None = None, bound: Bound | None = None
     ) -> None:
         """Choose what becomes of a bad tile.
 
@@ -35,11 +40,11 @@ class TileGuard:
             fallback: Give the tile the planes that stand in instead of an error.
             stand_in: Which channels of what the network is given stand in for its output; None if
                 none can.
-            factor: Times the largest input of its tile that an output may reach.
+            bound: What is believed; None for `plain_bound`.
         """
         self._fallback = fallback and stand_in is not None
         self._stand_in = stand_in
-        self._factor = factor
+        self._bound = plain_bound() if bound is None else bound
         self.replaced: list[str] = []
 
     def check(
@@ -56,7 +61,7 @@ class TileGuard:
             ContractError: If the tile is bad and there is no fallback, or the planes that stand in
                 are not finite either.
         """
-        trouble = _trouble(output, given, self._factor)
+        trouble = _trouble(output, given, self._bound)
         if trouble is None:
             return output
         tile = describe()
@@ -78,19 +83,52 @@ def is_finite(planes: FloatArray) -> bool:
     return math.isfinite(planes.min()) and math.isfinite(planes.max())
 
 
-def _trouble(output: FloatArray, given: FloatArray, factor: float) -> str | None:
+def plain_bound(factor: float = BOUND_FACTOR) -> Bound:
+    """Bound an output by a factor of its tile's largest input, to either side."""
+
+    def bound(largest: float) -> tuple[float, float]:
+        high = factor * largest + BOUND_OFFSET
+        return -high, high
+
+    return bound
+
+
+def light_bound(most_light: float, noise: NoiseModel, *, scale: float) -> Bound:
+    """Bound the light that a stabilised output stands for, whatever the noise says.
+
+    Where read noise is large beside shot noise, the square root is flat: a small step of what the
+    network gives is much light, and zero is far below black. So the light itself is bounded: above
+    by `most_light` times that of the tile's largest input, below by as much under black as that
+    input lies above it, both and what noise gives at black.
+
+    Args:
+        most_light: Times the light of its tile that an output may have.
+        noise: By which outputs are taken back to light; shot > 0.
+        scale: Divisor of `stabilise`.
+    """
+    square = max(r / s**2 for s, r in zip(noise.shot, noise.read_variance, strict=True))
+    dark_e = DARK_SPREADS * (math.sqrt(square) + 1)
+    plain = plain_bound(math.sqrt(most_light))
+
+    def bound(largest: float) -> tuple[float, float]:
+        least, most = plain(largest)
+        light_e = max((largest * scale) ** 2 - square, 0.0)
+        high = math.sqrt(most_light * light_e + dark_e + square) / scale
+        below = square - light_e - dark_e
+        return (math.sqrt(below) / scale if below > 0 else least), min(high, most)
+
+    return bound
+
+
+def _trouble(output: FloatArray, given: FloatArray, bound: Bound) -> str | None:
     """Say what is wrong with a tile; None if nothing is."""
     low, high = float(output.min()), float(output.max())
     if not (math.isfinite(low) and math.isfinite(high)):
         return "NaN or inf"
-    largest = max(high, -low)
     # A sound tile is told by some of its rows: the bound of all rows can only be wider.
-    if largest <= _bound(given[:, ::_SPARSE], factor) or largest <= (
-        bound := _bound(given, factor)
-    ):
-        return None
-    return f"values up to {largest:.3g}, beyond {bound:.3g},"
-
-
-def _bound(given: FloatArray, factor: float) -> float:
-    return factor * max(float(given.max()), -float(given.min())) + BOUND_OFFSET
+    for rows in (given[:, ::_SPARSE], given):
+        least, most = bound(max(float(rows.max()), -float(rows.min())))
+        if least <= low and high <= most:
+            return None
+    value, limit = (high, most) if high > most else (low, least)
+    return f"values up to {value:.3g}, beyond {limit:.3g},"

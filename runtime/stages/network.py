@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -15,7 +14,7 @@ from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.network.guard import TileGuard
+from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
 from camkit.runtime.network.windows import (
     NetworkWindows,
     SizedNetwork,
@@ -134,9 +133,13 @@ class _NetworkStage:
         job, entry = self._job, self._entry
         facts = self._windows.networks[0].facts
         stand_in = self._stand_in(taken)
-        factor = sqrt(entry.most_light) if entry.transform == "stabilise" else entry.most_light
+        noise = self._noise(taken[-1], len(facts.outputs))
         self._guard = TileGuard(
-            fallback=job.options.on_unsafe == "fallback", stand_in=stand_in, factor=factor
+            fallback=job.options.on_unsafe == "fallback",
+            stand_in=stand_in,
+            bound=plain_bound(entry.most_light)
+            if noise is None
+            else light_bound(entry.most_light, noise, scale=entry.scale),
         )
         bands = self._windows.bands(
             given_rows(entry, job, taken),
@@ -145,16 +148,20 @@ class _NetworkStage:
             guard=self._guard,
             stand_in=stand_in,
         )
-        if entry.transform == "stabilise":
-            bands = self._linear(bands, taken[-1], len(facts.outputs))
+        if noise is not None:
+            bands = self._linear(bands, noise)
         return self._split(bands, taken[-1], [port.channels for port in facts.outputs])
 
-    def _linear(
-        self, bands: Iterator[FloatArray], last: Stream, ports: int
-    ) -> Iterator[FloatArray]:
-        """Take stabilised bands back to light, in place; every port by the noise of `last`."""
-        one, scale = self._job.noise.with_gains(last.gains), self._entry.scale
-        noise = NoiseModel(shot=one.shot * ports, read_variance=one.read_variance * ports)
+    def _noise(self, last: Stream, ports: int) -> NoiseModel | None:
+        """Give the noise by which outputs are taken back: every port by that of the last input."""
+        if self._entry.transform != "stabilise":
+            return None
+        one = self._job.noise.with_gains(last.gains)
+        return NoiseModel(shot=one.shot * ports, read_variance=one.read_variance * ports)
+
+    def _linear(self, bands: Iterator[FloatArray], noise: NoiseModel) -> Iterator[FloatArray]:
+        """Take stabilised bands back to light, in place."""
+        scale = self._entry.scale
 
         def undo(rows: FloatArray, _: int) -> None:
             unstabilise(rows, noise, scale=scale, out=rows)

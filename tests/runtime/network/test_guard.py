@@ -2,11 +2,22 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
-from camkit.runtime.network.guard import BOUND_FACTOR, BOUND_OFFSET, TileGuard
+from camkit.runtime.network.guard import (
+    BOUND_FACTOR,
+    BOUND_OFFSET,
+    DARK_SPREADS,
+    TileGuard,
+    light_bound,
+    plain_bound,
+)
 from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
+from camkit.runtime.signal.stabilise import DEFAULT_SCALE, stabilise, unstabilise
 
 RNG = np.random.default_rng
 RESTORED = slice(3, 6)
@@ -75,13 +86,13 @@ def test_planes_that_are_not_finite_cannot_stand_in() -> None:
 def test_the_bound_grows_with_the_input() -> None:
     guard = TileGuard(fallback=False)
     for level in (0.1, 1.0, 50.0):
-        given = np.full((6, 4, 4), level, np.float32)
+        tile = np.full((6, 4, 4), level, np.float32)
         bound = BOUND_FACTOR * level + BOUND_OFFSET
         inside = np.full((3, 4, 4), 0.999 * bound, np.float32)
-        assert guard.check(inside, given, lambda: "tile") is inside
+        assert guard.check(inside, tile, lambda: "tile") is inside
         for sign in (1, -1):
             with pytest.raises(ContractError, match="beyond"):
-                guard.check(sign * 1.01 * inside, given, lambda: "tile")
+                guard.check(sign * 1.01 * inside, tile, lambda: "tile")
 
 
 def _fine_bands(planes: np.ndarray, guard: TileGuard, scale: int = 2) -> np.ndarray:
@@ -111,7 +122,10 @@ def test_a_bad_tile_of_a_finer_output_is_named_by_its_place_in_the_input() -> No
 def test_the_factor_of_the_bundle_widens_the_bound() -> None:
     given = np.full((6, 4, 4), 0.5, np.float32)
     bright = np.full((3, 8, 8), 100.0, np.float32)
-    assert TileGuard(fallback=False, factor=256.0).check(bright, given, lambda: "t") is bright
+    assert (
+        TileGuard(fallback=False, bound=plain_bound(256.0)).check(bright, given, lambda: "t")
+        is bright
+    )
     with pytest.raises(ContractError, match="beyond"):
         TileGuard(fallback=False).check(bright, given, lambda: "t")
 
@@ -123,3 +137,39 @@ def test_any_channels_of_the_input_may_stand_in(stand_in: slice) -> None:
     bad = np.full((stand_in.stop - stand_in.start, 4, 4), np.inf, np.float32)
     np.testing.assert_array_equal(guard.check(bad, given, lambda: "tile"), given[stand_in])
     assert guard.replaced == ["tile: NaN or inf"]
+
+
+@given(
+    shot=st.floats(1e-6, 0.1),
+    read_e=st.floats(0, 300),
+    largest=st.floats(0, 1),
+    most=st.sampled_from([16.0, 256.0]),
+)
+def test_light_is_bounded_whatever_the_noise_says(
+    shot: float, read_e: float, largest: float, most: float
+) -> None:
+    """In light: at most `most` times the largest input, at least as far below black, and noise."""
+    noise = NoiseModel(shot=(shot,) * 3, read_variance=((read_e * shot) ** 2,) * 3)
+    stable = stabilise(np.full((3, 1, 1), largest, np.float32), noise)
+    ends = light_bound(most, noise, scale=DEFAULT_SCALE)(float(stable.max()))
+    low, high = (
+        float(unstabilise(np.full((3, 1, 1), end, np.float32), noise)[0, 0, 0]) for end in ends
+    )
+    dark = DARK_SPREADS * (read_e + 1) * shot
+    rounding = 1e-3 * (largest + dark + read_e**2 * shot)
+    assert high <= most * largest + dark + most * rounding
+    assert low >= -(largest + dark) - rounding
+
+
+def test_a_flat_square_root_hides_no_light() -> None:
+    """A noise model off by far: a third of the stabilised signal is many times the white level."""
+    noise = NoiseModel(shot=(1e-4,) * 3, read_variance=((1000 * 1e-4) ** 2,) * 3)
+    given_ = stabilise(
+        np.full((6, 4, 4), 0.1, np.float32),
+        NoiseModel(shot=noise.shot * 2, read_variance=noise.read_variance * 2),
+    )[None]
+    guard = TileGuard(fallback=False, bound=light_bound(16.0, noise, scale=DEFAULT_SCALE))
+    assert guard.check(given_[:, :3], given_, lambda: "tile") is not None
+    for wrong in (2.0 * given_[:, :3], 0.8 * given_[:, :3]):
+        with pytest.raises(ContractError, match="beyond"):
+            guard.check(wrong, given_, lambda: "tile")

@@ -46,6 +46,34 @@ def test_measured_noise_is_that_of_the_simulation(iso):
         assert 0.8 < measured / expected < 1.25
 
 
+@pytest.mark.parametrize("level", [0.0, 0.05, 0.4])
+@pytest.mark.parametrize("read_e", [1.0, 10.0])
+def test_one_level_gives_the_noise_of_that_level_and_a_sensor_that_exists(level, read_e):
+    """A wall or a dark frame shows a sum: its shares are those of a usual sensor, never chance."""
+    shot, worst = 2e-4, (3 / 3839) ** 2
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        electrons = rng.poisson(level / shot, (480, 640)) + read_e * rng.standard_normal((480, 640))
+        noise = measure_noise(capture_of(shot * electrons))
+        expected = shot * level + (read_e * shot) ** 2 + worst / 108
+        assert 0.9 < (noise.shot[1] * level + noise.read_variance[1]) / expected < 1.1
+        assert noise.read_variance[1] ** 0.5 / noise.shot[1] < 30
+        assert 0.05 * shot < noise.shot[1] < 20 * shot
+
+
+@pytest.mark.parametrize("read_e", [0.5, 15.0, 40.0])
+def test_read_noise_is_told_from_shot_noise_where_the_levels_differ(read_e):
+    shot, ratios = 2e-4, []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        scene = smooth_scene(512, 768, seed)
+        electrons = rng.poisson(scene / shot) + read_e * rng.standard_normal(scene.shape)
+        noise = measure_noise(capture_of(shot * electrons))
+        truth = shot * 0.1 + (read_e * shot) ** 2
+        ratios.append((noise.shot[1] * 0.1 + noise.read_variance[1]) / truth)
+    assert 0.7 < np.median(ratios) < 1.3
+
+
 def test_noise_of_planes_is_measured_too():
     linear, shot = noisy(np.stack([smooth_scene(256, 384, s) for s in range(3)]), 800)
     noise = measure_noise(capture_of(linear, cfa=None))
