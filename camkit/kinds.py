@@ -87,7 +87,10 @@ def find_kind(name: str) -> Kind:
     found = _installed()
     if name not in found:
         known = ", ".join(sorted({*KINDS, *found}))
-        raise UnsupportedError(f"there is no kind of camera {name!r}; there are: {known}")
+        raise UnsupportedError(
+            f"there is no kind of camera {name!r} here; there are: {known}. The package that "
+            "brings it may not be installed"
+        )
     try:
         kind = found[name].load()
     except (ImportError, AttributeError) as error:

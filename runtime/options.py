@@ -139,6 +139,8 @@ FLAGS: Final = {
     "white_balance": "--wb",
     "exposure_ev": "--exposure",
     "max_mem_bytes": "--max-mem",
+    "vignetting": "--no-vignetting",
+    "undistort": "--no-undistort",
 }
 """Names that `camkit process` has for options where they differ from --name-of-the-field."""
 

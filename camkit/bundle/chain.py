@@ -46,8 +46,10 @@ def join_stages(stages: Sequence[Stage], parts: Parts) -> dict[str, Plane]:
         name = f"stage {number} ({stage.type})"
         for taken in stage.takes:
             if taken not in known:
-                have = ", ".join(known)
-                raise JoinError(f"{name} takes {taken!r}, which nothing before it gives ({have})")
+                have = ", ".join(f"{plane!r} of {made_by[plane]}" for plane in known)
+                raise JoinError(
+                    f"{name} takes {taken!r}, which nothing before it gives; there are {have}"
+                )
         try:
             given = stage.join([known[taken] for taken in stage.takes], parts)
         except JoinError as error:
@@ -83,7 +85,8 @@ def check_use(
     for number, stage in enumerate(stages, start=1):
         if not used & set(stage.gives):
             raise JoinError(
-                f"stage {number} ({stage.type}) gives {', '.join(stage.gives)}, which nothing takes"
+                f"stage {number} ({stage.type}) gives {', '.join(stage.gives)}, which no stage "
+                "takes and no product names"
             )
 
 

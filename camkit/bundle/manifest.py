@@ -251,9 +251,10 @@ def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:
 def _first(error: ValidationError) -> str:
     """Put the first complaint into one line: where, what."""
     details = error.errors(include_url=False, include_input=False)
-    where = ".".join(str(part) for part in details[0]["loc"]) or "manifest"
+    where = "".join(f"{part}." for part in details[0]["loc"]).removesuffix(".")
+    said = details[0]["msg"].removeprefix("Value error, ")
     more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
-    return f"{where}: {details[0]['msg']}{more}"
+    return f"{where}: {said}{more}" if where else f"{said}{more}"
 
 
 def manifest_to_bytes(manifest: Manifest) -> bytes:

@@ -43,9 +43,16 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
     where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"
     if foreign := [name for name in given if name not in known]:
         raise ContractError(
-            f"{', '.join(map(flag_of, foreign))} means nothing {where}: no stage of it knows of "
-            "that; leave it out"
+            f"{', '.join(map(flag_of, foreign))} means nothing {where}: "
+            f"{'nothing there' if bundle is None else 'no stage of it'} knows of that; leave it out"
         )
+    if options.size is not None and bundle is not None:
+        sizes = bundle.manifest.sizes
+        if options.size not in sizes:
+            raise ContractError(
+                f"bundle {bundle.manifest.name} holds size(s) {', '.join(sizes) or 'none'}; asked "
+                f"for {options.size}"
+            )
     methods = (DEVELOP,) if bundle is None else offered_methods(stages, bundle.manifest.all_planes)
     if options.method is not None and options.method not in methods:
         raise ContractError(

@@ -64,7 +64,7 @@ def _members(union: object) -> tuple[type, ...]:
 
 def test_unknown_kind_is_refused_naming_those_there_are(installed: Path) -> None:
     with pytest.raises(
-        UnsupportedError, match=r"no kind of camera 'plate'; there are: .*bayer.*mine"
+        UnsupportedError, match=r"no kind of camera 'plate' here; there are: .*bayer.*mine"
     ):
         find_kind("plate")
 

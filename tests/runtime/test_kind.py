@@ -22,7 +22,9 @@ def test_every_kind_of_camkit_is_read_and_photographed(name: str) -> None:
 
 
 def test_a_kind_that_is_not_there_is_refused() -> None:
-    with pytest.raises(UnsupportedError, match="there is no kind of camera 'dream'; there are"):
+    with pytest.raises(
+        UnsupportedError, match="there is no kind of camera 'dream' here; there are"
+    ):
         runtime_part("dream")
 
 

@@ -59,13 +59,13 @@ REFUSED: dict[str, tuple[tuple[Stage, ...], Parts, str]] = {
     "a plane that nobody gives": (
         (Linearise(), Color(takes=("straight",))),
         PARTS,
-        r"stage 2 \(color\) takes 'straight', which nothing before it gives \(capture, light, "
-        r"clipped\)",
+        r"stage 2 \(color\) takes 'straight', which nothing before it gives; there are "
+        r"'capture' of the sensor \(bayer\), 'light' of stage 1 \(linearise\), 'clipped' of",
     ),
     "a plane that comes later": (
         (Repair(), Linearise()),
         PARTS,
-        r"stage 1 \(repair\) takes 'light', which nothing before it gives \(capture\)",
+        r"stage 1 \(repair\) takes 'light', which nothing before it gives; there are 'capture'",
     ),
     "a plane given twice": (
         (Linearise(), Linearise()),
@@ -334,7 +334,7 @@ def test_products_that_no_stage_gives_are_refused() -> None:
 
 
 def test_idle_stages_and_roles_are_refused() -> None:
-    _refuse(r"stage 10 \(color\) gives picture, which nothing takes", products={"image": "even"})
+    _refuse(r"stage 10 \(color\) gives picture, which no stage takes", products={"image": "even"})
     idle = (*tiny_stages(), Demosaic(gives=("more",)))
     _refuse(r"stage 11 \(demosaic\) gives more", stages=idle, products={"image": "picture"})
     _refuse(

@@ -188,6 +188,7 @@ def test_flags_are_those_of_the_command() -> None:
 
     parameters = inspect.signature(process).parameters
     typed = {"--" + name.rstrip("_").replace("_", "-") for name in parameters}
+    typed |= {flag.replace("--", "--no-", 1) for flag in typed}
     for_programs = {"tile_px", "dtype", "provider"}
     assert {name for name in CHANGED if flag_of(name) not in typed} <= for_programs
 
@@ -197,3 +198,8 @@ def test_no_color_means_no_option_of_color(tmp_path: Path) -> None:
     camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
     check_choices(camera, Options(exposure_ev=1.0, color="acescg"))
     assert "--wb means nothing" in _refused(camera, white_balance=(2.0, 1.0, 2.0))
+
+
+def test_a_size_that_is_not_there_is_refused_even_where_no_network_runs(bundle: Bundle) -> None:
+    with pytest.raises(ContractError, match=r"holds size.*asked for Q"):
+        check_choices(bundle, Options(method="wiener", size="Q"))
