@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from camkit.errors import CamkitError, ContractError
+from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
+from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.network.tiling import Cancel, Cancelled
 from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
 from camkit.runtime.output.sidecar import read_sidecar
@@ -34,6 +35,7 @@ RAW_SUFFIXES: Final = frozenset(
 )
 CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
 NO_BUNDLE: Final = "none"
+_NAMELESS: Final = "names no bundle; say --bundle NAME, or --bundle none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +65,9 @@ def expand(files: Sequence[str | Path]) -> list[Path]:
     found: dict[Path, None] = {}
     for item in files:
         path = Path(item)
-        if path.is_dir():
+        if _is_unreachable(path):
+            found[path] = None
+        elif path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() in CAPTURE_SUFFIXES)
             found.update(dict.fromkeys(p for p in inside if p.is_file() and not _is_result(p)))
         elif not path.exists() and glob.has_magic(str(item)):
@@ -73,6 +77,17 @@ def expand(files: Sequence[str | Path]) -> list[Path]:
         else:
             found[path] = None
     return list(found)
+
+
+def _is_unreachable(path: Path) -> bool:
+    """Tell a path that no file can have: a name that is too long, a byte 0, a loop of links."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return False
+    except (OSError, ValueError):
+        return True
+    return False
 
 
 def _is_result(path: Path) -> bool:
@@ -88,14 +103,15 @@ def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptio
             nor overwrite was asked for), or no input names a bundle.
     """
     tasks = [_make_task(source, bundle, write) for source in sources]
-    _refuse_clashes(tasks)
-    refused = [t for t in tasks if t.refusal is not None]
-    if tasks and bundle is None and len(refused) == len(tasks):
-        names = ", ".join(str(t.source) for t in refused)
+    sound = [t for t in tasks if t.refusal is None]
+    _refuse_clashes(sound)
+    nameless = [t for t in tasks if t.refusal is not None and t.refusal.endswith(_NAMELESS)]
+    if nameless and not sound:
+        names = ", ".join(str(t.source) for t in nameless)
         raise ContractError(
             f"no file names a bundle ({names}); say --bundle NAME, or --bundle none to develop only"
         )
-    existing = [t.target for t in tasks if t.target.exists()]
+    existing = [t.target for t in sound if t.target.exists()]
     if existing and not (write.resume or write.overwrite):
         listed = ", ".join(map(str, existing[:5]))
         raise ContractError(
@@ -107,13 +123,24 @@ def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptio
 
 def _make_task(source: Path, bundle: str | None, write: WriteOptions) -> Task:
     target = write.out_dir / f"{source.stem}{write.suffix}"
+    refusal = _refusal(source)
     chosen = bundle
-    refusal = None
-    if chosen is None:
+    if chosen is None and refusal is None:
         chosen = named_bundle(source)
         if chosen is None:
-            refusal = f"{source} names no bundle; say --bundle NAME, or --bundle none"
+            refusal = f"{source} {_NAMELESS}"
     return Task(source=source, target=target, bundle=chosen or NO_BUNDLE, refusal=refusal)
+
+
+def _refusal(source: Path) -> str | None:
+    """Say why an input cannot be read, as far as that is known without opening it."""
+    try:
+        check_regular(source)
+    except OSError as error:
+        return f"cannot read {source}: {error.strerror or error}"
+    except (DecodeError, ValueError) as error:
+        return f"cannot read {source}: {error}"
+    return None
 
 
 def _refuse_clashes(tasks: Sequence[Task]) -> None:
@@ -279,6 +306,9 @@ def _run_task(task: Task, pipelines: _Pipelines, common: _Common) -> FileResult:
     except (CamkitError, OSError) as error:
         logger.debug("%s failed", task.source, exc_info=error)
         return FileResult.failure(task.source, named, f"{error}")
+    except MemoryError as error:
+        logger.debug("%s failed", task.source, exc_info=error)
+        return FileResult.failure(task.source, named, f"not enough memory: {error}".rstrip(": "))
 
 
 def _tick(progress: FileProgress, source: Path) -> Callable[[int, int], None]:

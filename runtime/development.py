@@ -151,32 +151,32 @@ def develop_file(
     with atomic_output(target) as part:
         write_s = _write_picture(part, work, write)
         output_sha256 = file_sha256(part)
-    seconds = {"decode": decode_s, **work.seconds, "write": write_s}
-    result = FileResult(
-        input=source,
-        output=target,
-        status="ok",
-        bundle=_bundle_name(pipeline),
-        size=work.size,
-        seconds=seconds,
-        peak_rss_mb=max(peak_rss_mb(), decoded_mb),
-        warnings=work.warnings,
-    )
-    if estimate is not None:
-        total_s = sum(seconds.values())
-        work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
-    record = {
-        **result.to_json(),
-        **_identity(capture.sha256, pipeline, write, mosaic),
-        "output_sha256": output_sha256,
-        "plan": work.record,
-        "clipped_fraction": work.clipped_fraction,
-        "orientation": capture.orientation,
-        "camera": capture.camera,
-        "iso": capture.iso,
-        "exposure_time_s": capture.exposure_time_s,
-    }
-    write_sidecar(target, record)
+        seconds = {"decode": decode_s, **work.seconds, "write": write_s}
+        result = FileResult(
+            input=source,
+            output=target,
+            status="ok",
+            bundle=_bundle_name(pipeline),
+            size=work.size,
+            seconds=seconds,
+            peak_rss_mb=max(peak_rss_mb(), decoded_mb),
+            warnings=work.warnings,
+        )
+        if estimate is not None:
+            total_s = sum(seconds.values())
+            work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
+        record = {
+            **result.to_json(),
+            **_identity(capture.sha256, pipeline, write, mosaic),
+            "output_sha256": output_sha256,
+            "plan": work.record,
+            "clipped_fraction": work.clipped_fraction,
+            "orientation": capture.orientation,
+            "camera": capture.camera,
+            "iso": capture.iso,
+            "exposure_time_s": capture.exposure_time_s,
+        }
+        write_sidecar(target, record)  # the picture gets its name when its proof has one
     return result
 
 

@@ -28,6 +28,7 @@ from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.raw_tags import sensor_place
+from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.files.tiff_tags import read_tiff_tags
 
 __all__ = ["Capture", "MosaicOptions", "file_sha256", "is_picture", "named_bundle", "read_capture"]
@@ -81,6 +82,7 @@ def read_capture(
     if not (math.isfinite(timeout_s) and timeout_s > 0 and max_memory_mb > 0):
         raise ContractError(f"limits must be > 0; got {timeout_s} s, {max_memory_mb} MB")
     try:
+        check_regular(file)
         picture = is_picture(file)
         if picture:
             capture = _read_picture(file, mosaic)
@@ -124,8 +126,9 @@ def named_bundle(path: str | os.PathLike[str]) -> str | None:
     Reads the tags only, so a long list of files can be planned before any is decoded.
     """
     try:
+        check_regular(Path(path))
         return sensor_place(read_tiff_tags(Path(path))).bundle_name
-    except OSError:
+    except (OSError, DecodeError):
         return None  # reading the capture tells what is wrong with the file
 
 
@@ -150,6 +153,7 @@ def _read_isolated(path: Path, limits: _Limits) -> Capture:
         "camkit.runtime.raw_worker",
         str(path.resolve()),
         str(limits.max_memory_mb),
+        str(os.getpid()),
     ]
     with (
         tempfile.TemporaryFile() as complaints,

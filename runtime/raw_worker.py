@@ -1,6 +1,6 @@
 """The decoding child, and the one module that touches rawpy.
 
-    python -P -m camkit.runtime.raw_worker PATH MAX_MEMORY_MB
+    python -P -m camkit.runtime.raw_worker PATH MAX_MEMORY_MB PARENT
       -> stdout: one line of JSON, then the samples as plain bytes
 
 Run as a process of its own so that a crash, a hang or an allocation storm in LibRaw costs one
@@ -11,6 +11,7 @@ take about 30 ms.
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ from camkit.runtime.memory import peak_rss_mb
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8
 FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
 WRITE_ROWS: Final = 256
+PR_SET_PDEATHSIG: Final = 1
 BELIEVABLE_GAIN_STOPS: Final = 6.0
 OUTLIER_NOTE_SHARE: Final = 2e-5
 
@@ -61,7 +63,7 @@ def _decoded(path: Path) -> Iterator[Capture]:
     tags = read_tiff_tags(path)
     raw_checks.check_chunks_inside(tags)
     try:
-        with rawpy.imread(str(path)) as raw:
+        with _named_in_utf8(path) as name, rawpy.imread(name) as raw:
             yield _to_capture(raw, tags)
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         text = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
@@ -70,6 +72,18 @@ def _decoded(path: Path) -> Iterator[Capture]:
         raise DecodeError(f"LibRaw's answer makes no sense: {error}") from error
     except MemoryError as error:
         raise DecodeError("decoding needs more memory than allowed; raise max_memory_mb") from error
+
+
+@contextmanager
+def _named_in_utf8(path: Path) -> Iterator[str]:
+    """Give a name that rawpy takes: that of an open file where the path is no UTF-8."""
+    try:
+        path.as_posix().encode()
+    except UnicodeEncodeError:
+        with path.open("rb") as file:
+            yield f"/dev/fd/{file.fileno()}"
+    else:
+        yield str(path)
 
 
 def _to_capture(raw: Any, tags: TiffTags) -> Capture:
@@ -284,9 +298,21 @@ def _limit_memory(max_memory_mb: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
 
 
+def end_with(parent: int) -> None:
+    """End this process when its parent does, where the system can tell it (Linux)."""
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, int(signal.SIGKILL))
+    if os.getppid() != parent:  # it ended before the system was asked
+        os._exit(1)
+
+
 def main(arguments: Sequence[str]) -> int:
     """Decode one file for the parent; every refusal becomes a line of JSON."""
     path, max_memory_mb = Path(arguments[0]), int(arguments[1])
+    end_with(int(arguments[2]))
     # LibRaw may print: keep the pipe to ourselves and send strays to stderr
     with os.fdopen(os.dup(1), "wb", buffering=1 << 20) as out:
         os.dup2(2, 1)

@@ -7,8 +7,12 @@ from pathlib import Path
 
 
 def part_path(path: Path) -> Path:
-    """Give the name under which a file is written before it is complete."""
-    return path.with_name(path.name + ".part")
+    """Give the name under which a file is written before it is complete.
+
+    It is UTF-8 whatever the name itself is: not every library opens other names.
+    """
+    name = os.fsencode(path.name).decode("utf-8", "backslashreplace")
+    return path.with_name(f"{name}.part")
 
 
 @contextmanager

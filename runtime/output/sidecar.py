@@ -38,7 +38,7 @@ def write_sidecar(output: Path, record: Mapping[str, Any]) -> Path:
     """Write the sidecar of a picture; complete or not at all.
 
     Args:
-        output: The picture, already under its real name.
+        output: The picture, whole and about to get its name.
         record: Plain JSON values, with at least the keys of `REQUIRED`.
 
     Raises:

@@ -214,6 +214,17 @@ def test_kill_in_mid_batch_and_resume_give_the_same_and_nothing_half(tmp_path: P
         np.testing.assert_array_equal(_pixels(result.output), _pixels(out / result.output.name))
 
 
+def test_without_its_sidecar_no_picture_appears(captures: Path) -> None:
+    """A picture without proof would be in the way of the next run."""
+    out = captures / "out"
+    (out / "a.camkit.json").mkdir(parents=True)
+    (result,) = camkit.process(
+        [captures / "a.dng"], bundle=str(captures / "tiny.camkit"), out_dir=out
+    )
+    assert result.status == "failed"
+    assert [path.name for path in out.iterdir()] == ["a.camkit.json"]
+
+
 def test_cancel_ends_the_run_and_keeps_what_is_finished(captures: Path) -> None:
     done: list[Path] = []
     with pytest.raises(Cancelled):

@@ -3,6 +3,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -359,3 +360,34 @@ def test_the_decoder_starts_without_what_it_does_not_need() -> None:
     code = "import sys, camkit.runtime.raw_worker\nprint(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(done.stdout.split()) & {"pydantic", "onnxruntime", "scipy", "cv2", "typer"}
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="only Linux tells a process of its parent's end"
+)
+def test_the_decoder_ends_with_its_parent() -> None:
+    child = (
+        "import os, sys, time\nfrom camkit.runtime.raw_worker import end_with\n"
+        "end_with(int(sys.argv[1]))\nprint(os.getpid(), flush=True)\ntime.sleep(60)\n"
+    )
+    parent = (
+        "import os, subprocess, sys\n"
+        f"subprocess.run([sys.executable, '-c', {child!r}, str(os.getpid())])\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.readline())
+        process.kill()
+    ended = time.monotonic() + 10
+    while (Path("/proc") / str(pid)).exists() and not _is_zombie(pid):
+        assert time.monotonic() < ended
+        time.sleep(0.01)
+
+
+def _is_zombie(pid: int) -> bool:
+    try:
+        return (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
