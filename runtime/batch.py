@@ -192,6 +192,8 @@ def process(
     options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
     listed = [files] if isinstance(files, str | Path) else list(files)
     tasks = list_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
+    if write.out_dir.exists() and not write.out_dir.is_dir():
+        raise ContractError(f"{write.out_dir} is no folder; pictures need one as --out-dir")
     if write.format == "dng":
         if options.color == "acescg":
             raise ContractError("a DNG holds camera RGB; leave --color out or say camera")

@@ -214,6 +214,11 @@ def test_kill_in_mid_batch_and_resume_give_the_same_and_nothing_half(tmp_path: P
         np.testing.assert_array_equal(_pixels(result.output), _pixels(out / result.output.name))
 
 
+def test_a_file_is_no_folder_to_write_to(captures: Path) -> None:
+    with pytest.raises(ContractError, match=r"a\.dng is no folder"):
+        camkit.process([captures / "b.dng"], bundle="none", out_dir=captures / "a.dng")
+
+
 def test_without_its_sidecar_no_picture_appears(captures: Path) -> None:
     """A picture without proof would be in the way of the next run."""
     out = captures / "out"
