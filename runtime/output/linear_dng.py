@@ -10,8 +10,9 @@ from camkit.errors import ContractError
 from camkit.runtime.output.dng import DngTags, write_linear_dng
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
 
-# Below black, room for the negative half of the noise; 1.0 of the raw signal is white.
-BLACK: Final = 1024
+# Black is 0, though it cuts the negative half of the noise: darktable (4.2.1) subtracts no black
+# level from linear DNGs, and any other makes its pictures magenta. 1.0 of the raw signal is white.
+BLACK: Final = 0
 WHITE: Final = 65535
 
 
@@ -57,8 +58,8 @@ class LinearDngWriter(PictureWriter):
 
     def encode(self, band: FloatArray) -> Codes:
         """Give the band as (3, rows, w) uint16 DN of the raw signal."""
-        scale = (WHITE - BLACK) / np.array(self._gains)
-        codes = band * scale.astype(np.float32)[:, None, None] + np.float32(BLACK)
+        scale = WHITE / np.array(self._gains)
+        codes = band * scale.astype(np.float32)[:, None, None]
         return np.asarray(np.clip(np.rint(codes), 0, WHITE), dtype=np.uint16)
 
     def store(self, rows: Codes) -> None:
