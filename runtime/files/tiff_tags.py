@@ -1,9 +1,11 @@
 """The tags of a TIFF-based file (DNG, ARW, NEF, CR2, KDC ...), read without trusting it.
 
 Every count and offset is bounded, loops of directories end, and a value that lies outside the
-file is left out instead of raising: what is missing shows up in the checks that need it.
+file is left out instead of raising: what is missing shows up in the checks that need it. All
+directories together have a limit too, since entries may share the bytes they point at.
 """
 
+import io
 import math
 import struct
 from collections.abc import Mapping
@@ -14,10 +16,13 @@ from typing import BinaryIO, Final
 TagValue = tuple[float, ...] | bytes
 
 EXIF_POINTER: Final = 34665
+GPS_POINTER: Final = 34853
 SUB_IFDS: Final = 330
 MAX_DIRECTORIES: Final = 64
 MAX_ENTRIES: Final = 4096
 MAX_VALUE_BYTES: Final = 4 << 20
+MAX_ALL_ENTRIES: Final = 16384
+MAX_ALL_BYTES: Final = 32 << 20
 
 # TIFF 6.0 section 2 and BigTIFF: type -> (struct code of one number, numbers per value)
 _TYPES: Final = {
@@ -65,6 +70,8 @@ class _Reader:
     file_bytes: int
     order: str
     big: bool
+    entries_left: int = MAX_ALL_ENTRIES
+    bytes_left: int = MAX_ALL_BYTES
     seen: set[int] = field(default_factory=set)
     found: list[Mapping[int, TagValue]] = field(default_factory=list)
 
@@ -87,16 +94,18 @@ class _Reader:
             self.seen.add(at)
             tags, following = self.directory(at)
             self.found.append(tags)
-            children = [*_whole(tags.get(SUB_IFDS)), *_whole(tags.get(EXIF_POINTER))]
-            pending = [*children, *pending, following]
+            pointers = (SUB_IFDS, EXIF_POINTER, GPS_POINTER)
+            children = [at for tag in pointers for at in _whole(tags.get(tag))]
+            pending = [*children[:MAX_DIRECTORIES], *pending, following]
 
     def directory(self, offset: int) -> tuple[dict[int, TagValue], int]:
         """Read one directory; gives its tags and the offset of the next one (0: none)."""
         count_code, entry_bytes, pointer = ("Q", 20, "Q") if self.big else ("H", 12, "I")
         count = self.unpack(count_code, offset)
         tags: dict[int, TagValue] = {}
-        if count is None or count[0] > MAX_ENTRIES:
+        if count is None or count[0] > min(MAX_ENTRIES, self.entries_left):
             return tags, 0
+        self.entries_left -= int(count[0])
         first = offset + struct.calcsize(self.order + count_code)
         for n in range(int(count[0])):
             entry = self.entry(first + n * entry_bytes, pointer)
@@ -115,8 +124,9 @@ class _Reader:
         if not code:
             return None
         value_bytes = struct.calcsize(code) * per_value * count
-        if not 0 < value_bytes <= MAX_VALUE_BYTES:
+        if not 0 < value_bytes <= min(MAX_VALUE_BYTES, self.bytes_left):
             return None
+        self.bytes_left -= value_bytes
         at = offset + 4 + struct.calcsize(self.order + pointer)
         if value_bytes > struct.calcsize(self.order + pointer):
             address = self.unpack(pointer, at)
@@ -133,18 +143,26 @@ def read_tiff_tags(path: Path) -> TiffTags:
     Raises:
         OSError: If the file cannot be read at all.
     """
-    file_bytes = path.stat().st_size
     with path.open("rb") as file:
-        head = file.read(16)
-        order = {b"II": "<", b"MM": ">"}.get(head[:2])
-        magic = struct.unpack(order + "H", head[2:4])[0] if order and len(head) == 16 else 0
-        if order is None or magic not in (42, 43):
-            return TiffTags(directories=(), file_bytes=file_bytes)
-        reader = _Reader(file=file, file_bytes=file_bytes, order=order, big=magic == 43)
-        (first,) = struct.unpack(
-            order + ("Q" if reader.big else "I"), head[8:] if reader.big else head[4:8]
-        )
-        reader.walk(first)
+        return _read(file, path.stat().st_size)
+
+
+def tags_of_block(block: bytes) -> TiffTags:
+    """Read all directories of a TIFF structure in memory, as EXIF is in other files."""
+    return _read(io.BytesIO(block), len(block))
+
+
+def _read(file: BinaryIO, file_bytes: int) -> TiffTags:
+    head = file.read(16)
+    order = {b"II": "<", b"MM": ">"}.get(head[:2])
+    magic = struct.unpack(order + "H", head[2:4])[0] if order and len(head) == 16 else 0
+    if order is None or magic not in (42, 43):
+        return TiffTags(directories=(), file_bytes=file_bytes)
+    reader = _Reader(file=file, file_bytes=file_bytes, order=order, big=magic == 43)
+    (first,) = struct.unpack(
+        order + ("Q" if reader.big else "I"), head[8:] if reader.big else head[4:8]
+    )
+    reader.walk(first)
     return TiffTags(directories=tuple(reader.found), file_bytes=file_bytes)
 
 
