@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.memory import mapping_of
+from camkit.runtime.metadata import Metadata
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -63,7 +64,7 @@ class Capture:
         white_balance: Gains (R, G, B) of the camera's own choice, G = 1; None if not stated.
         color_matrix: (3, 3) float64, XYZ (D65) to camera; None if not stated.
         orientation: EXIF orientation 1..8; the samples themselves are never turned.
-        iso: ISO speed; None if not stated.
+        iso: ISO speed of the samples, which tells their noise; None if not stated.
         exposure_time_s: Exposure time; None if not stated.
         noise: Noise of the linear signal (1.0 = white level) before white balance.
         origin_px: (x, y) of the top-left pixel on the full sensor; None if not stated.
@@ -71,6 +72,7 @@ class Capture:
         pixel_pitch_um: Pixel pitch; None if not stated.
         bundle_name: The bundle that the file itself names (captures made by camkit).
         camera: Make and model as people read it; empty if not stated.
+        metadata: What the file says of its photograph, to be carried into pictures.
         sha256: Hash of the file; None for arrays.
         notes: What a person should know of this decode.
         decoder_peak_mb: Peak memory of the process that decoded; 0 where it was this one.
@@ -91,6 +93,7 @@ class Capture:
     pixel_pitch_um: float | None = None
     bundle_name: str | None = None
     camera: str = ""
+    metadata: Metadata = field(default_factory=Metadata)
     sha256: str | None = None
     notes: tuple[str, ...] = ()
     decoder_peak_mb: float = field(default=0.0, compare=False)

@@ -158,6 +158,12 @@ def encode_uint16(band: FloatArray, *, tone: Literal["srgb", "linear"]) -> NDArr
     return np.asarray(_srgb_table()[np.rint(x, out=x).astype(np.uint16)])
 
 
+def encode_uint8(band: FloatArray, *, tone: Literal["srgb", "linear"]) -> NDArray[np.uint8]:
+    """Give 8-bit codes of a linear band, 1.0 = 255; values outside 0..1 are clipped."""
+    codes = encode_uint16(band, tone=tone).astype(np.uint32)
+    return ((codes + 128) // 257).astype(np.uint8)
+
+
 def _chromaticities(to_xyz: Matrix) -> Primaries:
     red, green, blue = ((float(c[0] / c.sum()), float(c[1] / c.sum())) for c in to_xyz.T)
     return red, green, blue

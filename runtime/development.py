@@ -14,13 +14,13 @@ from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_output
-from camkit.runtime.output.picture_writer import PictureFormat
+from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY, PictureFormat
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_sidecar
 from camkit.runtime.output.writer import SUFFIXES, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
 
-FileFormat = Literal["exr", "tiff", "png", "dng"]
+FileFormat = Literal["exr", "tiff", "png", "jpeg", "dng"]
 Status = Literal["ok", "failed", "skipped"]
 
 
@@ -30,8 +30,10 @@ class WriteOptions:
 
     Attributes:
         out_dir: Folder of pictures and sidecars, made if needed.
-        format: exr, tiff, png or dng.
-        linear: TIFF without the sRGB curve.
+        format: exr, tiff, png, jpeg or dng.
+        linear: TIFF and PNG without the sRGB curve.
+        jpeg_quality: Of JPEG, 1..100; None for 92.
+        strip_metadata: Leave out what the capture says of camera, lens, date, exposure and place.
         resume: Skip what a sidecar proves done.
         overwrite: Replace pictures that exist.
         jobs: Captures at once; threads and memory are shared among them.
@@ -40,6 +42,8 @@ class WriteOptions:
     out_dir: Path = Path()
     format: FileFormat = "exr"
     linear: bool = False
+    jpeg_quality: int | None = None
+    strip_metadata: bool = False
     resume: bool = False
     overwrite: bool = False
     jobs: int = 1
@@ -49,10 +53,21 @@ class WriteOptions:
             raise ContractError(
                 f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"
             )
+        if self.format == "jpeg" and self.linear:
+            raise ContractError("8 bits hold no linear light; say --format png or tiff")
+        if self.jpeg_quality is not None and self.format != "jpeg":
+            raise ContractError(f"a quality is for JPEG; leave it out for {self.format}")
+        if not 1 <= self.quality <= 100:
+            raise ContractError(f"JPEG quality must be 1..100; got {self.jpeg_quality}")
         if self.jobs < 1:
             raise ContractError(f"jobs must be >= 1; got {self.jobs}")
         if self.resume and self.overwrite:
             raise ContractError("resume keeps what is done, overwrite redoes it: choose one")
+
+    @property
+    def quality(self) -> int:
+        """Give the quality of a JPEG."""
+        return DEFAULT_JPEG_QUALITY if self.jpeg_quality is None else self.jpeg_quality
 
     @property
     def suffix(self) -> str:
@@ -175,6 +190,7 @@ def develop_file(
             "camera": capture.camera,
             "iso": capture.iso,
             "exposure_time_s": capture.exposure_time_s,
+            "metadata": {} if write.strip_metadata else work.origin.metadata.stated(),
         }
         write_sidecar(target, record)  # the picture gets its name when its proof has one
     return result
@@ -212,6 +228,8 @@ def _identity(
         chosen["depth_m"] = "inf"  # JSON knows no infinity
     chosen["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
     chosen |= {"format": write.format, "linear": write.linear}
+    chosen |= {"jpeg_quality": write.quality if write.format == "jpeg" else None}
+    chosen |= {"strip_metadata": write.strip_metadata}
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
     identity = {
         "camkit": __version__,
@@ -231,7 +249,8 @@ def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> flo
         color=work.color,
         orientation=1 if write.format == "dng" else work.capture.orientation,
         tone="linear" if write.linear else "srgb",
-        origin=work.origin,
+        jpeg_quality=write.quality,
+        origin=work.origin.stripped() if write.strip_metadata else work.origin,
     )
     seconds = 0.0
     with open_writer(path, write.format, picture) as writer, BandQueue(writer) as queue:

@@ -200,9 +200,10 @@ def _child_environment() -> dict[str, str]:
     """Let the child find this camkit also when it runs from a checkout that is not installed.
 
     Threads reserve address space (stacks, arenas), which on a machine with many cores would fill
-    the memory limit by itself; decoding uses few of them anyway.
+    the memory limit by itself; decoding uses few of them anyway. LibRaw takes the date of a file
+    through the time zone, which must not change with the machine.
     """
-    environment = {"OMP_NUM_THREADS": "4", **os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    environment = {"OMP_NUM_THREADS": "4", **os.environ, "OPENBLAS_NUM_THREADS": "1", "TZ": "UTC"}
     root = str(Path(camkit.__file__).resolve().parents[1])
     if not root.endswith(("site-packages", "dist-packages")):
         known = environment.get("PYTHONPATH")

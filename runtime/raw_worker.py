@@ -15,7 +15,7 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -26,8 +26,10 @@ from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture
 from camkit.runtime.files import dng_checks, raw_checks, raw_tags
+from camkit.runtime.files.raw_metadata import raw_metadata
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 from camkit.runtime.memory import peak_rss_mb
+from camkit.runtime.metadata import Metadata
 
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8
 FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
@@ -105,6 +107,7 @@ def _to_capture(raw: Any, tags: TiffTags) -> Capture:
     raw_checks.check_content(samples, levels)
     _note_outliers(samples, levels, cfa, notes)
     place = raw_tags.sensor_place(tags)
+    metadata = raw_metadata(raw, tags)
     return Capture(
         samples=samples,
         cfa=cfa,
@@ -113,14 +116,15 @@ def _to_capture(raw: Any, tags: TiffTags) -> Capture:
         white_balance=_white_balance(raw, tags, notes),
         color_matrix=_color_matrix(raw, tags, notes),
         orientation=FLIP_TO_EXIF.get(sizes.flip, 1),
-        iso=_stated(raw, tags, raw_tags.ISO_SPEED, "iso_speed"),
-        exposure_time_s=_stated(raw, tags, raw_tags.EXPOSURE_TIME, "shutter_speed"),
+        iso=metadata.iso,
+        exposure_time_s=metadata.exposure_time_s,
         noise=raw_tags.noise_profile(tags, cfa),
         origin_px=place.origin_px,
         sensor_size_px=place.sensor_size_px,
         pixel_pitch_um=place.pixel_pitch_um,
         bundle_name=place.bundle_name,
-        camera=raw_tags.camera_name(tags),
+        camera=raw_tags.camera_name(tags, metadata),
+        metadata=metadata,
         notes=tuple(notes),
     )
 
@@ -226,14 +230,6 @@ def _color_matrix(raw: Any, tags: TiffTags, notes: list[str]) -> NDArray[np.floa
     return None
 
 
-def _stated(raw: Any, tags: TiffTags, tag: int, name: str) -> float | None:
-    """Give a number of the file's tags; LibRaw's own only where the file has no such tag."""
-    if tags.numbers(tag) is not None:
-        return raw_tags.positive(tags, tag)
-    value = float(getattr(getattr(raw, "other", None), name, 0.0))
-    return value if np.isfinite(value) and value > 0 else None
-
-
 def header_of(capture: Capture) -> dict[str, Any]:
     """Give everything but the samples as plain JSON values."""
     header: dict[str, Any] = {
@@ -244,6 +240,7 @@ def header_of(capture: Capture) -> dict[str, Any]:
         header["color_matrix"] = capture.color_matrix.tolist()
     if capture.noise is not None:
         header["noise"] = [capture.noise.shot, capture.noise.read_variance]
+    header["metadata"] = asdict(capture.metadata)
     header["dtype"] = capture.samples.dtype.name
     header["shape"] = capture.samples.shape
     header["planes_sent"] = 1 if _is_repeated(capture.samples) else None
@@ -265,6 +262,7 @@ def capture_of(header: dict[str, Any], samples: NDArray[Any]) -> Capture:
     if values["noise"] is not None:
         shot, read_variance = (tuple(part) for part in values["noise"])
         values["noise"] = NoiseModel(shot=shot, read_variance=read_variance)
+    values["metadata"] = Metadata(**values["metadata"])
     return Capture(samples=samples, **values)
 
 

@@ -3,9 +3,10 @@
 import struct
 
 import numpy as np
+import tifffile
 
 from camkit.contracts import NoiseModel
-from camkit.runtime.output import dng
+from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
 
 MATRIX = np.array([[0.664, -0.1847, -0.0503], [-0.5238, 1.301, 0.2474], [-0.0993, 0.1673, 0.6527]])
@@ -20,8 +21,7 @@ def dng_tags(**change):
         "color_matrix": MATRIX,
         "as_shot_neutral": (0.5, 1.0, 0.625),
         "camera_model": "camkit duet",
-        "iso": 400,
-        "exposure_time_s": 1 / 50,
+        "metadata": Metadata(iso=400, exposure_time_s=1 / 50),
         "noise": NOISE,
         "description": camkit_description(
             bundle="duet", origin_px=(3, 4), sensor_size_px=(6000, 4000), pixel_pitch_um=5.96
@@ -54,5 +54,27 @@ def write_monochrome(path, plane):
 
 
 def write_other(path, samples, photometric, extra):
-    """Write a DNG that the project itself does not make, with the tags `extra`."""
-    dng._write(path, samples, photometric, extra, dng_tags())
+    """Write a DNG that the project itself does not make: one directory, with the tags `extra`."""
+    common = [
+        (271, 2, 0, "camkit", True),
+        (272, 2, 0, "duet", True),
+        (274, 3, 1, 1, True),
+        (50706, 1, 4, bytes((1, 4, 0, 0)), True),
+        (50708, 2, 0, "camkit duet", True),
+        (50721, 10, 9, tuple(n for v in MATRIX.ravel() for n in (round(v * 10**6), 10**6)), True),
+        (50728, 5, 3, (1, 2, 1, 1, 5, 8), True),
+        (50778, 3, 1, 21, True),
+        (33434, 5, 1, (1, 50), True),
+        (34855, 3, 1, 400, True),
+        (51041, 12, 6, (1e-4, 1e-7, 2e-4, 2e-7, 3e-4, 3e-7), True),
+    ]
+    tifffile.imwrite(
+        path,
+        samples,
+        photometric=photometric,
+        planarconfig="contig" if samples.ndim == 3 else None,
+        subfiletype=0,
+        metadata=None,
+        software=False,
+        extratags=[*extra, *common],
+    )

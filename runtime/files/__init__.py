@@ -1,7 +1,9 @@
 """What capture files say, and whether it can be believed.
 
 tiff_tags     tags of TIFF-based files, read within bounds
-raw_tags      metadata of a RAW file from its tags
+exif_tags     what a photograph says of itself, from EXIF anywhere
+raw_metadata  the same of a RAW file, with LibRaw's help
+raw_tags      noise, colour and place of a RAW file from its tags
 raw_checks    refuses unbelievable decodes
 dng_checks    a DNG against itself and against LibRaw
 mapped_tiff   large plain TIFF files read in place

@@ -4,13 +4,14 @@
     read_mosaic    a single-channel PNG or TIFF that is a Bayer mosaic
     read_scene     a sharp scene for the simulation, as linear Rec.709
 
-PNG, TIFF, JPEG and Radiance HDR are decoded by OpenCV, EXR by the OpenEXR package.
+PNG, TIFF, JPEG and Radiance HDR are decoded by OpenCV, EXR by the OpenEXR package. Samples stay as
+they are stored; an EXIF orientation is told beside them.
 """
 
 import contextlib
 import sys
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,9 +32,13 @@ from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.exif_tags import exif_of_picture, metadata_of, orientation_of
+from camkit.runtime.files.exr_attributes import metadata_of_exr
 from camkit.runtime.files.mapped_tiff import map_plain_tiff
-from camkit.runtime.files.tiff_tags import read_tiff_tags
+from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
+from camkit.runtime.geometry.turning import turn_back
 from camkit.runtime.memory import release_pages
+from camkit.runtime.metadata import Metadata
 
 EXR_MAGIC: Final = b"\x76\x2f\x31\x01"
 MAX_EXR_PIXELS_PER_BYTE: Final = 4096
@@ -56,6 +61,8 @@ class _Picture:
     samples: NDArray[Any]
     to_rec709: Matrix | None
     notes: tuple[str, ...]
+    orientation: int = 1
+    metadata: Metadata = field(default_factory=Metadata)
 
 
 def read_picture(path: Path) -> Capture:
@@ -90,6 +97,9 @@ def read_picture(path: Path) -> Capture:
         cfa=None,
         black_level=np.zeros(3, dtype=np.float32),
         white_level=white,
+        orientation=picture.orientation,
+        camera=picture.metadata.camera,
+        metadata=picture.metadata,
         notes=tuple(notes),
     )
 
@@ -123,6 +133,9 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
         cfa=options.cfa,
         black_level=levels.black,
         white_level=options.white_level,
+        orientation=picture.orientation,
+        camera=picture.metadata.camera,
+        metadata=picture.metadata,
         notes=("headerless mosaic: pattern and levels as given",),
     )
 
@@ -174,12 +187,26 @@ def _is_exr(path: Path) -> bool:
 def _decode(path: Path) -> _Picture:
     if _is_exr(path):
         return _decode_exr(path)
-    raw_checks.check_chunks_inside(read_tiff_tags(path))
+    tags = read_tiff_tags(path)
+    raw_checks.check_chunks_inside(tags)
     mapped = map_plain_tiff(path)
     if mapped is not None:
         planes = mapped if mapped.ndim == 2 else np.moveaxis(mapped, -1, 0)
-        return _Picture(samples=planes, to_rec709=None, notes=())
+        return _with_exif(_Picture(samples=planes, to_rec709=None, notes=()), tags)
     data = path.read_bytes()
+    picture = _decode_by_opencv(data)
+    if not tags.directories:
+        return _with_exif(picture, exif_of_picture(data))
+    # OpenCV turns a TIFF upright, whatever it is asked for
+    stored = turn_back(picture.samples, orientation_of(tags))
+    return _with_exif(replace(picture, samples=np.ascontiguousarray(stored)), tags)
+
+
+def _with_exif(picture: _Picture, tags: TiffTags) -> _Picture:
+    return replace(picture, orientation=orientation_of(tags), metadata=metadata_of(tags))
+
+
+def _decode_by_opencv(data: bytes) -> _Picture:
     # libjpeg fills what is missing with grey and only warns
     if data.startswith(_JPEG_MAGIC) and b"\xff\xd9" not in data[-65536:]:
         raise DecodeError("the JPEG has no end marker: it is cut off, copy it again")
@@ -238,6 +265,7 @@ def _decode_exr(path: Path) -> _Picture:
         samples=samples if wanted == "RGB" else samples[0],
         to_rec709=_to_rec709(header.get("chromaticities")),
         notes=("alpha channel dropped",) if "A" in names else (),
+        metadata=metadata_of_exr(header),
     )
 
 

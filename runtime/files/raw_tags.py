@@ -1,11 +1,10 @@
-"""What the tags of a RAW file say beyond LibRaw: ISO, noise profile, colour matrix, camkit's own.
+"""What the tags of a RAW file say beyond LibRaw: noise profile, colour matrix, camkit's own.
 
 Nothing here raises on odd values: a tag that is missing or not believable becomes None.
 Tag numbers and meanings: DNG specification 1.7, chapter 4; Exif 2.32, section 4.6.
 """
 
 import json
-import math
 import re
 from dataclasses import dataclass
 from typing import Any, Final
@@ -15,12 +14,9 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel, cfa_channels
 from camkit.runtime.files.tiff_tags import TiffTags
+from camkit.runtime.metadata import Metadata, clean_text
 
 IMAGE_DESCRIPTION: Final = 270
-MAKE: Final = 271
-MODEL: Final = 272
-EXPOSURE_TIME: Final = 33434
-ISO_SPEED: Final = 34855
 UNIQUE_CAMERA_MODEL: Final = 50708
 CFA_PLANE_COLOR: Final = 50710
 COLOR_MATRICES: Final = ((50721, 50778), (50722, 50779))
@@ -46,19 +42,9 @@ class SensorPlace:
     pixel_pitch_um: float | None = None
 
 
-def camera_name(tags: TiffTags) -> str:
+def camera_name(tags: TiffTags, metadata: Metadata) -> str:
     """Give the camera as people read it; empty if not stated."""
-    unique = tags.text(UNIQUE_CAMERA_MODEL)
-    if unique:
-        return unique
-    make, model = tags.text(MAKE) or "", tags.text(MODEL) or ""
-    return model if model.startswith(make) else f"{make} {model}".strip()
-
-
-def positive(tags: TiffTags, tag: int) -> float | None:
-    """Give the first number of a tag if it is finite and > 0 (zero means unknown in EXIF)."""
-    value = (tags.numbers(tag) or (math.nan,))[0]
-    return float(value) if math.isfinite(value) and value > 0 else None
+    return clean_text(tags.text(UNIQUE_CAMERA_MODEL)) or metadata.camera
 
 
 def noise_profile(tags: TiffTags, cfa: CfaPattern | None) -> NoiseModel | None:

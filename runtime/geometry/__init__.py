@@ -5,5 +5,6 @@ placement       where a capture lies on a bundle's sensor
 scatter         spatially varying blur, for the digital twin
 illumination    vignetting, and its division
 distortion      the radial model, its inverse and its fit
+turning         pictures turned upright as EXIF says, and back
 warp            pictures distorted and undistorted, band by band
 """

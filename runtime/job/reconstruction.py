@@ -127,8 +127,9 @@ class Reconstruction:
         capture, bundle = self.capture, self._setup.bundle
         return Origin(
             camera=capture.camera,
-            iso=capture.iso,
-            exposure_time_s=capture.exposure_time_s,
+            metadata=capture.metadata.completed(
+                iso=capture.iso, exposure_time_s=capture.exposure_time_s
+            ),
             orientation=capture.orientation,
             white_balance=self.white_balance,
             color_matrix=capture.color_matrix,

@@ -11,6 +11,7 @@ import OpenEXR
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.files.exr_attributes import exr_attributes
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
 
 HALF_MAX: Final = 65504.0
@@ -68,6 +69,8 @@ class ExrWriter(PictureWriter):
         point = Imath.point(0.0, 0.0)
         header["chromaticities"] = Imath.Chromaticities(point, point, point, point)
         header["whiteLuminance"] = WHITE_LUMINANCE
+        for name, value in exr_attributes(self.picture.origin.metadata).items():
+            header[name] = value
         return OpenEXR.OutputFile(str(self.path), header)
 
     def _promote(self) -> None:

@@ -7,17 +7,20 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.output.dng import DngTags, write_linear_dng
+from camkit.runtime.output.dng import DngTags, open_linear_dng
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
+from camkit.runtime.output.preview import Averages
 
 # Black is 0, though it cuts the negative half of the noise: darktable (4.2.1) subtracts no black
 # level from linear DNGs, and any other makes its pictures magenta. 1.0 of the raw signal is white.
 BLACK: Final = 0
 WHITE: Final = 65535
+LEAST_PREVIEW_STEP: Final = 2
+"""The preview must be smaller than the picture, see `DngFile.finish`."""
 
 
 class LinearDngWriter(PictureWriter):
-    """Collects 16-bit planes in sensor orientation and writes them at the end."""
+    """Streams 16-bit rows in sensor orientation; the averages of its preview follow at the end."""
 
     def __init__(
         self,
@@ -42,19 +45,18 @@ class LinearDngWriter(PictureWriter):
         # one channel comes as three planes of grey
         self._gains = gains * 3 if len(gains) == 1 else gains
         red, green, blue = self._gains
-        self._tags = DngTags(
+        tags = DngTags(
             cfa=None,
             black=BLACK,
             white=WHITE,
             color_matrix=origin.color_matrix,
             as_shot_neutral=(1 / red, 1 / green, 1 / blue),
-            camera_model=origin.camera or "camkit",
-            iso=origin.iso,
-            exposure_time_s=origin.exposure_time_s,
+            camera_model=origin.camera.encode("ascii", "replace").decode() or "camkit",
+            metadata=origin.metadata,
             orientation=origin.orientation,
         )
-        self._planes = np.empty((3, picture.height, picture.width), dtype=np.uint16)
-        self._stored = 0
+        self._preview = Averages(picture.height, picture.width, least_step=LEAST_PREVIEW_STEP)
+        self._file = open_linear_dng(path, (picture.height, picture.width), tags)
 
     def encode(self, band: FloatArray) -> Codes:
         """Give the band as (3, rows, w) uint16 DN of the raw signal."""
@@ -63,14 +65,14 @@ class LinearDngWriter(PictureWriter):
         return np.asarray(np.clip(np.rint(codes), 0, WHITE), dtype=np.uint16)
 
     def store(self, rows: Codes) -> None:
-        """Keep rows."""
-        end = self._stored + rows.shape[1]
-        self._planes[:, self._stored : end] = rows
-        self._stored = end
+        """Append rows, interleaved."""
+        self._file.append(rows.transpose(1, 2, 0))
+        self._preview.add(rows)
 
     def finish(self) -> None:
-        """Write the file."""
-        write_linear_dng(self.path, self._planes, tags=self._tags)
+        """Write preview and directories."""
+        self._file.finish(self._preview.planes())
 
     def release(self) -> None:
-        """Nothing is open before the end."""
+        """Let go of the file as it is."""
+        self._file.release()

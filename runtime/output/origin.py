@@ -1,10 +1,12 @@
 """What belongs to one capture or one camera body, and travels beside the planes to every writer."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.runtime.metadata import Metadata
 from camkit.runtime.unit import Unit
 
 
@@ -14,8 +16,7 @@ class Origin:
 
     Attributes:
         camera: Make and model as people read it; empty if not stated.
-        iso: ISO speed; None if not stated.
-        exposure_time_s: Exposure time; None if not stated.
+        metadata: What the photograph says of itself.
         orientation: EXIF orientation 1..8 of the capture.
         white_balance: Gains in the planes, one per channel of the sensor.
         color_matrix: (3, 3) XYZ (D65) to camera; None if not stated.
@@ -25,11 +26,17 @@ class Origin:
     """
 
     camera: str = ""
-    iso: float | None = None
-    exposure_time_s: float | None = None
+    metadata: Metadata = field(default_factory=Metadata)
     orientation: int = 1
     white_balance: tuple[float, ...] = (1.0, 1.0, 1.0)
     color_matrix: NDArray[np.float64] | None = None
     bundle: str | None = None
     bundle_sha256: str | None = None
     unit: Unit | None = None
+
+    def stripped(self) -> Self:
+        """Give the same without what tells of photographer, camera, date and place.
+
+        What a picture needs to be shown (orientation, gains, colour matrix) stays.
+        """
+        return replace(self, camera="", metadata=Metadata())

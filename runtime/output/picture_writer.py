@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import ColorStage
+from camkit.runtime.geometry.turning import turn
 from camkit.runtime.output.origin import Origin
 
 Tone = Literal["srgb", "linear"]
 Codes = NDArray[Any]
 
 UPRIGHT: Final = 1
+DEFAULT_JPEG_QUALITY: Final = 92
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +34,8 @@ class PictureFormat:
         height: Rows in sensor orientation.
         color: What the numbers mean.
         orientation: EXIF orientation 1..8; the pixels are turned so that the file needs none.
-        tone: Curve of TIFF and PNG.
+        tone: Curve of TIFF, PNG and JPEG.
+        jpeg_quality: Of JPEG, 1..100.
         origin: Where the picture comes from.
     """
 
@@ -41,6 +44,7 @@ class PictureFormat:
     color: ColorStage
     orientation: int = UPRIGHT
     tone: Tone = "srgb"
+    jpeg_quality: int = DEFAULT_JPEG_QUALITY
     origin: Origin = field(default_factory=Origin)
 
     def __post_init__(self) -> None:
@@ -48,6 +52,8 @@ class PictureFormat:
             raise ContractError(f"a picture needs sides >= 1; got {self.width}x{self.height}")
         if self.orientation not in range(1, 9):
             raise ContractError(f"EXIF orientation must be 1..8; got {self.orientation}")
+        if not 1 <= self.jpeg_quality <= 100:
+            raise ContractError(f"JPEG quality must be 1..100; got {self.jpeg_quality}")
 
     @property
     def file_size(self) -> tuple[int, int]:
@@ -148,20 +154,3 @@ class PictureWriter(ABC):
                 f"rows {self._rows}..{self._rows + band.shape[1]} hold NaN or inf; "
                 "the picture is not written"
             )
-
-
-def turn(planes: Codes, orientation: int) -> Codes:
-    """Turn (c, h, w) as a viewer would for an EXIF orientation.
-
-    Args:
-        planes: Picture as stored by the sensor.
-        orientation: 1..8 (CIPA DC-008, tag 274).
-    """
-    if orientation >= 5:
-        planes = planes.transpose(0, 2, 1)
-    # After the transposition of 5..8, these are the mirrors that remain.
-    if orientation in {2, 3, 6, 7}:
-        planes = planes[..., ::-1]
-    if orientation in {3, 4, 7, 8}:
-        planes = planes[:, ::-1]
-    return planes

@@ -1,6 +1,7 @@
-"""PNG with an ICC profile, 8 or 16 bits, streamed row by row.
+"""PNG with ICC profile and EXIF, 8 or 16 bits, streamed row by row.
 
-References: W3C PNG specification, third edition: 5 (chunks), 9 (filters), 11.3.3.3 (iCCP).
+References: W3C PNG specification, third edition: 5 (chunks), 9 (filters), 11.3.2.3 (iCCP),
+11.3.4.5 (eXIf).
 """
 
 import struct
@@ -12,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.runtime.color import encode_uint16
+from camkit.runtime.color import encode_uint8, encode_uint16
+from camkit.runtime.output.exif import NOTHING, color_tags, exif_block
 from camkit.runtime.output.icc import icc_profile
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
 
@@ -37,13 +39,14 @@ class PngWriter(PictureWriter):
         self._chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, RGB_COLOR, 0, 0, 0))
         profile = icc_profile(picture.color, tone=picture.tone)
         self._chunk(b"iCCP", b"camkit\0\0" + zlib.compress(profile, 9))
+        exif = exif_block(picture.origin.metadata, main=NOTHING, exif=color_tags(picture))
+        if exif:
+            self._chunk(b"eXIf", exif)
 
     def encode(self, band: FloatArray) -> Codes:
         """Give the band as (3, rows, w) codes."""
-        codes = encode_uint16(band, tone=self.picture.tone)
-        return (
-            codes if self._bits == 16 else ((codes.astype(np.uint32) + 128) // 257).astype(np.uint8)
-        )
+        encode = encode_uint16 if self._bits == 16 else encode_uint8
+        return encode(band, tone=self.picture.tone)
 
     def store(self, rows: Codes) -> None:
         """Append rows, filtered and compressed."""

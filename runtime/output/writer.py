@@ -8,7 +8,7 @@ from camkit.bundle.golden import IMAGE
 from camkit.errors import ContractError
 from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
 
-SUFFIXES: Final = {"exr": "exr", "tiff": "tif", "png": "png", "dng": "dng"}
+SUFFIXES: Final = {"exr": "exr", "tiff": "tif", "png": "png", "jpeg": "jpg", "dng": "dng"}
 Open = Callable[[Path, PictureFormat], PictureWriter]
 
 
@@ -30,6 +30,12 @@ def _png(path: Path, picture: PictureFormat) -> PictureWriter:
     return PngWriter(path, picture)
 
 
+def _jpeg(path: Path, picture: PictureFormat) -> PictureWriter:
+    from camkit.runtime.output.jpeg import JpegWriter
+
+    return JpegWriter(path, picture)
+
+
 def _dng(path: Path, picture: PictureFormat) -> PictureWriter:
     from camkit.runtime.output.linear_dng import LinearDngWriter
 
@@ -37,7 +43,7 @@ def _dng(path: Path, picture: PictureFormat) -> PictureWriter:
 
 
 WRITERS: Final[dict[str, dict[str, Open]]] = {
-    IMAGE: {"exr": _exr, "tiff": _tiff, "png": _png, "dng": _dng},
+    IMAGE: {"exr": _exr, "tiff": _tiff, "png": _png, "jpeg": _jpeg, "dng": _dng},
 }
 """Product -> format -> what opens its writer."""
 
@@ -49,7 +55,8 @@ def open_writer(
 
     Args:
         path: The file, usually the `.part` of `atomic_output`.
-        format_: exr (linear), tiff or png (16 bits, tone of the format), or dng (camera colour).
+        format_: exr (linear), tiff or png (16 bits, tone of the format), jpeg (8 bits), or dng
+            (camera colour).
         picture: Size, colour, orientation, tone and origin.
         product: What is written.
 

@@ -15,6 +15,7 @@ from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
 from camkit.runtime.output.part_file import atomic_output
 from camkit.runtime.twin.exposure import Setting, expose
@@ -154,7 +155,7 @@ def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_nam
         color_matrix=np.array(sensor.color_matrix, dtype=np.float64),
         as_shot_neutral=(red, green, blue),
         camera_model=f"camkit {bundle_name}",
-        iso=simulation.iso,
+        metadata=Metadata.believable(iso=simulation.iso),
         noise=sensor.noise_at(simulation.iso),
         description=camkit_description(
             bundle=bundle_name,

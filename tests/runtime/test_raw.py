@@ -1,5 +1,6 @@
 import logging
 import os
+import struct
 import subprocess
 import sys
 import time
@@ -14,6 +15,8 @@ from camkit.contracts import CFA_PATTERNS
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime import raw, raw_worker
 from camkit.runtime.capture import Capture
+from camkit.runtime.files.tiff_tags import EXIF_POINTER, read_tiff_tags
+from camkit.runtime.metadata import MAX_TEXT, Metadata
 from camkit.runtime.raw import MosaicOptions, file_sha256, is_picture, named_bundle, read_capture
 from tests.data_folder import data_path
 from tests.dng_factory import (
@@ -180,7 +183,7 @@ def test_whatever_an_odd_file_raises_becomes_a_decode_error(scene, monkeypatch, 
 
 
 def test_noise_profile_and_white_balance_may_be_missing(tmp_path):
-    write_scene(tmp_path / "x.dng", noise=None, iso=None, exposure_time_s=None, color_matrix=None)
+    write_scene(tmp_path / "x.dng", noise=None, metadata=Metadata(), color_matrix=None)
     capture = read_capture(tmp_path / "x.dng", isolate=False)
     assert (capture.noise, capture.iso, capture.exposure_time_s) == (None, None, None)
     assert capture.color_matrix is None
@@ -191,8 +194,12 @@ def test_noise_profile_and_white_balance_may_be_missing(tmp_path):
 def test_truncated_dng_is_refused(tmp_path, share):
     path = tmp_path / "x.dng"
     write_scene(path)
-    data = path.read_bytes()
-    path.write_bytes(data[: int(share * len(data))])
+    (end,) = [
+        int(d[273][0] + d[279][0])
+        for d in read_tiff_tags(path).directories
+        if d.get(262) == (CFA_PHOTOMETRIC,)
+    ]
+    path.write_bytes(path.read_bytes()[: int(share * end)])
     with pytest.raises(DecodeError, match=r"x\.dng"):
         read_capture(path, isolate=False)
 
@@ -391,3 +398,39 @@ def _is_zombie(pid: int) -> bool:
         return (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
     except FileNotFoundError:
         return True
+
+
+def test_hostile_metadata_neither_fail_nor_slow_a_photograph(tmp_path):
+    """Loops, offsets nowhere, counts beyond the file, text that is no text."""
+    extra = [
+        (33421, 3, 2, (2, 2), True),
+        (33422, 1, 4, bytes((0, 1, 1, 2)), True),
+        (50714, 4, 1, 256, True),
+        (50717, 4, 1, 4095, True),
+        (315, 2, 0, b"\x1b[31m" + bytes(range(1, 32)) + b"x" * 9000, True),
+        (42036, 2, 0, b"\xff\xfe\x80 lens", True),
+        (37386, 5, 1, (7, 0), True),
+        (36867, 2, 0, b"9999:99:99 99:99:99", True),
+    ]
+    path = tmp_path / "x.dng"
+    mosaic = scene_mosaic()
+    write_other(path, mosaic, CFA_PHOTOMETRIC, extra)
+    start = time.monotonic()
+    found = read_capture(path)
+    assert time.monotonic() - start < 10
+    assert np.array_equal(found.samples, mosaic)
+    assert found.metadata.artist.startswith("[31m xxx")
+    assert len(found.metadata.artist) <= MAX_TEXT
+    assert found.metadata.lens_model.isprintable()
+    assert (found.metadata.focal_length_mm, found.metadata.captured_at) == (None, "")
+
+
+def test_an_exif_pointer_that_leads_in_a_circle_costs_only_the_metadata(tmp_path):
+    path = tmp_path / "x.dng"
+    mosaic = write_scene(path)
+    data = path.read_bytes()
+    at = data.index(struct.pack("<HHI", EXIF_POINTER, 4, 1)) + 8
+    path.write_bytes(data[:at] + struct.pack("<I", 8) + data[at + 4 :])
+    found = read_capture(path)
+    assert np.array_equal(found.samples, mosaic)
+    assert found.metadata == Metadata(make="camkit", model="duet")

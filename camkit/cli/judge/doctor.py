@@ -23,6 +23,7 @@ PACKAGES = [
     "opencv-contrib-python-headless",
     "OpenEXR",
     "tifffile",
+    "pillow",
     "scikit-image",
     "safetensors",
     "pydantic",

@@ -112,6 +112,7 @@ def _describe_capture(path: Path, mosaic: Any) -> dict[str, Any]:
         "orientation": capture.orientation,
         "iso": capture.iso,
         "exposure_time_s": capture.exposure_time_s,
+        "metadata": capture.metadata.stated(),
         "noise": None if noise is None else [noise.shot, noise.read_variance],
         "origin_px": capture.origin_px,
         "sensor_size_px": capture.sensor_size_px,

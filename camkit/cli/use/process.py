@@ -26,7 +26,14 @@ def process(
     max_seconds: MaxSeconds = None,
     max_error_db: MaxErrorDb = None,
     out_dir: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path(),
-    format_: Annotated[str, typer.Option("--format", help="exr, tiff, png or dng.")] = "exr",
+    format_: Annotated[str, typer.Option("--format", help="exr, tiff, png, jpeg or dng.")] = "exr",
+    jpeg_quality: Annotated[
+        int | None, typer.Option(help="With --format jpeg: 1..100. Default: 92.")
+    ] = None,
+    strip_metadata: Annotated[
+        bool,
+        typer.Option("--strip-metadata", help="Leave out camera, lens, date, exposure and place."),
+    ] = False,
     color: Annotated[
         str, typer.Option(help="rec709, acescg or camera; a DNG is camera.")
     ] = "rec709",
@@ -103,6 +110,8 @@ def process(
         out_dir=out_dir,
         format=format_,  # type: ignore[arg-type]
         linear=linear,
+        jpeg_quality=jpeg_quality,
+        strip_metadata=strip_metadata,
         resume=resume,
         overwrite=overwrite,
         jobs=jobs,

@@ -1,3 +1,4 @@
+import struct
 import sys
 
 import cv2
@@ -5,11 +6,14 @@ import numpy as np
 import OpenEXR
 import pytest
 import tifffile
+from PIL import Image
 
 from camkit.colorimetry import ACES_WHITE, ACESCG_PRIMARIES, decode_srgb
 from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.files.mapped_tiff import map_plain_tiff
 from camkit.runtime.files.picture import read_mosaic, read_picture, read_scene
+from camkit.runtime.metadata import Metadata
 from camkit.runtime.raw import read_capture
 from tests.data_folder import data_path
 
@@ -186,3 +190,56 @@ def test_real_hdr_pictures_are_read():
     assert bright.notes == ("18 samples are NaN or infinite",)
     assert read_scene(data_path("hdr/StageEnvLatLong.exr")).max() == 4096
     assert read_scene(data_path("hdr/esplanade.hdr")).max() == 49664
+
+
+ORIENTED = np.arange(6 * 8 * 3, dtype=np.uint16).reshape(6, 8, 3) * 300
+
+
+def _write_oriented(path, orientation, block=None):
+    """Write ORIENTED as TIFF, PNG or JPEG that says how to turn it."""
+    if path.suffix == ".tif":
+        extra = [(274, 3, 1, orientation, True), (271, 2, 0, "Canon", True)]
+        tifffile.imwrite(path, ORIENTED, photometric="rgb", extratags=extra)
+        return
+    exif = Image.Exif()
+    exif[274], exif[271] = orientation, "Canon"
+    pixels = (ORIENTED // 257).astype(np.uint8)
+    Image.fromarray(pixels).save(
+        path, exif=block or exif, **({"quality": 100} if "j" in path.suffix else {})
+    )
+
+
+@pytest.mark.parametrize("suffix", [".tif", ".png", ".jpg"])
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_samples_stay_as_stored_and_the_orientation_is_told(tmp_path, suffix, orientation):
+    path = tmp_path / f"x{suffix}"
+    _write_oriented(path, 1)
+    stored = read_picture(path).samples
+    _write_oriented(path, orientation)
+    found = read_picture(path)
+    assert found.orientation == orientation
+    assert np.array_equal(found.samples, stored)
+    assert (found.camera, found.metadata.make) == ("Canon", "Canon")
+
+
+def test_a_mosaic_that_says_how_to_turn_it_keeps_its_pattern(tmp_path):
+    mosaic = np.arange(48, dtype=np.uint16).reshape(6, 8)
+    tifffile.imwrite(tmp_path / "x.tif", mosaic, extratags=[(274, 3, 1, 6, True)])
+    options = MosaicOptions(cfa="RGGB", black_level=0, white_level=100)
+    found = read_mosaic(tmp_path / "x.tif", options)
+    assert (found.orientation, found.samples.tolist()) == (6, mosaic.tolist())
+    assert np.array_equal(map_plain_tiff(tmp_path / "x.tif", least_bytes=1), mosaic)
+
+
+def test_damaged_exif_costs_only_the_metadata(tmp_path):
+    loop = b"II*\0\x08\0\0\0\x01\0" + struct.pack("<HHII", 34665, 4, 1, 8) + bytes(4)
+    _write_oriented(tmp_path / "x.png", 1, b"Exif\0\0" + loop)
+    found = read_picture(tmp_path / "x.png")
+    assert (found.orientation, found.metadata) == (1, Metadata())
+
+
+def test_the_speed_of_a_picture_is_carried_and_says_nothing_of_its_noise(tmp_path):
+    extra = [(34855, 3, 1, 800, True)]
+    tifffile.imwrite(tmp_path / "x.tif", ORIENTED, photometric="rgb", extratags=extra)
+    found = read_picture(tmp_path / "x.tif")
+    assert (found.metadata.iso, found.iso) == (800, None)

@@ -6,6 +6,7 @@ import pytest
 
 from camkit.contracts import NoiseModel
 from camkit.runtime.files import raw_tags
+from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.raw_tags import SensorPlace
 from camkit.runtime.files.tiff_tags import TiffTags
 
@@ -66,17 +67,15 @@ def test_a_matrix_that_cannot_be_is_none(values):
     assert raw_tags.color_matrix(tags_of(t50721=values)) is None
 
 
-def test_zero_means_unknown():
-    assert raw_tags.positive(tags_of(t34855=(0,)), raw_tags.ISO_SPEED) is None
-    assert raw_tags.positive(tags_of(t34855=(math.inf,)), raw_tags.ISO_SPEED) is None
-    assert raw_tags.positive(tags_of(t34855=(100,)), raw_tags.ISO_SPEED) == 100
-
-
 def test_camera_is_the_unique_model_or_make_and_model():
-    assert raw_tags.camera_name(tags_of(t50708=b"Duet\0", t271=b"X", t272=b"Y")) == "Duet"
-    assert raw_tags.camera_name(tags_of(t271=b"Canon", t272=b"Canon EOS 6D")) == "Canon EOS 6D"
-    assert raw_tags.camera_name(tags_of(t271=b"SONY", t272=b"ILCE-7RM3")) == "SONY ILCE-7RM3"
-    assert raw_tags.camera_name(tags_of()) == ""
+    def named(**values):
+        tags = tags_of(**values)
+        return raw_tags.camera_name(tags, metadata_of(tags))
+
+    assert named(t50708=b"Duet\0", t271=b"X", t272=b"Y") == "Duet"
+    assert named(t271=b"Canon", t272=b"Canon EOS 6D") == "Canon EOS 6D"
+    assert named(t271=b"SONY", t272=b"ILCE-7RM3") == "SONY ILCE-7RM3"
+    assert named() == ""
 
 
 def place(record, model=b""):

@@ -4,8 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime.color import color_stage
+from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.linear_dng import LinearDngWriter
 from camkit.runtime.output.origin import Origin
 from camkit.runtime.output.picture_writer import PictureFormat
@@ -18,8 +19,7 @@ STEP = 1 / 65535
 
 ORIGIN = Origin(
     camera="test camera",
-    iso=800.0,
-    exposure_time_s=0.01,
+    metadata=Metadata(iso=800.0, exposure_time_s=0.01),
     orientation=6,
     white_balance=GAINS,
     color_matrix=np.array(COLOR_MATRIX),
@@ -55,14 +55,15 @@ def test_other_colour_or_turned_bands_are_refused(
         LinearDngWriter(tmp_path / "a.dng", facts)
 
 
-def test_error_leaves_no_file(tmp_path: Path) -> None:
+def test_error_leaves_nothing_that_can_be_read(tmp_path: Path) -> None:
     facts = PictureFormat(width=3, height=2, color=color_stage(None, "camera"))
     with (
         pytest.raises(ContractError),
         LinearDngWriter(tmp_path / "a.dng", facts) as writer,
     ):
         writer.write(np.full((3, 2, 3), np.nan, np.float32))
-    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(DecodeError):
+        read_capture(tmp_path / "a.dng", isolate=False)
 
 
 def test_one_channel_is_written_as_three_planes_of_grey(tmp_path: Path) -> None:

@@ -1,0 +1,117 @@
+"""EXIF: where it lies in a PNG or JPEG, and what its tags say of a photograph.
+
+The tags are read by `tiff_tags`, within its bounds; what is not believable counts as not stated.
+References: Exif 2.32 (CIPA DC-008), 4.6; PNG, third edition, 11.3.4.5 (eXIf); ISO 10918-1, B.1.
+"""
+
+import math
+from typing import Final
+
+from camkit.runtime.files.tiff_tags import TiffTags, tags_of_block
+from camkit.runtime.metadata import Metadata
+
+TEXT_TAGS: Final = {
+    "make": 271,
+    "model": 272,
+    "lens_make": 42035,
+    "lens_model": 42036,
+    "artist": 315,
+    "copyright": 33432,
+    "captured_at": 36867,
+    "utc_offset": 36881,
+}
+NUMBER_TAGS: Final = {
+    "exposure_time_s": 33434,
+    "f_number": 33437,
+    "iso": 34855,
+    "focal_length_mm": 37386,
+}
+ORIENTATION: Final = 274
+RECOMMENDED_EXPOSURE_INDEX: Final = 34866
+ISO_IN_OTHER_TAG: Final = 65535
+LATITUDE_REF, LATITUDE, LONGITUDE_REF, LONGITUDE, ALTITUDE_REF, ALTITUDE = range(1, 7)
+BELOW_SEA_LEVEL: Final = 1
+
+_PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
+_EXIF_PREFIX: Final = b"Exif\0\0"
+_MAX_CHUNKS: Final = 1024
+_NO_TAGS: Final = TiffTags(directories=(), file_bytes=0)
+
+
+def exif_of_picture(data: bytes) -> TiffTags:
+    """Give the EXIF tags of a PNG or JPEG; none where there are none or they cannot be found."""
+    if data.startswith(_PNG_SIGNATURE):
+        return tags_of_block(_png_block(data))
+    return tags_of_block(_jpeg_block(data)) if data.startswith(b"\xff\xd8") else _NO_TAGS
+
+
+def _png_block(data: bytes) -> bytes:
+    at = len(_PNG_SIGNATURE)
+    for _ in range(_MAX_CHUNKS):
+        length, name = int.from_bytes(data[at : at + 4]), data[at + 4 : at + 8]
+        if name == b"eXIf":
+            return data[at + 8 : at + 8 + length].removeprefix(_EXIF_PREFIX)
+        at += 12 + length
+        if at >= len(data):
+            break
+    return b""
+
+
+def _jpeg_block(data: bytes) -> bytes:
+    """Walk the segments before the first scan; APP1 that starts with Exif holds the block."""
+    at = 2
+    for _ in range(_MAX_CHUNKS):
+        marker, length = data[at : at + 2], int.from_bytes(data[at + 2 : at + 4])
+        if len(marker) < 2 or marker[0] != 0xFF or marker[1] == 0xDA or length < 2:
+            break
+        content = data[at + 4 : at + 2 + length]
+        if marker[1] == 0xE1 and content.startswith(_EXIF_PREFIX):
+            return content.removeprefix(_EXIF_PREFIX)
+        at += 2 + length
+    return b""
+
+
+def orientation_of(tags: TiffTags) -> int:
+    """Give the EXIF orientation, 1 where none is stated that exists."""
+    stated = (tags.numbers(ORIENTATION) or (1,))[0]
+    return int(stated) if stated in range(1, 9) else 1
+
+
+def metadata_of(tags: TiffTags) -> Metadata:
+    """Give what tags say of a photograph."""
+    told: dict[str, object] = {name: tags.text(tag) for name, tag in TEXT_TAGS.items()}
+    told |= {name: (tags.numbers(tag) or (None,))[0] for name, tag in NUMBER_TAGS.items()}
+    if told["iso"] == ISO_IN_OTHER_TAG:
+        told["iso"] = (tags.numbers(RECOMMENDED_EXPOSURE_INDEX) or (told["iso"],))[0]
+    return Metadata.believable(**told, **_place(tags))
+
+
+def is_stated(tags: TiffTags, name: str) -> bool:
+    """Tell whether a file has the tag of a field, be it empty or zero."""
+    tag = TEXT_TAGS.get(name) or NUMBER_TAGS[name]
+    return any(tag in directory for directory in tags.directories)
+
+
+def _place(tags: TiffTags) -> dict[str, float | None]:
+    """Give latitude, longitude and altitude with their signs."""
+    height = (tags.numbers(ALTITUDE) or (math.nan,))[0]
+    below = _is_below(tags)
+    return {
+        "latitude_deg": _degrees(tags, LATITUDE, LATITUDE_REF, "NS"),
+        "longitude_deg": _degrees(tags, LONGITUDE, LONGITUDE_REF, "EW"),
+        "altitude_m": -height if below else height,
+    }
+
+
+def _is_below(tags: TiffTags) -> bool:
+    told = tags.numbers(ALTITUDE_REF)
+    return told is not None and told[0] == BELOW_SEA_LEVEL
+
+
+def _degrees(tags: TiffTags, tag: int, reference: int, signs: str) -> float | None:
+    """Give degrees, minutes and seconds as one signed number; None if they are incomplete."""
+    parts, side = tags.numbers(tag), (tags.text(reference) or "").upper()[:1]
+    if parts is None or len(parts) != 3 or not side or side not in signs:
+        return None
+    degrees = parts[0] + parts[1] / 60 + parts[2] / 3600
+    return -degrees if side == signs[1] else degrees

@@ -1,0 +1,68 @@
+"""The metadata of a photograph as standard attributes of an OpenEXR file, and back.
+
+Reference: OpenEXR, "Standard Attributes". Numbers are 32 bits there, the UTC offset is UTC less
+local time, and there is no attribute for the artist.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+from camkit.runtime.metadata import Metadata
+
+TEXTS: Final = {
+    "make": "cameraMake",
+    "model": "cameraModel",
+    "lens_make": "lensMake",
+    "lens_model": "lensModel",
+    "copyright": "owner",
+    "captured_at": "capDate",
+}
+NUMBERS: Final = {
+    "exposure_time_s": "expTime",
+    "f_number": "aperture",
+    "iso": "isoSpeed",
+    "focal_length_mm": "nominalFocalLength",
+    "latitude_deg": "latitude",
+    "longitude_deg": "longitude",
+    "altitude_m": "altitude",
+}
+UTC_OFFSET: Final = "utcOffset"
+_HALF_MINUTE_S: Final = 30
+
+
+def exr_attributes(metadata: Metadata) -> dict[str, bytes | float]:
+    """Give the attributes of what is stated, text as UTF-8."""
+    told = metadata.stated()
+    found: dict[str, bytes | float] = {
+        name: str(told[key]).encode() for key, name in TEXTS.items() if key in told
+    }
+    found |= {name: float(told[key]) for key, name in NUMBERS.items() if key in told}
+    if metadata.utc_offset:
+        found[UTC_OFFSET] = -_seconds(metadata.utc_offset)
+    return found
+
+
+def metadata_of_exr(header: Mapping[str, Any]) -> Metadata:
+    """Give what a header says of the photograph."""
+    told: dict[str, Any] = {key: header.get(name) for key, name in TEXTS.items()}
+    told |= {key: _short(header.get(name)) for key, name in NUMBERS.items()}
+    return Metadata.believable(**told, utc_offset=_offset(header.get(UTC_OFFSET)))
+
+
+def _short(value: Any) -> Any:
+    """Give a 32-bit number by the digits that it holds."""
+    return float(f"{value:.7g}") if isinstance(value, float) else value
+
+
+def _seconds(offset: str) -> float:
+    hours, minutes = (int(n) for n in re.findall(r"[0-9]+", offset))
+    return float((hours * 60 + minutes) * 60 * (-1 if offset[0] == "-" else 1))
+
+
+def _offset(seconds: Any) -> str:
+    if not isinstance(seconds, float) or not math.isfinite(seconds):
+        return ""
+    minutes = int((abs(seconds) + _HALF_MINUTE_S) // 60)
+    return f"{'-' if seconds > 0 else '+'}{minutes // 60:02d}:{minutes % 60:02d}"

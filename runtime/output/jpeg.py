@@ -1,0 +1,98 @@
+"""JPEG, 8 bits, with ICC profile and EXIF.
+
+Pillow takes a picture as a whole, so it is held until it is: 3 bytes per pixel, 72 MB for 24
+megapixels. Colour keeps its full resolution (4:4:4), since that is what was reconstructed.
+"""
+
+import io
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.color import encode_uint8
+from camkit.runtime.output.directory import Kind
+from camkit.runtime.output.exif import color_tags, exif_block
+from camkit.runtime.output.icc import icc_profile
+from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
+
+MAX_SIDE_PX: Final = 65500
+"""Longer sides are refused by libjpeg."""
+
+
+def encode_jpeg(
+    pixels: NDArray[np.uint8], *, quality: int, icc: bytes = b"", exif: bytes = b""
+) -> bytes:
+    """Code a picture.
+
+    Args:
+        pixels: (h, w, 3) uint8.
+        quality: 1..100.
+        icc: Its profile; none if empty.
+        exif: Its EXIF block; none if empty.
+    """
+    from PIL import Image
+
+    told = {"icc_profile": icc or None, "exif": b"Exif\0\0" + exif if exif else b""}
+    coded = io.BytesIO()
+    Image.fromarray(pixels).save(coded, "JPEG", quality=quality, subsampling=0, **told)
+    return coded.getvalue()
+
+
+class JpegWriter(PictureWriter):
+    """Holds the codes of a picture and writes them at the end."""
+
+    def __init__(self, path: Path, picture: PictureFormat) -> None:
+        """Open the writer.
+
+        Raises:
+            ContractError: If a side is longer than a JPEG can be.
+        """
+        super().__init__(path, picture)
+        width, height = picture.file_size
+        if max(width, height) > MAX_SIDE_PX:
+            raise ContractError(
+                f"a JPEG has sides of at most {MAX_SIDE_PX} px; got {width}x{height}; "
+                "choose --format png or tiff"
+            )
+        self._pixels = np.empty((height, width, 3), dtype=np.uint8)
+        self._stored = 0
+
+    def encode(self, band: FloatArray) -> Codes:
+        """Give the band as (3, rows, w) uint8 codes."""
+        return encode_uint8(band, tone=self.picture.tone)
+
+    def store(self, rows: Codes) -> None:
+        """Keep rows, interleaved."""
+        end = self._stored + rows.shape[1]
+        self._pixels[self._stored : end] = rows.transpose(1, 2, 0)
+        self._stored = end
+
+    def finish(self) -> None:
+        """Write the file."""
+        coded = encode_jpeg(
+            self._pixels,
+            quality=self.picture.jpeg_quality,
+            icc=icc_profile(self.picture.color, tone=self.picture.tone),
+            exif=self._exif(),
+        )
+        self.path.write_bytes(coded)
+
+    def release(self) -> None:
+        """Nothing is open before the end."""
+
+    def _exif(self) -> bytes:
+        width, height = self.picture.file_size
+        return exif_block(
+            self.picture.origin.metadata,
+            main={531: (Kind.SHORT, 1)},  # YCbCrPositioning: centred
+            exif={
+                **color_tags(self.picture),
+                37121: (Kind.UNDEFINED, bytes((1, 2, 3, 0))),  # ComponentsConfiguration: YCbCr
+                40962: (Kind.LONG, width),  # PixelXDimension
+                40963: (Kind.LONG, height),  # PixelYDimension
+            },
+        )
