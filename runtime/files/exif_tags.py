@@ -72,8 +72,9 @@ def _jpeg_block(data: bytes) -> bytes:
 
 
 def orientation_of(tags: TiffTags) -> int:
-    """Give the EXIF orientation, 1 where none is stated that exists."""
-    stated = (tags.numbers(ORIENTATION) or (1,))[0]
+    """Give the EXIF orientation of the first picture, 1 where none is stated that exists."""
+    first = tags.directories[0].get(ORIENTATION) if tags.directories else None
+    stated = first[0] if first else 1
     return int(stated) if stated in range(1, 9) else 1
 
 

@@ -6,6 +6,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray
@@ -71,4 +72,4 @@ def preview_jpeg(
     if matrix is not None:
         linear = apply_matrix(rec709_from_camera(matrix), linear)
     codes = encode_uint8(linear, tone="srgb").transpose(1, 2, 0)
-    return encode_jpeg(np.ascontiguousarray(codes), quality=QUALITY)
+    return encode_jpeg(Image.fromarray(np.ascontiguousarray(codes)), quality=QUALITY)

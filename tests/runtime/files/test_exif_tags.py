@@ -92,7 +92,12 @@ def test_a_place_without_its_side_is_none():
 
 def test_only_orientations_that_exist_are_taken():
     assert [orientation_of(tags_of(t274=(n,))) for n in (0, 6, 9, math.nan)] == [1, 6, 1, 1]
-    assert orientation_of(tags_of()) == 1
+    assert orientation_of(tags_of()) == orientation_of(TiffTags(directories=(), file_bytes=0)) == 1
+
+
+def test_the_orientation_of_a_thumbnail_is_not_that_of_the_picture():
+    tags = TiffTags(directories=({256: (9,)}, {256: (3,), 274: (6,)}), file_bytes=1)
+    assert orientation_of(tags) == 1
 
 
 @settings(max_examples=100, deadline=None)

@@ -74,3 +74,14 @@ def test_one_channel_is_written_as_three_planes_of_grey(tmp_path: Path) -> None:
         writer.write(grey)
     found = read_capture(tmp_path / "a.dng", isolate=False)
     np.testing.assert_allclose(found.linear_rows(0, 40), grey, atol=0.51 * STEP)
+
+
+def test_a_camera_whose_name_is_not_ascii_is_named_in_metadata(tmp_path: Path) -> None:
+    """UniqueCameraModel is ASCII, Make and Model are not."""
+    origin = replace(ORIGIN, camera="Größe 7", metadata=Metadata(make="Größe", model="7"))
+    stage = color_stage(np.array(COLOR_MATRIX), "camera")
+    facts = PictureFormat(width=50, height=40, color=stage, origin=origin)
+    with LinearDngWriter(tmp_path / "a.dng", facts) as writer:
+        writer.write(np.random.default_rng(0).random((3, 40, 50), dtype=np.float32))
+    found = read_capture(tmp_path / "a.dng", isolate=False)
+    assert (found.metadata.make, found.camera) == ("Größe", "Gr??e 7")
