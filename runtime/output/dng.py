@@ -145,8 +145,7 @@ class DngFile:
                 "choose --format tiff or exr"
             )
         self._file = Path(path).open("wb")  # noqa: SIM115
-        self._front_bytes = len(self._front((1, 1), 0))
-        self._file.write(bytes(self._front_bytes))
+        self._file.write(bytes(len(self._front((1, 1), 0))))
 
     def append(self, rows: NDArray[np.uint16]) -> None:
         """Append (rows, w) or (rows, w, 3) samples."""
