@@ -13,9 +13,9 @@ from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Cancel, Progress
 from camkit.runtime.output.band_queue import BandQueue
-from camkit.runtime.output.part_file import atomic_output
+from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.picture_writer import PictureFormat
-from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_sidecar
+from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, sidecar_text
 from camkit.runtime.output.writer import SUFFIXES, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
@@ -100,8 +100,8 @@ class FileResult:
         )
 
     @classmethod
-    def skip(cls, source: Path, target: Path, pipeline: Pipeline) -> Self:
-        """Give the result of an input that was done before."""
+    def skip(cls, source: Path, target: Path, pipeline: Pipeline, *warnings: str) -> Self:
+        """Give the result of an input that was done before, or is done by another process."""
         return cls(
             input=source,
             output=target,
@@ -110,6 +110,7 @@ class FileResult:
             size=pipeline.size,
             seconds={},
             peak_rss_mb=peak_rss_mb(),
+            warnings=warnings,
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -148,7 +149,7 @@ def develop_file(
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
     work = pipeline.start(capture, progress=progress, cancel=cancel)
     estimate = work.explain()
-    with atomic_output(target) as part:
+    with atomic_outputs(sidecar_path(target), target) as (proof, part):
         write_s = _write_picture(part, work, write)
         output_sha256 = file_sha256(part)
         seconds = {"decode": decode_s, **work.seconds, "write": write_s}
@@ -176,7 +177,7 @@ def develop_file(
             "iso": capture.iso,
             "exposure_time_s": capture.exposure_time_s,
         }
-        write_sidecar(target, record)  # the picture gets its name when its proof has one
+        proof.write_text(sidecar_text(record), encoding="utf-8")
     return result
 
 
