@@ -148,7 +148,8 @@ def develop_file(
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
     work = pipeline.start(capture, progress=progress, cancel=cancel)
-    estimate = work.explain()
+    # who asks for a time has had the machine timed; nobody else waits for it
+    estimate = None if pipeline.options.max_seconds is None else work.explain()
     with atomic_outputs(sidecar_path(target), target) as (proof, part):
         write_s = _write_picture(part, work, write)
         output_sha256 = file_sha256(part)

@@ -118,16 +118,17 @@ class Pipeline:
 
     def speed(self, sizes: Sequence[str]) -> Speed:
         """Give how fast this machine is; networks and bank are timed once per pipeline."""
-        roles = () if self.bundle is None else tuple(self.bundle.manifest.networks)
+        bundle = self.bundle
+        roles = () if bundle is None else bundle.manifest.networks
         new = {
-            (role, size): self.network(role, size)
+            (role, size): (self.network(role, size), bundle.network_facts(role, size))
             for role in roles
             for size in sizes
-            if (role, size) not in self._speeds
+            if bundle is not None and (role, size) not in self._speeds
         }
         with self._lock:
             if self._speed is None or new:
-                stage = None if self.bundle is None else self.bundle.manifest.stage(Wiener)
+                stage = None if bundle is None else bundle.manifest.stage(Wiener)
                 made = measure_speed(new, stage, threads=self.threads)
                 self._speeds.update(made.network_s_per_mp)
                 self._speed = self._speed or made

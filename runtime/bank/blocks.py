@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +32,9 @@ MaskRows = Callable[[int, int], NDArray[np.bool_]]
 
 TAPER_SHRINK: Final = 4
 """The taper blends to a blurred block that is computed at this fraction of its size."""
+
+UNCUT_PX: Final = 512
+"""Blocks up to this side stay as they are, however small the picture."""
 
 BORDER_SHARE: Final = 7 / 16
 """Mirrored border around the picture, as a share of the overlap."""
@@ -129,6 +133,20 @@ def lay_spans(size_px: int, block_px: int, overlap_px: int) -> tuple[Span, ...]:
             weights[block_px - overlap_px :] = rise[::-1]
         spans.append(_clip_span(first + i * step, weights, size_px))
     return tuple(spans)
+
+
+def cut_block_px(block_px: int, overlap_px: int, size_px: tuple[int, int]) -> int:
+    """Give the side of the blocks of a picture: none much larger than the picture is.
+
+    Args:
+        block_px: As the bundle states it.
+        overlap_px: Overlap of neighbours.
+        size_px: Two sides of the picture.
+    """
+    border = int(overlap_px * BORDER_SHARE)
+    covering = cv2.getOptimalDFTSize(max(size_px) + 2 * border + TAPER_SHRINK)
+    covering += -covering % TAPER_SHRINK
+    return min(block_px, max(covering, UNCUT_PX, 2 * overlap_px))
 
 
 def _rise(overlap_px: int) -> FloatArray:

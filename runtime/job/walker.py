@@ -71,6 +71,11 @@ class Walk:
         flexible = [work for work in running if work.fit is not None]
         cap = job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
         spent = self._fixed_bytes(running)
+        if spent > cap and not flexible:
+            raise ContractError(
+                f"this takes about {spent // 10**6} MB, the cap is {cap // 10**6} MB; "
+                "raise --max-mem"
+            )
         for number, work in enumerate(flexible):
             assert work.fit is not None
             share = max(cap - spent, 1) // (len(flexible) - number)
