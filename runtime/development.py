@@ -5,7 +5,7 @@ import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import Any, Final, Literal, Self, get_args
 
 from camkit.errors import ContractError
 from camkit.runtime.capture import MosaicOptions
@@ -21,6 +21,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
 
 FileFormat = Literal["exr", "tiff", "png", "dng"]
+LINEAR_FORMATS: Final = frozenset({"exr", "dng"})
 Status = Literal["ok", "failed", "skipped"]
 
 
@@ -49,6 +50,8 @@ class WriteOptions:
             raise ContractError(
                 f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"
             )
+        if self.linear and self.format in LINEAR_FORMATS:
+            raise ContractError(f"{self.format} is always linear; leave --linear out")
         if self.jobs < 1:
             raise ContractError(f"jobs must be >= 1; got {self.jobs}")
         if self.resume and self.overwrite:

@@ -119,6 +119,7 @@ class Job:
                     f"has {self.capture.channels} channel(s)"
                 )
             return
+        self._check_camera(bundle.manifest.name)
         wanted = bundle.manifest.sensor.inputs
         if self.capture.contract not in wanted:
             raise ContractError(
@@ -127,6 +128,20 @@ class Job:
             )
         if self.capture.contract != wanted[0]:
             self.notes.append(f"a linear RGB capture in a {wanted[0]} bundle: not demosaicked")
+
+    def _check_camera(self, name: str) -> None:
+        """Refuse a capture of another camera; warn where that can only be feared."""
+        capture, options = self.capture, self.options
+        if capture.bundle_name not in (None, name):
+            told = f"the capture names bundle {capture.bundle_name}, not {name}"
+            if not options.force_bundle:
+                raise ContractError(f"{told}; leave --bundle out, or say --force-bundle")
+            self.notes.append(f"{told}: the blur of another lens is undone")
+        elif capture.bundle_name is None and capture.camera and options.assume is not None:
+            self.notes.append(
+                f"the file names the camera {capture.camera}: unless the lens of bundle {name} was "
+                "on it, the blur of another lens is undone"
+            )
 
     @cached_property
     def placement(self) -> Placement:
