@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Final
 
 from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.runtime.cancel import Cancel, Cancelled
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.files.regular_file import check_regular
-from camkit.runtime.network.tiling import Cancel, Cancelled
 from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
 from camkit.runtime.output.claim import claimed
 from camkit.runtime.output.sidecar import read_sidecar
@@ -196,8 +196,8 @@ def process(
         options: What changes the pixels. Single fields may also be given by name (size="S").
         write: Where and how to write, how many at once. Single fields also by name (jobs=2).
         mosaic: How to read headerless mosaics.
-        progress: Called with (file, done, total) at every tile, from the working thread.
-        cancel: Asked at every tile; true ends the run with `Cancelled`, finished files stay.
+        progress: Called with (file, work done, work in all) from the working thread.
+        cancel: Asked ten times a second; true ends the run with `Cancelled`, finished files stay.
         on_result: Called with each result as it is ready.
         **choices: Single fields of `Options` and `WriteOptions` by name.
 

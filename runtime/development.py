@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
 
 from camkit.errors import ContractError
+from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
-from camkit.runtime.network.tiling import Cancel, Progress
+from camkit.runtime.network.tiling import Progress
 from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.picture_writer import PictureFormat
@@ -146,7 +147,7 @@ def develop_file(
         Cancelled: If `cancel` said so.
     """
     began = time.perf_counter()
-    capture = pipeline.read(source, mosaic)
+    capture = pipeline.read(source, mosaic, cancel=cancel)
     decode_s = time.perf_counter() - began
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb

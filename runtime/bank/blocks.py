@@ -25,6 +25,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, transform
+from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RowSource
 
@@ -311,6 +312,7 @@ class BlockBank:
         source: RowSource,
         saturated: MaskRows | None = None,
         plain: PlainBlock | None = None,
+        cancel: Cancel | None = None,
     ) -> Iterator[FloatArray]:
         """Restore a picture from top to bottom.
 
@@ -319,12 +321,14 @@ class BlockBank:
             saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (c, rows, w);
                 asked after those rows were read.
             plain: Tells which blocks, given as (row span, column span), stay as they are.
+            cancel: Asked before every block.
 
         Yields:
             (c, rows, w) float32, consecutive.
 
         Raises:
             ContractError: If the source has another size.
+            Cancelled: If `cancel` said so.
         """
         width, height = self._psf.window.size_px
         channels = self._psf.channels
@@ -341,7 +345,7 @@ class BlockBank:
             mask = None if saturated is None else saturated(top, bottom)
             strip = _Strip(rows, mask, top, span, plain)
             total = _lengthened(total, span.start + span.inner.stop - done)
-            self._add_blocks(strip, total[:, span.start + span.inner.start - done :])
+            self._add_blocks(strip, total[:, span.start + span.inner.start - done :], cancel)
             last = i + 1 == len(self._rows)
             ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
             finished, total = total[:, : ready - done].copy(), total[:, ready - done :].copy()
@@ -351,16 +355,19 @@ class BlockBank:
             yield finished
             del finished
 
-    def _add_blocks(self, strip: "_Strip", total: FloatArray) -> None:
+    def _add_blocks(self, strip: "_Strip", total: FloatArray, cancel: Cancel | None) -> None:
         """Add the windowed blocks of one block row to its rows, from left to right."""
         # The threads end with the block row: a generator that waits for its next reader must not
         # own any, since the garbage collector may close it while another thread is starting.
         with ThreadPoolExecutor(self._threads) as pool:
-            for column, part in zip(self._columns, self._restore(strip, pool), strict=True):
+            restored = self._restore(strip, pool, cancel)
+            for column, part in zip(self._columns, restored, strict=True):
                 x = column.start + column.inner.start
                 total[:, :, x : x + part.shape[2]] += part
 
-    def _restore(self, strip: "_Strip", pool: ThreadPoolExecutor) -> Iterator[FloatArray]:
+    def _restore(
+        self, strip: "_Strip", pool: ThreadPoolExecutor, cancel: Cancel | None
+    ) -> Iterator[FloatArray]:
         """Give the windowed blocks of one block row, from left to right."""
         places = [self._psf.position_mm(c.centre, strip.span.centre) for c in self._columns]
         filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
@@ -377,6 +384,7 @@ class BlockBank:
         otfs = {key: pool.submit(self._otf, key) for key in keys}
 
         def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
+            check_cancelled(cancel)
             window = strip.span.weights[:, None] * column.weights
             if strip.is_plain(column):
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window

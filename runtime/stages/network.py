@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -105,7 +106,7 @@ class _NetworkStage:
         networks = [
             SizedNetwork(
                 size=size,
-                run=job.setup.networks(entry.role, size).run,
+                run=partial(job.setup.networks(entry.role, size).run, cancel=job.cancel),
                 facts=bundle.network_facts(entry.role, size),
             )
             for size in work.sizes()
@@ -143,7 +144,7 @@ class _NetworkStage:
         )
         bands = self._windows.bands(
             given_rows(entry, job, taken),
-            progress=job.progress,
+            progress=lambda done, total: job.meter.reach(entry.gives[0], done / total),
             cancel=job.cancel,
             guard=self._guard,
             stand_in=stand_in,

@@ -46,7 +46,7 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         planes, mask = taken[0], taken[1] if len(taken) > 1 else None
         bank = make_bank(entry, job, planes)
         unknown = None if mask is None else mask.rows().read
-        bands = bank.restore_bands(planes.rows(), unknown, _plain(job))
+        bands = bank.restore_bands(planes.rows(), unknown, _plain(job), job.cancel)
         return (planes.with_bands(bands),)
 
     size_px = job.capture.width, job.capture.height

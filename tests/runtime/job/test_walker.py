@@ -246,7 +246,8 @@ def test_for_a_branch_that_nobody_reads_nothing_is_kept(tmp_path: Path) -> None:
     rows = start(camera, capture, tile_px=32).rows_of("near")
     rows.read(0, 10)
     rows.read(600, 640)
-    rolling = rows._source._source._rows  # type: ignore[attr-defined]  # timed, channels, reader
+    # metered, timed, channels, reader
+    rolling = rows._source._source._source._rows  # type: ignore[attr-defined]
     assert sum(band.shape[1] for _, band in rolling._kept) < 200
 
 
