@@ -25,12 +25,14 @@ if TYPE_CHECKING:
         UnsupportedError,
     )
     from camkit.runtime.batch import process
+    from camkit.runtime.cancel import Cancelled
     from camkit.runtime.development import FileResult
     from camkit.runtime.pipeline import Pipeline, load
 
 __all__ = [
     "BundleError",
     "CamkitError",
+    "Cancelled",
     "ContractError",
     "DecodeError",
     "FileResult",
@@ -49,6 +51,7 @@ _HOMES = {
     "Pipeline": "camkit.runtime.pipeline",
     "process": "camkit.runtime.batch",
     "FileResult": "camkit.runtime.development",
+    "Cancelled": "camkit.runtime.cancel",
 }
 
 

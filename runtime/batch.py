@@ -1,7 +1,7 @@
 """Many captures: which files, which bundle for each, where the pictures go, what is done already.
 
     files -> expand -> plan (bundles, names, clashes: errors before any work) -> run, `jobs` at once
-          -> NAME.ext and NAME.camkit.json, written to .part and renamed
+          -> NAME.ext and NAME.camkit.json, claimed, written to part files and renamed
 
 One file's failure never stops the others; `resume` skips only what a sidecar proves done.
 """
@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Final
 
 from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.runtime.cancel import Cancel, Cancelled
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.files.regular_file import check_regular
-from camkit.runtime.network.tiling import Cancel, Cancelled
 from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
+from camkit.runtime.output.claim import claimed
 from camkit.runtime.output.sidecar import read_sidecar
 from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.raw import named_bundle
@@ -35,6 +36,7 @@ RAW_SUFFIXES: Final = frozenset(
 )
 CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
 NO_BUNDLE: Final = "none"
+_ELSEWHERE: Final = "another process makes this picture"
 _NAMELESS: Final = "names no bundle; say --bundle NAME, or --bundle none"
 
 
@@ -47,12 +49,14 @@ class Task:
         target: The picture to write.
         bundle: Name or path of the bundle; "none" only develops.
         refusal: Why the file cannot be done, when that is known beforehand.
+        before: State of the target then; None without one.
     """
 
     source: Path
     target: Path
     bundle: str
     refusal: str | None = None
+    before: tuple[int, int, int] | None = None
 
 
 def expand(files: Sequence[str | Path]) -> list[Path]:
@@ -129,7 +133,22 @@ def _make_task(source: Path, bundle: str | None, write: WriteOptions) -> Task:
         chosen = named_bundle(source)
         if chosen is None:
             refusal = f"{source} {_NAMELESS}"
-    return Task(source=source, target=target, bundle=chosen or NO_BUNDLE, refusal=refusal)
+    return Task(
+        source=source,
+        target=target,
+        bundle=chosen or NO_BUNDLE,
+        refusal=refusal,
+        before=_state_of(target),
+    )
+
+
+def _state_of(path: Path) -> tuple[int, int, int] | None:
+    """Give what changes when a file is written anew; None without a file."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def _refusal(source: Path) -> str | None:
@@ -177,8 +196,8 @@ def process(
         options: What changes the pixels. Single fields may also be given by name (size="S").
         write: Where and how to write, how many at once. Single fields also by name (jobs=2).
         mosaic: How to read headerless mosaics.
-        progress: Called with (file, done, total) at every tile, from the working thread.
-        cancel: Asked at every tile; true ends the run with `Cancelled`, finished files stay.
+        progress: Called with (file, work done, work in all) from the working thread.
+        cancel: Asked ten times a second; true ends the run with `Cancelled`, finished files stay.
         on_result: Called with each result as it is ready.
         **choices: Single fields of `Options` and `WriteOptions` by name.
 
@@ -288,21 +307,12 @@ def _run_task(task: Task, pipelines: _Pipelines, common: _Common) -> FileResult:
     if task.refusal is not None:
         return FileResult.failure(task.source, None, task.refusal)
     named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
-    write = common.write
     try:
         pipeline = pipelines.get(task.bundle)
-        if write.resume and proved_done(task.source, task.target, pipeline, write, common.mosaic):
-            return FileResult.skip(task.source, task.target, pipeline)
-        tick = None if common.progress is None else _tick(common.progress, task.source)
-        return develop_file(
-            task.source,
-            task.target,
-            pipeline,
-            write,
-            mosaic=common.mosaic,
-            progress=tick,
-            cancel=common.cancel,
-        )
+        with claimed(task.target) as ours:
+            if not ours:
+                return FileResult.skip(task.source, task.target, pipeline, _ELSEWHERE)
+            return _make(task, pipeline, common)
     except Cancelled:
         raise
     except (CamkitError, OSError) as error:
@@ -311,6 +321,31 @@ def _run_task(task: Task, pipelines: _Pipelines, common: _Common) -> FileResult:
     except MemoryError as error:
         logger.debug("%s failed", task.source, exc_info=error)
         return FileResult.failure(task.source, named, f"not enough memory: {error}".rstrip(": "))
+
+
+def _make(task: Task, pipeline: Pipeline, common: _Common) -> FileResult:
+    """Make a picture that nobody else makes now, unless it is done already.
+
+    Raises:
+        ContractError: If somebody put another file in its place since the run began.
+    """
+    write = common.write
+    appeared = _state_of(task.target) != task.before
+    if write.resume or appeared:
+        if proved_done(task.source, task.target, pipeline, write, common.mosaic):
+            return FileResult.skip(task.source, task.target, pipeline, *[_ELSEWHERE][:appeared])
+        if appeared and task.target.exists() and not write.overwrite:
+            raise ContractError(f"{task.target} appeared since the run began; it is left as it is")
+    tick = None if common.progress is None else _tick(common.progress, task.source)
+    return develop_file(
+        task.source,
+        task.target,
+        pipeline,
+        write,
+        mosaic=common.mosaic,
+        progress=tick,
+        cancel=common.cancel,
+    )
 
 
 def _tick(progress: FileProgress, source: Path) -> Callable[[int, int], None]:

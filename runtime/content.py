@@ -38,6 +38,9 @@ TELLABLE: Final = 0.03
 """Detail below this share of the noise cannot be told from noise (2 % is one standard deviation
 of a cell's steps) and counts as this much."""
 
+LIGHT_PX: Final = 32
+"""Side of the squares that say where samples are clipped."""
+
 CellArray = NDArray[np.float64]
 
 
@@ -55,6 +58,8 @@ class Content:
         clipped: (row, column) share of 2x2 cells with a clipped sample.
         field: (row, column) distance of the cell's middle from the axis over the half diagonal of
             the sensor.
+        lights: (row, column) of LIGHT_PX squares, true where any sample is clipped; every sample
+            was looked at.
     """
 
     height_px: int
@@ -65,6 +70,7 @@ class Content:
     noise: CellArray
     clipped: CellArray
     field: CellArray
+    lights: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
         wanted = lattice_shape(self.height_px, self.width_px)
@@ -72,6 +78,9 @@ class Content:
             got = getattr(self, name)
             if got.shape != wanted or not np.isfinite(got).all():
                 raise ContractError(f"{name} must be finite {wanted} cells; got {got.shape}")
+        places = -(-self.height_px // LIGHT_PX), -(-self.width_px // LIGHT_PX)
+        if self.lights.shape != places:
+            raise ContractError(f"lights must be {places} squares; got {self.lights.shape}")
         if (self.detail <= 0).any() or (self.noise <= 0).any():
             raise ContractError("detail and noise must be > 0")
 
@@ -161,6 +170,7 @@ def measure_content(
         noise=noise_steps,
         clipped=clipped,
         field=_field(window, capture.height, capture.width),
+        lights=_lights(capture),
     )
 
 
@@ -192,6 +202,18 @@ def _clipped_bins(capture: Capture, top: int) -> NDArray[np.float32]:
     return np.asarray(
         above[:, ::2] | above[:, 1::2] | below[:, ::2] | below[:, 1::2], dtype=np.float32
     )
+
+
+def _lights(capture: Capture) -> NDArray[np.bool_]:
+    """Give the squares of LIGHT_PX that hold a clipped sample."""
+    height, width = capture.height, capture.width
+    lefts = np.arange(0, width, LIGHT_PX)
+    found = np.zeros((-(-height // LIGHT_PX), lefts.size), dtype=np.bool_)
+    for row, top in enumerate(range(0, height, LIGHT_PX)):
+        clipped = capture.saturated_rows(top, min(top + LIGHT_PX, height))
+        columns = clipped.reshape(-1, width).any(axis=0)
+        found[row] = np.logical_or.reduceat(columns, lefts)
+    return found
 
 
 class _Sums:

@@ -5,22 +5,24 @@ import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import Any, Final, Literal, Self, get_args
 
 from camkit.errors import ContractError
+from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.memory import peak_rss_mb
-from camkit.runtime.network.tiling import Cancel, Progress
+from camkit.runtime.network.tiling import Progress
 from camkit.runtime.output.band_queue import BandQueue
-from camkit.runtime.output.part_file import atomic_output
+from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY, PictureFormat
-from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, write_sidecar
+from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, sidecar_text
 from camkit.runtime.output.writer import SUFFIXES, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
 
 FileFormat = Literal["exr", "tiff", "png", "jpeg", "dng"]
+LINEAR_FORMATS: Final = frozenset({"exr", "dng"})
 Status = Literal["ok", "failed", "skipped"]
 
 
@@ -53,6 +55,8 @@ class WriteOptions:
             raise ContractError(
                 f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"
             )
+        if self.linear and self.format in LINEAR_FORMATS:
+            raise ContractError(f"{self.format} is always linear; leave --linear out")
         if self.format == "jpeg" and self.linear:
             raise ContractError("8 bits hold no linear light; say --format png or tiff")
         if self.jpeg_quality is not None and self.format != "jpeg":
@@ -115,8 +119,8 @@ class FileResult:
         )
 
     @classmethod
-    def skip(cls, source: Path, target: Path, pipeline: Pipeline) -> Self:
-        """Give the result of an input that was done before."""
+    def skip(cls, source: Path, target: Path, pipeline: Pipeline, *warnings: str) -> Self:
+        """Give the result of an input that was done before, or is done by another process."""
         return cls(
             input=source,
             output=target,
@@ -125,6 +129,7 @@ class FileResult:
             size=pipeline.size,
             seconds={},
             peak_rss_mb=peak_rss_mb(),
+            warnings=warnings,
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -157,13 +162,14 @@ def develop_file(
         Cancelled: If `cancel` said so.
     """
     began = time.perf_counter()
-    capture = pipeline.read(source, mosaic)
+    capture = pipeline.read(source, mosaic, cancel=cancel)
     decode_s = time.perf_counter() - began
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
     work = pipeline.start(capture, progress=progress, cancel=cancel)
-    estimate = work.explain()
-    with atomic_output(target) as part:
+    # who asks for a time has had the machine timed; nobody else waits for it
+    estimate = None if pipeline.options.max_seconds is None else work.explain()
+    with atomic_outputs(sidecar_path(target), target) as (proof, part):
         write_s = _write_picture(part, work, write)
         output_sha256 = file_sha256(part)
         seconds = {"decode": decode_s, **work.seconds, "write": write_s}
@@ -192,7 +198,7 @@ def develop_file(
             "exposure_time_s": capture.exposure_time_s,
             "metadata": {} if write.strip_metadata else work.origin.metadata.stated(),
         }
-        write_sidecar(target, record)  # the picture gets its name when its proof has one
+        proof.write_text(sidecar_text(record), encoding="utf-8")
     return result
 
 

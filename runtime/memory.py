@@ -1,9 +1,11 @@
 """The peak memory of this process, and arrays that lie in a file instead."""
 
+import ctypes
 import mmap
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,38 @@ def _max_rss_mb() -> float:
         return 0.0
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+def trim_heap(limit_bytes: int) -> None:
+    """Give freed memory back to the system where the process takes more than a limit.
+
+    The C library keeps what was freed between two blocks in use: up to a quarter of the memory of
+    a large picture. Giving it back costs milliseconds, so it is done near the limit only. Nothing
+    happens where the C library is not glibc.
+    """
+    if _MALLOC_TRIM is not None and _resident_bytes() > limit_bytes:
+        _MALLOC_TRIM(0)
+
+
+def _resident_bytes() -> int:
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, IndexError, ValueError):
+        return 0
+    return pages * mmap.PAGESIZE
+
+
+def _malloc_trim() -> Callable[[int], int] | None:
+    if sys.platform != "linux":
+        return None
+    try:
+        found: Callable[[int], int] = ctypes.CDLL(None).malloc_trim
+    except (OSError, AttributeError):
+        return None
+    return found
+
+
+_MALLOC_TRIM: Final = _malloc_trim()
 
 
 def mapping_of(samples: NDArray[Any]) -> mmap.mmap | None:

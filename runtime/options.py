@@ -43,6 +43,7 @@ class Options:
         vignetting: Divide by the relative illumination.
         undistort: Undo the radial distortion.
         assume: What the caller vouches for where the capture's size does not match the sensor.
+        force_bundle: Take the bundle also for captures that name another one.
         on_unsafe: What becomes of a capture outside the bundle's envelope, and of a tile whose
             output is not finite or not bounded: warn (a bad tile is an error), fallback (the
             Wiener result of capture or tile), fail (an error before work).
@@ -69,6 +70,7 @@ class Options:
     vignetting: bool = True
     undistort: bool = True
     assume: Assumption | None = None
+    force_bundle: bool = False
     on_unsafe: OnUnsafe = "warn"
     max_mem_bytes: int | None = None
     threads: int | None = None
@@ -82,6 +84,10 @@ class Options:
         for name, value in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
             if value is not None and not 0 < value < 1e6:
                 raise ContractError(f"the most {name} must be > 0; got {value}")
+        if self.max_seconds is not None and self.quality != "exact":
+            raise ContractError(
+                "--max-seconds finds the best quality that fits by itself; leave --quality out"
+            )
         _check_depth(self.depth_m)
         _check_choice("mode", self.mode, get_args(Mode))
         _check_choice("dtype", self.dtype, get_args(Dtype))

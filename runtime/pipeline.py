@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import BAYER
+from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction
@@ -29,7 +30,7 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import runtime_part
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
-from camkit.runtime.network.tiling import Cancel, Progress
+from camkit.runtime.network.tiling import Progress
 from camkit.runtime.options import Options
 from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
@@ -102,6 +103,12 @@ class Pipeline:
             for role in bundle.manifest.networks:
                 self.network(role, self.size)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what the pipeline was made from; the bundle is opened again by its hash."""
+        bundle = self.bundle
+        known = None if bundle is None else (bundle.path, bundle.manifest.name, bundle.sha256)
+        return _reopened, (known, self.options)
+
     def network(self, role: str, size: str) -> NetworkEngine:
         """Give the network of a role and size, made when first asked for.
 
@@ -118,28 +125,34 @@ class Pipeline:
 
     def speed(self, sizes: Sequence[str]) -> Speed:
         """Give how fast this machine is; networks and bank are timed once per pipeline."""
-        roles = () if self.bundle is None else tuple(self.bundle.manifest.networks)
+        bundle = self.bundle
+        roles = () if bundle is None else bundle.manifest.networks
         new = {
-            (role, size): self.network(role, size)
+            (role, size): (self.network(role, size), bundle.network_facts(role, size))
             for role in roles
             for size in sizes
-            if (role, size) not in self._speeds
+            if bundle is not None and (role, size) not in self._speeds
         }
         with self._lock:
             if self._speed is None or new:
-                stage = None if self.bundle is None else self.bundle.manifest.stage(Wiener)
+                stage = None if bundle is None else bundle.manifest.stage(Wiener)
                 made = measure_speed(new, stage, threads=self.threads)
                 self._speeds.update(made.network_s_per_mp)
                 self._speed = self._speed or made
             return replace(self._speed, network_s_per_mp=dict(self._speeds))
 
-    def read(self, file: Path, mosaic: MosaicOptions | None = None) -> Capture:
+    def read(
+        self, file: Path, mosaic: MosaicOptions | None = None, *, cancel: Cancel | None = None
+    ) -> Capture:
         """Read a capture of the bundle's kind of camera.
 
         Raises:
             DecodeError: If the file cannot be read.
+            Cancelled: If `cancel` said so.
         """
-        return self._part.read(file, mosaic, None if self.bundle is None else self.bundle.manifest)
+        with cancellable(cancel):
+            manifest = None if self.bundle is None else self.bundle.manifest
+            return self._part.read(file, mosaic, manifest)
 
     def start(
         self,
@@ -153,8 +166,8 @@ class Pipeline:
 
         Args:
             capture: What the sensor gave.
-            progress: Called with (tiles done, tiles in all).
-            cancel: Asked at every tile; true raises `Cancelled`.
+            progress: Called with (work done, work in all), over all stages.
+            cancel: Asked ten times a second; true raises `Cancelled`.
             known: Planes of this capture that another reconstruction kept, by name.
 
         Raises:
@@ -184,8 +197,8 @@ class Pipeline:
             file: RAW, DNG, EXR, TIFF or PNG.
             mosaic: How to read a headerless mosaic.
             out: (3, h, w) float32 to fill; a new array when None.
-            progress: Called with (tiles done, tiles in all).
-            cancel: Asked at every tile; true raises `Cancelled`.
+            progress: Called with (work done, work in all), over all stages.
+            cancel: Asked ten times a second; true raises `Cancelled`.
 
         Raises:
             DecodeError: If the file cannot be read.
@@ -215,8 +228,8 @@ class Pipeline:
             file: RAW, DNG, EXR, TIFF or PNG.
             on_band: Called with (first row, band (3, rows, w) float32) from top to bottom.
             mosaic: How to read a headerless mosaic.
-            progress: Called with (tiles done, tiles in all).
-            cancel: Asked at every tile; true raises `Cancelled`.
+            progress: Called with (work done, work in all), over all stages.
+            cancel: Asked ten times a second; true raises `Cancelled`.
 
         Raises:
             DecodeError: If the file cannot be read.
@@ -243,7 +256,7 @@ class Pipeline:
     ) -> tuple[Reconstruction, float]:
         """Read a capture and plan its reconstruction; also give the seconds of reading."""
         began = time.perf_counter()
-        capture = self.read(Path(file), mosaic)
+        capture = self.read(Path(file), mosaic, cancel=cancel)
         decode_s = time.perf_counter() - began
         return self.start(capture, progress=progress, cancel=cancel), decode_s
 
@@ -267,8 +280,8 @@ class Pipeline:
             white_balance: Gains (R, G, B); None takes those of the bundle's illuminant.
             origin_px: (x, y) of the first pixel on the sensor, for a crop; None for a whole frame.
             out: (3, H, W) float32 to fill; a new array when None.
-            progress: Called with (tiles done, tiles in all).
-            cancel: Asked at every tile; true raises `Cancelled`.
+            progress: Called with (work done, work in all), over all stages.
+            cancel: Asked ten times a second; true raises `Cancelled`.
 
         Returns:
             (3, H, W) float32, linear, Rec.709 unless the options ask otherwise.
@@ -325,6 +338,24 @@ def load(
     if bundle is None or str(bundle).lower() == "none":
         return Pipeline(None, chosen)
     return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
+
+
+def _reopened(known: tuple[Path, str, str] | None, options: Options) -> Pipeline:
+    """Give the pipeline that was pickled.
+
+    Raises:
+        BundleError: If neither the path nor the name leads to the same bundle.
+    """
+    if known is None:
+        return Pipeline(None, options)
+    path, name, sha256 = known
+    bundle = open_bundle(path if path.is_file() else find_bundle(name))
+    if bundle.sha256 != sha256:
+        raise BundleError(
+            f"{bundle.path} is not the bundle {name} that was pickled: its sha256 is "
+            f"{bundle.sha256}, not {sha256}; give every process the same file"
+        )
+    return Pipeline(bundle, options)
 
 
 def _engine(

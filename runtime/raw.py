@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 import camkit
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.raw_tags import sensor_place
@@ -170,10 +171,11 @@ def _read_isolated(path: Path, limits: _Limits) -> Capture:
         timer = threading.Timer(limits.timeout_s, _expire, (child, expired))
         timer.start()
         try:
-            sha256 = file_sha256(path)
-            capture = _receive(child)
-            if capture is not None and child.wait() == 0:
-                return replace(capture, sha256=sha256)
+            with watched(current_wish(), child.kill):
+                sha256 = file_sha256(path)
+                capture = _receive(child)
+                if capture is not None and child.wait() == 0:
+                    return replace(capture, sha256=sha256)
         finally:
             timer.cancel()
             child.kill()

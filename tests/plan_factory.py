@@ -12,7 +12,7 @@ from camkit.bundle.stages import Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import RadialDistortion
-from camkit.runtime.content import CELL_PX, Content
+from camkit.runtime.content import CELL_PX, LIGHT_PX, Content
 from camkit.runtime.plan.loss import LossModel, plan_entries
 from tests.bundle_factory import (
     tiny_facts,
@@ -53,6 +53,7 @@ def made_content(
         noise=noise * like,
         clipped=clipped * like,
         field=field * like,
+        lights=np.full([CELL_PX // LIGHT_PX * side for side in detail.shape], clipped > 0),
     )
 
 

@@ -1,8 +1,9 @@
-"""The main job, end to end: photograph a scene with `duet`, process the DNG, show what it gained.
+"""The main job, end to end: photograph two scenes with `duet`, process the DNGs, show the gain.
 
     python -m tools.demo --out-dir out
 
-leaves demo.dng, demo.exr, demo.png, their sidecars, and before_after.png.
+Confetti fills a quarter of the sensor, from the axis to a corner; a photograph lies half way out.
+Leaves confetti.dng and .exr, photo.dng and .png, their sidecars, and before_after.png.
 """
 
 import argparse
@@ -22,17 +23,25 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import apply_matrix, encode_srgb
 from camkit.contracts import FloatArray
+from camkit.runtime.files.picture import read_scene
 from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.signal.demosaic import demosaic
-from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate, write_capture
+from camkit.runtime.twin.simulate import (
+    Simulation,
+    SimulationOptions,
+    photograph,
+    write_capture,
+)
 from camkit.scenes import procedural_scene
 from tools.capture.simulated import rec709_of
 
-CROP_PX = 512
+CROP_PX = 384
 BORDER_PX = 32
 EXPOSURE = 0.5
 FIELDS = (0.0, 0.25, 0.5, 0.75, 0.95)
+PHOTO = Path(__file__).parent / "scenes" / "coffee.png"
+"""600x400, by Rachel Michetti, CC0; see scenes/README.md."""
 
 
 def main() -> None:
@@ -45,33 +54,44 @@ def main() -> None:
     arguments = parser.parse_args()
     out_dir: Path = arguments.out_dir
     out_dir.mkdir(parents=True, exist_ok=True)
+    began = time.perf_counter()
 
     bundle = open_bundle(find_bundle(arguments.bundle))
     sensor = _mosaic_sensor(bundle)
-    print("photographing a 24-megapixel scene (about a minute) ...", flush=True)
-    began = time.perf_counter()
-    scene = procedural_scene(arguments.seed, sensor.height_px, sensor.width_px)
-    simulation = simulate(
-        scene,
-        sensor,
-        bundle.psf,
-        SimulationOptions(
-            iso=arguments.iso,
-            seed=1,
-            exposure=EXPOSURE,
-            workers=available_threads(None),
-        ),
-    )
-    del scene
-    capture = out_dir / "demo.dng"
-    write_capture(capture, simulation, sensor, bundle.manifest.name)
-    print(f"{capture}: photographed in {time.perf_counter() - began:.1f} s")
+    width, height = sensor.width_px // 4 * 2, sensor.height_px // 4 * 2
+    confetti = procedural_scene(arguments.seed, height, width)
+    photo = read_scene(PHOTO)
+    half_way = (width * 3 - photo.shape[2]) // 2, (height * 3 - photo.shape[1]) // 2
+    taken = {
+        "confetti": _photograph(confetti, bundle, (width, height), arguments.iso),
+        "photo": _photograph(photo, bundle, half_way, arguments.iso),
+    }
+    for name, simulation in taken.items():
+        write_capture(out_dir / f"{name}.dng", simulation, sensor, bundle.manifest.name)
+        shape = "x".join(map(str, simulation.samples.shape[::-1]))
+        print(f"{out_dir / name}.dng: {shape} at {simulation.window.origin_px}")
+    print(f"photographed in {time.perf_counter() - began:.1f} s\n", flush=True)
 
-    plan = ("plan", str(capture), "--bundle", arguments.bundle)
+    plan = ("plan", str(out_dir / "confetti.dng"), "--bundle", arguments.bundle)
     subprocess.run([sys.executable, "-m", "camkit", *plan], check=True)
-    for suffix in ("exr", "png"):
-        _process(capture, arguments.bundle, out_dir, suffix)
-    _show_quality(simulation, arguments.bundle, arguments.iso, out_dir / "before_after.png")
+    print(flush=True)
+    for name, suffix in (("confetti", "exr"), ("photo", "png")):
+        _process(out_dir / f"{name}.dng", arguments.bundle, out_dir, suffix)
+    _show_quality(taken, arguments.bundle, arguments.iso, out_dir / "before_after.png")
+    print(f"all of it in {time.perf_counter() - began:.0f} s")
+
+
+def _photograph(
+    scene: FloatArray, bundle: Bundle, origin_px: tuple[int, int], iso: float
+) -> Simulation:
+    options = SimulationOptions(
+        iso=iso,
+        seed=1,
+        exposure=EXPOSURE,
+        origin_px=(origin_px[0] // 2 * 2, origin_px[1] // 2 * 2),
+        workers=available_threads(None),
+    )
+    return photograph(scene, bundle, options)
 
 
 def _mosaic_sensor(bundle: Bundle) -> BayerSensor:
@@ -99,37 +119,58 @@ def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
         print(f"  note: {warning}")
 
 
-def _show_quality(simulation: Simulation, name: str, iso: float, picture: Path) -> None:
-    """Compare crops from axis to corner with the sharp scene, in sensor geometry."""
+def _show_quality(taken: dict[str, Simulation], name: str, iso: float, picture: Path) -> None:
+    """Compare crops with the sharp scenes, in sensor geometry."""
     bundle = open_bundle(find_bundle(name))
-    matrix = rec709_of(_mosaic_sensor(bundle))
     methods = {
-        "wiener": camkit.load(name, method="wiener", undistort=False),
-        "net M": camkit.load(name, undistort=False),
+        "Wiener": camkit.load(name, method="wiener", undistort=False),
+        "network": camkit.load(name, undistort=False),
     }
-    height, width = simulation.samples.shape
-    red, green, blue = simulation.white_balance
+    heads = ("as taken", *methods)
+    print("\nPSNR in dB against the sharp scene, on sRGB values, before undistortion")
+    print(f"{'scene':<10}{'distance from axis':<20}" + "".join(f"{head:>10}" for head in heads))
+    print(f"{'':<10}{'share of half field':<20}" + f"{'dB':>10}" * len(heads))
     rows = []
-    print("\nPSNR in dB on sRGB values, sensor geometry, 512-px crops from axis to corner")
-    print("field   " + "".join(f"{label:>10}" for label in ("input", *methods)))
-    for field in FIELDS:
-        x = int((width / 2 - CROP_PX) * field + (width - CROP_PX) / 2) // 2 * 2
-        y = int((height / 2 - CROP_PX) * field + (height - CROP_PX) / 2) // 2 * 2
-        x, y = min(x, width - CROP_PX) // 2 * 2, min(y, height - CROP_PX) // 2 * 2
-        cut = np.s_[..., y : y + CROP_PX, x : x + CROP_PX]
-        sharp = encode_srgb(apply_matrix(matrix, simulation.clean[cut]))
-        mosaic = np.ascontiguousarray(simulation.samples[cut])
-        tiles = [encode_srgb(_seen(mosaic, simulation, bundle, x, y))]
-        for pipeline in methods.values():
-            image = pipeline.process_array(
-                mosaic, iso=iso, white_balance=(red, green, blue), origin_px=(x, y)
-            )
-            tiles.append(encode_srgb(image))
-        print(f"{field:5.2f}   " + "".join(f"{_psnr(t, sharp):10.2f}" for t in tiles))
-        rows.append(np.concatenate([*tiles, sharp], axis=2))
+    crops = [("confetti", field) for field in FIELDS] + [("photo", None)]
+    for scene, field in crops:
+        simulation = taken[scene]
+        height, width = simulation.samples.shape
+        share = 0.5 if field is None else field
+        x, y = (int((side - CROP_PX) * share) // 2 * 2 for side in (width, height))
+        tiles = _crop(simulation, bundle, methods, (x, y), iso)
+        *made, sharp = tiles
+        place = "half way" if field is None else f"{field:.2f}"
+        numbers = "".join(f"{_psnr(tile, sharp):10.2f}" for tile in made)
+        print(f"{scene:<10}{place:<20}{numbers}")
+        rows.append(np.concatenate(tiles, axis=2))
     sheet = np.concatenate(rows, axis=1).transpose(1, 2, 0)[..., ::-1]
     cv2.imwrite(str(picture), (np.clip(sheet, 0, 1) * 255 + 0.5).astype(np.uint8))
-    print(f"\n{picture}: before, Wiener bank, network, sharp scene; one row per field position")
+    print(f"\n{picture}: columns {', '.join(heads)}, sharp scene; rows as in the table")
+
+
+def _crop(
+    simulation: Simulation,
+    bundle: Bundle,
+    methods: dict[str, camkit.Pipeline],
+    corner: tuple[int, int],
+    iso: float,
+) -> list[FloatArray]:
+    """Give a crop as taken, by every method, and sharp; (3, CROP_PX, CROP_PX), sRGB values."""
+    x, y = corner
+    cut = np.s_[..., y : y + CROP_PX, x : x + CROP_PX]
+    mosaic = np.ascontiguousarray(simulation.samples[cut])
+    left, top = (
+        int(first + more) for first, more in zip(simulation.window.origin_px, corner, strict=True)
+    )
+    red, green, blue = simulation.white_balance
+    tiles = [encode_srgb(_seen(mosaic, simulation, bundle, left, top))]
+    for pipeline in methods.values():
+        image = pipeline.process_array(
+            mosaic, iso=iso, white_balance=(red, green, blue), origin_px=(left, top)
+        )
+        tiles.append(encode_srgb(image))
+    matrix = rec709_of(_mosaic_sensor(bundle))
+    return [*tiles, encode_srgb(apply_matrix(matrix, simulation.clean[cut]))]
 
 
 def _seen(

@@ -365,7 +365,7 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
         width = height * 3 // 2
         with tempfile.TemporaryDirectory() as folder:
             large, mosaic = Path(folder) / "large.camkit", Path(folder) / "mosaic.tif"
-            _write_stretched(bundle, large, width, height)
+            write_stretched(bundle, large, width, height)
             samples = tifffile.memmap(mosaic, shape=(height, width), dtype=np.uint16)
             rng = np.random.default_rng(0)
             middle = (sensor.black_level + sensor.white_level) / 3
@@ -393,7 +393,7 @@ def profile_sizes(arguments: argparse.Namespace) -> None:
             )
 
 
-def _write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:
+def write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None:
     """Write a bundle whose sensor has as many pixels over the same width in millimetres."""
     manifest = bundle.manifest
     extent = manifest.sensor.known_extent

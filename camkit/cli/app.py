@@ -19,6 +19,7 @@ from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
 from camkit.cli.judge.stress import stress
+from camkit.cli.say import say
 from camkit.cli.use.info import info
 from camkit.cli.use.plan import plan
 from camkit.cli.use.process import process
@@ -60,7 +61,7 @@ def options(
     if version:
         from camkit import __version__
 
-        typer.echo(f"camkit {__version__}")
+        say(f"camkit {__version__}")
         raise typer.Exit
 
 
@@ -82,12 +83,12 @@ def run(arguments: Sequence[str]) -> int:
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else ExitCode.INPUT_FAILED
         if code == ExitCode.INTERRUPTED:
-            typer.echo("camkit: interrupted", err=True)
+            say("camkit: interrupted", err=True)
         return code
     except (CamkitError, OSError) as error:
         if debug:
             traceback.print_exc()
-        typer.echo(f"camkit: {_one_line(error)}", err=True)
+        say(f"camkit: {_one_line(error)}", err=True)
         return exit_code_of(error)
     return ExitCode.DONE
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +25,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, transform
+from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows, RowSource
 
@@ -31,6 +33,9 @@ MaskRows = Callable[[int, int], NDArray[np.bool_]]
 
 TAPER_SHRINK: Final = 4
 """The taper blends to a blurred block that is computed at this fraction of its size."""
+
+UNCUT_PX: Final = 512
+"""Blocks up to this side stay as they are, however small the picture."""
 
 BORDER_SHARE: Final = 7 / 16
 """Mirrored border around the picture, as a share of the overlap."""
@@ -129,6 +134,20 @@ def lay_spans(size_px: int, block_px: int, overlap_px: int) -> tuple[Span, ...]:
             weights[block_px - overlap_px :] = rise[::-1]
         spans.append(_clip_span(first + i * step, weights, size_px))
     return tuple(spans)
+
+
+def cut_block_px(block_px: int, overlap_px: int, size_px: tuple[int, int]) -> int:
+    """Give the side of the blocks of a picture: none much larger than the picture is.
+
+    Args:
+        block_px: As the bundle states it.
+        overlap_px: Overlap of neighbours.
+        size_px: Two sides of the picture.
+    """
+    border = int(overlap_px * BORDER_SHARE)
+    covering = cv2.getOptimalDFTSize(max(size_px) + 2 * border + TAPER_SHRINK)
+    covering += -covering % TAPER_SHRINK
+    return min(block_px, max(covering, UNCUT_PX, 2 * overlap_px))
 
 
 def _rise(overlap_px: int) -> FloatArray:
@@ -293,6 +312,7 @@ class BlockBank:
         source: RowSource,
         saturated: MaskRows | None = None,
         plain: PlainBlock | None = None,
+        cancel: Cancel | None = None,
     ) -> Iterator[FloatArray]:
         """Restore a picture from top to bottom.
 
@@ -301,12 +321,14 @@ class BlockBank:
             saturated: Gives the clipped samples of rows top..bottom, (rows, w) or (c, rows, w);
                 asked after those rows were read.
             plain: Tells which blocks, given as (row span, column span), stay as they are.
+            cancel: Asked before every block.
 
         Yields:
             (c, rows, w) float32, consecutive.
 
         Raises:
             ContractError: If the source has another size.
+            Cancelled: If `cancel` said so.
         """
         width, height = self._psf.window.size_px
         channels = self._psf.channels
@@ -323,7 +345,7 @@ class BlockBank:
             mask = None if saturated is None else saturated(top, bottom)
             strip = _Strip(rows, mask, top, span, plain)
             total = _lengthened(total, span.start + span.inner.stop - done)
-            self._add_blocks(strip, total[:, span.start + span.inner.start - done :])
+            self._add_blocks(strip, total[:, span.start + span.inner.start - done :], cancel)
             last = i + 1 == len(self._rows)
             ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
             finished, total = total[:, : ready - done].copy(), total[:, ready - done :].copy()
@@ -333,16 +355,19 @@ class BlockBank:
             yield finished
             del finished
 
-    def _add_blocks(self, strip: "_Strip", total: FloatArray) -> None:
+    def _add_blocks(self, strip: "_Strip", total: FloatArray, cancel: Cancel | None) -> None:
         """Add the windowed blocks of one block row to its rows, from left to right."""
         # The threads end with the block row: a generator that waits for its next reader must not
         # own any, since the garbage collector may close it while another thread is starting.
         with ThreadPoolExecutor(self._threads) as pool:
-            for column, part in zip(self._columns, self._restore(strip, pool), strict=True):
+            restored = self._restore(strip, pool, cancel)
+            for column, part in zip(self._columns, restored, strict=True):
                 x = column.start + column.inner.start
                 total[:, :, x : x + part.shape[2]] += part
 
-    def _restore(self, strip: "_Strip", pool: ThreadPoolExecutor) -> Iterator[FloatArray]:
+    def _restore(
+        self, strip: "_Strip", pool: ThreadPoolExecutor, cancel: Cancel | None
+    ) -> Iterator[FloatArray]:
         """Give the windowed blocks of one block row, from left to right."""
         places = [self._psf.position_mm(c.centre, strip.span.centre) for c in self._columns]
         filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
@@ -359,6 +384,7 @@ class BlockBank:
         otfs = {key: pool.submit(self._otf, key) for key in keys}
 
         def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
+            check_cancelled(cancel)
             window = strip.span.weights[:, None] * column.weights
             if strip.is_plain(column):
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window

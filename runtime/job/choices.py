@@ -13,13 +13,14 @@ from camkit.contracts import depth_weights
 from camkit.errors import ContractError
 from camkit.runtime.job.setup import DEVELOPMENT
 from camkit.runtime.options import Options, flag_of
-from camkit.runtime.plan.decision import DEVELOP
-from camkit.runtime.plan.ways import offered_methods
+from camkit.runtime.plan.decision import DEVELOP, Work
+from camkit.runtime.plan.ways import LEFT_OUT, offered_methods, ways_of
 from camkit.runtime.stage_finder import stage_module
 
 GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method", "unit"})
 ON_A_SENSOR: Final = frozenset({"assume"})
 """What means something wherever the size of the sensor is known."""
+WITH_A_BUNDLE: Final = frozenset({"force_bundle"})
 
 
 def known_options(stages: Sequence[Stage]) -> frozenset[str]:
@@ -38,6 +39,8 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
     known = known_options(stages)
     if bundle is not None and bundle.manifest.sensor.extent is not None:
         known |= ON_A_SENSOR
+    if bundle is not None:
+        known |= WITH_A_BUNDLE
     plain = Options()
     given = [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]
     where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"
@@ -58,8 +61,29 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
         raise ContractError(
             f"method must be one of {', '.join(methods)} {where}; got {options.method!r}"
         )
+    if bundle is not None and (idle := _idle(bundle, options, given)):
+        raise ContractError(
+            f"{', '.join(map(flag_of, idle))} means nothing with --method {options.method}: what "
+            "knows of that is left out; leave it out too"
+        )
     if options.unit is not None:
         options.unit.check(bundle)
     if options.depth_m is not None and bundle is not None:
         assert bundle.manifest.stage(Wiener) is not None  # only a bank knows of depths
         depth_weights(bundle.psf.depths_mm, options.depth_mm)
+
+
+def _idle(bundle: Bundle, options: Options, given: Sequence[str]) -> list[str]:
+    """Name the options that only stages know of which the method leaves out."""
+    stages = bundle.manifest.stages
+    if options.method is None:
+        return []
+    usual, now = (ways_of(stages, Work(method=method)) for method in (None, options.method))
+    left_out = [
+        stage
+        for stage, before, after in zip(stages, usual, now, strict=True)
+        if before != LEFT_OUT and after == LEFT_OUT
+    ]
+    others = [stage for stage in stages if stage not in left_out]
+    idle = known_options(left_out) - known_options(others)
+    return [name for name in given if name in idle]

@@ -13,14 +13,16 @@ from camkit.bundle.plane import Plane
 from camkit.bundle.reader import Bundle
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import COLOURS, Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
 from camkit.runtime.geometry.placement import Placement, place
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.job.meter import Meter
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.network.tiling import Cancel, Progress
+from camkit.runtime.network.tiling import Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.options import Options
 from camkit.runtime.plan.decision import Subject, Work
@@ -37,6 +39,8 @@ class Job:
         setup: What it shares with others.
         capture: The capture.
         clock: Seconds per stage.
+        cancel: The caller's wish to stop.
+        meter: How far it is.
         notes: What the user should know, in the order it was found.
         record: The plan as the sidecar keeps it.
         white_balance: Gains in use; ones where the stages balance nothing.
@@ -63,8 +67,8 @@ class Job:
     ) -> None:
         self.setup = setup
         self.capture = capture
-        self.progress = progress
         self.cancel = cancel
+        self.meter = Meter(progress, cancel)
         self.clock = StageClock()
         self.notes = list(capture.notes)
         self.record: dict[str, Any] = {}
@@ -119,6 +123,7 @@ class Job:
                     f"has {self.capture.channels} channel(s)"
                 )
             return
+        self._check_camera(bundle.manifest.name)
         wanted = bundle.manifest.sensor.inputs
         if self.capture.contract not in wanted:
             raise ContractError(
@@ -127,6 +132,20 @@ class Job:
             )
         if self.capture.contract != wanted[0]:
             self.notes.append(f"a linear RGB capture in a {wanted[0]} bundle: not demosaicked")
+
+    def _check_camera(self, name: str) -> None:
+        """Refuse a capture of another camera; warn where that can only be feared."""
+        capture, options = self.capture, self.options
+        if capture.bundle_name not in (None, name):
+            told = f"the capture names bundle {capture.bundle_name}, not {name}"
+            if not options.force_bundle:
+                raise ContractError(f"{told}; leave --bundle out, or say --force-bundle")
+            self.notes.append(f"{told}: the blur of another lens is undone")
+        elif capture.bundle_name is None and capture.camera and options.assume is not None:
+            self.notes.append(
+                f"the file names the camera {capture.camera}: unless the lens of bundle {name} was "
+                "on it, the blur of another lens is undone"
+            )
 
     @cached_property
     def placement(self) -> Placement:

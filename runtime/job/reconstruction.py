@@ -15,6 +15,7 @@ from camkit.bundle.golden import IMAGE
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
@@ -23,7 +24,7 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.setup import DEVELOPMENT, Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import Walk
-from camkit.runtime.network.tiling import Cancel, Progress
+from camkit.runtime.network.tiling import Progress
 from camkit.runtime.network.windows import NetworkWindows
 from camkit.runtime.output.origin import Origin
 from camkit.runtime.plan.decision import DEVELOP, Labels, Subject, Work
@@ -186,7 +187,11 @@ class Reconstruction:
         Raises:
             ContractError: If there is no such product.
         """
-        return self._walk.stream(self._plane_of(product)).bands()
+        return self._metered(self._walk.stream(self._plane_of(product)).bands())
+
+    def _metered(self, bands: Iterator[Rows]) -> Iterator[Rows]:
+        yield from bands
+        self.job.meter.finish()
 
     def rows_of(self, plane: str) -> RowSource:
         """Give the rows of any plane of the manifest, for export, reports and tests."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from camkit.bundle.plane import Plane
 from camkit.errors import ContractError
 from camkit.runtime.clock import StageClock, TimedRows
+from camkit.runtime.job.meter import Meter, MeteredRows
 from camkit.runtime.rows import PiecedRows, RollingRows, RowReader, Rows, RowSource, read_bands
 
 Shape = tuple[int, int, int]
@@ -69,6 +70,13 @@ class Stream:
             return replace(self, made=clock.bands(name, self.made))
         assert self.source is not None
         return replace(self, source=TimedRows(self.source, clock, name))
+
+    def metered(self, meter: Meter, key: str) -> "Stream":
+        """Give the stream whose rows are counted."""
+        if self.made is not None:
+            return replace(self, made=meter.bands(key, self.made, self.shape[1]))
+        assert self.source is not None
+        return replace(self, source=MeteredRows(self.source, meter, key))
 
     def shared(self, takers: int) -> list["Stream"]:
         """Give a stream for each of several takers; rows are kept until all have read them."""

@@ -71,6 +71,11 @@ class Walk:
         flexible = [work for work in running if work.fit is not None]
         cap = job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
         spent = self._fixed_bytes(running)
+        if spent > cap and not flexible:
+            raise ContractError(
+                f"this takes about {spent // 10**6} MB, the cap is {cap // 10**6} MB; "
+                "raise --max-mem"
+            )
         for number, work in enumerate(flexible):
             assert work.fit is not None
             share = max(cap - spent, 1) // (len(flexible) - number)
@@ -105,12 +110,14 @@ class Walk:
         takers = Counter([last, *(name for number in needed for name in self._taken(number))])
         there = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.known}
         ready = {name: stream.shared(takers[name]) for name, stream in there.items()}
+        job.meter.expect([name for number in needed for name in self.stages[number].gives])
         for number in needed:
             taken = [ready[name].pop() for name in self._taken(number)]
             made = self._works[number].run(taken)
             for name, given in zip(self.stages[number].gives, made, strict=True):
                 if name not in job.known:
-                    ready[name] = given.timed(job.clock, self.keys[number]).shared(takers[name])
+                    counted = given.timed(job.clock, self.keys[number]).metered(job.meter, name)
+                    ready[name] = counted.shared(takers[name])
         return ready[last].pop()
 
     def keep(self, wanted: str) -> Stream:

@@ -22,16 +22,14 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.network.tiling import (
     BANDS_HELD,
-    Cancel,
-    Cancelled,
     PixelCost,
     Progress,
     Run,
-    is_cancelled,
 )
 from camkit.runtime.rows import RowSource
 
@@ -247,8 +245,7 @@ def infer_cells(
         held = buffer.move_to(first)
         band = held[stand_in, top - first : bottom - first, :width].copy()
         for window in windows:
-            if is_cancelled(cancel):
-                raise Cancelled(f"stopped on request after {done} of {layout.window_count} windows")
+            check_cancelled(cancel)
             y0, x0, y1, x1 = window.pixels
             given = np.ascontiguousarray(held[None, :, y0 - first : y1 - first, x0:x1])
             made = _checked(networks[window.network].run(given), given, window, guard)

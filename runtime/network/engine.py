@@ -13,6 +13,7 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
+from camkit.runtime.cancel import Cancel, Cancelled, watched
 
 _IMPORTED_BEFORE = "onnxruntime" in sys.modules and "ORT_DISABLE_TELEMETRY" not in os.environ
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -133,19 +134,27 @@ class NetworkEngine:
         self.scale = scale
         self.channels, self.outputs = _check_contract(self._session)
 
-    def run(self, window: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    def run(
+        self,
+        window: FloatArray,
+        out: FloatArray | None = None,
+        *,
+        cancel: Cancel | None = None,
+    ) -> FloatArray:
         """Run the network on one window; may be called from many threads.
 
         Args:
             window: (1, channels, h, w) float32, C-contiguous, h and w multiples of the network's
                 stride.
             out: (1, outputs, s h, s w) float32, C-contiguous, to be filled; None makes a new one.
+            cancel: Asked while the network runs; true ends it between two of its nodes.
 
         Returns:
             `out`.
 
         Raises:
             ContractError: If shapes or types disagree, or onnxruntime refuses the size.
+            Cancelled: If `cancel` said so.
         """
         window = self._checked(window)
         shape = (1, self.outputs, *(self.scale * side for side in window.shape[2:]))
@@ -158,8 +167,16 @@ class NetworkEngine:
         binding = self._session.io_binding()
         binding.bind_cpu_input("input", window)
         binding.bind_output("output", "cpu", 0, np.float32, shape, out.ctypes.data)
+        running = ort.RunOptions()
+
+        def end() -> None:
+            running.terminate = True
+
         try:
-            self._session.run_with_iobinding(binding)
+            with watched(cancel, end):
+                self._session.run_with_iobinding(binding, running)
+        except Cancelled:
+            raise
         except (RuntimeError, *_ORT_ERRORS) as error:
             raise ContractError(
                 f"the network cannot run on a window of {window.shape}: {error}; "

@@ -19,12 +19,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
 from camkit.contracts import FloatArray
-from camkit.errors import CamkitError, ContractError
+from camkit.errors import ContractError
+from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.rows import RowSource
@@ -38,21 +39,7 @@ reads, and what it still needs of the one before."""
 
 Run = Callable[[FloatArray], FloatArray]
 Progress = Callable[[int, int], None]
-
-
-class Flag(Protocol):
-    """Something that can be raised from another thread, like `threading.Event`."""
-
-    def is_set(self) -> bool:
-        """Tell whether it has been raised."""
-        ...
-
-
-Cancel = Callable[[], bool] | Flag
-
-
-class Cancelled(CamkitError):  # noqa: N818 - a wish, not an error
-    """The caller asked to stop; no tile was begun after that."""
+"""Called with (work done, work in all)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -332,8 +319,7 @@ def infer_bands(
         held = buffer.move_to(row.origin_px)
         band: FloatArray | None = None
         for j, column in enumerate(layout.columns):
-            if is_cancelled(cancel):
-                raise Cancelled(f"stopped on request after {done} of {layout.window_count} windows")
+            check_cancelled(cancel)
             filled = _filled(window, held, column.origin_px)
             kept = _kept(run(filled), row, column, (height, width), scale)
             if guard is not None:
@@ -369,13 +355,6 @@ def _kept(
     right = min(column.stop_px, size[1]) - column.origin_px
     rows, columns = slice(scale * top, scale * bottom), slice(scale * left, scale * right)
     return output[0, :, rows, columns]
-
-
-def is_cancelled(cancel: Cancel | None) -> bool:
-    """Tell whether the caller asked to stop."""
-    if cancel is None:
-        return False
-    return cancel() if callable(cancel) else cancel.is_set()
 
 
 def _not_finite_message(i: int, j: int, row: Span, column: Span) -> str:

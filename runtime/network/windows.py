@@ -13,6 +13,7 @@ from typing import Any, Final
 from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import Cancel
 from camkit.runtime.network.cell_windows import (
     CellLayout,
     CellLimits,
@@ -23,7 +24,6 @@ from camkit.runtime.network.cell_windows import (
 )
 from camkit.runtime.network.guard import TileGuard
 from camkit.runtime.network.tiling import (
-    Cancel,
     PixelCost,
     Progress,
     Run,

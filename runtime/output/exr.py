@@ -82,7 +82,7 @@ class ExrWriter(PictureWriter):
             rows = min(COPY_ROWS, height - top)
             self._file.writePixels(dict.fromkeys("RGB", filler[:rows]), rows)
         self._file.close()
-        draft = self.path.with_name(self.path.name + ".half")
+        draft = self.path.with_name(f"{self.path.stem}-half{self.path.suffix}")
         self.path.replace(draft)
         self.is_half = False
         self._stored = 0

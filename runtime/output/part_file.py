@@ -1,44 +1,111 @@
-"""Files that appear complete or not at all: written to `.part`, fsynced, renamed."""
+"""Files that appear complete or not at all: written to a part file, fsynced, renamed.
+
+Every writer has a part file of its own, so two processes never write into one another's.
+"""
 
 import os
-from collections.abc import Iterator
+import secrets
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Final
+
+PART_SUFFIX: Final = ".part"
+MOST_NAME_BYTES: Final = 200
+"""Of a file's name within that of its part; file systems allow 255 in all."""
 
 
 def part_path(path: Path) -> Path:
-    """Give the name under which a file is written before it is complete.
+    """Give a new name under which a file is written before it is complete.
 
     It is UTF-8 whatever the name itself is: not every library opens other names.
     """
+    return path.with_name(f"{_part_prefix(path)}{secrets.token_hex(4)}{PART_SUFFIX}")
+
+
+def stale_parts(path: Path) -> list[Path]:
+    """Give the parts of a file that lie beside it, whoever wrote them."""
+    prefix = _part_prefix(path)
+    return [
+        near
+        for near in path.parent.iterdir()
+        if near.name.startswith(prefix)
+        and near.name.endswith(PART_SUFFIX)
+        and "." not in near.name[len(prefix) : -len(PART_SUFFIX)]
+    ]
+
+
+def _part_prefix(path: Path) -> str:
     name = os.fsencode(path.name).decode("utf-8", "backslashreplace")
-    return path.with_name(f"{name}.part")
+    return name.encode()[:MOST_NAME_BYTES].decode("utf-8", "ignore") + "."
 
 
 @contextmanager
 def atomic_output(path: Path) -> Iterator[Path]:
-    """Give the path to write to; the file takes its real name when the block ends well.
+    """Give the path to write one file to; see `atomic_outputs`."""
+    with atomic_outputs(path) as (part,):
+        yield part
 
-    The content is on the disk before the name is, so that even after a power cut the name never
-    stands for half a file. When the block raises, nothing is left and an older file stays.
+
+@contextmanager
+def atomic_outputs(*paths: Path) -> Iterator[tuple[Path, ...]]:
+    """Give the paths to write to; the files take their real names when the block ends well.
+
+    The content is on the disk before the names are, so that even after a power cut no name stands
+    for half a file. When the block raises, or one of the files cannot take its name, nothing new
+    is left and older files stay.
 
     Args:
-        path: The file to appear; its folder exists.
+        *paths: The files to appear, in this order; their folders exist. All parts are named after
+            the last one.
 
     Raises:
-        OSError: If the file cannot be written.
+        OSError: If a file cannot be written.
     """
-    part = part_path(path)
-    part.unlink(missing_ok=True)
+    parts = tuple(part_path(path.with_name(paths[-1].name)) for path in paths)
     try:
-        yield part
-        _sync(part)
-        part.replace(path)
+        yield parts
+        for part in parts:
+            _sync(part)
+        _rename(parts, paths)
+    finally:
+        for part in parts:
+            part.unlink(missing_ok=True)
+
+
+def _rename(parts: Sequence[Path], paths: Sequence[Path]) -> None:
+    """Give every part its name, or none."""
+    older: list[tuple[Path, Path | None]] = []
+    try:
+        for part, path in zip(parts, paths, strict=True):
+            older.append((path, _kept(path)))
+            part.replace(path)
+        if os.name == "posix":
+            for folder in {path.parent for path in paths}:
+                _sync(folder)
     except BaseException:
-        part.unlink(missing_ok=True)
+        for (path, kept), part in zip(reversed(older), reversed(parts[: len(older)]), strict=True):
+            if kept is not None:
+                kept.replace(path)
+            elif not part.exists():
+                path.unlink(missing_ok=True)
         raise
-    if os.name == "posix":
-        _sync(path.parent)
+    finally:
+        for _, kept in older:
+            if kept is not None:
+                kept.unlink(missing_ok=True)
+
+
+def _kept(path: Path) -> Path | None:
+    """Keep an older file under a second name; None if there is none to replace."""
+    if not path.is_file():
+        return None
+    kept = part_path(path)
+    try:
+        os.link(path, kept)
+    except OSError:  # a file system without second names
+        path.rename(kept)
+    return kept
 
 
 def _sync(path: Path) -> None:

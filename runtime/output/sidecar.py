@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.errors import ContractError
-from camkit.runtime.output.part_file import atomic_output
 
 SIDECAR_SUFFIX: Final = ".camkit.json"
 SIDECAR_VERSION: Final = 1
@@ -34,11 +33,10 @@ def sidecar_path(output: Path) -> Path:
     return output.with_name(output.stem + SIDECAR_SUFFIX)
 
 
-def write_sidecar(output: Path, record: Mapping[str, Any]) -> Path:
-    """Write the sidecar of a picture; complete or not at all.
+def sidecar_text(record: Mapping[str, Any]) -> str:
+    """Give what the sidecar of a picture holds.
 
     Args:
-        output: The picture, whole and about to get its name.
         record: Plain JSON values, with at least the keys of `REQUIRED`.
 
     Raises:
@@ -51,10 +49,7 @@ def write_sidecar(output: Path, record: Mapping[str, Any]) -> Path:
         text = json.dumps({"sidecar_version": SIDECAR_VERSION, **record}, indent=2, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ContractError(f"the sidecar must hold plain JSON values: {error}") from error
-    path = sidecar_path(output)
-    with atomic_output(path) as part:
-        part.write_text(text + "\n", encoding="utf-8")
-    return path
+    return text + "\n"
 
 
 def read_sidecar(output: Path) -> dict[str, Any] | None:

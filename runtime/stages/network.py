@@ -14,7 +14,10 @@ from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.memory import trim_heap
+from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
+from camkit.runtime.network.tiling import Run
 from camkit.runtime.network.windows import (
     NetworkWindows,
     SizedNetwork,
@@ -29,6 +32,8 @@ from camkit.runtime.rows import RowSource, changed_bands
 from camkit.runtime.signal.stabilise import StackedRows, unstabilise
 
 METHODS: Final = ("net",)
+TRIM_SHARE: Final = 0.7
+"""Of the cap; above it freed memory is given back before every window."""
 OPTIONS: Final = (
     *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
     *("dtype", "provider"),
@@ -105,7 +110,7 @@ class _NetworkStage:
         networks = [
             SizedNetwork(
                 size=size,
-                run=job.setup.networks(entry.role, size).run,
+                run=self._trimmed(job.setup.networks(entry.role, size), max_bytes),
                 facts=bundle.network_facts(entry.role, size),
             )
             for size in work.sizes()
@@ -116,6 +121,18 @@ class _NetworkStage:
         tiles = {role: windows.to_json() for role, windows in job.windows.items()}
         one = len(bundle.manifest.networks) == 1
         job.record["tiles"] = tiles[entry.role] if one else tiles
+
+    def _trimmed(self, engine: NetworkEngine, cap_bytes: int) -> Run:
+        """Give the run of a network that has the memory to itself, as far as that is near the cap.
+
+        Its activations are the peak: what other stages have freed must not lie beside them.
+        """
+
+        def run(window: FloatArray) -> FloatArray:
+            trim_heap(int(TRIM_SHARE * cap_bytes))
+            return engine.run(window, cancel=self._job.cancel)
+
+        return run
 
     def planned_bytes(self) -> int:
         """Give the memory of the windows."""
@@ -143,7 +160,7 @@ class _NetworkStage:
         )
         bands = self._windows.bands(
             given_rows(entry, job, taken),
-            progress=job.progress,
+            progress=lambda done, total: job.meter.reach(entry.gives[0], done / total),
             cancel=job.cancel,
             guard=self._guard,
             stand_in=stand_in,

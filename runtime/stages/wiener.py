@@ -4,23 +4,30 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.stages import Wiener
 from camkit.contracts import depth_name
 from camkit.runtime.bank.baselines import restoration_bank
-from camkit.runtime.bank.blocks import BlockBank, LocalPsf, PlainBlock, lay_spans
+from camkit.runtime.bank.blocks import (
+    BlockBank,
+    LocalPsf,
+    PlainBlock,
+    Span,
+    cut_block_px,
+    lay_spans,
+)
 from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.content import LIGHT_PX
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.plan.blocks import plain_blocks, plain_share
+from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 
 METHODS: Final = ("wiener", "rl", "admm-tv")
 OPTIONS: Final = ("depth_m",)
-CLIPPED_BLOCK: Final = 3.3
-"""A block with clipped samples costs so many of one without (six rounds of Richardson-Lucy)."""
 BLOCK_SET_UP: Final = 1.25
 """A block with its kernel, window and sum over a block that is only filtered."""
 BYTES_PER_BLOCK_ROW: Final = 80
@@ -39,10 +46,12 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         planes, mask = taken[0], taken[1] if len(taken) > 1 else None
         bank = make_bank(entry, job, planes)
         unknown = None if mask is None else mask.rows().read
-        bands = bank.restore_bands(planes.rows(), unknown, _plain(job))
+        bands = bank.restore_bands(planes.rows(), unknown, _plain(job), job.cancel)
         return (planes.with_bands(bands),)
 
-    held = BYTES_PER_BLOCK_ROW * entry.block_px * job.capture.width
+    size_px = job.capture.width, job.capture.height
+    block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
+    held = BYTES_PER_BLOCK_ROW * block_px * max(job.capture.width, job.threads * block_px)
     return StageWork(run=run, held_bytes=held)
 
 
@@ -63,7 +72,9 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     )
     method = job.work.method if job.work.method in METHODS else METHODS[0]
     noise = job.noise.with_gains(planes.gains)
-    return restoration_bank(local, entry, noise, method=method, threads=job.threads)
+    side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)
+    cut = entry.model_copy(update={"block_px": max(side, *local.kernels.kernels.shape[-2:])})
+    return restoration_bank(local, cut, noise, method=method, threads=job.threads)
 
 
 def _plain(job: Job) -> PlainBlock | None:
@@ -77,13 +88,29 @@ def _plain(job: Job) -> PlainBlock | None:
 
 def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    rows = lay_spans(subject.height_px, entry.block_px, entry.overlap_px)
-    columns = lay_spans(subject.width_px, entry.block_px, entry.overlap_px)
-    blocks = float(len(rows) * len(columns))
+    size_px = subject.height_px, subject.width_px
+    block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
+    rows, columns = (lay_spans(side, block_px, entry.overlap_px) for side in size_px)
+    lit = np.zeros((len(rows), len(columns)), dtype=np.bool_)
+    if subject.content is not None and entry.clip_iterations:
+        lit = _lit_blocks(subject.content.lights, rows, columns)
+    blocks = np.where(lit, speed.clipped_block_s, speed.block_s)
     if work.labels is not None:
         reach = max((subject.facts(size).reach_px for size in work.sizes()), default=0)
-        blocks *= 1 - plain_share(work.labels, reach, rows, columns)
-    if subject.content is not None and entry.clip_iterations:
-        clipped = float(np.mean(subject.content.clipped > 0))
-        blocks *= 1 + (CLIPPED_BLOCK - 1) * min(1.0, clipped * (entry.block_px / 256) ** 2)
-    return blocks * speed.block_s * BLOCK_SET_UP / speed.threads
+        test = plain_blocks(work.labels, reach)
+        if test is not None:
+            blocks *= [[not test(row, column) for column in columns] for row in rows]
+    return float(blocks.sum()) * BLOCK_SET_UP / speed.threads
+
+
+def _lit_blocks(
+    lights: NDArray[np.bool_], rows: Sequence[Span], columns: Sequence[Span]
+) -> NDArray[np.bool_]:
+    """Tell (row, column) which blocks hold clipped samples."""
+    found = np.zeros((len(rows), len(columns)), dtype=np.bool_)
+    for i, row in enumerate(rows):
+        down = slice(row.index.min() // LIGHT_PX, row.index.max() // LIGHT_PX + 1)
+        for j, column in enumerate(columns):
+            across = slice(column.index.min() // LIGHT_PX, column.index.max() // LIGHT_PX + 1)
+            found[i, j] = lights[down, across].any()
+    return found

@@ -15,8 +15,8 @@ import pytest
 import camkit
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.batch import expand
+from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import MosaicOptions
-from camkit.runtime.network.tiling import Cancelled
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.capture_factory import write_tiny_captures
 

@@ -157,3 +157,17 @@ def test_a_window_of_another_size_is_refused() -> None:
     window = SensorWindow(size_px=(9, 8), origin_px=(0, 0), sensor_size_px=(9, 8), pitch_um=5.0)
     with pytest.raises(ContractError, match="window"):
         measure_content(capture, _noise(1e-4, 0.0), GAINS, window)
+
+
+def test_a_single_clipped_sample_is_seen_wherever_it_is() -> None:
+    samples = np.full((200, 330), 900, np.uint16)
+    samples[199, 329] = samples[70, 31] = WHITE
+    capture = Capture(
+        samples=samples, cfa="RGGB", black_level=np.zeros((2, 2), np.float32), white_level=WHITE
+    )
+    window = SensorWindow(
+        size_px=(330, 200), origin_px=(0, 0), sensor_size_px=(330, 200), pitch_um=5.0
+    )
+    lights = measure_content(capture, _noise(1e-4, 1e-6), GAINS, window).lights
+    assert lights.shape == (7, 11)
+    assert sorted(zip(*np.nonzero(lights), strict=True)) == [(2, 0), (6, 10)]

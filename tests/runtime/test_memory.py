@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,3 +29,35 @@ def test_a_child_does_not_inherit_the_peak_of_its_parent() -> None:
 def test_without_the_mark_getrusage_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory.Path, "read_text", lambda *_, **__: "")
     assert memory.peak_rss_mb() > 10
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not tell")
+def test_freed_memory_is_given_back_near_the_limit_only() -> None:
+    """In a process of its own: small blocks pin the heap between large ones that are freed."""
+    done = subprocess.run([sys.executable, "-c", HOLES], capture_output=True, text=True, check=True)
+    held, unasked, given_back = map(int, done.stdout.split())
+    assert held > 60e6
+    assert unasked > 0.9 * held
+    assert given_back < 0.5 * held
+
+
+HOLES = """
+import ctypes
+from camkit.runtime import memory
+libc = ctypes.CDLL(None)
+libc.malloc.restype = ctypes.c_void_p
+libc.free.argtypes = [ctypes.c_void_p]
+before = memory._resident_bytes()
+large, small = [], []
+for _ in range(1000):
+    large.append(libc.malloc(100_000))
+    libc.memset(ctypes.c_void_p(large[-1]), 1, 100_000)
+    small.append(libc.malloc(64))
+for block in large:
+    libc.free(block)
+held = memory._resident_bytes() - before
+memory.trim_heap(10**12)
+unasked = memory._resident_bytes() - before
+memory.trim_heap(0)
+print(held, unasked, memory._resident_bytes() - before)
+"""

@@ -1,5 +1,6 @@
 """The pipeline as an application uses it: same bits however it runs, clear refusals."""
 
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -8,13 +9,14 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError
-from camkit.runtime.network.tiling import Cancelled
+from camkit.errors import BundleError, ContractError
+from camkit.runtime.cancel import Cancelled
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
-from tests.bundle_factory import write_tiny_bundle
+from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.deep_bundle import write_deep_bundle
 from tests.psf_factory import psnr_db, texture
@@ -72,15 +74,47 @@ def test_out_of_the_wrong_shape_is_refused(bundle: Path, mosaic: np.ndarray) -> 
         load(bundle).process_array(mosaic, out=np.empty((3, 64, 95), dtype=np.float32))
 
 
-def test_progress_counts_every_tile_and_cancel_stops(bundle: Path, mosaic: np.ndarray) -> None:
+@pytest.mark.parametrize("method", ["net", "wiener", "develop"])
+def test_progress_rises_over_all_stages_to_the_whole(
+    bundle: Path, mosaic: np.ndarray, method: str
+) -> None:
     seen: list[tuple[int, int]] = []
-    pipeline = load(bundle, tile_px=32)
+    pipeline = load(bundle, method=method)
     pipeline.process_array(mosaic, iso=100.0, progress=lambda *ticks: seen.append(ticks))
-    total = seen[0][1]
-    assert seen == [(i + 1, total) for i in range(total)]
-    assert total > 1
+    done, totals = zip(*seen, strict=True)
+    assert len(set(totals)) == 1
+    assert list(done) == sorted(set(done))
+    assert done[-1] == totals[0]
+    assert len(done) > 3
+
+
+@pytest.mark.parametrize("asked", [1, 2, 5, 9])
+def test_cancel_stops_wherever_it_is_asked(bundle: Path, mosaic: np.ndarray, asked: int) -> None:
+    times = iter(range(1000))
     with pytest.raises(Cancelled):
-        pipeline.process_array(mosaic, iso=100.0, cancel=lambda: True)
+        load(bundle).process_array(mosaic, iso=100.0, cancel=lambda: next(times) >= asked)
+
+
+def test_a_pipeline_is_pickled_by_what_it_was_made_from(bundle: Path, mosaic: np.ndarray) -> None:
+    pipeline = load(bundle, exposure_ev=0.5)
+    packed = pickle.dumps(pipeline)
+    assert len(packed) < 5000
+    again = pickle.loads(packed)
+    assert again.options == pipeline.options
+    np.testing.assert_array_equal(
+        again.process_array(mosaic, iso=100.0), pipeline.process_array(mosaic, iso=100.0)
+    )
+    assert pickle.loads(pickle.dumps(load(None))).bundle is None
+
+
+def test_a_pickled_pipeline_refuses_another_bundle(bundle: Path, tmp_path: Path) -> None:
+    moved = tmp_path / bundle.name
+    moved.write_bytes(bundle.read_bytes())
+    packed = pickle.dumps(load(moved))
+    other = tiny_manifest().model_copy(update={"freeze": {"other": 1.0}})
+    write_bundle(moved, other, tiny_members())
+    with pytest.raises(BundleError, match="not the bundle tiny that was pickled"):
+        pickle.loads(packed)
 
 
 def test_a_crop_with_its_origin_keeps_place_and_vignetting(bundle: Path) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def design(
         search=search,
     )
     if chosen.starts.count and chosen.schedule.lens_rate and not resume:
-        typer.echo(f"trying {chosen.starts.count} starts", err=True)
+        say(f"trying {chosen.starts.count} starts", err=True)
     run = DesignRun(
         chosen,
         DesignOptions(
@@ -77,20 +78,20 @@ def design(
         ),
     )
     for variable, own in run.loop.parts.lens.problem.free.outside():
-        typer.echo(
+        say(
             f"{variable.kind} of surface {variable.surface}: the given lens has {own:.6g}, outside "
             f"its bounds {variable.low:g} .. {variable.high:g}: it begins at the bound",
             err=True,
         )
     if run.searched_s:
-        typer.echo(f"starts tried in {run.searched_s:.0f} s", err=True)
+        say(f"starts tried in {run.searched_s:.0f} s", err=True)
     for moment in run.go():
-        typer.echo(_line(moment), err=True)
+        say(_line(moment), err=True)
         if pictures and run.leads and moment.step % pictures == 0:
             _draw(run, moment)
     if run.leads:
         report = run.finish()
-        typer.echo(json.dumps(report) if json_ else _text(report))
+        say(json.dumps(report) if json_ else _text(report))
 
 
 def _line(moment: "Progress") -> str:

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping
 from importlib import util
 from pathlib import Path
 
-import typer
-
+from camkit.cli.say import say
 from camkit.errors import ContractError, UnsupportedError
 
 
@@ -34,8 +33,8 @@ def refuse_existing(paths: Iterable[Path | None], *, overwrite: bool) -> None:
 def print_report(report: Mapping[str, object], as_json: bool) -> None:
     """Print a flat report for people, or as one JSON object."""
     if as_json:
-        typer.echo(json.dumps(report))
+        say(json.dumps(report))
         return
     width = max(map(len, report), default=0)
     for name, value in report.items():
-        typer.echo(f"{name:<{width}}  {value}")
+        say(f"{name:<{width}}  {value}")

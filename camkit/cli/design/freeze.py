@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
 from camkit.errors import ContractError, UnsupportedError
 
 
@@ -67,7 +68,7 @@ def freeze(
         settings=next((stage for stage in stages if isinstance(stage, Wiener)), None),
         limit_db=limit_db,
         grid=grid,
-        tell=lambda line: typer.echo(line, err=True),
+        tell=lambda line: say(line, err=True),
     )
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)

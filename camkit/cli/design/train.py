@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
 from camkit.errors import ContractError
 
 WITHOUT_VGG = (
@@ -101,7 +102,7 @@ def _fine_tuning(
     from camkit.models_def.training.refinement import FineTuningOptions, refining_kind
 
     if vgg is None:
-        typer.echo(f"camkit: {WITHOUT_VGG}", err=True)
+        say(f"camkit: {WITHOUT_VGG}", err=True)
     options = FineTuningOptions(
         start=start,
         size=size,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json
+from camkit.cli.say import say, say_over
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -113,20 +114,20 @@ def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
     tell("")
     files = write_bench(result, out_dir)
     if as_json:
-        typer.echo(json.dumps(result.report, allow_nan=False))
+        say(json.dumps(result.report, allow_nan=False))
         return
     for line in _lines(result.report["rows"]):
-        typer.echo(line)
+        say(line)
     for skip in result.report["skipped"]:
-        typer.echo(f"camkit: not measured: {skip['what']}: {skip['reason']}", err=True)
-    typer.echo(f"written: {', '.join(str(file) for file in files)}")
+        say(f"camkit: not measured: {skip['what']}: {skip['reason']}", err=True)
+    say(f"written: {', '.join(str(file) for file in files)}")
 
 
 def _teller() -> "Callable[[str], None]":
     """Give what shows progress: one line on a terminal's stderr, nothing elsewhere."""
     if not sys.stderr.isatty():
         return lambda _text: None
-    return lambda text: typer.echo(f"\r\033[K{text[:100]}", err=True, nl=False)
+    return lambda text: say_over(text[:100])
 
 
 def _lines(rows: "list[Row]") -> list[str]:

@@ -7,6 +7,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json
 from camkit.cli.exit_code import ExitCode
+from camkit.cli.say import say
 
 
 def check(
@@ -28,9 +29,9 @@ def check(
 
     report = check_bundle(find_bundle(bundle), level=level, run=case_work)
     if json_:
-        typer.echo(json.dumps(report.to_json()))
+        say(json.dumps(report.to_json()))
     else:
         for line in report.lines():
-            typer.echo(line)
+            say(line)
     if not report.passed:
         raise typer.Exit(ExitCode.BUNDLE_REFUSED)

@@ -9,9 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import typer
-
 from camkit.cli.choices import Debug, Json
+from camkit.cli.say import say
 from camkit.errors import CamkitError
 
 PACKAGES = [
@@ -41,15 +40,15 @@ def doctor(
     """Print versions, threads, providers and bundles, and try the RAW decoder."""
     report = examine()
     if json_:
-        typer.echo(json.dumps(report, indent=2))
+        say(json.dumps(report, indent=2))
         return
     for name, value in report.items():
         if isinstance(value, dict):
-            typer.echo(f"{name}:")
+            say(f"{name}:")
             for key, item in value.items():
-                typer.echo(f"  {key}: {item}")
+                say(f"  {key}: {item}")
         else:
-            typer.echo(f"{name}: {value}")
+            say(f"{name}: {value}")
 
 
 def examine() -> dict[str, Any]:

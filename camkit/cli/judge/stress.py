@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug
+from camkit.cli.say import say, say_over
 from camkit.errors import ContractError
 
 
@@ -47,7 +48,7 @@ def stress(
 
     if list_:
         for scenario in choose(scenarios):
-            typer.echo(f"{scenario.name:20} {scenario.title}")
+            say(f"{scenario.name:20} {scenario.title}")
         return
     if bundle is None:
         raise ContractError("stress tests a bundle: give a NAME or PATH, or --list")
@@ -69,14 +70,14 @@ def stress(
     if write:
         write_envelope(opened, result.envelope)
     if json_:
-        typer.echo(json.dumps(result.rows))
+        say(json.dumps(result.rows))
         return
     for row in result.rows:
-        typer.echo(_line(row))
+        say(_line(row))
     if result.page is not None:
-        typer.echo(f"page: {result.page}")
+        say(f"page: {result.page}")
     for name, found in result.envelope.items():
-        typer.echo(f"{name}: {found.low:.4g} to {found.high:.4g}{' (stored)' if write else ''}")
+        say(f"{name}: {found.low:.4g} to {found.high:.4g}{' (stored)' if write else ''}")
 
 
 def _line(row: dict[str, object]) -> str:
@@ -97,5 +98,4 @@ def _line(row: dict[str, object]) -> str:
 def _progress(scenario: str, done: int, total: int) -> None:
     """Show the progress on stderr, on a terminal only."""
     if sys.stderr.isatty():
-        end = "\n" if done == total else ""
-        typer.echo(f"\r{done}/{total} {scenario:24}{end}", nl=False, err=True)
+        say_over(f"{done}/{total} {scenario}", last=done == total)

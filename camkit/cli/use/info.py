@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from camkit.cli.choices import Debug, Json
+from camkit.cli.say import say
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def info(
     if schema:
         from camkit.bundle.manifest import manifest_schema
 
-        typer.echo(json.dumps(manifest_schema(), indent=2))
+        say(json.dumps(manifest_schema(), indent=2))
         return
     if file is None:
         raise ContractError("give a bundle or a capture, or --schema")
@@ -41,10 +42,10 @@ def info(
     options = mosaic_options(mosaic, black_level, white_level)
     facts = _describe(file, options)
     if json_:
-        typer.echo(json.dumps(facts))
+        say(json.dumps(facts))
         return
     for line in _lines(facts, ""):
-        typer.echo(line)
+        say(line)
 
 
 def _describe(file: str, mosaic: Any) -> dict[str, Any]:

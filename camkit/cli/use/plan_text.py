@@ -3,8 +3,7 @@
 import json
 from typing import TYPE_CHECKING, Any
 
-import typer
-
+from camkit.cli.say import say
 from camkit.errors import BundleError, CamkitError, ContractError
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def print_plans(
                 raise
             facts |= {"status": "failed", "error": str(error)}
             done = False
-        typer.echo(json.dumps(facts) if as_json else "\n".join(plan_lines(facts)))
+        say(json.dumps(facts) if as_json else "\n".join(plan_lines(facts)))
     return done
 
 

@@ -7,6 +7,7 @@ import typer
 
 from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality
 from camkit.cli.exit_code import ExitCode
+from camkit.cli.say import say
 from camkit.errors import ContractError
 
 Files = Annotated[list[str], typer.Argument(help="Captures, folders or globs.", metavar="FILES...")]
@@ -62,6 +63,9 @@ def process(
     assume: Annotated[
         str | None, typer.Option(help="centre or scale, for a picture that is no full frame.")
     ] = None,
+    force_bundle: Annotated[
+        bool, typer.Option("--force-bundle", help="Also where a capture names another bundle.")
+    ] = False,
     on_unsafe: Annotated[
         str,
         typer.Option(help="Outside the bundle's measured range: warn, fallback (Wiener) or fail."),
@@ -101,6 +105,7 @@ def process(
         vignetting=vignetting,
         undistort=undistort,
         assume=assume,  # type: ignore[arg-type]
+        force_bundle=force_bundle,
         on_unsafe=on_unsafe,  # type: ignore[arg-type]
         max_mem_bytes=None if max_mem is None else parse_memory(max_mem),
         threads=threads,
@@ -118,7 +123,7 @@ def process(
     )
     sources = expand(files)
     if not sources:
-        typer.echo(f"camkit: no capture matches {', '.join(files)}", err=True)
+        say(f"camkit: no capture matches {', '.join(files)}", err=True)
         raise typer.Exit(ExitCode.NOTHING_MATCHED)
     headerless = mosaic_options(mosaic, black_level, white_level)
     if dry_run:

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-import typer
+from camkit.cli.say import plain, say
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -52,9 +52,11 @@ class TileProgress:
         """Show that `done` of `total` tiles of a file are finished."""
         if self._live is None:
             return
+        from rich.markup import escape
+
         with self._lock:
             if file not in self._bars:
-                self._bars[file] = self._live.add_task(file.name, total=total)
+                self._bars[file] = self._live.add_task(escape(plain(file.name)), total=total)
             self._live.update(self._bars[file], completed=done)
 
     def result(self, result: "FileResult", *, as_json: bool) -> None:
@@ -72,9 +74,9 @@ class TileProgress:
 
 def _print(result: "FileResult", *, as_json: bool) -> None:
     if as_json:
-        typer.echo(json.dumps(result.to_json()))
+        say(json.dumps(result.to_json()))
     elif result.status == "failed":
-        typer.echo(f"{result.input}: failed: {result.error}", err=True)
+        say(f"{result.input}: failed: {result.error}", err=True)
     else:
         _print_result(result)
 
@@ -83,9 +85,9 @@ def _print_result(result: "FileResult") -> None:
     total = sum(result.seconds.values())
     head = f"{result.input} -> {result.output}"
     if result.status == "skipped":
-        typer.echo(f"{head}: done before, skipped")
+        say(f"{head}: {'; '.join(result.warnings) or 'done before'}, skipped")
         return
     stages = ", ".join(f"{name} {value:.2f}" for name, value in result.seconds.items())
-    typer.echo(f"{head}: {total:.2f} s ({stages}), peak {result.peak_rss_mb:.0f} MB")
+    say(f"{head}: {total:.2f} s ({stages}), peak {result.peak_rss_mb:.0f} MB")
     for warning in result.warnings:
-        typer.echo(f"  note: {warning}", err=True)
+        say(f"  note: {warning}", err=True)

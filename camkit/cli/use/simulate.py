@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, DepthM, Overwrite
+from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.units import MM_PER_M
 
@@ -62,7 +63,7 @@ def simulate(
     part.write(out, simulation, opened)
     height, width = simulation.samples.shape[-2:]
     depth = "" if simulation.depth_mm is None else f", {depth_name(simulation.depth_mm)} away"
-    typer.echo(f"{out}: {width}x{height}, ISO {iso:g}{depth}")
+    say(f"{out}: {width}x{height}, ISO {iso:g}{depth}")
 
 
 def _depth_mm(bundle: "Bundle") -> float | None:

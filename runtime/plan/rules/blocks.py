@@ -3,7 +3,7 @@
 from typing import Final
 
 from camkit.bundle.stages import Wiener
-from camkit.runtime.bank.blocks import lay_spans
+from camkit.runtime.bank.blocks import cut_block_px, lay_spans
 from camkit.runtime.plan.blocks import plain_share
 from camkit.runtime.plan.decision import Decision, Subject, Work
 
@@ -15,8 +15,9 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     stage = subject.bundle.manifest.stage(Wiener)
     if stage is None:
         return work, None
-    rows = lay_spans(subject.height_px, stage.block_px, stage.overlap_px)
-    columns = lay_spans(subject.width_px, stage.block_px, stage.overlap_px)
+    size_px = subject.height_px, subject.width_px
+    block_px = cut_block_px(stage.block_px, stage.overlap_px, size_px)
+    rows, columns = (lay_spans(side, block_px, stage.overlap_px) for side in size_px)
     count = len(rows) * len(columns)
     if work.labels is None:
         return work, Decision(what="blocks", choice=f"all {count}", reason="no plain cells")

@@ -9,6 +9,7 @@ from camkit.errors import ContractError
 from camkit.runtime.bank.blocks import (
     BlockBank,
     LocalPsf,
+    cut_block_px,
     lay_spans,
     mirror_otf,
     taper_edges,
@@ -326,3 +327,18 @@ def test_a_bank_that_waits_between_bands_owns_no_threads() -> None:
     before = threading.active_count()
     next(bands)
     assert threading.active_count() == before
+
+
+@pytest.mark.parametrize(
+    ("block_px", "size_px", "wanted"),
+    [(384, (96, 64), 384), (512, (96, 64), 512), (8192, (96, 64), 512), (8192, (9000, 9000), 8192)],
+)
+def test_no_block_is_much_larger_than_its_picture(block_px, size_px, wanted):
+    assert cut_block_px(block_px, 128, size_px) == wanted
+
+
+def test_a_cut_block_covers_the_picture_and_its_borders():
+    side = cut_block_px(8192, 128, (1500, 1000))
+    assert 1500 + 2 * 56 <= side < 1700
+    assert side % 4 == 0
+    assert len(lay_spans(1500, side, 128)) == 1

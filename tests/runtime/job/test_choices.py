@@ -33,6 +33,7 @@ CHANGED: dict[str, Any] = {
     "vignetting": False,
     "undistort": False,
     "assume": "centre",
+    "force_bundle": True,
     "on_unsafe": "fallback",
     "max_mem_bytes": 500_000_000,
     "threads": 1,
@@ -79,7 +80,7 @@ def _refused(bundle: Bundle | None, **choices: Any) -> str:
 def test_every_option_is_in_the_list_of_this_test() -> None:
     assert set(CHANGED) == {field.name for field in dataclasses.fields(Options)}
     claimed = set.union(*OF_STAGE.values())
-    assert set(CHANGED) == claimed | FREE | {"assume", "unit"}
+    assert set(CHANGED) == claimed | FREE | {"assume", "force_bundle", "unit"}
 
 
 @pytest.mark.parametrize("name", CHANGED)
@@ -89,7 +90,7 @@ def test_a_camera_of_every_stage_knows_every_option(tiny: Bundle, name: str) -> 
 
 @pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
 def test_each_option_that_means_nothing_is_refused_by_name(bare: Bundle, name: str) -> None:
-    if name in FREE:
+    if name in FREE | {"force_bundle"}:
         check_choices(bare, Options(**{name: CHANGED[name]}))
         return
     said = _refused(bare, **{name: CHANGED[name]})
@@ -203,3 +204,20 @@ def test_no_color_means_no_option_of_color(tmp_path: Path) -> None:
 def test_a_size_that_is_not_there_is_refused_even_where_no_network_runs(bundle: Bundle) -> None:
     with pytest.raises(ContractError, match=r"holds size.*asked for Q"):
         check_choices(bundle, Options(method="wiener", size="Q"))
+
+
+@pytest.mark.parametrize(
+    ("method", "option", "value"),
+    [("wiener", "size", "M"), ("develop", "mode", "fast"), ("wiener", "on_unsafe", "fail")],
+)
+def test_an_option_of_a_stage_that_the_method_leaves_out_is_refused(
+    bundle: Bundle, method: str, option: str, value: str
+) -> None:
+    options = Options(method=method, **{option: value})  # type: ignore[arg-type]
+    with pytest.raises(ContractError, match=rf"--{flag(option)} means nothing with --method"):
+        check_choices(bundle, options)
+    check_choices(bundle, Options(**{option: value}))  # type: ignore[arg-type]
+
+
+def flag(option: str) -> str:
+    return option.replace("_", "-")

@@ -105,3 +105,23 @@ def test_the_window_of_a_finer_plane_covers_the_same_place(bundle: Bundle) -> No
             job.placement.window.corner_radius_mm, abs=0.006
         )
         np.testing.assert_allclose(window.centre_mm, job.placement.window.centre_mm, atol=1e-12)
+
+
+def test_a_capture_of_another_camera_is_refused_unless_it_is_forced(bundle: Bundle) -> None:
+    capture = made_mosaic(bundle_name="trio")
+    with pytest.raises(ContractError, match=r"names bundle trio, not tiny; .* --force-bundle"):
+        start(bundle, capture)
+    forced = start(bundle, capture, force_bundle=True).job
+    assert forced.notes == [
+        "the capture names bundle trio, not tiny: the blur of another lens is undone"
+    ]
+    assert start(bundle, made_mosaic(bundle_name="tiny")).job.notes == []
+
+
+def test_a_foreign_camera_whose_place_is_assumed_is_warned_of(bundle: Bundle) -> None:
+    small = np.full((32, 48), 500, np.uint16)
+    foreign = made_mosaic(samples=small, camera="Nikon D850")
+    notes = start(bundle, foreign, assume="centre").job.notes
+    assert notes[0].startswith("the file names the camera Nikon D850: unless the lens of bundle")
+    own = made_mosaic(samples=small, camera="camkit tiny", bundle_name="tiny")
+    assert len(start(bundle, own, assume="centre").job.notes) == 1

@@ -175,6 +175,14 @@ def test_memory_is_shared_among_networks_within_the_cap(tmp_path: Path) -> None:
     assert made.record["tiles"].keys() == made.windows.keys()
 
 
+def test_rows_beyond_the_cap_are_refused_before_any_work(tmp_path: Path) -> None:
+    capture = made_planes(samples=np.zeros((1, 2000, 25_000), np.float32))
+    stages = (Linearise(gives=("light",)), Color(takes=("light",)))
+    camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
+    with pytest.raises(ContractError, match=r"cap is 400 MB; raise --max-mem"):
+        start(camera, capture, max_mem_bytes=400_000_000, assume="scale")
+
+
 def _ran(monkeypatch: pytest.MonkeyPatch, *types: str) -> list[str]:
     """Note which stages run."""
     ran: list[str] = []
@@ -238,7 +246,8 @@ def test_for_a_branch_that_nobody_reads_nothing_is_kept(tmp_path: Path) -> None:
     rows = start(camera, capture, tile_px=32).rows_of("near")
     rows.read(0, 10)
     rows.read(600, 640)
-    rolling = rows._source._source._rows  # type: ignore[attr-defined]  # timed, channels, reader
+    # metered, timed, channels, reader
+    rolling = rows._source._source._source._rows  # type: ignore[attr-defined]
     assert sum(band.shape[1] for _, band in rolling._kept) < 200
 
 

@@ -8,7 +8,9 @@ import pytest
 
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Color, Linearise, Network
+from camkit.bundle.stages import Color, Linearise, Network, Wiener
+from camkit.runtime.bank.blocks import lay_spans
+from camkit.runtime.content import LIGHT_PX
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.estimate import (
     FILE_SHARE,
@@ -21,12 +23,15 @@ from camkit.runtime.plan.estimate import (
 )
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stages.wiener import BLOCK_SET_UP
 from tests.job_factory import made_mosaic, made_planes, start
+from tests.plan_factory import made_content
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 
 SPEED = Speed(
     network_s_per_mp={("restore", "M"): 3.0, ("clean", "M"): 5.0, ("enlarge", "M"): 7.0},
     block_s=0.01,
+    clipped_block_s=5 * 0.01,
     rest_s_per_mp=2.0,
     threads=2,
 )
@@ -55,6 +60,28 @@ def test_what_is_left_out_takes_no_time(subject: Subject) -> None:
     usual, less = stage_seconds(subject, Work(), SPEED), stage_seconds(subject, work, SPEED)
     assert [n for n, seconds in enumerate(less) if seconds == 0] == [5, 8]
     assert all(a == b for n, (a, b) in enumerate(zip(usual, less, strict=True)) if n not in (5, 8))
+
+
+def test_only_blocks_with_clipped_samples_take_longer(subject: Subject) -> None:
+    number = next(n for n, s in enumerate(subject.bundle.manifest.stages) if s.type == "wiener")
+    bank = subject.bundle.manifest.stages[number]
+    assert isinstance(bank, Wiener)
+    bank = bank.model_copy(update={"clip_iterations": 6, "block_px": 128, "overlap_px": 32})
+    content = made_content(np.full((3, 4), 1e-3))
+    content.lights[5, 7] = True
+    lit = replace(subject, height_px=768, width_px=1024, content=content)
+    dark = replace(lit, content=made_content(np.full((3, 4), 1e-3)))
+    rows, columns = (lay_spans(side, 128, 32) for side in (768, 1024))
+    touching = sum(
+        bool(np.isin(row.index // LIGHT_PX, 5).any() and np.isin(column.index // LIGHT_PX, 7).any())
+        for row in rows
+        for column in columns
+    )
+    assert 1 <= touching <= 4
+    taken = [stage_module("wiener").seconds(bank, one, Work(), SPEED) for one in (dark, lit)]
+    each = BLOCK_SET_UP / SPEED.threads
+    assert taken[0] == pytest.approx(0.01 * each * len(rows) * len(columns))
+    assert taken[1] - taken[0] == pytest.approx(0.04 * each * touching)
 
 
 def test_windows_that_are_planned_count_as_they_are(subject: Subject) -> None:

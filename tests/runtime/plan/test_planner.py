@@ -27,6 +27,7 @@ from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_pl
 SPEED = Speed(
     network_s_per_mp={(DEFAULT_ROLE, "M"): 2.0, (DEFAULT_ROLE, "S"): 1.0},
     block_s=0.005,
+    clipped_block_s=5 * 0.005,
     rest_s_per_mp=0.1,
     threads=1,
 )

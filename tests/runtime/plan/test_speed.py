@@ -1,15 +1,17 @@
 """The speed of the machine: the best of some rounds, per megapixel, refused when it is none."""
 
+import tracemalloc
 from dataclasses import replace
 
 import pytest
 
+from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.plan.speed import ROUNDS, WINDOW_PX, Speed, measure_speed
-from tests.bundle_factory import tiny_network
+from tests.bundle_factory import tiny_facts, tiny_network
 
 STAGE = Wiener(block_px=64, overlap_px=16, prior_scale=1e-3, prior_exponent=2.0)
 
@@ -36,6 +38,38 @@ class _Network:
         return window[:, :3]
 
 
+def _with_facts(
+    engines: dict[tuple[str, str], _Network], **facts: object
+) -> dict[tuple[str, str], tuple[NetworkEngine, NetworkFacts]]:
+    changed = tiny_facts().model_copy(update=facts)
+    return {key: (engine, changed) for key, engine in engines.items()}  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("facts", "side"),
+    [({"stride_px": 7}, 315), ({"stride_px": 640}, 640), ({"bytes_per_pixel": 20_000.0}, 70)],
+)
+def test_the_timed_window_respects_stride_and_memory(facts: dict[str, object], side: int) -> None:
+    network = _Network(_Clock(), *[0.1] * ROUNDS)
+    measure_speed(_with_facts({("restore", "M"): network}, **facts), STAGE, threads=1)
+    assert set(network.shapes) == {(1, 6, side, side)}
+
+
+def test_a_block_larger_than_any_picture_is_not_made_to_be_timed() -> None:
+    huge = STAGE.model_copy(update={"block_px": 8192, "overlap_px": 4096})
+    tracemalloc.start()
+    speed = measure_speed({}, huge, threads=1)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 50e6
+    assert speed.block_s > 100 * measure_speed({}, STAGE, threads=1).block_s
+
+
+def test_a_block_with_clipped_samples_takes_longer() -> None:
+    speed = measure_speed({}, STAGE.model_copy(update={"clip_iterations": 6}), threads=1)
+    assert speed.clipped_block_s > 1.5 * speed.block_s
+
+
 def test_a_window_counts_with_its_best_round_per_megapixel(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -45,7 +79,7 @@ def test_a_window_counts_with_its_best_round_per_megapixel(
         ("split", "M"): _Network(clock, 0.9, 0.6, 0.7),
         ("fuse", "M"): _Network(clock, 0.2, 0.3, 0.4, channels=4),
     }
-    speed = measure_speed(engines, STAGE, threads=2)  # type: ignore[arg-type]
+    speed = measure_speed(_with_facts(engines), STAGE, threads=2)
     megapixels = WINDOW_PX**2 / 1e6
     assert speed.network_s_per_mp["split", "M"] == pytest.approx(0.6 / megapixels)
     assert speed.network_s_per_mp["fuse", "M"] == pytest.approx(0.2 / megapixels)
@@ -56,7 +90,7 @@ def test_a_window_counts_with_its_best_round_per_megapixel(
 
 def test_a_real_network_and_the_default_block_are_timed() -> None:
     engine = NetworkEngine(tiny_network(), threads=1)
-    speed = measure_speed({("restore", "M"): engine}, None, threads=1)
+    speed = measure_speed({("restore", "M"): (engine, tiny_facts())}, None, threads=1)
     assert speed.network_s_per_mp["restore", "M"] > 0
     assert speed.block_s > 1e-5
 
@@ -79,6 +113,8 @@ def test_the_rest_is_given_in_blocks_of_one_size_whatever_the_bank_has() -> None
     ],
 )
 def test_a_speed_without_time_or_threads_is_refused(wrong: dict[str, object]) -> None:
-    sound = Speed(network_s_per_mp={}, block_s=0.01, rest_s_per_mp=0.1, threads=1)
+    sound = Speed(
+        network_s_per_mp={}, block_s=0.01, clipped_block_s=0.05, rest_s_per_mp=0.1, threads=1
+    )
     with pytest.raises(ContractError, match="seconds > 0"):
         replace(sound, **wrong)  # type: ignore[arg-type]

@@ -58,6 +58,7 @@ def test_a_flat_half_is_saved_and_texture_everywhere_keeps_every_bit_of_exact(
     steady = Speed(
         network_s_per_mp={(DEFAULT_ROLE, "S"): 0.2, (DEFAULT_ROLE, "M"): 0.5},
         block_s=0.02,
+        clipped_block_s=5 * 0.02,
         rest_s_per_mp=0.1,
         threads=1,
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.say import say
 
 if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
@@ -54,12 +55,12 @@ def convert(
         notes = (*notes, "what `vary` names stays behind: OUT is all fixed")
     write_lens(lens, out)
     for note in notes:
-        typer.echo(f"{source.name}: {note}", err=True)
+        say(f"{source.name}: {note}", err=True)
     if json_:
         found = {"lens": lens.name, "surfaces": len(lens.surfaces), "out": str(out)}
-        typer.echo(json.dumps({**found, "notes": list(notes)}))
+        say(json.dumps({**found, "notes": list(notes)}))
     else:
-        typer.echo(f"{out}: {lens.name}, {len(lens.surfaces)} surfaces")
+        say(f"{out}: {lens.name}, {len(lens.surfaces)} surfaces")
 
 
 def _clipped(lens: "Lens") -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.say import say
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -84,8 +85,8 @@ def optimize(
         "notes": notes,
     }
     for note in notes:
-        typer.echo(f"{source.name}: {note}", err=True)
-    typer.echo(json.dumps(report) if json_ else _text(report))
+        say(f"{source.name}: {note}", err=True)
+    say(json.dumps(report) if json_ else _text(report))
 
 
 def _problem(lens: "Lens", vary: str | None, *, merit: str, core_mm: float, rays: int) -> "Problem":

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.say import say
 
 
 def show(
@@ -51,9 +52,9 @@ def show(
     facts = analyse(lens, chosen, notes)
     written = [] if folder is None else write_lens_page(facts, folder, file.stem)
     if json_:
-        typer.echo(json.dumps(to_json(facts), allow_nan=False))
+        say(json.dumps(to_json(facts), allow_nan=False))
         return
     for note in facts.notes:
-        typer.echo(f"{file.name}: {note}", err=True)
+        say(f"{file.name}: {note}", err=True)
     for path in written:
-        typer.echo(str(path))
+        say(str(path))

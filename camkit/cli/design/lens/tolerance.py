@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.say import say, say_over
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -60,18 +61,18 @@ def tolerance(
         refuse_existing(chart_paths(folder, file.stem), overwrite=overwrite)
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
     for note in notes:
-        typer.echo(f"{file.name}: {note}", err=True)
+        say(f"{file.name}: {note}", err=True)
     run = ToleranceRun(
         copies=samples, seed=seed, pictures=data, pitch_um=pitch_um, noise=noise, rays=rays
     )
     result = run_tolerance(lens, _tolerances(file, errors), run, _progress)
     written = () if folder is None else write_tolerance(result, folder, file.stem)
     if json_:
-        typer.echo(json.dumps(to_json(result), allow_nan=False))
+        say(json.dumps(to_json(result), allow_nan=False))
         return
-    typer.echo(to_text(result))
+    say(to_text(result))
     for path in written:
-        typer.echo(str(path))
+        say(str(path))
 
 
 def _tolerances(file: Path, errors: Path | None) -> "Tolerances":
@@ -89,5 +90,4 @@ def _tolerances(file: Path, errors: Path | None) -> "Tolerances":
 
 def _progress(done: int, total: int) -> None:
     if sys.stderr.isatty():
-        end = "\n" if done == total else ""
-        typer.echo(f"\r{done} of {total} copies{end}", nl=False, err=True)
+        say_over(f"{done} of {total} copies", last=done == total)

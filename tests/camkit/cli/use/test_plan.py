@@ -48,15 +48,29 @@ def test_sidecar_keeps_the_plan_and_how_far_the_estimate_was_off(
     bundle: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    assert (
-        run(["process", str(tmp_path / "a.dng"), "--bundle", str(bundle), "--out-dir", str(out)])
-        == 0
-    )
+    command = ["process", str(tmp_path / "a.dng"), "--bundle", str(bundle), "--out-dir", str(out)]
+    assert run([*command, "--max-seconds", "1000"]) == 0
     plan = json.loads((out / "a.camkit.json").read_text(encoding="utf-8"))["plan"]
     assert plan["quality"] == "exact"
     assert plan["estimate"]["real_seconds"] > 0
     assert plan["estimate"]["seconds_ratio"] > 0
     assert [d["what"] for d in plan["decisions"]][:2] == ["size", "cells"]
+
+
+def test_nothing_is_timed_where_nobody_asks_for_a_time(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def timed(*_: object, **__: object) -> None:
+        raise AssertionError("the machine is timed")
+
+    monkeypatch.setattr("camkit.runtime.pipeline.measure_speed", timed)
+    out = tmp_path / "out"
+    assert (
+        run(["process", str(tmp_path / "a.dng"), "--bundle", str(bundle), "--out-dir", str(out)])
+        == 0
+    )
+    plan = json.loads((out / "a.camkit.json").read_text(encoding="utf-8"))["plan"]
+    assert "estimate" not in plan
 
 
 @pytest.mark.parametrize(

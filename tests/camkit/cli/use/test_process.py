@@ -177,14 +177,14 @@ def test_white_balance_gains_are_taken_relative_to_green(captures, camkit_comman
 
 def test_options_reach_the_sidecar(captures, camkit_command) -> None:
     outcome = camkit_command(
-        *("process", "a.dng", "--bundle", "tiny.camkit", "--method", "wiener", "--mode", "whole"),
+        *("process", "a.dng", "--bundle", "tiny.camkit", "--method", "net", "--mode", "whole"),
         *("--no-vignetting", "--no-undistort", "--exposure", "-1.5", "--demosaic", "quality"),
         *("--color", "acescg", "--max-mem", "2G", "--threads", "1"),
     )
     assert outcome.code == 0, outcome.err
     record = _record(captures)
     wanted = {
-        "method": "wiener",
+        "method": "net",
         "mode": "whole",
         "vignetting": False,
         "undistort": False,
