@@ -12,6 +12,7 @@ from tests.bundle_factory import write_tiny_bundle
 PUBLIC = [
     "BundleError",
     "CamkitError",
+    "Cancelled",
     "ContractError",
     "DecodeError",
     "FileResult",

@@ -16,7 +16,7 @@ from tests.faults.small_batch import End, run_small_batch
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks and counts calls on Linux")
 
-FORMATS = {"exr": "exr", "tiff": "tif", "png": "png", "dng": "dng"}
+FORMATS = {"exr": "exr", "tiff": "tif", "png": "png", "jpeg": "jpg", "dng": "dng"}
 NAMES = ("a", "b")
 EVERY = 22
 """Of the default run; the slow one takes every call."""
