@@ -30,6 +30,7 @@ from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
 from camkit.bundle.stages import JoinError, Network, Parts, Stage
+from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.errors import BundleError
 
@@ -208,9 +209,10 @@ def read_manifest(data: bytes) -> Manifest:
     """Decode and check the bytes of manifest.json; one of format 1.0 is brought up to date.
 
     Raises:
-        BundleError: If it is no JSON, of a newer format than this reader knows (major or
-            minor), or breaks the schema.
+        BundleError: If it is no JSON or holds a key twice, is of a newer format than this reader
+            knows (major or minor), or breaks the schema.
     """
+    read_json(data, what="manifest.json")
     try:
         head = _Head.model_validate_json(data)
     except ValidationError as error:
