@@ -81,8 +81,8 @@ NETWORK_WORK: Final = Limit(
     default=4e6,
     unit="operations per pixel",
 )
-"""Multiply-adds, samples pooled, read and written; the largest built-in network takes 35 000, the
-largest reference network 1.2 million."""
+"""Multiply-adds (what is pooled or grouped counts several times), samples read and written; the
+largest built-in network takes 35 000, the largest reference network 1.2 million."""
 
 BANK_WORK: Final = Limit(
     variable="CAMKIT_MAX_BANK_WORK",
@@ -96,8 +96,8 @@ PROOF_MB: Final = Limit(variable="CAMKIT_MAX_PROOF_MB", default=2000.0, unit="MB
 """Memory of the windows with which `camkit check` proves a network."""
 
 PROOF_WORK: Final = Limit(
-    variable="CAMKIT_MAX_PROOF_WORK", default=2e13, unit="operations in a proof"
+    variable="CAMKIT_MAX_PROOF_WORK", default=3e12, unit="operations in a proof"
 )
-"""The same as operations in all: some minutes on two cores."""
+"""The same as operations in all: about a minute on two cores."""
 
 LIMITS: Final = (NETWORK_WORK, BANK_WORK, PROOF_MB, PROOF_WORK)

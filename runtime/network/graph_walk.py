@@ -35,6 +35,8 @@ _BYTES_PER_VALUE: Final = 4
 _BLOCK_ALIGNMENT: Final = 4
 _SMALL_INPUT: Final = 8
 _LARGE_BLOCK: Final = 16
+# How much longer a sample takes that is pooled, or multiplied in groups or off the blocked path.
+_SLOWNESS: Final = 16
 _MAX_CHANNELS: Final = 2**16
 _MAX_EXTRA_PX: Final = 64
 # Operators that may take several computed tensors; all others take one, the rest is constant.
@@ -56,7 +58,8 @@ class GraphFacts:
             may differ there.
         mac_per_pixel: Multiply-accumulates of all convolutions per pixel of the input.
         bytes_per_pixel: Peak of the live float32 activations per pixel of the input.
-        work_per_pixel: Multiply-accumulates, samples that are pooled, read and written.
+        work_per_pixel: Multiply-accumulates, those of pooling, of groups and off the blocked path
+            several times, as slow as they are; samples read and written.
         parameters: Number of constants of floating point.
         values_per_pixel: Samples of all tensors together.
     """
@@ -86,7 +89,7 @@ class _Walk:
     unblocked: list[str] = field(default_factory=list)
     workspace: dict[str, float] = field(default_factory=dict)
     mac_per_pixel: float = 0.0
-    pooled_per_pixel: float = 0.0
+    slow_per_pixel: float = 0.0
 
     def extent(self, node: Node, index: int = 0) -> Extent:
         name = node.inputs[index] if index < len(node.inputs) else ""
@@ -164,7 +167,7 @@ def walk_graph(
         unblocked_convolutions=tuple(walk.unblocked),
         mac_per_pixel=walk.mac_per_pixel,
         bytes_per_pixel=_peak_bytes(nodes, walk, keep=target[0]),
-        work_per_pixel=walk.mac_per_pixel + walk.pooled_per_pixel + values + read,
+        work_per_pixel=walk.mac_per_pixel + _SLOWNESS * walk.slow_per_pixel + values + read,
         parameters=sum(a.size for a in constants.values() if a.dtype.kind == "f"),
         values_per_pixel=values,
     )
@@ -291,6 +294,8 @@ def _convolve(walk: _Walk, node: Node) -> Extent:
         # It multiplies all of its input before it adds up what falls on one sample.
         walk.workspace[node.outputs[0]] = grid * channels * math.prod(shape[2:])
     walk.mac_per_pixel += grid * math.prod(shape)
+    if groups > 1 or not _is_blocked(node, extent.channels, channels, groups):
+        walk.slow_per_pixel += grid * math.prod(shape)
     if not _is_blocked(node, extent.channels, channels, groups):
         walk.unblocked.append(node.label)
         if node.op == "Conv":  # blocks behind another one are put in plain order first
@@ -304,7 +309,7 @@ def _pool(walk: _Walk, node: Node) -> Extent:
     kernel = node.integers("kernel_shape", [])
     windows = convolution_windows(node, tuple(kernel))
     result = walk.pass_through(node, walk.extent(node).channels, windows)
-    walk.pooled_per_pixel += math.prod(kernel) * result.samples_per_pixel
+    walk.slow_per_pixel += math.prod(kernel) * result.samples_per_pixel
     return result
 
 

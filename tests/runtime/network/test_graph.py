@@ -487,7 +487,7 @@ def test_pooling_counts_as_work_and_not_as_multiplications() -> None:
     found = inspect_graph(_bytes(_chain(_conv(1), pool)))
     assert found.mac_per_pixel == 9
     # read and written: 3 channels before, between and behind, the middle twice
-    assert found.work_per_pixel == 9 + 81 * 3 + (3 + 3 + 3) + (3 + 3)
+    assert found.work_per_pixel == 9 + 16 * 81 * 3 + (3 + 3 + 3) + (3 + 3)
     assert found.values_per_pixel == 9
 
 
