@@ -87,7 +87,7 @@ def _with_bank(folder: Path, **change: Any) -> Path:
 ODD: dict[str, tuple[Callable[[Path], Path], str, float]] = {
     # how it is made, how it ends, MB it may take
     "wide, and says so": (lambda folder: _write(folder, _wide(20_000)), "processed", PROOF_MB),
-    "wide beyond the cap": (lambda f: _write(f, _wide(60_000)), "not proved", MOST_MB),
+    "wide beyond a proof": (lambda f: _write(f, _wide(60_000)), "not proved", PROOF_MB),
     "wide, and understates": (
         lambda folder: _write(folder, _wide(60_000), bytes_per_pixel=48.0),
         "not processed",
@@ -129,3 +129,22 @@ def test_an_odd_bundle_stays_within_its_memory_and_time(
     assert found["end"] == end, found
     assert found["peak_mb"] < most_mb, found
     assert found["seconds"] < MOST_SECONDS, found
+
+
+@pytest.mark.parametrize(
+    "model",
+    [_wide(20_000), _wide(60_000), _transposed()],
+    ids=["wide", "wider than the cap", "transposed"],
+)
+def test_a_picture_of_an_odd_network_stays_within_the_cap(
+    tmp_path: Path, model: onnx.ModelProto
+) -> None:
+    told = subprocess.run(
+        [sys.executable, "-m", "tests.hostile.picture", str(_write(tmp_path, model))],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=MOST_SECONDS,
+    )
+    assert float(told.stdout) < MOST_MB

@@ -45,7 +45,7 @@ def try_bundle(path: Path) -> str:
             raise FaultError(f"check passed what does not open: {error}") from error
         return "refused"
     try:
-        picture = _process(bundle)
+        picture = process(bundle)
     except CamkitError as error:
         _check_line(str(error))
         return "not processed"
@@ -54,7 +54,7 @@ def try_bundle(path: Path) -> str:
     return "processed" if report.passed else "not proved"
 
 
-def _process(bundle: Bundle) -> np.ndarray:
+def process(bundle: Bundle) -> np.ndarray:
     """Process noise of the size of the sensor, or a crop of one that is not tiny."""
     sensor = bundle.manifest.sensor
     size, origin_px = (HEIGHT_PX, WIDTH_PX), None
