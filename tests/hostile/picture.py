@@ -1,4 +1,4 @@
-"""One picture in a process of its own: `python -m tests.hostile.picture FILE.camkit`, peak in MB."""
+"""One picture in a process of its own: `python -m tests.hostile.picture FILE`; prints peak MB."""
 
 import sys
 from pathlib import Path
