@@ -4,9 +4,10 @@ VENV := .venv
 DEV := .venv-dev
 RUNTIME_STAMP := $(VENV)/.runtime-installed
 DEV_STAMP := $(DEV)/.dev-installed
+FUZZ_SECONDS ?= 600
 SOURCES := camkit runtime export models_def tests tools setup.py
 
-.PHONY: demo test test-slow check format docs clean
+.PHONY: demo test test-slow fuzz check format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
 	$(VENV)/bin/python -m tools.demo --out-dir out
@@ -19,6 +20,10 @@ test: check  ## set-up with everything, gate, tests with branch coverage
 
 test-slow: $(DEV_STAMP)  ## also the tests that take minutes
 	$(DEV)/bin/python -m pytest -q -m slow --timeout=3600
+
+fuzz: $(DEV_STAMP)  ## search for bundles that camkit does not stand (Linux); FUZZ_SECONDS=600
+	$(DEV)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt -e ".[fuzz]"
+	OMP_NUM_THREADS=1 FUZZ_SECONDS=$(FUZZ_SECONDS) $(DEV)/bin/python -m tests.hostile.fuzz
 
 check: $(DEV_STAMP)  ## format, lint, types, layers, spelling
 	$(DEV)/bin/ruff format --check $(SOURCES)

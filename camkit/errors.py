@@ -10,9 +10,23 @@
 A message says what was expected, what came, and what to do.
 """
 
+from typing import Final
+
+_MOST_CHARACTERS: Final = 1000
+
 
 class CamkitError(Exception):
-    """Every error that camkit raises on purpose."""
+    """Every error that camkit raises on purpose; its text is one printable line."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
+
+
+def one_line(text: str) -> str:
+    """Give a text as one printable line of bounded length, whatever files put into it."""
+    line = " ".join(text.split())
+    shown = "".join(letter if letter.isprintable() else "?" for letter in line)
+    return shown if len(shown) <= _MOST_CHARACTERS else shown[: _MOST_CHARACTERS - 3] + "..."
 
 
 class ContractError(CamkitError, ValueError):

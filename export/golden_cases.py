@@ -12,7 +12,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import MOSAIC, Extent
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.kind import runtime_part
+from camkit.runtime.kind import part_of
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.twin.light import stated_balance
 from camkit.runtime.twin.simulate import SimulationOptions
@@ -75,7 +75,7 @@ def photograph(
         scale=scale,
         depth_mm=bundle.reference_depth_mm if manifest.optics else None,
     )
-    simulation = runtime_part(manifest.kind).simulate(scene, bundle, options)
+    simulation = part_of(manifest).simulate(scene, bundle, options)
     case = GoldenCase(
         name=name,
         recipe={

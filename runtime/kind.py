@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError
+from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import find_kind
 from camkit.runtime.array_capture import capture_of_array
 from camkit.runtime.capture import Capture, MosaicOptions
@@ -69,3 +69,15 @@ def runtime_part(kind: str) -> RuntimePart:
     if not isinstance(part, RuntimePart):
         raise ContractError(f"{module.__name__} must define PART as a RuntimePart")
     return part
+
+
+def part_of(manifest: Manifest) -> RuntimePart:
+    """Give what the runtime knows of the kind of a bundle.
+
+    Raises:
+        BundleError: If that kind cannot be used here; says why.
+    """
+    try:
+        return runtime_part(manifest.kind)
+    except (UnsupportedError, ContractError) as error:
+        raise BundleError(f"bundle {manifest.name} cannot be used here: {error}") from error

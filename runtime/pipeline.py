@@ -27,13 +27,14 @@ from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.kind import runtime_part
+from camkit.runtime.kind import part_of, runtime_part
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Progress
-from camkit.runtime.options import Options
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
 from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
+from camkit.runtime.stage_finder import check_stages
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,14 +86,18 @@ class Pipeline:
         """Make ready what captures will need.
 
         Raises:
+            BundleError: If the bundle is of a kind that is not installed, or asks too much of a
+                machine.
             ContractError: If the bundle lacks what was asked for, or an option means nothing to it.
         """
         self.bundle = bundle
         self.options = options
         self.threads = available_threads(options.threads)
+        if bundle is not None:
+            check_stages(bundle.manifest, options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES)
         check_choices(bundle, options)
         # without a bundle captures are read as colour photographs are
-        self._part = runtime_part(BAYER.name if bundle is None else bundle.manifest.kind)
+        self._part = runtime_part(BAYER.name) if bundle is None else part_of(bundle.manifest)
         self._lock = threading.Lock()
         self._engines: dict[tuple[str, str], NetworkEngine] = {}
         self._speeds: dict[tuple[str, str], float] = {}

@@ -7,6 +7,9 @@ A module defines
     METHODS                              names of its ways, as `--method` takes them; may be empty
     OPTIONS                              fields of `Options` that mean something to it
     is_left_out(options)                 optional: whether the caller wants it left out
+    check(entry, manifest, max_bytes)    optional: refuses, when a bundle is loaded, what asks too
+                                         much of a machine
+    FACTS                                optional: facts of a camera body that it knows, by name
 """
 
 import importlib
@@ -16,6 +19,7 @@ from functools import cache
 from types import ModuleType
 from typing import Final
 
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.stages import Stage
 from camkit.errors import UnsupportedError
 
@@ -37,6 +41,32 @@ def stage_module(name: str) -> ModuleType:
             f"this runtime has no stage {name!r}; it has {', '.join(sorted(known))}"
         )
     return importlib.import_module(f"{STAGES}.{name}")
+
+
+def check_stages(manifest: Manifest, max_bytes: int) -> None:
+    """Refuse stages that ask too much of a machine.
+
+    Args:
+        manifest: Of the bundle.
+        max_bytes: Memory that the process may take.
+
+    Raises:
+        BundleError: If one does more work than is admitted.
+        ContractError: If one cannot do with the memory.
+    """
+    for stage in manifest.stages:
+        check = getattr(stage_module(stage.type), "check", None)
+        if check is not None:
+            check(stage, manifest, max_bytes)
+
+
+def known_facts(stages: Sequence[Stage]) -> tuple[str, ...]:
+    """Name the facts of a camera body that some stages know."""
+    return tuple(
+        dict.fromkeys(
+            fact for stage in stages for fact in getattr(stage_module(stage.type), "FACTS", ())
+        )
+    )
 
 
 def stage_keys(stages: Sequence[Stage]) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ name = "body 17"          for people
 focus_um = 12.5
 """
 
+import difflib
 import re
 import tomllib
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ from typing import Any
 
 from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError
+from camkit.runtime.stage_finder import known_facts
 
 _KEYS = frozenset({"bundle_sha256", "name", "facts"})
 
@@ -35,10 +37,11 @@ class Unit:
     facts: Mapping[str, float] = field(default_factory=dict)
 
     def check(self, bundle: Bundle | None) -> None:
-        """Refuse a unit of another bundle.
+        """Refuse a unit of another bundle, or one of which facts would be passed over.
 
         Raises:
-            ContractError: If there is no bundle, or its hash is another.
+            ContractError: If there is no bundle, its hash is another, or no stage of it knows a
+                fact; near names are suggested.
         """
         if bundle is None:
             raise ContractError(f"the unit {self.name} belongs to a bundle, and there is none")
@@ -46,6 +49,14 @@ class Unit:
             raise ContractError(
                 f"the unit {self.name} was measured with the bundle of sha256 "
                 f"{self.bundle_sha256[:16]}, this is {bundle.sha256[:16]}; measure it again"
+            )
+        known = known_facts(bundle.manifest.stages)
+        if foreign := [name for name in self.facts if name not in known]:
+            near = {n for name in foreign for n in difflib.get_close_matches(name, known, n=2)}
+            hint = f"did you mean {' or '.join(sorted(near))}?" if near else "leave them out;"
+            raise ContractError(
+                f"the unit {self.name} states {', '.join(foreign)}, which no stage of bundle "
+                f"{bundle.manifest.name} knows; {hint} known are: {', '.join(known) or 'none'}"
             )
 
 

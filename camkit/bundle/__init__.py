@@ -6,7 +6,8 @@
     manifest                       what manifest.json may say, and its schema
     upgrade                        manifests of format 1.0
     psf_file, golden               the safetensors members
-    container                      the zip: names, sizes, refusals
+    strict_json                    JSON that every reader understands alike
+    local_headers, container       the zip: names, sizes, refusals
     reader                         container + manifest + hashes -> Bundle
     writer                         members -> one file, the same bytes for the same content
 

@@ -2,8 +2,9 @@
 
 What is refused here, each with its own message: no zip, encryption, unknown compression, too many
 members, `..`, absolute, drive, backslash and other odd names, duplicate names, links and other
-special files, a compression ratio above 100, more bytes than the cap, damaged data. The sizes in
-the zip's headers are used to refuse early, never to allocate: reading stops at the cap.
+special files, a compression ratio above 100, more bytes than the cap, damaged data, and headers in
+front of the members that contradict the directory (local_headers.py). The sizes in the zip's
+headers are used to refuse early, never to allocate: reading stops at the cap.
 """
 
 import hashlib
@@ -17,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from camkit.bundle.local_headers import check_local_headers
 from camkit.errors import BundleError
 
 MAX_BUNDLE_BYTES: Final = 128 * 2**20
@@ -122,9 +124,10 @@ def container_from_bytes(data: bytes, *, what: str, max_bytes: int = MAX_BUNDLE_
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             entries = archive.infolist()
+            _check_entries(entries, max_bytes)
+            check_local_headers(data, archive)
     except _ZIP_ERRORS as error:
         raise BundleError(f"{what} is a damaged zip ({error}); fetch the bundle again") from error
-    _check_entries(entries, max_bytes)
     return Container(
         data=data,
         sha256=hashlib.sha256(data).hexdigest(),
@@ -134,6 +137,8 @@ def container_from_bytes(data: bytes, *, what: str, max_bytes: int = MAX_BUNDLE_
 
 
 def _check_entries(entries: list[zipfile.ZipInfo], max_bytes: int) -> None:
+    if not entries:
+        raise BundleError("the zip is empty, so it is not a bundle; fetch the bundle again")
     if len(entries) > MAX_MEMBERS:
         raise BundleError(
             f"the bundle has too many members: {len(entries)}; at most {MAX_MEMBERS} are read"

@@ -1,10 +1,14 @@
 """What was measured at export: facts about each network, and the card of the camera."""
 
-from typing import Annotated, Self
+from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
 from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Word
+
+MAX_REACH_PX: Final = 4096
+"""Far beyond any network that may be tiled: the reference networks of 64 channels reach 446 px."""
+Reach = Annotated[int, Field(ge=0, le=MAX_REACH_PX)]
 
 
 class HaloError(Entry):
@@ -15,7 +19,7 @@ class HaloError(Entry):
         psnr_db: PSNR of tiled against whole; None where they are equal.
     """
 
-    halo_px: Count
+    halo_px: Reach
     max_abs: NonNegative
     psnr_db: float | None
 
@@ -67,11 +71,11 @@ class NetworkFacts(Entry):
     inputs: Annotated[tuple[Port, ...], Field(min_length=1, max_length=64)]
     output_name: str = "output"
     outputs: Annotated[tuple[Port, ...], Field(min_length=1, max_length=64)]
-    receptive_field_radius_px: Count
-    receptive_field_probe_px: Count
-    stride_px: Annotated[int, Field(gt=0, le=4096)]
+    receptive_field_radius_px: Reach
+    receptive_field_probe_px: Reach
+    stride_px: Annotated[int, Field(gt=0, le=256)]
     global_operators: tuple[str, ...] = ()
-    halo_error: tuple[HaloError, ...] = ()
+    halo_error: Annotated[tuple[HaloError, ...], Field(max_length=256)] = ()
     max_activation: NonNegative
     node_activation: dict[str, NonNegative] = Field(default_factory=dict)
     fp16_headroom: Positive = 4.0

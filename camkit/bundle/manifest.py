@@ -30,6 +30,7 @@ from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
 from camkit.bundle.stages import JoinError, Network, Parts, Stage
+from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.errors import BundleError
 
@@ -39,6 +40,8 @@ _S = TypeVar("_S", bound=Entry)
 NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
 """Name of a size of network; S, M and L from fast to good."""
 Border = Literal["reflect", "edge", "zero"]
+Tolerance = Annotated[float, Field(ge=0, le=1e-2)]
+"""Of a golden case: a picture has 1.0 = white level, so more than this would prove nothing."""
 
 
 class Member(Entry):
@@ -66,8 +69,8 @@ class GoldenCase(Entry):
     iso: Positive
     origin_px: tuple[int, int] = (0, 0)
     white_balance: tuple[Positive, Positive, Positive] | None = None
-    rtol: NonNegative = 1e-3
-    atol: NonNegative = 1e-4
+    rtol: Tolerance = 1e-3
+    atol: Tolerance = 1e-4
 
 
 class Range(Entry):
@@ -120,11 +123,14 @@ class Manifest(Entry):
     sensor: Sensor
     optics: Optics | None = None
     border: Border = "edge"
-    stages: tuple[Stage, ...]
+    stages: Annotated[tuple[Stage, ...], Field(max_length=32)]
     planes: Annotated[dict[Word, Plane], Sorted]
-    products: Annotated[dict[Word, Word], Sorted]
-    networks: dict[Word, dict[NetworkSize, NetworkFacts]] = Field(default_factory=dict)
-    golden: tuple[GoldenCase, ...] = ()
+    products: Annotated[dict[Word, Word], Field(max_length=16), Sorted]
+    networks: Annotated[
+        dict[Word, Annotated[dict[NetworkSize, NetworkFacts], Field(max_length=16)]],
+        Field(max_length=16),
+    ] = Field(default_factory=dict)
+    golden: Annotated[tuple[GoldenCase, ...], Field(max_length=32)] = ()
     card: Card = Card()
     freeze: Annotated[dict[str, int | float | str], Sorted] = Field(default_factory=dict)
     envelope: Annotated[dict[str, Range], Sorted] | None = None
@@ -208,9 +214,10 @@ def read_manifest(data: bytes) -> Manifest:
     """Decode and check the bytes of manifest.json; one of format 1.0 is brought up to date.
 
     Raises:
-        BundleError: If it is no JSON, of a newer format than this reader knows (major or
-            minor), or breaks the schema.
+        BundleError: If it is no JSON or holds a key twice, is of a newer format than this reader
+            knows (major or minor), or breaks the schema.
     """
+    read_json(data, what="manifest.json")
     try:
         head = _Head.model_validate_json(data)
     except ValidationError as error:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from camkit.bundle.strict_json import read_json
 from camkit.contracts import FrozenPsf, RadialDistortion, Symmetry
 from camkit.errors import BundleError, ContractError
 
@@ -23,6 +24,8 @@ _AXES: Final = ("field_heights_mm", "depths_mm", "wavelengths_um", "relative_ill
 _SCALARS: Final = ("pixel_pitch_um", "distortion_radius_mm")
 _TENSORS: Final = frozenset({"kernels", "distortion_coefficients", *_AXES, *_SCALARS})
 _SYMMETRY: Final = "symmetry"
+_LENGTH_BYTES: Final = 8
+_MAX_HEADER_BYTES: Final = 2**20
 _GRID: Final = ("grid_x_mm", "grid_y_mm")
 _ADDED: Final = {"radial": (), "uniform": (_SYMMETRY,), "grid": (_SYMMETRY, *_GRID)}
 """What a PSF of each symmetry holds besides."""
@@ -36,8 +39,10 @@ def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
         what: Its name in the error message.
 
     Raises:
-        BundleError: If the bytes are not a sound safetensors file of numpy types.
+        BundleError: If the bytes are not a sound safetensors file of numpy types, or its header
+            holds a name twice.
     """
+    _check_header(data, what)
     try:
         tensors = load(data)
     except (SafetensorError, KeyError, TypeError, ValueError, OverflowError) as error:
@@ -47,6 +52,17 @@ def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
     for array in tensors.values():
         array.flags.writeable = False
     return tensors
+
+
+def _check_header(data: bytes, what: str) -> None:
+    """Refuse a header that readers take differently; the rest is told by the library."""
+    stated = int.from_bytes(data[:_LENGTH_BYTES], "little")
+    if stated > min(len(data) - _LENGTH_BYTES, _MAX_HEADER_BYTES):
+        raise BundleError(
+            f"{what} is not a sound safetensors file (its header is said to have {stated} bytes); "
+            "export it again"
+        )
+    read_json(data[_LENGTH_BYTES : _LENGTH_BYTES + stated], what=f"the header of {what}")
 
 
 def psf_to_bytes(psf: FrozenPsf) -> bytes:

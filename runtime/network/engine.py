@@ -207,13 +207,19 @@ def largest_activations(
         Largest |value| by name over all windows; NaN where one occurred.
 
     Raises:
-        BundleError: If onnxruntime refuses the model.
+        BundleError: If onnxruntime refuses the model, or cannot run it.
     """
     with _CREATION:
         session = _create_session(model, available_threads(None))
     largest = dict.fromkeys(names, 0.0)
     for window in windows:
-        for name, value in zip(names, session.run(list(names), {"input": window}), strict=True):
+        try:
+            values = session.run(list(names), {"input": window})
+        except (RuntimeError, *_ORT_ERRORS) as error:
+            raise BundleError(
+                f"the network cannot run on a window of {window.shape}: {error}; export it again"
+            ) from error
+        for name, value in zip(names, values, strict=True):
             largest[name] = float(np.maximum(largest[name], np.abs(value).max(initial=0)))
     return largest
 

@@ -21,6 +21,7 @@ from onnx import numpy_helper
 
 from camkit.bundle.facts import NetworkFacts
 from camkit.errors import BundleError
+from camkit.runtime.limits import NETWORK_WORK
 from camkit.runtime.network.graph_walk import GraphFacts, walk_graph
 from camkit.runtime.network.operators import (
     ELEMENTWISE,
@@ -41,6 +42,8 @@ ALLOWED_OPERATORS: Final = (
 OPSETS: Final = range(18, 21)
 MAX_IR: Final = 10
 _MAX_NODES: Final = 4096
+_MAX_WIRES: Final = 256
+COST_RTOL: Final = 1e-6
 _DEFAULT_DOMAINS: Final = ("", "ai.onnx")
 
 
@@ -77,6 +80,7 @@ def parse_graph(data: bytes) -> Graph:
     model = _decode(data)
     _check_header(model)
     graph = model.graph
+    _check_text(model)
     _check_tensors([*graph.initializer])
     if graph.sparse_initializer:
         raise BundleError("the graph has sparse initializers; refused")
@@ -121,6 +125,19 @@ def _check_header(model: Any) -> None:
         raise BundleError("the ONNX holds training information; refused")
 
 
+def _check_text(message: Any) -> None:
+    """Refuse text that is no UTF-8, which protobuf lets through as bytes."""
+    for kind, value in message.ListFields():
+        values = value if kind.is_repeated else (value,)
+        if kind.type == kind.TYPE_STRING and not all(isinstance(one, str) for one in values):
+            raise BundleError(
+                f"the ONNX is damaged: text in it ({kind.name}) is no UTF-8; export it again"
+            )
+        if kind.type == kind.TYPE_MESSAGE:
+            for one in values:
+                _check_text(one)
+
+
 def _check_tensors(tensors: Sequence[Any]) -> None:
     for tensor in tensors:
         if tensor.data_location == onnx.TensorProto.EXTERNAL or tensor.external_data:
@@ -144,6 +161,8 @@ def _label(proto: Any, index: int) -> str:
 
 
 def _check_node(proto: Any, label: str) -> None:
+    if max(len(proto.input), len(proto.output)) > _MAX_WIRES:
+        raise BundleError(f"{label}: more than {_MAX_WIRES} inputs or outputs; refused")
     if proto.domain not in _DEFAULT_DOMAINS:
         raise BundleError(f"{label}: operator of domain {proto.domain!r}; refused")
     for attribute in proto.attribute:
@@ -264,7 +283,8 @@ def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
 
     Raises:
         BundleError: If the graph is not admissible or contradicts the manifest in names,
-            channels, scale, stride or global operators, or reaches further than it says.
+            channels, scale, stride or global operators, reaches further or holds more memory than
+            it says, or computes more than is admitted.
     """
     found = inspect_graph(data)
     pairs = {
@@ -282,6 +302,14 @@ def check_graph(data: bytes, facts: NetworkFacts) -> GraphFacts:
                 f"{facts.member}: {what} of the graph is {got!r}, the manifest says {said!r}; "
                 "export the bundle again"
             )
+    # More memory than the walk counts may have been measured; less cannot be.
+    if found.bytes_per_pixel > facts.bytes_per_pixel * (1 + COST_RTOL):
+        raise BundleError(
+            f"{facts.member}: bytes_per_pixel is {found.bytes_per_pixel:g}, the manifest says "
+            f"{facts.bytes_per_pixel:g}; too little memory would be planned. Export the bundle "
+            "again"
+        )
+    NETWORK_WORK.check(found.work_per_pixel, f"the network {facts.member}")
     if found.receptive_field_radius_px > facts.reach_px:
         raise BundleError(
             f"{facts.member}: the graph reaches {found.receptive_field_radius_px} px, the manifest "

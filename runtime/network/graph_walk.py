@@ -35,6 +35,13 @@ _BYTES_PER_VALUE: Final = 4
 _BLOCK_ALIGNMENT: Final = 4
 _SMALL_INPUT: Final = 8
 _LARGE_BLOCK: Final = 16
+# How much longer a sample takes that is pooled, or multiplied in groups or off the blocked path.
+_SLOWNESS: Final = 16
+_MAX_CHANNELS: Final = 2**16
+_MAX_EXTRA_PX: Final = 64
+# Operators that may take several computed tensors; all others take one, the rest is constant.
+_FLOATS: Final = (1, 10)  # of TensorProto.DataType: float32 and float16
+_FREE: Final = frozenset({"Add", "Sub", "Mul", "Div", "Max", "Min", "Concat"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +58,10 @@ class GraphFacts:
             may differ there.
         mac_per_pixel: Multiply-accumulates of all convolutions per pixel of the input.
         bytes_per_pixel: Peak of the live float32 activations per pixel of the input.
+        work_per_pixel: Multiply-accumulates, those of pooling, of groups and off the blocked path
+            several times, as slow as they are; samples read and written.
         parameters: Number of constants of floating point.
+        values_per_pixel: Samples of all tensors together.
     """
 
     input_name: str
@@ -65,7 +75,9 @@ class GraphFacts:
     unblocked_convolutions: tuple[str, ...]
     mac_per_pixel: float
     bytes_per_pixel: float
+    work_per_pixel: float
     parameters: int
+    values_per_pixel: float
 
 
 @dataclass(slots=True, kw_only=True)
@@ -75,7 +87,9 @@ class _Walk:
     windows: dict[str, Windows] = field(default_factory=dict)
     global_operators: list[str] = field(default_factory=list)
     unblocked: list[str] = field(default_factory=list)
+    workspace: dict[str, float] = field(default_factory=dict)
     mac_per_pixel: float = 0.0
+    slow_per_pixel: float = 0.0
 
     def extent(self, node: Node, index: int = 0) -> Extent:
         name = node.inputs[index] if index < len(node.inputs) else ""
@@ -128,10 +142,17 @@ def walk_graph(
     walk = _Walk(constants=constants, extents={source[0]: start})
     for node in nodes:
         extents = _node_extents(walk, node)
+        _check_extents(node, extents)
         walk.extents.update(zip(node.outputs, extents, strict=False))
     final, scale = _final(walk.extents, target)
     steps = [axis.step for e in walk.extents.values() if e.axes is not None for axis in e.axes]
     stride = math.lcm(*(step.numerator for step in steps))
+    values = sum(extent.samples_per_pixel for extent in walk.extents.values())
+    read = sum(
+        walk.extents[name].samples_per_pixel
+        for node in nodes
+        for name in _names(walk.extents, node.inputs)
+    )
     return GraphFacts(
         input_name=source[0],
         input_channels=source[1],
@@ -145,9 +166,25 @@ def walk_graph(
         global_operators=tuple(walk.global_operators),
         unblocked_convolutions=tuple(walk.unblocked),
         mac_per_pixel=walk.mac_per_pixel,
-        bytes_per_pixel=_peak_bytes(nodes, walk.extents, keep=target[0]),
+        bytes_per_pixel=_peak_bytes(nodes, walk, keep=target[0]),
+        work_per_pixel=walk.mac_per_pixel + _SLOWNESS * walk.slow_per_pixel + values + read,
         parameters=sum(a.size for a in constants.values() if a.dtype.kind == "f"),
+        values_per_pixel=values,
     )
+
+
+def _check_extents(node: Node, extents: Sequence[Extent]) -> None:
+    """Refuse tensors that would be absurdly large whatever the picture."""
+    for extent in extents:
+        if extent.channels > _MAX_CHANNELS:
+            raise BundleError(
+                f"{node.label}: gives {extent.channels} channels; at most {_MAX_CHANNELS} are "
+                "admitted"
+            )
+        if any(axis.extra * axis.step > _MAX_EXTRA_PX for axis in extent.axes or ()):
+            raise BundleError(
+                f"{node.label}: pads the picture by more than {_MAX_EXTRA_PX} px; refused"
+            )
 
 
 def _final(extents: Mapping[str, Extent], target: tuple[str, int | None]) -> tuple[Extent, int]:
@@ -200,17 +237,24 @@ def _reach(
     return reach
 
 
+def _check_inputs(walk: _Walk, node: Node) -> None:
+    """Refuse tensors where constants belong, and numbers of other types than float."""
+    if node.op not in _FREE:
+        for index, name in enumerate(node.inputs[1:], start=1):
+            if name:
+                walk.constant_shape(node, index)
+    if node.op == "Cast" and node.integer("to", 0) not in _FLOATS:
+        raise BundleError(f"{node.label}: casts to float32 and float16 alone are admitted")
+
+
 def _node_extents(walk: _Walk, node: Node) -> list[Extent]:
+    _check_inputs(walk, node)
     if node.op in ("Conv", "ConvTranspose"):
         return [_convolve(walk, node)]
     if node.op in ELEMENTWISE:
         return [_elementwise(walk, node)]
     if node.op in ("MaxPool", "AveragePool"):
-        if len(node.outputs) > 1:
-            raise BundleError(f"{node.label}: pooling with indices is refused")
-        extent = walk.extent(node)
-        windows = convolution_windows(node, tuple(node.integers("kernel_shape", [])))
-        return [walk.pass_through(node, extent.channels, windows)]
+        return [_pool(walk, node)]
     if node.op in ("DepthToSpace", "SpaceToDepth"):
         return [_shuffle(walk, node)]
     if node.op == "Resize":
@@ -237,14 +281,35 @@ def _convolve(walk: _Walk, node: Node) -> Extent:
         raise BundleError(f"{node.label}: weight {shape} does not fit {extent.channels} channels")
     if node.integers("kernel_shape", list(shape[2:])) != list(shape[2:]):
         raise BundleError(f"{node.label}: kernel_shape contradicts the weight {shape}")
+    if len(node.inputs) > 2 and node.inputs[2] and walk.constant_shape(node, 2) != (channels,):
+        raise BundleError(
+            f"{node.label}: a bias has one number for each of {channels} channels; got shape "
+            f"{walk.constant_shape(node, 2)}"
+        )
     result = walk.pass_through(node, channels, convolution_windows(node, shape[2:]))
     # A transposed convolution spends its multiplications per sample of its input.
     grid = result.samples_per_pixel / channels
     if node.op == "ConvTranspose":
         grid = extent.samples_per_pixel / extent.channels
+        # It multiplies all of its input before it adds up what falls on one sample.
+        walk.workspace[node.outputs[0]] = grid * channels * math.prod(shape[2:])
     walk.mac_per_pixel += grid * math.prod(shape)
+    if groups > 1 or not _is_blocked(node, extent.channels, channels, groups):
+        walk.slow_per_pixel += grid * math.prod(shape)
     if not _is_blocked(node, extent.channels, channels, groups):
         walk.unblocked.append(node.label)
+        if node.op == "Conv":  # blocks behind another one are put in plain order first
+            walk.workspace[node.outputs[0]] = extent.samples_per_pixel
+    return result
+
+
+def _pool(walk: _Walk, node: Node) -> Extent:
+    if len(node.outputs) > 1:
+        raise BundleError(f"{node.label}: pooling with indices is refused")
+    kernel = node.integers("kernel_shape", [])
+    windows = convolution_windows(node, tuple(kernel))
+    result = walk.pass_through(node, walk.extent(node).channels, windows)
+    walk.slow_per_pixel += math.prod(kernel) * result.samples_per_pixel
     return result
 
 
@@ -361,11 +426,13 @@ def _global(walk: _Walk, node: Node) -> Extent:
     raise BundleError(f"{node.label}: {node.op} that drops axes is refused; keep dimensions")
 
 
-def _peak_bytes(nodes: Sequence[Node], extents: Mapping[str, Extent], *, keep: str) -> float:
+def _peak_bytes(nodes: Sequence[Node], walk: _Walk, *, keep: str) -> float:
     """Give the peak of live activations in bytes per pixel, each freed after its last use.
 
     An elementwise node writes over an operand that nobody needs any more, as onnxruntime does.
+    Some convolutions need room of their own.
     """
+    extents = walk.extents
     last = {name: index for index, node in enumerate(nodes) for name in node.inputs}
     last[keep] = len(nodes)
     alive = set(_names(extents, [next(iter(extents))]))
@@ -376,7 +443,8 @@ def _peak_bytes(nodes: Sequence[Node], extents: Mapping[str, Extent], *, keep: s
         if node.op in ELEMENTWISE:
             alive -= set(list(dying)[:1])
         alive |= set(outputs)
-        peak = max(peak, sum(extents[name].samples_per_pixel for name in alive))
+        room = sum(walk.workspace.get(name, 0.0) for name in node.outputs)
+        peak = max(peak, room + sum(extents[name].samples_per_pixel for name in alive))
         alive -= dying
         alive -= {name for name in outputs if name not in last}
     return peak * _BYTES_PER_VALUE

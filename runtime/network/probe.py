@@ -16,6 +16,7 @@ from camkit.errors import ContractError
 from camkit.runtime.network.tiling import Run, TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 
+_MOST_PHASES: Final = 32
 _KICK: Final = 1e3  # far beyond the base, so that it survives rounding after many layers
 
 
@@ -58,7 +59,9 @@ def perturbation_reach(
     channels: int,
     scale: int = 1,
 ) -> ProbedReach:
-    """Kick one input pixel at every phase of the stride and see where the output changes.
+    """Kick one input pixel at the phases of the stride and see where the output changes.
+
+    Of a stride beyond 32 px so many phases are tried, the first and the last among them.
 
     Args:
         run: (1, channels, h, w) float32 -> (1, k, s h, s w) float32.
@@ -84,7 +87,7 @@ def perturbation_reach(
     still = run(base).copy()
     cell = size_px // 2 // stride_px * stride_px
     radius = halo = 0
-    for phase in range(stride_px):
+    for phase in _phases(stride_px):
         for kick in (_KICK, -_KICK):
             kicked = base.copy()
             kicked[:, :, cell + phase, cell + phase] += kick
@@ -100,6 +103,16 @@ def perturbation_reach(
                 first = hit // stride_px * stride_px
                 halo = max(halo, _distance(first, first + stride_px - 1, cell + phase))
     return ProbedReach(radius_px=radius, halo_px=halo)
+
+
+def _phases(stride_px: int) -> list[int]:
+    count = min(stride_px, _MOST_PHASES)
+    return sorted({round(i * (stride_px - 1) / max(count - 1, 1)) for i in range(count)})
+
+
+def probe_runs(stride_px: int) -> int:
+    """Give how often a network runs to be probed."""
+    return 1 + 2 * len(_phases(stride_px))
 
 
 def _by_pixel(changed: np.ndarray, scale: int) -> np.ndarray:

@@ -18,16 +18,22 @@ from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
+from camkit.runtime.limits import PROOF_MB, PROOF_WORK
 from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.network.probe import perturbation_reach
+from camkit.runtime.network.graph import inspect_graph
+from camkit.runtime.network.graph_walk import GraphFacts
+from camkit.runtime.network.probe import perturbation_reach, probe_runs
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
 from camkit.runtime.network.tiling import TileLayout, TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 
 _SEED: Final = 7
-_TILE_PX: Final = 64
+_TILES_PX: Final = (64, 40, 1)
+"""Sides of the tiles tried, whole cells of the stride: an odd number of them but for the first."""
 _SYNTHETIC_PX: Final = 96
 _SYNTHETIC_MOST: Final = 8.0
+_SAMPLES: Final = 2
+"""Pictures on which tiled is compared with whole: a golden case, and noise."""
 # Activations of the same input on another processor differ by rounding only.
 _RANGE_RTOL: Final = 1e-3
 
@@ -36,6 +42,10 @@ Result = tuple[bool, str]
 
 class CaseWork(Protocol):
     """A golden capture on its way through the pipeline."""
+
+    def shape_of(self, product: str) -> tuple[int, int, int]:
+        """Give (c, h, w) of a product before any of it is computed."""
+        ...
 
     def fill(self, out: FloatArray | None = None, product: str = "image") -> FloatArray:
         """Give a product, (c, h, w)."""
@@ -64,40 +74,37 @@ def prove_golden(bundle: Bundle, *, run: GoldenRun | None) -> Result:
     if not cases:
         return False, "no golden case"
     arrays = _golden(bundle)
-    if arrays.keys() != cases.keys():
-        raise BundleError(
-            f"the manifest has the golden cases {', '.join(sorted(cases))}; "
-            f"{GOLDEN} has {', '.join(sorted(arrays))}"
-        )
     if run is None:
         return False, "nothing to compare: no pipeline was given"
     worst, compared = 0.0, 0
     for size in bundle.manifest.sizes or (None,):
         for name, case in cases.items():
-            for got, stored, what in _pairs(bundle, case, arrays[name], size, run):
-                worst = max(worst, _compare(got, stored, case, what))
+            for share in _compared(bundle, case, arrays[name], size, run):
+                worst = max(worst, share)
                 compared += 1
     if not compared:
         return False, "nothing to compare: no output is stored"
     return True, f"{compared} results, worst at {worst:.3g} of what is allowed"
 
 
-def _pairs(
+def _compared(
     bundle: Bundle, case: GoldenCase, arrays: GoldenArrays, size: str | None, run: GoldenRun
-) -> Iterator[tuple[FloatArray, FloatArray, str]]:
-    """Give (computed, stored, what it is) of every product that is stored for a size."""
+) -> Iterator[float]:
+    """Compute every product that is stored for a size; give how it compares."""
     for product in arrays.outputs:
         stored = arrays.output(product, size or NO_SIZE)
-        if stored is not None:
-            got = run(bundle, case, arrays, size).fill(product=product)
-            yield got, stored, f"{product} of size {size or NO_SIZE}"
+        if stored is None:
+            continue
+        where = f"golden case {case.name}, {product} of size {size or NO_SIZE}"
+        work = run(bundle, case, arrays, size)
+        # Before any work: a product may be stated finer than memory holds.
+        if (shape := work.shape_of(product)) != stored.shape:
+            raise ParityError(f"{where}: computed {shape}, stored {stored.shape}")
+        yield _compare(work.fill(product=product), stored, case, where)
 
 
-def _compare(got: FloatArray, stored: FloatArray, case: GoldenCase, what: str) -> float:
+def _compare(got: FloatArray, stored: FloatArray, case: GoldenCase, where: str) -> float:
     """Give the largest difference as a share of what is allowed."""
-    where = f"golden case {case.name}, {what}"
-    if got.shape != stored.shape:
-        raise ParityError(f"{where}: computed {got.shape}, stored {stored.shape}")
     allowed = case.atol + case.rtol * max(1.0, float(np.abs(stored).max()))
     difference = float(np.abs(got - stored).max())
     if not difference <= allowed:
@@ -113,6 +120,7 @@ def prove_tiling(bundle: Bundle, *, run: GoldenRun | None, threads: int) -> Resu
 
     Raises:
         ParityError: If a single bit differs, or a pixel acts further than stated.
+        BundleError: If the proof would take more memory or work than is admitted.
     """
     notes = []
     for role, size, facts in _networks(bundle):
@@ -120,9 +128,10 @@ def prove_tiling(bundle: Bundle, *, run: GoldenRun | None, threads: int) -> Resu
         if facts.global_operators:
             notes.append(f"{what}: cannot be tiled ({', '.join(facts.global_operators)})")
             continue
+        _admit_tiling(inspect_graph(bundle.network_bytes(role, size)), facts, what)
         engine = _engine(bundle, role, size, threads)
-        sample = _windows(bundle, role, size, run)[0]
-        count = _prove_equal(engine, facts, sample, what)
+        samples = [_windows(bundle, role, size, run)[0], _noise(facts)]
+        count = sum(_prove_equal(engine, facts, sample, what) for sample in samples)
         probe = perturbation_reach(
             engine.run,
             _probe_px(facts),
@@ -158,23 +167,70 @@ def _engine(bundle: Bundle, role: str, size: str, threads: int) -> NetworkEngine
     return NetworkEngine(bundle.network_bytes(role, size), threads=threads, scale=scale)
 
 
-def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray, what: str) -> int:
-    """Compare tiled with whole on a picture of odd sides with at least 2 x 2 windows."""
-    stride = facts.stride_px
+def _tiles_px(stride: int) -> tuple[int, ...]:
+    """Give three sides of tiles on the lattice of a stride.
+
+    Origins of tiles of an odd number of cells, one cell among them, come to lie on every phase of
+    a lattice that is twice or four times as coarse: what is exact on multiples of 64 px alone is
+    found out.
+    """
+    first, *others = _TILES_PX
+    cells = {math.ceil(first / stride), *(px // stride | 1 for px in others)}
+    more = (count for count in range(1, 4) if count not in cells)
+    while len(cells) < len(_TILES_PX):
+        cells.add(next(more))
+    return tuple(count * stride for count in sorted(cells))
+
+
+def _picture_px(facts: NetworkFacts, tile: int) -> tuple[int, int]:
+    """Give odd sides (h, w) that need at least 2 x 2 windows."""
+    stride, wide = facts.stride_px, max(_tiles_px(facts.stride_px))
     halo = math.ceil(facts.reach_px / stride) * stride
-    height, width = 2 * (halo + _TILE_PX) + stride + 1, 2 * halo + _TILE_PX + 2 * stride + 3
-    pads = [(0, 0), (0, max(0, height - sample.shape[1])), (0, max(0, width - sample.shape[2]))]
-    picture = np.pad(sample, pads, mode="symmetric")[:, :height, :width]
-    limits = TileLimits(stride_px=stride, halo_px=halo, max_bytes=sys.maxsize, whole=True)
-    whole = lay_windows(height, width, limits)
-    tiled = lay_windows(height, width, replace(limits, whole=False, tile_px=_TILE_PX))
-    difference = _infer(engine, picture, tiled) - _infer(engine, picture, whole)
-    if difference.any():
-        raise ParityError(
-            f"size {what}: tiled differs from whole by up to {np.abs(difference).max():.3g} with "
-            f"a halo of {halo} px; exact tiling is not kept"
-        )
-    return tiled.window_count
+    return 2 * (halo + tile) + stride + 1, 2 * halo + wide + 2 * stride + 3
+
+
+def _layouts(facts: NetworkFacts) -> Iterator[tuple[TileLayout, TileLayout]]:
+    """Lay the windows that are compared: tiled and whole, at every side of a tile."""
+    limits = TileLimits(
+        stride_px=facts.stride_px, halo_px=facts.reach_px, max_bytes=sys.maxsize, whole=True
+    )
+    for tile in _tiles_px(facts.stride_px):
+        size = _picture_px(facts, tile)
+        tiled = lay_windows(*size, replace(limits, whole=False, tile_px=tile))
+        yield tiled, lay_windows(*size, limits)
+
+
+def _admit_tiling(found: GraphFacts, facts: NetworkFacts, what: str) -> None:
+    """Refuse a proof of tiling that would take too much."""
+    ends = 4 * (facts.input_channels + 4 * facts.output_channels * facts.output_scale**2)
+    probe_px = _probe_px(facts) ** 2
+    pictures = [math.prod(_picture_px(facts, tile)) for tile in _tiles_px(facts.stride_px)]
+    proof = f"proving that size {what} of the network is tiled exactly"
+    PROOF_MB.check(max(*pictures, probe_px) * (found.bytes_per_pixel + ends) / 1e6, proof)
+    runs_px = probe_runs(facts.stride_px) * probe_px
+    for tiled, whole in _layouts(facts):
+        area = tiled.height_px * tiled.width_px
+        runs_px += _SAMPLES * round(area * (tiled.work_ratio + whole.work_ratio))
+    PROOF_WORK.check(runs_px * (found.work_per_pixel + 1), proof)
+
+
+def _prove_equal(engine: NetworkEngine, facts: NetworkFacts, sample: FloatArray, what: str) -> int:
+    """Compare tiled with whole at every side of a tile; give the windows compared."""
+    count = 0
+    for tiled, whole in _layouts(facts):
+        height, width = whole.height_px, whole.width_px
+        pads = [(0, 0), (0, max(0, height - sample.shape[1])), (0, max(0, width - sample.shape[2]))]
+        picture = np.pad(sample, pads, mode="symmetric")[:, :height, :width]
+        difference = _infer(engine, picture, tiled) - _infer(engine, picture, whole)
+        if difference.any():
+            window = f"{tiled.window_width_px}x{tiled.window_height_px}"
+            raise ParityError(
+                f"size {what}: tiled differs from whole by up to {np.abs(difference).max():.3g} "
+                f"with windows of {window} px and a halo of {tiled.halo_px} px; exact tiling is "
+                "not kept"
+            )
+        count += tiled.window_count
+    return count
 
 
 def _infer(engine: NetworkEngine, picture: FloatArray, layout: TileLayout) -> FloatArray:
@@ -195,11 +251,15 @@ def prove_range(bundle: Bundle, *, run: GoldenRun | None) -> Result:
     Raises:
         ParityError: If activations on the golden cases exceed the stated ones, or fp16 is
             claimed beyond its range.
+        BundleError: If the proof would take more memory than is admitted.
     """
     notes = []
     for role, size, facts in _networks(bundle):
         what = _name(bundle, role, size)
         windows = [window[None] for window in _windows(bundle, role, size, run)]
+        graph = inspect_graph(bundle.network_bytes(role, size))
+        area = max(math.prod(window.shape[2:]) for window in windows)
+        PROOF_MB.check(4e-6 * area * graph.values_per_pixel, f"measuring the range of size {what}")
         found = node_activations(bundle.network_bytes(role, size), windows)
         largest = max(found.values())
         if not math.isfinite(largest):
@@ -222,7 +282,19 @@ def prove_range(bundle: Bundle, *, run: GoldenRun | None) -> Result:
 
 
 def _golden(bundle: Bundle) -> dict[str, GoldenArrays]:
-    return golden_from_bytes(bundle.member(GOLDEN)) if GOLDEN in bundle.names else {}
+    """Give the arrays of the cases that the manifest lists.
+
+    Raises:
+        BundleError: If manifest and golden.safetensors hold other cases.
+    """
+    arrays = golden_from_bytes(bundle.member(GOLDEN)) if GOLDEN in bundle.names else {}
+    names = {case.name for case in bundle.manifest.golden}
+    if arrays.keys() != names:
+        raise BundleError(
+            f"the manifest has the golden cases {', '.join(sorted(names))}; "
+            f"{GOLDEN} has {', '.join(sorted(arrays))}"
+        )
+    return arrays
 
 
 def _windows(bundle: Bundle, role: str, size: str, run: GoldenRun | None) -> list[FloatArray]:
@@ -235,13 +307,21 @@ def _windows(bundle: Bundle, role: str, size: str, run: GoldenRun | None) -> lis
             for case in bundle.manifest.golden
         ]
         return [np.ascontiguousarray(_whole_cells(planes, facts.stride_px)) for planes in given]
+    return [_noise(facts)]
+
+
+def _noise(facts: NetworkFacts) -> FloatArray:
+    """Give noise as the input of a network."""
     side = math.ceil(_SYNTHETIC_PX / facts.stride_px) * facts.stride_px
     rng = np.random.default_rng(_SEED)
     planes = rng.random((facts.input_channels, side, side), dtype=np.float32)
-    return [np.float32(_SYNTHETIC_MOST) * planes]
+    return np.float32(_SYNTHETIC_MOST) * planes
 
 
 def _whole_cells(planes: FloatArray, stride: int) -> FloatArray:
-    """Cut planes to multiples of the stride."""
+    """Cut planes to multiples of the stride; those smaller than a cell are continued to one."""
+    missing = [(0, max(0, stride - side)) for side in planes.shape[1:]]
+    if any(pad for _, pad in missing):
+        planes = np.pad(planes, [(0, 0), *missing], mode="edge")
     _, height, width = planes.shape
     return planes[:, : height // stride * stride, : width // stride * stride]

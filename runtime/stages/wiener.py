@@ -6,8 +6,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.stages import Wiener
 from camkit.contracts import depth_name
+from camkit.errors import ContractError
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import (
     BlockBank,
@@ -22,6 +24,8 @@ from camkit.runtime.content import LIGHT_PX
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.job.walker import FIXED_BYTES
+from camkit.runtime.limits import BANK_WORK
 from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
@@ -30,8 +34,44 @@ METHODS: Final = ("wiener", "rl", "admm-tv")
 OPTIONS: Final = ("depth_m",)
 BLOCK_SET_UP: Final = 1.25
 """A block with its kernel, window and sum over a block that is only filtered."""
+PLANES_HELD: Final = 5
+PLANES_PER_BLOCK: Final = 5
+"""Block-sized planes of every channel: kept, and per block that is being restored (measured)."""
 BYTES_PER_BLOCK_ROW: Final = 80
 """Of a row of blocks, per column of the picture and row of a block (measured)."""
+
+
+def check(entry: Wiener, manifest: Manifest, max_bytes: int) -> None:
+    """Refuse blocks that take more work than is admitted, or more memory than there is.
+
+    Raises:
+        BundleError: If every pixel would be transformed too often.
+        ContractError: If one block does not fit.
+    """
+    channels = len(manifest.sensor.channels)
+    BANK_WORK.check(bank_work(entry, channels), f"the Wiener bank of {manifest.name}")
+    least = FIXED_BYTES + block_bytes(entry.block_px, channels, threads=1)
+    if least > max_bytes:
+        raise ContractError(
+            f"the Wiener bank of {manifest.name} has blocks of {entry.block_px} px, which take "
+            f"{least // 10**6} MB; got {max_bytes // 10**6} MB: raise --max-mem"
+        )
+
+
+def bank_work(entry: Wiener, channels: int) -> float:
+    """Give how often a pixel is transformed at most: overlaps, channels, rounds at clipped lights.
+
+    A block takes a transform for its kernel and two for its filter; where samples are clipped,
+    four for every round of Richardson-Lucy and two each for what it explains and leaves.
+    """
+    transforms = 3 + (4 * entry.clip_iterations + 2 if entry.clip_iterations else 0)
+    share = (entry.block_px / (entry.block_px - entry.overlap_px)) ** 2
+    return channels * transforms * share
+
+
+def block_bytes(block_px: int, channels: int, *, threads: int) -> int:
+    """Give the memory in which some threads restore a block each (measured)."""
+    return 4 * channels * block_px * block_px * (PLANES_HELD + PLANES_PER_BLOCK * threads)
 
 
 def prepare(entry: Wiener, job: Job) -> StageWork:
@@ -51,7 +91,12 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
 
     size_px = job.capture.width, job.capture.height
     block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
-    held = BYTES_PER_BLOCK_ROW * block_px * max(job.capture.width, job.threads * block_px)
+    columns = len(lay_spans(job.capture.width, block_px, entry.overlap_px))
+    threads = min(job.threads, columns)
+    held = max(
+        BYTES_PER_BLOCK_ROW * block_px * job.capture.width,
+        block_bytes(block_px, len(bundle.manifest.sensor.channels), threads=threads),
+    )
     return StageWork(run=run, held_bytes=held)
 
 

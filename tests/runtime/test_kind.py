@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from camkit import kinds
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import KINDS
-from camkit.runtime.kind import RuntimePart, runtime_part
+from camkit.runtime.kind import RuntimePart, part_of, runtime_part
+from tests.bundle_factory import tiny_manifest
 
 PACKAGE = "camkit_kind_of_runtime_test"
 
@@ -73,3 +74,9 @@ def test_a_module_without_a_part_is_named(package: Path, text: str) -> None:
     (package / "runtime.py").write_text(text, encoding="utf-8")
     with pytest.raises(ContractError, match=rf"{PACKAGE}\.runtime must define PART"):
         runtime_part("mine")
+
+
+def test_a_bundle_of_a_kind_that_is_not_there_is_refused_by_name() -> None:
+    assert part_of(tiny_manifest()) is runtime_part("bayer")
+    with pytest.raises(BundleError, match="bundle tiny cannot be used here: there is no kind"):
+        part_of(tiny_manifest(kind="dream"))

@@ -8,6 +8,7 @@ from camkit.bundle.reader import open_bundle
 from camkit.errors import ContractError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.stage_finder import stage_module
 from camkit.runtime.unit import Unit, read_unit
 from tests.bundle_factory import write_tiny_bundle
 from tests.job_factory import made_mosaic
@@ -61,8 +62,30 @@ def test_a_unit_of_another_bundle_is_refused_before_any_work(tmp_path: Path) -> 
     other = Unit(name="body", bundle_sha256=HASH)
     with pytest.raises(ContractError, match=rf"sha256 {HASH[:16]}, this is {bundle.sha256[:16]}"):
         Pipeline(bundle, Options(unit=other))
-    own = Unit(name="body", bundle_sha256=bundle.sha256, facts={"focus_um": 2.0})
+    own = Unit(name="body", bundle_sha256=bundle.sha256)
     work = Pipeline(bundle, Options(unit=own)).start(made_mosaic())
     assert work.origin.unit is own
     assert (work.origin.bundle, work.origin.bundle_sha256) == ("tiny", bundle.sha256)
     assert (work.origin.iso, work.origin.white_balance) == (100.0, work.white_balance)
+
+
+def test_facts_that_no_stage_knows_are_refused_by_name(tmp_path: Path) -> None:
+    bundle = open_bundle(write_tiny_bundle(tmp_path))
+    unit = Unit(name="body", bundle_sha256=bundle.sha256, facts={"focus_um": 2.0, "turns": 1.0})
+    with pytest.raises(
+        ContractError,
+        match=r"states focus_um, turns, which no stage of bundle tiny knows; .*known are: none",
+    ):
+        Pipeline(bundle, Options(unit=unit))
+
+
+def test_facts_that_a_stage_knows_are_taken_and_near_misses_suggested(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage_module("wiener"), "FACTS", ("focus_um",), raising=False)
+    bundle = open_bundle(write_tiny_bundle(tmp_path))
+    own = Unit(name="body", bundle_sha256=bundle.sha256, facts={"focus_um": 2.0})
+    assert Pipeline(bundle, Options(unit=own)).options.unit is own
+    near = Unit(name="body", bundle_sha256=bundle.sha256, facts={"focus_mm": 2.0})
+    with pytest.raises(ContractError, match=r"did you mean focus_um\? known are: focus_um"):
+        Pipeline(bundle, Options(unit=near))

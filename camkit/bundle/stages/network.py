@@ -9,6 +9,8 @@ from camkit.bundle.plane import Plane
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_domain, need_rows
 
 DEFAULT_ROLE = "restore"
+MAX_FINER = 64
+"""Samples along a side for one pixel of the sensor, all networks of a bundle together."""
 
 
 class Network(StageEntry):
@@ -57,6 +59,7 @@ class Network(StageEntry):
             for port in outputs:
                 _check_noise(port.channels, parts)
         last = taken[-1]
+        _check_finest(last, outputs)
         if self.transform == "stabilise" and any(
             port.channels != len(last.channels) for port in outputs
         ):
@@ -92,6 +95,16 @@ def _check_noise(count: int, parts: Parts) -> None:
     if count != len(channels):
         raise JoinError(
             f"it stabilises by the noise of {', '.join(channels)}, one of each; a plane has {count}"
+        )
+
+
+def _check_finest(plane: Plane, outputs: Sequence[Port]) -> None:
+    """Refuse outputs that no memory holds."""
+    finest = plane.grid.pitch_ratio / max(port.scale for port in outputs)
+    if finest < 1 / MAX_FINER:
+        raise JoinError(
+            f"its outputs are {1 / finest:g} times as fine as the sensor; at most {MAX_FINER} "
+            "times is admitted"
         )
 
 

@@ -36,14 +36,14 @@ def simulate(
     """Photograph a scene with the bundle's camera: blur, vignetting, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
     from camkit.contracts import depth_name
-    from camkit.runtime.kind import runtime_part
+    from camkit.runtime.kind import part_of
     from camkit.runtime.network.engine import available_threads
     from camkit.runtime.twin.simulate import SimulationOptions
 
     if out.exists() and not overwrite:
         raise ContractError(f"{out} exists; say --overwrite or another name")
     opened = open_bundle(find_bundle(bundle))
-    part, sensor = runtime_part(opened.manifest.kind), opened.manifest.sensor
+    part, sensor = part_of(opened.manifest), opened.manifest.sensor
     if out.suffix.lower() != part.suffix:
         raise ContractError(
             f"a simulated capture of this camera is a {part.suffix[1:].upper()}; expected a name "

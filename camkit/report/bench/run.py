@@ -24,7 +24,7 @@ from camkit.report.bench.timed.timing import interleaved
 from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
 from camkit.report.kind_finder import camera_of
 from camkit.report.quality import FIELD_SHARES, list_set
-from camkit.runtime.kind import runtime_part
+from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads, usable_providers
 
 REPORT_VERSION: Final = 1
@@ -135,7 +135,7 @@ def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Ent
 def _camera(entrant: Entrant, settings: Settings, folder: Path) -> Camera:
     if settings.capture is not None:
         manifest = entrant.bundle.manifest
-        shot = runtime_part(manifest.kind).read(settings.capture, None, manifest)
+        shot = part_of(manifest).read(settings.capture, None, manifest)
         return Camera(
             entrant=entrant,
             capture=settings.capture,

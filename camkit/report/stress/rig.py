@@ -22,7 +22,7 @@ from camkit.report.stress.shot import NOISE_SEED, Shot
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.capture import Capture
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.kind import runtime_part
+from camkit.runtime.kind import part_of
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import DEVELOP, Work
@@ -134,7 +134,7 @@ class Rig:
         depth_mm = Options(**self._chosen).depth_mm
         kernels = color_kernels(bundle.psf, *self.sensor.response_arrays(), depth_mm=depth_mm)
         self.assumed_lens = replace(self.lens, kernels_at=kernels.at)
-        self._from_array = runtime_part(bundle.manifest.kind).from_array
+        self._from_array = part_of(bundle.manifest).from_array
         self._lights: dict[str, Light] = {}
         self._others: dict[tuple[tuple[str, Any], ...], Rig] = {}
         self._last: tuple[Capture, Restored] | None = None

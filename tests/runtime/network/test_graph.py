@@ -14,6 +14,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from camkit.bundle.facts import Port
 from camkit.errors import BundleError
+from camkit.runtime.limits import NETWORK_WORK
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import check_graph, inspect_graph, parse_graph, with_node_outputs
 from tests.bundle_factory import make_model, make_weight, tiny_facts, tiny_model, tiny_network
@@ -395,6 +396,7 @@ def test_grids_that_do_not_meet_are_refused() -> None:
         ({"stride_px": 4}, "stride"),
         ({"global_operators": ("a (Softmax)",)}, "global operators"),
         ({"receptive_field_radius_px": 2, "receptive_field_probe_px": 2}, "reaches 3 px"),
+        ({"bytes_per_pixel": 47.0}, "bytes_per_pixel is 48, the manifest says 47"),
     ],
 )
 def test_graph_that_contradicts_the_manifest_is_refused(
@@ -411,7 +413,97 @@ def test_graph_that_agrees_with_the_manifest_is_admitted() -> None:
     assert found.global_operators == ()
 
 
+def test_a_network_of_more_work_than_is_admitted_is_refused_unless_the_limit_is_raised(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    work = inspect_graph(tiny_network()).work_per_pixel
+    monkeypatch.setenv(NETWORK_WORK.variable, str(0.99 * work))
+    with pytest.raises(BundleError, match=rf"network_m\.onnx takes .*{NETWORK_WORK.variable}="):
+        check_graph(tiny_network(), tiny_facts())
+    monkeypatch.setenv(NETWORK_WORK.variable, str(work))
+    check_graph(tiny_network(), tiny_facts())
+
+
+@pytest.mark.parametrize("name", [b"head", b"tail.weight", b"wiener", b"height", b"Conv"])
+def test_a_name_that_is_no_utf_8_is_refused(name: bytes) -> None:
+    data = tiny_network().replace(name, b"\xff\xfe" + name[2:])
+    assert data != tiny_network()
+    with pytest.raises(BundleError, match=r"text in it \(.*\) is no UTF-8"):
+        inspect_graph(data)
+
+
+def _with_third_input(name: str, weights: dict[str, NDArray[np.generic]]) -> bytes:
+    nodes = [NODE("Conv", ["input", "w", name], ["output"], "conv")]
+    return _bytes(make_model(nodes, {"w": make_weight(3, 6, 1, 1)} | weights))
+
+
+def test_a_bias_is_constant_and_has_a_number_for_every_channel() -> None:
+    inspect_graph(_with_third_input("bias", {"bias": np.ones(3, np.float32)}))
+    with pytest.raises(BundleError, match="conv: input 2 must be a constant"):
+        inspect_graph(_with_third_input("input", {}))
+    with pytest.raises(BundleError, match="a bias has one number for each of 3 channels"):
+        inspect_graph(_with_third_input("bias", {"bias": np.ones(4, np.float32)}))
+
+
+ABSURD: dict[str, tuple[onnx.ModelProto, str]] = {
+    "inputs without end": (
+        _chain(_conv(1), ("Max", {}, (np.zeros((3, 1, 1), np.float32),) * 300)),
+        "more than 256 inputs",
+    ),
+    "a rim without end": (
+        _chain(_conv(1, pads=[200] * 4), _conv(401, pads=[0] * 4)),
+        "pads the picture by more than 64 px",
+    ),
+    "numbers of 8 bytes": (
+        _chain(("Cast", {"to": TensorProto.DOUBLE}, ()), ("Cast", {"to": TensorProto.FLOAT}, ())),
+        "casts to float32 and float16 alone",
+    ),
+    "channels without end": (
+        make_model(
+            [
+                NODE("Concat", ["input"] * 256, ["a"], "a", axis=1),
+                NODE("Concat", ["a"] * 256, ["output"], "b", axis=1),
+            ],
+            {},
+        ),
+        "b: gives 393216 channels; at most 65536",
+    ),
+}
+
+
+@pytest.mark.parametrize(("model", "message"), ABSURD.values(), ids=ABSURD.keys())
+def test_tensors_that_would_be_absurdly_large_are_refused(
+    model: onnx.ModelProto, message: str
+) -> None:
+    with pytest.raises(BundleError, match=message):
+        inspect_graph(_bytes(model))
+
+
 # ---------------------------------------------------------------------------- facts
+
+
+def test_pooling_counts_as_work_and_not_as_multiplications() -> None:
+    pool = ("AveragePool", {"kernel_shape": [9, 9], "pads": [4] * 4}, ())
+    found = inspect_graph(_bytes(_chain(_conv(1), pool)))
+    assert found.mac_per_pixel == 9
+    # read and written: 3 channels before, between and behind, the middle twice
+    assert found.work_per_pixel == 9 + 16 * 81 * 3 + (3 + 3 + 3) + (3 + 3)
+    assert found.values_per_pixel == 9
+
+
+def test_the_room_that_a_transposed_convolution_needs_counts_as_memory() -> None:
+    weight = make_weight(3, 3, 15, 15)
+    found = inspect_graph(_bytes(_chain(_conv(1), ("ConvTranspose", {"pads": [7] * 4}, (weight,)))))
+    assert found.bytes_per_pixel == 4 * (3 + 3 + 3 * 15 * 15)
+
+
+def test_a_convolution_off_the_blocked_path_needs_its_input_twice() -> None:
+    nodes = [
+        NODE("Conv", ["input", "a"], ["x"], "a", pads=[1] * 4),
+        NODE("Conv", ["x", "b"], ["output"], "b", pads=[1] * 4),
+    ]
+    weights = {"a": make_weight(50, 6, 3, 3), "b": make_weight(3, 50, 3, 3)}
+    assert inspect_graph(_bytes(make_model(nodes, weights))).bytes_per_pixel == 4 * (50 + 50 + 3)
 
 
 def test_cost_of_the_tiny_network_is_the_sum_by_hand() -> None:

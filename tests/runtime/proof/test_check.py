@@ -1,6 +1,7 @@
 """A good bundle proves itself; one that does not keep its word fails in the right layer."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from onnx import helper
+from pydantic import ValidationError
 
-from camkit.bundle.facts import Port
+from camkit.bundle.facts import NetworkFacts, Port
 from camkit.bundle.golden import NO_SIZE, GoldenArrays, golden_from_bytes, golden_to_bytes
 from camkit.bundle.manifest import GoldenCase, Manifest
 from camkit.bundle.reader import GOLDEN, Bundle, open_bundle
@@ -17,7 +19,10 @@ from camkit.bundle.stages import Color, Linearise, Network
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError
+from camkit.errors import CamkitError, ContractError
+from camkit.runtime.limits import BANK_WORK, PROOF_MB, PROOF_WORK, Limit
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.proof.check import LAYERS, CheckReport, check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from tests.bundle_factory import (
@@ -195,6 +200,10 @@ def test_pipeline_is_run_on_the_capture_and_compared(tmp_path: Path) -> None:
         def __init__(self, error: float) -> None:
             self.error = error
 
+        def shape_of(self, product: str) -> tuple[int, int, int]:
+            assert product == "image"
+            return 3, 32, 48
+
         def fill(self, out: FloatArray | None = None, product: str = "image") -> FloatArray:
             assert (out, product) == (None, "image")
             return stored + np.float32(self.error)
@@ -299,6 +308,153 @@ def test_tiled_and_whole_that_differ_fail(tmp_path: Path, monkeypatch: pytest.Mo
     report = check_bundle(write_tiny_bundle(tmp_path), "tiling")
     assert "tiled differs from whole" in _message(report, "tiling")
     assert not report.passed
+
+
+def test_a_network_that_is_exact_with_large_tiles_alone_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As matrix products do, whose sums depend on the width of the window.
+    from camkit.runtime.proof import layers as proofs
+
+    class Narrow(proofs.NetworkEngine):
+        def run(self, window: FloatArray, out: FloatArray | None = None) -> FloatArray:
+            made = super().run(window, out)
+            return made if window.shape[3] > 40 else made + np.float32(1e-6)
+
+    monkeypatch.setattr(proofs, "NetworkEngine", Narrow)
+    report = check_bundle(write_tiny_bundle(tmp_path), "tiling")
+    assert "with windows of 10x10 px and a halo of 4 px" in _message(report, "tiling")
+    assert not report.passed
+
+
+@pytest.mark.parametrize(("stride", "tiles"), [(1, (1, 41, 64)), (16, (16, 48, 64))])
+def test_tiles_lie_on_every_phase_of_the_lattice(stride: int, tiles: tuple[int, ...]) -> None:
+    from camkit.runtime.proof.layers import _tiles_px
+
+    assert _tiles_px(stride) == tiles
+    for any_stride in range(1, 257):
+        sides = _tiles_px(any_stride)
+        assert len(set(sides)) == 3
+        assert any_stride in sides
+        assert not any(side % any_stride for side in sides)
+
+
+@pytest.mark.parametrize("limit", [PROOF_MB, PROOF_WORK])
+def test_a_proof_that_would_take_too_much_is_refused_before_it_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: Limit
+) -> None:
+    path = _write(tmp_path, _with_facts(receptive_field_radius_px=4096))
+    message = _message(check_bundle(path, "tiling"), "tiling")
+    assert f"says {PROOF_MB.variable}=" in message
+    sound = write_tiny_bundle(tmp_path)
+    monkeypatch.setenv(limit.variable, "0.001")
+    message = _message(check_bundle(sound, "tiling"), "tiling")
+    assert f"{limit.variable}=" in message
+
+
+def test_out_of_memory_fails_its_layer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from camkit.runtime.proof import layers as proofs
+
+    def full(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(proofs, "perturbation_reach", full)
+    report = check_bundle(write_tiny_bundle(tmp_path), "tiling")
+    assert _message(report, "tiling").startswith("out of memory")
+    assert not report.passed
+
+
+@pytest.mark.parametrize("name", ["receptive_field_radius_px", "receptive_field_probe_px"])
+def test_a_reach_beyond_any_network_breaks_the_schema(name: str) -> None:
+    document = tiny_facts().model_dump(mode="json")
+    NetworkFacts.model_validate(document | {name: 4096})
+    with pytest.raises(ValidationError, match=name):
+        NetworkFacts.model_validate(document | {name: 10**12})
+
+
+@pytest.mark.parametrize("name", ["atol", "rtol"])
+def test_a_tolerance_that_proves_nothing_breaks_the_schema(name: str) -> None:
+    GoldenCase.model_validate({"name": "a", "iso": 100, name: 0.01})
+    with pytest.raises(ValidationError, match=name):
+        GoldenCase.model_validate({"name": "a", "iso": 100, name: 1e308})
+
+
+ODD_CAPTURES = {
+    "one sample": (1, 1),
+    "one row": (1, 48),
+    "one column": (48, 1),
+    "odd": (7, 9),
+    "three axes": (3, 32, 48),
+    "one of three axes": (1, 32, 48),
+    "a thousand planes": (1000, 1, 1),
+}
+
+
+@pytest.mark.parametrize("shape", ODD_CAPTURES.values(), ids=ODD_CAPTURES.keys())
+@pytest.mark.parametrize("level", ["golden", "tiling", "range"])
+def test_golden_cases_of_odd_shapes_pass_or_fail_in_their_layer(
+    tmp_path: Path, shape: tuple[int, ...], level: str
+) -> None:
+    capture = np.full(shape, 500, np.uint16)
+    picture = np.zeros((3, *shape[-2:]), np.float32)
+    arrays = GoldenArrays(capture=capture, reference=picture, outputs={"image": {"M": picture}})
+    golden = golden_to_bytes({"typical": arrays})
+    report = check_bundle(
+        _write(tmp_path, tiny_manifest(), golden__safetensors=golden), level, run=case_work
+    )
+    assert _states(report)[level] in ("pass", "fail")
+
+
+@pytest.mark.parametrize("level", ["tiling", "range"])
+def test_golden_cases_of_other_names_fail_wherever_they_are_used(
+    tmp_path: Path, level: str
+) -> None:
+    manifest = tiny_manifest().model_copy(update={"golden": (GoldenCase(name="dark", iso=1),)})
+    report = check_bundle(_write(tmp_path, manifest), level, run=case_work)
+    assert "the manifest has the golden cases dark" in _message(report, level)
+
+
+def test_a_product_finer_than_memory_holds_is_not_computed(tmp_path: Path) -> None:
+    class Work:
+        def shape_of(self, product: str) -> tuple[int, int, int]:
+            return 3, 2**20, 2**20
+
+        def fill(self, out: FloatArray | None = None, product: str = "image") -> FloatArray:
+            raise AssertionError(product)
+
+        def network_input(self, role: str) -> FloatArray:
+            raise AssertionError(role)
+
+    message = _message(check_bundle(_proved(tmp_path), "golden", run=lambda *_: Work()), "golden")
+    assert "computed (3, 1048576, 1048576), stored (3, 32, 48)" in message
+
+
+def test_a_kind_that_is_not_installed_fails_the_schema(tmp_path: Path) -> None:
+    manifest = tiny_manifest(kind="dream")
+    report = check_bundle(_write(tmp_path, manifest), "schema")
+    assert not report.passed
+    assert "there is no kind of camera 'dream' here" in _message(report, "schema")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"block_px": 8192}, "blocks of 8192 px, which take .* raise --max-mem"),
+        ({"clip_iterations": 100, "overlap_px": 16}, BANK_WORK.variable),
+    ],
+)
+def test_a_bank_that_asks_too_much_fails_the_schema_and_is_not_loaded(
+    tmp_path: Path, change: dict[str, Any], message: str
+) -> None:
+    stages = tuple(
+        stage.model_copy(update=change) if stage.type == "wiener" else stage
+        for stage in tiny_stages()
+    )
+    path = _write(tmp_path, tiny_manifest(stages=stages))
+    report = check_bundle(path, "schema")
+    assert re.search(message, _message(report, "schema"))
+    with pytest.raises(CamkitError, match=message):
+        Pipeline(open_bundle(path), Options())
 
 
 def test_probe_that_reaches_further_than_stated_fails(

@@ -11,7 +11,7 @@ from camkit.bundle.sensor import Sensor
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.files.picture import read_scene
-from camkit.runtime.kind import runtime_part
+from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.scenes import procedural_scene
@@ -49,7 +49,7 @@ def timed_capture(
         ContractError: If the size does not fit the sensor, or the photo is smaller.
         UnsupportedError: If the camera cannot be simulated.
     """
-    manifest, part = bundle.manifest, runtime_part(bundle.manifest.kind)
+    manifest, part = bundle.manifest, part_of(bundle.manifest)
     width, height = _sides(manifest.sensor, width_px, height_px, bundle.path.name)
     optics = manifest.optics
     lens = None if optics is None else manifest.members[optics.member].sha256

@@ -10,6 +10,8 @@ from camkit.runtime.proof.check import LAYERS
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "data" / "example-1.0.camkit"
 
+EXAMPLE_2 = EXAMPLE.with_name("example-2.0.camkit")
+
 
 def test_the_example_of_format_1_0_passes_every_layer(camkit_command) -> None:
     outcome = camkit_command("check", EXAMPLE, "--json")
@@ -36,6 +38,19 @@ def test_a_damaged_bundle_ends_with_3(captures, camkit_command, where: float) ->
     outcome = camkit_command("check", "bad.camkit")
     assert outcome.code == ExitCode.BUNDLE_REFUSED
     assert "fail" in outcome.out
+
+
+def test_a_kind_that_is_not_installed_ends_with_3_wherever_it_is_used(
+    captures, camkit_command
+) -> None:
+    for command in (
+        ["check", EXAMPLE_2, "--level", "schema"],
+        ["process", "shot.dng", "--bundle", EXAMPLE_2, "--out-dir", "out"],
+        ["simulate", "procedural:1", "--bundle", EXAMPLE_2, "-o", "new.dng"],
+    ):
+        outcome = camkit_command(*command)
+        assert outcome.code == ExitCode.BUNDLE_REFUSED, outcome
+        assert "no kind of camera 'toy'" in outcome.out + outcome.err
 
 
 def test_an_unknown_level_is_a_usage_error(captures, camkit_command) -> None:
