@@ -7,7 +7,8 @@
     geometry/                          place on the sensor, illumination, distortion
     color, output/                     camera colour to files and sidecars
 
-    rows, slices, clock, memory        how stages pull rows, and what each costs
+    rows, clock, cancel                how stages pull rows, what each costs, the wish to stop
+    machine/                           limits, memory, threads
     content, plan/                     what a capture holds; no more work than it needs
     envelope                           is a capture inside the bundle's measured ranges?
     options, job/                      one capture: what is decided, then the stages joined

@@ -20,6 +20,7 @@ from camkit.runtime.cancel import Cancel, Cancelled
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.files.regular_file import check_regular
+from camkit.runtime.job.choices import check_idle
 from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
 from camkit.runtime.output.claim import claimed
 from camkit.runtime.output.sidecar import read_sidecar
@@ -299,7 +300,9 @@ class _Pipelines:
         with self._lock:
             if bundle not in self._made:
                 name = None if bundle.lower() == NO_BUNDLE else bundle
-                self._made[bundle] = load(name, options=self._options)
+                made = load(name, options=self._options)
+                check_idle(made.bundle, self._options)
+                self._made[bundle] = made
             return self._made[bundle]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
-from camkit.runtime.memory import mapping_of
+from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
 
 SATURATION_SHARE: Final = 0.99

@@ -11,7 +11,7 @@ from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.job.reconstruction import Reconstruction
-from camkit.runtime.memory import peak_rss_mb
+from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_outputs

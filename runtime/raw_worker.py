@@ -28,7 +28,7 @@ from camkit.runtime.capture import Capture
 from camkit.runtime.files import dng_checks, raw_checks, raw_tags
 from camkit.runtime.files.raw_metadata import raw_metadata
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
-from camkit.runtime.memory import peak_rss_mb
+from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.metadata import Metadata
 
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8

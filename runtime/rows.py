@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.slices import run_chunks
+from camkit.runtime.machine.slices import run_chunks
 
 Rows = NDArray[Any]
 """(channel, rows, w): float32, or bool for a mask."""

@@ -1,23 +1,35 @@
 """Write bundles anew in the newest format: `python -m tools.repack OLD.camkit -o NEW.camkit`.
 
 The manifest is brought up to date, golden pictures are packed as they are today, every other member
-keeps its bytes. The result proves itself before it gets its name.
+keeps its bytes. With `--clip-reach-px N` the Wiener bank explains clipped lights in their
+surroundings alone: then golden outputs and activations are made anew, and the version is raised.
+The result proves itself before it gets its name.
 """
 
 import argparse
 import tempfile
 from pathlib import Path
 
+from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
-from camkit.bundle.reader import GOLDEN, open_bundle
+from camkit.bundle.manifest import FORMAT_VERSION, Manifest
+from camkit.bundle.reader import GOLDEN, Bundle, open_bundle
+from camkit.bundle.stages import Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ParityError
+from camkit.export.golden_cases import Cases, add_outputs
+from camkit.runtime.network.ranges import node_activations
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 
 
-def repack(old: Path, new: Path) -> int:
+def repack(old: Path, new: Path, *, clip_reach_px: int | None = None) -> int:
     """Write one bundle anew; give its bytes.
+
+    Args:
+        old: The bundle.
+        new: The file to write.
+        clip_reach_px: Of the Wiener bank; None leaves it as it is.
 
     Raises:
         BundleError: If the old one is damaged.
@@ -27,14 +39,55 @@ def repack(old: Path, new: Path) -> int:
     members = {name: bundle.member(name) for name in bundle.names}
     if GOLDEN in members:
         members[GOLDEN] = golden_to_bytes(golden_from_bytes(members[GOLDEN]))
+    newest = {"format_version": ".".join(map(str, FORMAT_VERSION))}
+    manifest = bundle.manifest.model_copy(update=newest)
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
-        write_bundle(trial, bundle.manifest, members)
+        if clip_reach_px is not None:
+            manifest = _reaching(manifest, clip_reach_px)
+            made = write_bundle(trial, manifest, members)
+            golden = golden_from_bytes(members[GOLDEN])
+            cases = {case.name: (case, golden[case.name]) for case in manifest.golden}
+            members[GOLDEN] = golden_to_bytes(add_outputs(made, cases))
+            manifest = manifest.model_copy(update={"networks": _measured(made, cases)})
+        write_bundle(trial, manifest, members)
         report = check_bundle(trial, run=case_work)
     if not report.passed:
         raise ParityError("the new bundle fails its check: " + "; ".join(report.lines()))
-    write_bundle(new, bundle.manifest, members)
+    write_bundle(new, manifest, members)
     return new.stat().st_size
+
+
+def _reaching(manifest: Manifest, clip_reach_px: int) -> Manifest:
+    """Give the manifest with another bank, as the next minor version of the bundle."""
+    stages = tuple(
+        stage.model_copy(update={"clip_reach_px": clip_reach_px})
+        if isinstance(stage, Wiener)
+        else stage
+        for stage in manifest.stages
+    )
+    major, minor, *_ = manifest.version.split(".")
+    return manifest.model_copy(update={"stages": stages, "version": f"{major}.{int(minor) + 1}.0"})
+
+
+def _measured(bundle: Bundle, cases: Cases) -> dict[str, dict[str, NetworkFacts]]:
+    """Give the facts with activations that hold for the golden cases too."""
+    found: dict[str, dict[str, NetworkFacts]] = {}
+    for role, sizes in bundle.manifest.networks.items():
+        found[role] = {}
+        for size, facts in sizes.items():
+            windows = [
+                case_work(bundle, case, arrays, size).network_input(role)[None]
+                for case, arrays in cases.values()
+            ]
+            seen = node_activations(bundle.network_bytes(role, size), windows)
+            known = facts.node_activation
+            largest = {name: max(value, known.get(name, 0.0)) for name, value in seen.items()}
+            top = max(facts.max_activation, *largest.values())
+            found[role][size] = facts.model_copy(
+                update={"node_activation": largest, "max_activation": top}
+            )
+    return found
 
 
 def main() -> None:
@@ -42,9 +95,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("old", type=Path)
     parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--clip-reach-px", type=int)
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
-    after = repack(arguments.old, arguments.out)
+    after = repack(arguments.old, arguments.out, clip_reach_px=arguments.clip_reach_px)
     print(f"{arguments.out}: {after} bytes, before {before}")
 
 

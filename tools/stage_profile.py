@@ -34,7 +34,7 @@ from camkit.bundle.writer import write_bundle
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.runtime.clock import StageClock
 from camkit.runtime.job.reconstruction import Reconstruction
-from camkit.runtime.memory import peak_rss_mb
+from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_output

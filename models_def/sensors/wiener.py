@@ -4,6 +4,8 @@ Twin of the block filter of `camkit.runtime.bank.wiener`; `tests/parity` holds t
 patch is one periodic block: cut about 80 px from each side of the result, as the bank does.
 """
 
+import numpy as np
+import scipy.ndimage
 import torch
 from torch import Tensor
 
@@ -59,7 +61,7 @@ def wiener_restore(
         settings: Prior, clip iterations, and the overlap, whose outer quarter is tapered.
         saturated: (b, 1 or c, h, w), true where the sensor clipped; those pixels, and the two
             beside them that the demosaic reaches, are at least as bright as they read. Their
-            patches are explained by Richardson-Lucy first; the rest goes through the filter.
+            surroundings are explained by Richardson-Lucy first; the rest goes through the filter.
 
     Returns:
         (b, c, h, w).
@@ -84,11 +86,27 @@ def wiener_restore(
     clipped_patch = unknown.flatten(1).any(dim=1)[:, None, None, None]
     background = (read_variance / shot.clamp(min=1e-12))[..., None, None]
     lights = richardson_lucy(patches, otf, background, settings.clip_iterations, unknown)
-    lights = torch.where(clipped_patch, lights, 0)
+    near = _nearness(saturated, settings.clip_reach_px, like=patches)
+    left = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
+    unexplained = (left.square() * near).mean(dim=(-2, -1)) * clipped_patch[..., 0, 0]
+    lights = torch.where(clipped_patch, lights * near, 0)
     residual = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
-    unexplained = residual.square().mean(dim=(-2, -1)) * clipped_patch[..., 0, 0]
     variance = torch.maximum(variance, unexplained)
     return lights + _filter(residual, _gain(otf, variance / power, settings.prior_exponent, size))
+
+
+def _nearness(clipped: Tensor, reach_px: int | None, *, like: Tensor) -> Tensor:
+    """Give (b, c, h, w): 1 near clipped samples, falling smoothly to 0; 1 without a reach."""
+    if reach_px is None:
+        return torch.ones((), dtype=like.dtype, device=like.device)
+    near = np.zeros(tuple(clipped.shape), dtype=np.float32)
+    for index in np.ndindex(near.shape[:2]):
+        mask = clipped[index].cpu().numpy()
+        if mask.any():
+            distance = scipy.ndimage.distance_transform_edt(~mask)
+            t = np.clip(2 - distance * (2 / reach_px), 0, 1)
+            near[index] = t * t * (3 - 2 * t)
+    return torch.from_numpy(near).to(like)
 
 
 def richardson_lucy(

@@ -51,21 +51,23 @@ def restoration_bank(
     """
     return BlockBank(
         psf,
-        block_filter(method, settings, noise),
+        block_filter(method, settings, noise, max(psf.kernels.kernels.shape[-2:])),
         block_px=settings.block_px,
         overlap_px=settings.overlap_px,
         threads=threads,
     )
 
 
-def block_filter(method: str, settings: Wiener, noise: NoiseModel) -> BlockFilter:
-    """Give the block filter of a method.
+def block_filter(
+    method: str, settings: Wiener, noise: NoiseModel, kernel_px: int | None = None
+) -> BlockFilter:
+    """Give the block filter of a method; see `wiener_filter`.
 
     Raises:
         UnsupportedError: If the method is unknown.
     """
     if method == "wiener":
-        return wiener_filter(settings, noise)
+        return wiener_filter(settings, noise, kernel_px)
     if method == "rl":
         return richardson_lucy_filter(noise)
     if method == "admm-tv":

@@ -4,7 +4,8 @@
 
 Where the sensor clipped, a linear filter would turn the missing light into rings over the whole
 block. There a few rounds of Richardson-Lucy, which take clipped samples as "at least this bright",
-explain the lights first; the Wiener filter gets what they leave unexplained, which counts as noise.
+explain the lights first (`lights`); the Wiener filter gets what they leave, and what they leave
+unexplained near the lights counts as noise.
 """
 
 from functools import lru_cache
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.runtime.bank.blocks import Block, BlockFilter
-from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, spread_clipped
+from camkit.runtime.bank.lights import explain_lights
+from camkit.runtime.bank.richardson_lucy import background_of, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
 
 CORNER_FREQUENCY: Final = 1 / 512
@@ -30,12 +32,13 @@ KERNEL_ERROR: Final = 1e-2
 frozen OTF calls almost nothing must not be raised without end."""
 
 
-def wiener_filter(settings: Wiener, noise: NoiseModel) -> BlockFilter:
+def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = None) -> BlockFilter:
     """Give the Wiener filter of one block as a block filter.
 
     Args:
         settings: Prior, and rounds of Richardson-Lucy for clipped blocks.
         noise: Noise after white balance.
+        kernel_px: Side of the kernels; None explains lights in whole blocks only.
 
     References: Sun 2021, eq. (2.9); van der Schaaf and van Hateren 1996 (natural-image prior).
     """
@@ -51,13 +54,9 @@ def wiener_filter(settings: Wiener, noise: NoiseModel) -> BlockFilter:
         if block.unknown is None or settings.clip_iterations == 0:
             gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
             return apply_transfer(block.samples, gain)
-        unknown = spread_clipped(block.unknown)
-        lights = richardson_lucy(
-            block.samples, block.otf, background, settings.clip_iterations, unknown
-        )
+        lights, unexplained = explain_lights(block, background, settings, kernel_px)
         residual = block.samples - apply_transfer(lights, block.otf)
-        np.copyto(residual, 0, where=unknown)
-        unexplained = np.square(residual).mean(axis=(-2, -1), dtype=np.float64)
+        np.copyto(residual, 0, where=spread_clipped(block.unknown))
         variance = np.maximum(variance, unexplained)
         gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
         return lights + apply_transfer(residual, gain)

@@ -37,7 +37,7 @@ from camkit.runtime.files.exr_attributes import metadata_of_exr
 from camkit.runtime.files.mapped_tiff import map_plain_tiff
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 from camkit.runtime.geometry.turning import turn_back
-from camkit.runtime.memory import release_pages
+from camkit.runtime.machine.memory import release_pages
 from camkit.runtime.metadata import Metadata
 
 EXR_MAGIC: Final = b"\x76\x2f\x31\x01"

@@ -25,8 +25,8 @@ from camkit.runtime.geometry.distortion import (
     undistort_points,
 )
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.machine.slices import run_slices
 from camkit.runtime.rows import RowSource
-from camkit.runtime.slices import run_slices
 
 FloatGrid = NDArray[np.float64]
 

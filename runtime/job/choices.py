@@ -41,8 +41,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
         known |= ON_A_SENSOR
     if bundle is not None:
         known |= WITH_A_BUNDLE
-    plain = Options()
-    given = [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]
+    given = _given(options)
     where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"
     if foreign := [name for name in given if name not in known]:
         raise ContractError(
@@ -61,11 +60,6 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
         raise ContractError(
             f"method must be one of {', '.join(methods)} {where}; got {options.method!r}"
         )
-    if bundle is not None and (idle := _idle(bundle, options, given)):
-        raise ContractError(
-            f"{', '.join(map(flag_of, idle))} means nothing with --method {options.method}: what "
-            "knows of that is left out; leave it out too"
-        )
     if options.unit is not None:
         options.unit.check(bundle)
     if options.depth_m is not None and bundle is not None:
@@ -73,11 +67,17 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
         depth_weights(bundle.psf.depths_mm, options.depth_mm)
 
 
-def _idle(bundle: Bundle, options: Options, given: Sequence[str]) -> list[str]:
-    """Name the options that only stages know of which the method leaves out."""
+def check_idle(bundle: Bundle | None, options: Options) -> None:
+    """Refuse options that only stages know of which the method leaves out.
+
+    For what a person says: programs may hand one set of options to several methods.
+
+    Raises:
+        ContractError: If an option was given that changes nothing.
+    """
+    if bundle is None or options.method is None:
+        return
     stages = bundle.manifest.stages
-    if options.method is None:
-        return []
     usual, now = (ways_of(stages, Work(method=method)) for method in (None, options.method))
     left_out = [
         stage
@@ -86,4 +86,14 @@ def _idle(bundle: Bundle, options: Options, given: Sequence[str]) -> list[str]:
     ]
     others = [stage for stage in stages if stage not in left_out]
     idle = known_options(left_out) - known_options(others)
-    return [name for name in given if name in idle]
+    if said := [name for name in _given(options) if name in idle]:
+        raise ContractError(
+            f"{', '.join(map(flag_of, said))} means nothing with --method {options.method}: what "
+            "knows of that is left out; leave it out too"
+        )
+
+
+def _given(options: Options) -> list[str]:
+    """Name the options that are not as they are by default."""
+    plain = Options()
+    return [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]

@@ -21,7 +21,7 @@ from onnx import numpy_helper
 
 from camkit.bundle.facts import NetworkFacts
 from camkit.errors import BundleError
-from camkit.runtime.limits import NETWORK_WORK
+from camkit.runtime.machine.limits import NETWORK_WORK
 from camkit.runtime.network.graph_walk import GraphFacts, walk_graph
 from camkit.runtime.network.operators import (
     ELEMENTWISE,

@@ -18,7 +18,7 @@ from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
-from camkit.runtime.limits import PROOF_MB, PROOF_WORK
+from camkit.runtime.machine.limits import PROOF_MB, PROOF_WORK
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.graph_walk import GraphFacts

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.machine.slices import run_chunks
 from camkit.runtime.rows import PiecedRows
-from camkit.runtime.slices import run_chunks
 
 DEFAULT_SCALE: Final = 64.0
 

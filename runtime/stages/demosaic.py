@@ -11,6 +11,7 @@ from camkit.contracts import CfaPattern
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.machine.slices import run_slices
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
@@ -20,7 +21,6 @@ from camkit.runtime.signal.demosaic import (
     demosaic,
     shift_rows,
 )
-from camkit.runtime.slices import run_slices
 
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final = ("demosaic",)

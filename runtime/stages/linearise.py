@@ -10,11 +10,11 @@ from camkit.runtime.capture import Capture
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.memory import release_pages
+from camkit.runtime.machine.memory import release_pages
+from camkit.runtime.machine.slices import run_slices
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows
-from camkit.runtime.slices import run_slices
 
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final[tuple[str, ...]] = ()

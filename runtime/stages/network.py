@@ -14,7 +14,7 @@ from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.memory import trim_heap
+from camkit.runtime.machine.memory import trim_heap
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
 from camkit.runtime.network.tiling import Run

@@ -11,11 +11,11 @@ from camkit.bundle.stages import Repair
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.machine.slices import run_slices
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.signal.noise import REPAIR_MARGIN_PX, repair_mosaic, repair_planes
-from camkit.runtime.slices import run_slices
 
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final[tuple[str, ...]] = ()

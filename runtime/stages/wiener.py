@@ -19,13 +19,14 @@ from camkit.runtime.bank.blocks import (
     cut_block_px,
     lay_spans,
 )
+from camkit.runtime.bank.lights import light_share, window_px
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.content import LIGHT_PX
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import FIXED_BYTES
-from camkit.runtime.limits import BANK_WORK
+from camkit.runtime.machine.limits import BANK_WORK
 from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
@@ -34,6 +35,8 @@ METHODS: Final = ("wiener", "rl", "admm-tv")
 OPTIONS: Final = ("depth_m",)
 BLOCK_SET_UP: Final = 1.25
 """A block with its kernel, window and sum over a block that is only filtered."""
+LIGHTS_AT_LEAST: Final = 1 / 7
+"""Of explaining a block as a whole, what it costs however small the windows (two transforms)."""
 PLANES_HELD: Final = 5
 PLANES_PER_BLOCK: Final = 5
 """Block-sized planes of every channel: kept, and per block that is being restored (measured)."""
@@ -136,10 +139,11 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     size_px = subject.height_px, subject.width_px
     block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
     rows, columns = (lay_spans(side, block_px, entry.overlap_px) for side in size_px)
-    lit = np.zeros((len(rows), len(columns)), dtype=np.bool_)
+    blocks = np.full((len(rows), len(columns)), speed.block_s)
     if subject.content is not None and entry.clip_iterations:
-        lit = _lit_blocks(subject.content.lights, rows, columns)
-    blocks = np.where(lit, speed.clipped_block_s, speed.block_s)
+        kernel_px = window_px(entry, max(subject.bundle.psf.kernels.shape[-2:]))
+        work_share = _light_work(subject.content.lights, (rows, columns), block_px, kernel_px)
+        blocks += work_share * (speed.clipped_block_s - speed.block_s)
     if work.labels is not None:
         reach = max((subject.facts(size).reach_px for size in work.sizes()), default=0)
         test = plain_blocks(work.labels, reach)
@@ -148,14 +152,22 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     return float(blocks.sum()) * BLOCK_SET_UP / speed.threads
 
 
-def _lit_blocks(
-    lights: NDArray[np.bool_], rows: Sequence[Span], columns: Sequence[Span]
-) -> NDArray[np.bool_]:
-    """Tell (row, column) which blocks hold clipped samples."""
-    found = np.zeros((len(rows), len(columns)), dtype=np.bool_)
+def _light_work(
+    lights: NDArray[np.bool_],
+    spans: tuple[Sequence[Span], Sequence[Span]],
+    block_px: int,
+    kernel_px: int | None,
+) -> NDArray[np.float64]:
+    """Give (row, column): what clipped samples cost a block, 1 where it is explained as a whole."""
+    rows, columns = spans
+    found = np.zeros((len(rows), len(columns)))
     for i, row in enumerate(rows):
         down = slice(row.index.min() // LIGHT_PX, row.index.max() // LIGHT_PX + 1)
         for j, column in enumerate(columns):
             across = slice(column.index.min() // LIGHT_PX, column.index.max() // LIGHT_PX + 1)
-            found[i, j] = lights[down, across].any()
+            squares = lights[down, across]
+            if squares.any():
+                side = block_px // LIGHT_PX
+                share = light_share(squares[:side, :side], block_px, kernel_px, step_px=LIGHT_PX)
+                found[i, j] = LIGHTS_AT_LEAST + (1 - LIGHTS_AT_LEAST) * min(share, 1.0)
     return found

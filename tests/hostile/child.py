@@ -14,7 +14,7 @@ import time
 import traceback
 from pathlib import Path
 
-from camkit.runtime.memory import peak_rss_mb
+from camkit.runtime.machine.memory import peak_rss_mb
 from tests.hostile.generator import hostile_bundle, seeded_decisions
 from tests.hostile.trial import try_bundle
 from tests.toy_camera.install import write_entry_point

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from camkit.bundle.reader import open_bundle
-from camkit.runtime.memory import peak_rss_mb
+from camkit.runtime.machine.memory import peak_rss_mb
 from tests.hostile.trial import process
 
 if __name__ == "__main__":

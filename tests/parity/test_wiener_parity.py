@@ -26,20 +26,21 @@ def tensors(noise):
     return torch.tensor(noise.shot), torch.tensor(noise.read_variance)
 
 
-def settings(clip_iterations):
+def settings(clip_iterations, clip_reach_px=None):
     return Wiener(
         block_px=64,
         overlap_px=24,
         prior_scale=3e-4,
         prior_exponent=2.5,
         clip_iterations=clip_iterations,
+        clip_reach_px=clip_reach_px,
     )
 
 
 @pytest.mark.parametrize("size", [64, 66, 63])
-@pytest.mark.parametrize("clip_iterations", [0, 6])
+@pytest.mark.parametrize(("clip_iterations", "reach"), [(0, None), (6, None), (6, 16), (6, 5)])
 @pytest.mark.parametrize("mask_channels", [0, 1, 3])
-def test_block_filter_and_torch_agree(size, clip_iterations, mask_channels):
+def test_block_filter_and_torch_agree(size, clip_iterations, reach, mask_channels):
     patches, masks, expected = [], [], []
     for i, kernel in enumerate(KERNELS):
         scene = texture(size, size, seed=i)
@@ -50,14 +51,14 @@ def test_block_filter_and_torch_agree(size, clip_iterations, mask_channels):
         otf = to_otf(kernel, size)
         unknown = mask if mask_channels and mask.any() else None
         block = Block(samples=taper_edges(planes, otf, 6), otf=otf, unknown=unknown)
-        expected.append(wiener_filter(settings(clip_iterations), ISO_100)(block))
+        expected.append(wiener_filter(settings(clip_iterations, reach), ISO_100)(block))
         patches.append(planes)
         masks.append(mask)
     restored = wiener_restore(
         torch.from_numpy(np.stack(patches)),
         torch.from_numpy(KERNELS),
         *tensors(ISO_100),
-        settings(clip_iterations),
+        settings(clip_iterations, reach),
         torch.from_numpy(np.stack(masks)) if mask_channels else None,
     )
     np.testing.assert_allclose(restored.numpy(), np.stack(expected), atol=TOLERANCE)

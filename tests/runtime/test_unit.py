@@ -66,7 +66,7 @@ def test_a_unit_of_another_bundle_is_refused_before_any_work(tmp_path: Path) -> 
     work = Pipeline(bundle, Options(unit=own)).start(made_mosaic())
     assert work.origin.unit is own
     assert (work.origin.bundle, work.origin.bundle_sha256) == ("tiny", bundle.sha256)
-    assert (work.origin.iso, work.origin.white_balance) == (100.0, work.white_balance)
+    assert (work.origin.metadata.iso, work.origin.white_balance) == (100.0, work.white_balance)
 
 
 def test_facts_that_no_stage_knows_are_refused_by_name(tmp_path: Path) -> None:

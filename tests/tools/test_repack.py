@@ -18,9 +18,10 @@ def test_the_newest_format_is_written_and_nothing_is_lost(tmp_path: Path) -> Non
     new = tmp_path / "new.camkit"
     assert repack.repack(EXAMPLE, new) == new.stat().st_size
     before, after = open_bundle(EXAMPLE), open_bundle(new)
-    assert after.manifest.format_version == "2.0"
+    assert after.manifest.format_version == "2.1"
+    new_format = {"members": {}, "format_version": "2.1"}
     assert after.manifest.model_copy(update={"members": {}}) == before.manifest.model_copy(
-        update={"members": {}}
+        update=new_format
     )
     for name in set(before.names) - {GOLDEN, MANIFEST}:
         assert after.member(name) == before.member(name)
@@ -38,6 +39,6 @@ def test_what_fails_its_check_gets_no_name(tmp_path: Path, monkeypatch: pytest.M
     layer = Layer(name="golden", status="fail", message="another picture")
     failed = CheckReport(path=EXAMPLE, layers=(layer,))
     monkeypatch.setattr(repack, "check_bundle", lambda *_, **__: failed)
-    with pytest.raises(ParityError, match="fails its check: fail  golden  another picture"):
+    with pytest.raises(ParityError, match=r"fails its check: fail +golden +another picture"):
         repack.repack(EXAMPLE, tmp_path / "new.camkit")
     assert not list(tmp_path.iterdir())

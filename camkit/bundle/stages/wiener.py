@@ -28,6 +28,8 @@ class Wiener(StageEntry):
         prior_scale: Scale of the power spectrum assumed for a sharp scene.
         prior_exponent: Its fall with frequency: scale * f^-exponent.
         clip_iterations: Rounds of re-estimating clipped pixels; 0 for none.
+        clip_reach_px: Farther than this from clipped samples nothing is re-estimated (format 2.1);
+            None for whole blocks, as before.
     """
 
     type: Literal["wiener"] = "wiener"
@@ -38,6 +40,7 @@ class Wiener(StageEntry):
     prior_scale: Positive
     prior_exponent: NonNegative
     clip_iterations: Annotated[int, Field(ge=0, le=100)] = 0
+    clip_reach_px: Annotated[int, Field(ge=2, le=1024)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> "Wiener":

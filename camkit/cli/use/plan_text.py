@@ -31,6 +31,7 @@ def print_plans(
         BundleError: If the bundle that was named is refused.
     """
     from camkit.runtime.batch import list_tasks
+    from camkit.runtime.job.choices import check_idle
     from camkit.runtime.pipeline import load
 
     made: dict[str, Pipeline] = {}
@@ -42,6 +43,7 @@ def print_plans(
                 raise ContractError(task.refusal)
             if task.bundle not in made:
                 made[task.bundle] = load(task.bundle, options=options)
+                check_idle(made[task.bundle].bundle, options)
             facts |= _planned(task, made[task.bundle], headerless)
         except CamkitError as error:
             if bundle is not None and isinstance(error, BundleError):

@@ -9,7 +9,7 @@ import tifffile
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import mapped_tiff, picture
 from camkit.runtime.files.mapped_tiff import map_plain_tiff
-from camkit.runtime.memory import mapping_of, release_pages
+from camkit.runtime.machine.memory import mapping_of, release_pages
 
 RNG = np.random.default_rng(0)
 MOSAIC = RNG.integers(60, 1000, (50, 36)).astype(np.uint16)

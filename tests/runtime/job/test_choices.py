@@ -11,7 +11,7 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Color, Linearise, Repair
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
-from camkit.runtime.job.choices import check_choices
+from camkit.runtime.job.choices import check_choices, check_idle
 from camkit.runtime.options import Options, flag_of
 from camkit.runtime.unit import Unit
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages, write_tiny_bundle
@@ -214,9 +214,11 @@ def test_an_option_of_a_stage_that_the_method_leaves_out_is_refused(
     bundle: Bundle, method: str, option: str, value: str
 ) -> None:
     options = Options(method=method, **{option: value})  # type: ignore[arg-type]
+    check_choices(bundle, options)
     with pytest.raises(ContractError, match=rf"--{flag(option)} means nothing with --method"):
-        check_choices(bundle, options)
-    check_choices(bundle, Options(**{option: value}))  # type: ignore[arg-type]
+        check_idle(bundle, options)
+    check_idle(bundle, Options(**{option: value}))  # type: ignore[arg-type]
+    check_idle(None, Options(method="develop"))
 
 
 def flag(option: str) -> str:

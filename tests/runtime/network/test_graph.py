@@ -14,7 +14,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from camkit.bundle.facts import Port
 from camkit.errors import BundleError
-from camkit.runtime.limits import NETWORK_WORK
+from camkit.runtime.machine.limits import NETWORK_WORK
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import check_graph, inspect_graph, parse_graph, with_node_outputs
 from tests.bundle_factory import make_model, make_weight, tiny_facts, tiny_model, tiny_network

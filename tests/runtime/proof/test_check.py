@@ -20,7 +20,7 @@ from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
-from camkit.runtime.limits import BANK_WORK, PROOF_MB, PROOF_WORK, Limit
+from camkit.runtime.machine.limits import BANK_WORK, PROOF_MB, PROOF_WORK, Limit
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.proof.check import LAYERS, CheckReport, check_bundle

@@ -108,7 +108,7 @@ def test_a_network_that_explodes_is_a_fault_and_not_a_picture(bundle: Bundle, sc
     (network,) = rig.networks
     engine = network.pipeline.network("restore", "M")
     run = engine.run
-    engine.run = lambda window: 1e6 * run(window)  # type: ignore[method-assign]
+    engine.run = lambda window, **_: 1e6 * run(window)  # type: ignore[method-assign]
     outcome = Judge(rig).score(rig.shoot(scene)).outcomes["M"]
     assert outcome.psnr_db is None
     assert "tile (row 0, column 0)" in (outcome.fault or "")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.runtime import memory
+from camkit.runtime.machine import memory
 
 
 def test_a_large_array_raises_the_peak() -> None:
@@ -20,7 +20,7 @@ def test_a_large_array_raises_the_peak() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the kernel's high-water mark")
 def test_a_child_does_not_inherit_the_peak_of_its_parent() -> None:
     held = np.ones(40_000_000)
-    code = "from camkit.runtime.memory import peak_rss_mb; print(peak_rss_mb())"
+    code = "from camkit.runtime.machine.memory import peak_rss_mb; print(peak_rss_mb())"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
     assert float(told.stdout) < 200
     del held
@@ -43,7 +43,7 @@ def test_freed_memory_is_given_back_near_the_limit_only() -> None:
 
 HOLES = """
 import ctypes
-from camkit.runtime import memory
+from camkit.runtime.machine import memory
 libc = ctypes.CDLL(None)
 libc.malloc.restype = ctypes.c_void_p
 libc.free.argtypes = [ctypes.c_void_p]

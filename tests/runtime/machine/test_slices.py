@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
-from camkit.runtime.slices import LEAST_ROWS, run_slices
+from camkit.runtime.machine.slices import LEAST_ROWS, run_slices
 
 
 @given(rows=st.integers(1, 200), threads=st.integers(1, 5), lattice=st.sampled_from([1, 2, 8]))

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from camkit.errors import BundleError, ContractError
-from camkit.runtime.limits import LIMITS, NETWORK_WORK, Limit
+from camkit.runtime.machine.limits import LIMITS, NETWORK_WORK, Limit
 
 LIMIT = Limit(variable="CAMKIT_MAX_TEST", default=100.0, unit="tests")
 

@@ -1,0 +1,6 @@
+"""The machine: what a bundle may ask of it, its memory, its threads.
+
+limits    what a bundle may ask at most, and how who wants more says so
+memory    peak of this process, freed memory given back, arrays that lie in files
+slices    rows shared among threads, with the same bits
+"""
