@@ -26,6 +26,7 @@ from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture
 from camkit.runtime.files import dng_checks, raw_checks, raw_tags
+from camkit.runtime.files.lone_pixels import count_lone
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 from camkit.runtime.memory import peak_rss_mb
 
@@ -34,7 +35,7 @@ FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
 WRITE_ROWS: Final = 256
 PR_SET_PDEATHSIG: Final = 1
 BELIEVABLE_GAIN_STOPS: Final = 6.0
-OUTLIER_NOTE_SHARE: Final = 2e-5
+LONE_NOTE_SHARE: Final = 2e-5
 
 
 def decode_raw(path: Path) -> Capture:
@@ -103,7 +104,7 @@ def _to_capture(raw: Any, tags: TiffTags) -> Capture:
     dng_checks.check_dng(tags, cfa, levels)
     samples, levels = _samples(raw, cfa, levels, notes)
     raw_checks.check_content(samples, levels)
-    _note_outliers(samples, levels, cfa, notes)
+    _note_lone(samples, levels, cfa, notes)
     place = raw_tags.sensor_place(tags)
     return Capture(
         samples=samples,
@@ -191,14 +192,14 @@ def develop_linear(raw: Any, notes: list[str]) -> tuple[NDArray[Any], raw_checks
     return np.moveaxis(picture, -1, 0), raw_checks.Levels(black=black, white=65535.0)
 
 
-def _note_outliers(
+def _note_lone(
     samples: NDArray[Any], levels: raw_checks.Levels, cfa: CfaPattern | None, notes: list[str]
 ) -> None:
     planes, cell = ([samples], 2) if cfa is not None else (list(samples), 1)
-    count = sum(raw_checks.count_outliers(plane, levels, cell) for plane in planes)
+    count = sum(count_lone(plane, levels, cell) for plane in planes)
     share = count / samples.size
-    if share >= OUTLIER_NOTE_SHARE:
-        notes.append(f"{count} pixels ({share:.4%}) stand out alone: hot pixels, noise or damage")
+    if share >= LONE_NOTE_SHARE:
+        notes.append(f"{count} pixels ({share:.4%}) stand out alone: hot pixels or damage")
 
 
 def _white_balance(raw: Any, tags: TiffTags, notes: list[str]) -> tuple[float, float, float] | None:

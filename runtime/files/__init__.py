@@ -3,6 +3,7 @@
 tiff_tags     tags of TIFF-based files, read within bounds
 raw_tags      metadata of a RAW file from its tags
 raw_checks    refuses unbelievable decodes
+lone_pixels   hot or damaged pixels counted
 dng_checks    a DNG against itself and against LibRaw
 mapped_tiff   large plain TIFF files read in place
 picture       EXR, TIFF and PNG as captures or scenes

@@ -25,8 +25,6 @@ OVER_WHITE_SHARE: Final = 0.05
 OVER_WHITE_FACTOR: Final = 1.1
 ZERO_SHARE: Final = 0.02
 LIVE_SIGNAL: Final = 0.02
-OUTLIER_STEP: Final = 0.1
-BAND_ROWS: Final = 32
 
 _WIDTH: Final = 256
 _HEIGHT: Final = 257
@@ -184,44 +182,3 @@ def _check_unread(samples: Samples, levels: Levels) -> None:
             raise DecodeError(
                 f"the last {tail} rows are 0 after a bright row: the data are cut off"
             )
-
-
-def count_outliers(samples: Samples, levels: Levels, cell: int) -> int:
-    """Count pixels that stand out alone: hot pixels, or damage within the pixel data.
-
-    A pixel counts if it lies above the largest or below the smallest of its four neighbours of
-    the same colour by more than `OUTLIER_STEP` of the range.
-
-    Args:
-        samples: (h, w) uint8 or uint16.
-        levels: Black and white level.
-        cell: Distance to the next pixel of the same colour: 2 in a Bayer mosaic, 1 in a plane.
-    """
-    height, width = samples.shape
-    if height <= 2 * cell or width <= 2 * cell:
-        return 0
-    step = max(1, round(OUTLIER_STEP * (levels.white - float(levels.black.min()))))
-    return sum(
-        _outliers(samples[top - cell : min(top + BAND_ROWS, height - cell) + cell], cell, step)
-        for top in range(cell, height - cell, BAND_ROWS)
-    )
-
-
-def _outliers(band: Samples, cell: int, step: int) -> int:
-    if band.dtype != np.uint16:
-        band = band.astype(np.uint16)
-    inner = band[cell:-cell, cell:-cell]
-    neighbours = (
-        band[: -2 * cell, cell:-cell],
-        band[2 * cell :, cell:-cell],
-        band[cell:-cell, : -2 * cell],
-        band[cell:-cell, 2 * cell :],
-    )
-    above = np.maximum(neighbours[0], neighbours[1])
-    np.maximum(above, np.maximum(neighbours[2], neighbours[3]), out=above)
-    below = np.minimum(neighbours[0], neighbours[1])
-    np.minimum(below, np.minimum(neighbours[2], neighbours[3]), out=below)
-    # unsigned numbers wrap, so each difference is taken from a bound that is never crossed
-    high = np.maximum(inner, above) - above > step
-    low = below - np.minimum(inner, below) > step
-    return int(np.count_nonzero(high)) + int(np.count_nonzero(low))
