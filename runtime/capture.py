@@ -28,26 +28,38 @@ _SAMPLE_TYPES: Final = (np.uint8, np.uint16, np.float32)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MosaicOptions:
-    """What a headerless mosaic (single-channel PNG or TIFF) does not say of itself.
+    """What the caller says of a mosaic: all that a headerless one does not say, or a RAW's levels.
 
     Attributes:
-        cfa: Letters of the 2x2 cell at pixel (0, 0) in reading order.
-        black_level: Stored value without light.
-        white_level: Stored value at saturation.
+        cfa: Letters of the 2x2 cell at pixel (0, 0) in reading order, for a headerless mosaic
+            (single-channel PNG or TIFF); None for a RAW file, which says it itself.
+        black_level: Stored value without light; None for what the RAW file says.
+        white_level: Stored value at saturation; None for what the RAW file says.
     """
 
-    cfa: CfaPattern
-    black_level: float
-    white_level: float
+    cfa: CfaPattern | None = None
+    black_level: float | None = None
+    white_level: float | None = None
 
     def __post_init__(self) -> None:
-        if self.cfa not in CFA_PATTERNS:
+        black, white = self.black_level, self.white_level
+        if self.cfa is not None and self.cfa not in CFA_PATTERNS:
             raise ContractError(f"mosaic must be one of {CFA_PATTERNS}; got {self.cfa!r}")
-        if not 0 <= self.black_level < self.white_level < np.inf:
+        if self.cfa is not None and (black is None or white is None):
             raise ContractError(
-                "mosaic levels must be 0 <= black < white; "
-                f"got black {self.black_level}, white {self.white_level}"
+                "a headerless mosaic needs --mosaic, --black-level and --white-level"
             )
+        lower = 0.0 if black is None else black
+        if not 0 <= lower < (np.inf if white is None else white) or white == np.inf:
+            raise ContractError(
+                f"mosaic levels must be 0 <= black < white; got black {black}, white {white}"
+            )
+
+    @property
+    def levels(self) -> frozenset[str]:
+        """Name the levels that are said: "black", "white"."""
+        said = {"black": self.black_level, "white": self.white_level}
+        return frozenset(name for name, level in said.items() if level is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

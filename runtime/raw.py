@@ -71,11 +71,13 @@ def read_capture(
             in LibRaw is a crash of theirs (time and memory limits then do not apply).
         timeout_s: Time limit of the child.
         max_memory_mb: Address-space limit of the child (where the system has one).
-        mosaic: What a headerless single-channel picture does not say of itself.
+        mosaic: What a headerless single-channel picture does not say of itself, or the levels of a
+            RAW file where its own are wrong.
 
     Raises:
         DecodeError: If the file is missing, damaged, or not believable.
-        ContractError: If `mosaic` is given for a RAW file, which says it itself.
+        ContractError: If a pattern is given for a RAW file, which says it itself, or levels alone
+            for a picture.
     """
     file = Path(path)
     limits = _Limits(timeout_s=timeout_s, max_memory_mb=max_memory_mb)
@@ -87,15 +89,16 @@ def read_capture(
         if picture:
             capture = _read_picture(file, mosaic)
             return replace(capture, sha256=file_sha256(file))
-        if mosaic is not None:
+        if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
-                f"mosaic options are for headerless PNG or TIFF; {file.name} needs none, omit them"
+                f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit --mosaic"
             )
+        said = mosaic or MosaicOptions()
         if isolate:
-            return _read_isolated(file, limits)
+            return _read_isolated(file, limits, said)
         from camkit.runtime.raw_worker import decode_raw
 
-        return replace(decode_raw(file), sha256=file_sha256(file))
+        return replace(decode_raw(file, said), sha256=file_sha256(file))
     except OSError as error:
         raise DecodeError(f"cannot read {file}: {error.strerror or error}") from error
     except DecodeError as error:
@@ -141,10 +144,17 @@ def file_sha256(path: Path) -> str:
 def _read_picture(path: Path, mosaic: MosaicOptions | None) -> Capture:
     from camkit.runtime.files.picture import read_mosaic, read_picture
 
-    return read_picture(path) if mosaic is None else read_mosaic(path, mosaic)
+    if mosaic is None:
+        return read_picture(path)
+    if mosaic.cfa is None:
+        raise ContractError(
+            f"{path.name} is a picture, levels are for RAW files; say --mosaic too if it is a "
+            "headerless mosaic"
+        )
+    return read_mosaic(path, mosaic)
 
 
-def _read_isolated(path: Path, limits: _Limits) -> Capture:
+def _read_isolated(path: Path, limits: _Limits, said: MosaicOptions) -> Capture:
     """Decode in a child; the hash is computed here while it works."""
     command = [
         sys.executable,
@@ -154,6 +164,7 @@ def _read_isolated(path: Path, limits: _Limits) -> Capture:
         str(path.resolve()),
         str(limits.max_memory_mb),
         str(os.getpid()),
+        json.dumps([said.black_level, said.white_level]),
     ]
     with (
         tempfile.TemporaryFile() as complaints,

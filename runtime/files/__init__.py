@@ -4,6 +4,8 @@ tiff_tags     tags of TIFF-based files, read within bounds
 raw_tags      metadata of a RAW file from its tags
 raw_checks    refuses unbelievable decodes
 lone_pixels   hot or damaged pixels counted
+doubts        what of a decode is not likely, as notes
+white_level   white where the data contradict the file
 dng_checks    a DNG against itself and against LibRaw
 mapped_tiff   large plain TIFF files read in place
 picture       EXR, TIFF and PNG as captures or scenes

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel, cfa_channels
+from camkit.runtime.files.raw_checks import sensor_directories
 from camkit.runtime.files.tiff_tags import TiffTags
 
+BITS_PER_SAMPLE: Final = 258
 IMAGE_DESCRIPTION: Final = 270
 MAKE: Final = 271
 MODEL: Final = 272
@@ -59,6 +61,13 @@ def positive(tags: TiffTags, tag: int) -> float | None:
     """Give the first number of a tag if it is finite and > 0 (zero means unknown in EXIF)."""
     value = (tags.numbers(tag) or (math.nan,))[0]
     return float(value) if math.isfinite(value) and value > 0 else None
+
+
+def sample_bits(tags: TiffTags) -> int:
+    """Give the bits of a sample of the sensor picture; 0 if not stated or not believable."""
+    stated = [d.get(BITS_PER_SAMPLE, b"") for d in sensor_directories(tags.directories)]
+    bits = [value[0] for value in stated if value and not isinstance(value, bytes)]
+    return int(max(bits)) if bits and 1 <= max(bits) <= 16 else 0
 
 
 def noise_profile(tags: TiffTags, cfa: CfaPattern | None) -> NoiseModel | None:

@@ -35,10 +35,12 @@ class TiffTags:
     Attributes:
         directories: Tag number -> numbers, or bytes for text and opaque values.
         file_bytes: Size of the file.
+        starts: Where each directory lies in the file.
     """
 
     directories: tuple[Mapping[int, TagValue], ...]
     file_bytes: int
+    starts: tuple[int, ...] = ()
 
     def numbers(self, tag: int) -> tuple[float, ...] | None:
         """Give the numbers of a tag from the first directory that has it."""
@@ -66,7 +68,7 @@ class _Reader:
     order: str
     big: bool
     seen: set[int] = field(default_factory=set)
-    found: list[Mapping[int, TagValue]] = field(default_factory=list)
+    found: dict[int, Mapping[int, TagValue]] = field(default_factory=dict)
 
     def unpack(self, code: str, offset: int) -> tuple[float, ...] | None:
         """Give numbers at an offset, or None where the file does not reach."""
@@ -86,7 +88,7 @@ class _Reader:
                 continue
             self.seen.add(at)
             tags, following = self.directory(at)
-            self.found.append(tags)
+            self.found[at] = tags
             children = [*_whole(tags.get(SUB_IFDS)), *_whole(tags.get(EXIF_POINTER))]
             pending = [*children, *pending, following]
 
@@ -145,7 +147,9 @@ def read_tiff_tags(path: Path) -> TiffTags:
             order + ("Q" if reader.big else "I"), head[8:] if reader.big else head[4:8]
         )
         reader.walk(first)
-    return TiffTags(directories=tuple(reader.found), file_bytes=file_bytes)
+    return TiffTags(
+        directories=tuple(reader.found.values()), file_bytes=file_bytes, starts=tuple(reader.found)
+    )
 
 
 def _values(raw: tuple[float, ...], per_value: int) -> tuple[float, ...]:

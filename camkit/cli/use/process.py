@@ -41,8 +41,8 @@ def process(
     mosaic: Annotated[
         str | None, typer.Option(help="Headerless mosaic: RGGB, BGGR, GRBG or GBRG.")
     ] = None,
-    black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
-    white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
+    black_level: Annotated[float | None, typer.Option(help="Black, DN, not the file's.")] = None,
+    white_level: Annotated[float | None, typer.Option(help="White, DN, not the file's.")] = None,
     depth_m: DepthM = None,
     method: Annotated[
         str | None,

@@ -40,6 +40,15 @@ def test_strips_inside_the_file_pass_and_outside_are_refused():
         check_chunks_inside(tags_of({262: (34892,), 324: (100,), 325: (901,)}))
 
 
+def test_pixel_data_that_lie_over_the_header_are_refused():
+    with pytest.raises(DecodeError, match="before the header ends"):
+        check_chunks_inside(tags_of({262: (32803,), 273: (0,), 279: (400,)}))
+    sensor = {262: (32803,), 273: (100,), 279: (400,)}
+    check_chunks_inside(TiffTags(directories=(sensor,), file_bytes=1000, starts=(8, 500)))
+    with pytest.raises(DecodeError, match="before the header ends"):
+        check_chunks_inside(TiffTags(directories=(sensor,), file_bytes=1000, starts=(8, 400)))
+
+
 def test_offsets_without_their_lengths_are_refused():
     with pytest.raises(DecodeError, match="2 strip offsets but 1 lengths"):
         check_chunks_inside(tags_of({262: (32803,), 273: (1, 2), 279: (3,)}))
