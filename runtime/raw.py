@@ -27,6 +27,7 @@ import camkit
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
 from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.files.tiff_tags import read_tiff_tags
@@ -56,7 +57,7 @@ class _Limits:
 
 
 def read_capture(
-    path: str | os.PathLike[str],
+    path: Source,
     *,
     isolate: bool = True,
     timeout_s: float = DEFAULT_TIMEOUT_S,
@@ -66,7 +67,7 @@ def read_capture(
     """Read a RAW, DNG, EXR, TIFF or PNG file as a capture in sensor orientation.
 
     Args:
-        path: The file.
+        path: The file: a path, bytes, or a file opened in binary mode.
         isolate: Decode RAW in a child process; False for those who embed and accept that a crash
             in LibRaw is a crash of theirs (time and memory limits then do not apply).
         timeout_s: Time limit of the child.
@@ -79,14 +80,17 @@ def read_capture(
         ContractError: If a pattern is given for a RAW file, which says it itself, or levels alone
             for a picture.
     """
-    file = Path(path)
     limits = _Limits(timeout_s=timeout_s, max_memory_mb=max_memory_mb)
     if not (math.isfinite(timeout_s) and timeout_s > 0 and max_memory_mb > 0):
         raise ContractError(f"limits must be > 0; got {timeout_s} s, {max_memory_mb} MB")
+    with stored(path) as file:
+        return _read(file, isolate=isolate, limits=limits, mosaic=mosaic)
+
+
+def _read(file: Path, *, isolate: bool, limits: _Limits, mosaic: MosaicOptions | None) -> Capture:
     try:
         check_regular(file)
-        picture = is_picture(file)
-        if picture:
+        if is_picture(file):
             capture = _read_picture(file, mosaic)
             return replace(capture, sha256=file_sha256(file))
         if mosaic is not None and mosaic.cfa is not None:

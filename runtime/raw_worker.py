@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.capture import MAX_ISO, Capture, MosaicOptions
 from camkit.runtime.files import dng_checks, raw_checks, raw_tags
 from camkit.runtime.files.doubts import find_doubts
 from camkit.runtime.files.lone_pixels import count_lone
@@ -128,7 +128,7 @@ def _to_capture(raw: Any, tags: TiffTags, said: MosaicOptions) -> Capture:
         white_balance=_white_balance(raw, tags, notes),
         color_matrix=_color_matrix(raw, tags, notes),
         orientation=FLIP_TO_EXIF.get(sizes.flip, 1),
-        iso=_stated(raw, tags, raw_tags.ISO_SPEED, "iso_speed"),
+        iso=_believable_iso(_stated(raw, tags, raw_tags.ISO_SPEED, "iso_speed")),
         exposure_time_s=_stated(raw, tags, raw_tags.EXPOSURE_TIME, "shutter_speed"),
         noise=raw_tags.noise_profile(tags, cfa),
         origin_px=place.origin_px,
@@ -276,6 +276,10 @@ def _stated(raw: Any, tags: TiffTags, tag: int, name: str) -> float | None:
         return raw_tags.positive(tags, tag)
     value = float(getattr(getattr(raw, "other", None), name, 0.0))
     return value if np.isfinite(value) and value > 0 else None
+
+
+def _believable_iso(iso: float | None) -> float | None:
+    return iso if iso is not None and iso <= MAX_ISO else None
 
 
 def header_of(capture: Capture) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """What capture files say, and whether it can be believed.
 
 tiff_tags     tags of TIFF-based files, read within bounds
+in_memory     bytes and open files, stored while they are read
 raw_tags      metadata of a RAW file from its tags
 raw_checks    refuses unbelievable decodes
 lone_pixels   hot or damaged pixels counted

@@ -174,6 +174,7 @@ def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
 
     Columns between are left out of a wide picture.
     """
+    cells: Cells
     if cfa is None:
         plane = samples[samples.shape[0] // 2]
         cells = plane[:, :: max(1, plane.shape[1] // _CELL_COLUMNS)].astype(np.float32)
@@ -198,7 +199,8 @@ def _unit_rows(rows: Cells) -> Cells:
     """Give rows of mean 0 and length 1, so that their products are correlations."""
     rows = rows - rows.mean(axis=1, keepdims=True)
     length = np.sqrt(np.einsum("yx,yx->y", rows, rows))[:, None]
-    return np.asarray(rows / np.maximum(length, np.float32(1e-9)), dtype=np.float32)
+    unit: Cells = np.divide(rows, np.maximum(length, np.float32(1e-9)), dtype=np.float32)
+    return unit
 
 
 def _order_doubt(cells: Cells) -> str:

@@ -18,7 +18,7 @@ from camkit.runtime.plan.ways import offered_methods
 from camkit.runtime.stage_finder import stage_module
 
 GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method", "unit"})
-ON_A_SENSOR: Final = frozenset({"assume"})
+ON_A_SENSOR: Final = frozenset({"assume", "origin_px"})
 """What means something wherever the size of the sensor is known."""
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality
+from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality, whole_pair
 from camkit.cli.exit_code import ExitCode
 from camkit.errors import ContractError
 
@@ -52,6 +52,9 @@ def process(
     unit: Annotated[
         Path | None, typer.Option(help="The camera body: a TOML with the bundle's sha256.")
     ] = None,
+    origin_px: Annotated[
+        str | None, typer.Option(help="X,Y on the sensor of a crop that records no place.")
+    ] = None,
     assume: Annotated[
         str | None, typer.Option(help="centre or scale, for a picture that is no full frame.")
     ] = None,
@@ -93,6 +96,7 @@ def process(
         exposure_ev=exposure,
         vignetting=vignetting,
         undistort=undistort,
+        origin_px=None if origin_px is None else whole_pair(origin_px, "--origin-px"),
         assume=assume,  # type: ignore[arg-type]
         on_unsafe=on_unsafe,  # type: ignore[arg-type]
         max_mem_bytes=None if max_mem is None else parse_memory(max_mem),

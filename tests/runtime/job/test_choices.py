@@ -33,6 +33,7 @@ CHANGED: dict[str, Any] = {
     "vignetting": False,
     "undistort": False,
     "assume": "centre",
+    "origin_px": (2, 4),
     "on_unsafe": "fallback",
     "max_mem_bytes": 500_000_000,
     "threads": 1,
@@ -79,7 +80,7 @@ def _refused(bundle: Bundle | None, **choices: Any) -> str:
 def test_every_option_is_in_the_list_of_this_test() -> None:
     assert set(CHANGED) == {field.name for field in dataclasses.fields(Options)}
     claimed = set.union(*OF_STAGE.values())
-    assert set(CHANGED) == claimed | FREE | {"assume", "unit"}
+    assert set(CHANGED) == claimed | FREE | {"assume", "origin_px", "unit"}
 
 
 @pytest.mark.parametrize("name", CHANGED)
