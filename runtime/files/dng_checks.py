@@ -21,9 +21,13 @@ UNCOMPRESSED: Final = 1
 LOSSY_JPEG: Final = 34892
 LEVEL_TOLERANCE: Final = 1.0
 ROW_PADDING_BYTES: Final = 16
+MOST_BITS: Final = 64
+TABLE_TOLERANCE: Final = 0.1
+CFA: Final = 32803
 
 _BITS, _COMPRESSION, _SAMPLES, _SAMPLE_FORMAT = 258, 259, 277, 339
 _WIDTH, _HEIGHT, _STRIP_BYTES = 256, 257, 279
+_PHOTOMETRIC: Final = 262
 _CHUNKS: Final = (("strip", 273, 0, 278), ("tile", 324, 322, 323))
 _CROP_ORIGIN, _CROP_SIZE, _ACTIVE_AREA = 50719, 50720, 50829
 _CURVES: Final = (50712, 51008, 51009)  # LinearizationTable, OpcodeList1, OpcodeList2
@@ -85,13 +89,18 @@ def check_dng(
 
 
 def find_doubts(tags: TiffTags) -> list[str]:
-    """Say where the sensor picture of a DNG does not fit its own size; nothing for other files."""
-    if not is_dng(tags):
-        return []
+    """Say where the sensor picture of a DNG contradicts itself, or of any file has no data."""
     directories = [d for d in sensor_directories(tags.directories) if _numbers(d, _WIDTH)]
-    found = []
+    found = [
+        "the header does not say where the pixels of the mosaic lie"
+        for picture in directories
+        if picture.get(_PHOTOMETRIC) == (CFA,) and not any(t in picture for _, t, *_ in _CHUNKS)
+    ]
+    if not is_dng(tags):
+        directories = []
     for picture in directories:
         found += [_chunk_doubt(picture), _area_doubt(picture), _curve_doubt(picture)]
+        found.append(_table_doubt(picture))
     return [f"{doubt}: the header is damaged" for doubt in found if doubt]
 
 
@@ -118,6 +127,14 @@ def _curve_doubt(picture: Directory) -> str:
     """See whether 8 bits of lossy JPEG come with the curve that makes light of them."""
     lossy = _first(picture, _COMPRESSION) == LOSSY_JPEG
     return "" if not lossy or any(tag in picture for tag in _CURVES) else "its curve is missing"
+
+
+def _table_doubt(picture: Directory) -> str:
+    """Compare white with the end of the table that makes light of the stored numbers."""
+    table, white = _numbers(picture, _LINEARIZATION), _first(picture, _WHITE)
+    if not table or not white or abs(max(table) / white - 1) <= TABLE_TOLERANCE:
+        return ""
+    return f"white is {white:g}, the table of the samples ends at {max(table):g}"
 
 
 def _area_doubt(picture: Directory) -> str:
@@ -148,7 +165,8 @@ def _numbers(directory: Directory, tag: int) -> tuple[float, ...]:
 
 
 def _first(directory: Directory, tag: int, default: float = 0.0) -> float:
-    return next(iter(_numbers(directory, tag)), default)
+    value = next(iter(_numbers(directory, tag)), default)
+    return value if math.isfinite(value) else default
 
 
 def _check_strip_bytes(picture: Directory) -> None:
@@ -191,7 +209,7 @@ def _check_white(picture: Directory, levels: Levels) -> None:
             f"the DNG states white {max(stated):g}, LibRaw found {levels.white:g}; "
             "its header is damaged"
         )
-    if not _numbers(picture, _LINEARIZATION) and levels.white > 2**bits - 1:
+    if not _numbers(picture, _LINEARIZATION) and levels.white > 2.0 ** min(bits, MOST_BITS) - 1:
         raise DecodeError(
             f"white level {levels.white:g} does not fit in the {bits:.0f} bits of the DNG; "
             "its header is damaged"

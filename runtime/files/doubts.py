@@ -40,6 +40,8 @@ _CELL_COLUMNS: Final = 1024
 _BAND_CELLS: Final = 32
 _JOINED: Final = 0.8
 _BROKEN: Final = 0.6
+_STRANGE: Final = 0.3
+_SCRAMBLED_SHARE: Final = 0.02
 _LEAST_RUN: Final = 3
 _LONGEST_GAP: Final = 4
 _SHIFT_MATCH: Final = 0.8
@@ -72,7 +74,7 @@ def find_doubts(
         *_level_doubts(samples, levels),
         _masked_doubt(masked, levels),
         _green_doubt(samples, levels, cfa),
-        _order_doubt(cells),
+        _order_doubt(cells) or _scramble_doubt(cells),
         _noise_doubt(cells),
         _edge_doubt(cells),
     )
@@ -220,6 +222,17 @@ def _order_doubt(cells: Cells) -> str:
             f"every row is shifted by about {usual / cells.shape[1]:.1%} of the width against the "
             "one above: the width or the pixel data are damaged"
         )
+    return ""
+
+
+def _scramble_doubt(cells: Cells) -> str:
+    """Find rows that are smooth along themselves and have nothing in common with the next."""
+    rows = _unit_rows(cells[:, :: max(1, cells.shape[1] // 512)])
+    alike = np.einsum("yx,yx->y", rows[:-1], rows[1:])
+    smooth = np.einsum("yx,yx->y", rows[:, :-1], rows[:, 1:]) > _JOINED
+    share = float(np.mean((alike < _STRANGE) & smooth[:-1] & smooth[1:]))
+    if share > _SCRAMBLED_SHARE:
+        return f"{share:.0%} of the rows do not go with the next: the pixel data are damaged"
     return ""
 
 

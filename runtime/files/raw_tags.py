@@ -17,6 +17,9 @@ from camkit.contracts import CfaPattern, NoiseModel, cfa_channels
 from camkit.runtime.files.raw_checks import sensor_directories
 from camkit.runtime.files.tiff_tags import TiffTags
 
+MAX_FACTOR: Final = 1e3
+"""Of a colour matrix or a balance that a camera can have."""
+
 BITS_PER_SAMPLE: Final = 258
 IMAGE_DESCRIPTION: Final = 270
 MAKE: Final = 271
@@ -117,7 +120,7 @@ def color_matrix(tags: TiffTags) -> tuple[NDArray[np.float64], str | None] | Non
     found = []
     for matrix_tag, light_tag in COLOR_MATRICES:
         values = tags.numbers(matrix_tag)
-        if values is None or len(values) != 9 or not np.isfinite(values).all():
+        if values is None or len(values) != 9 or not (np.abs(values) < MAX_FACTOR).all():
             continue
         light = int((tags.numbers(light_tag) or (0,))[0])
         kelvin = _ILLUMINANT_KELVIN.get(light, 0)
@@ -127,12 +130,7 @@ def color_matrix(tags: TiffTags) -> tuple[NDArray[np.float64], str | None] | Non
     distance, light, values = min(found, key=lambda item: item[0])
     matrix = np.array(values, dtype=np.float64).reshape(3, 3)
     balance = tags.numbers(ANALOG_BALANCE)
-    if (
-        balance is not None
-        and len(balance) == 3
-        and np.isfinite(balance).all()
-        and min(balance) > 0
-    ):
+    if balance is not None and len(balance) == 3 and min(balance) > 0 and max(balance) < MAX_FACTOR:
         matrix = np.array(balance)[:, None] * matrix
     if abs(np.linalg.det(matrix)) < 1e-9:
         return None

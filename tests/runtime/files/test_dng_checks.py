@@ -9,6 +9,7 @@ from camkit.runtime.files.tiff_tags import TiffTags
 GOOD = {
     256: (80,),
     257: (60,),
+    273: (8,),
     258: (16,),
     259: (1,),
     262: (32803,),
@@ -95,7 +96,7 @@ def test_a_sound_layout_raises_no_doubt():
     assert doubts() == []
     assert doubts(t278=(20,), t273=(8, 3208, 6408), t279=(3200,) * 3) == []
     assert doubts(t322=(48,), t323=(32,), t324=(1, 2, 3, 4)) == []
-    assert doubts(t259=(34892,), t50712=tuple(range(256))) == []
+    assert doubts(t259=(34892,), t50712=(0, 100, 4000)) == []
     assert doubts(t50829=(4, 8, 60, 80), t50719=(2, 2), t50720=(68, 52)) == []
     assert find_doubts(TiffTags(directories=({256: (9,), 257: (7,)},), file_bytes=9)) == []
 
@@ -112,6 +113,7 @@ def test_a_sound_layout_raises_no_doubt():
         ({"t50829": (4, 8, 60, 80), "t50720": (73, 56)}, "crop (73, 56) at (0.0, 0.0) leaves"),
         ({"t50719": (20, 0), "t50720": (70, 60)}, "crop"),
         ({"t259": (34892,)}, "curve is missing"),
+        ({"t50712": (0, 100, 2000), "t50717": (4095,)}, "the table of the samples ends at 2000"),
         ({"t259": (7,), "t277": (2,)}, "one sample in each pixel, not 2"),
     ],
 )
@@ -119,3 +121,9 @@ def test_a_layout_that_contradicts_its_size_is_named(change, message):
     (doubt,) = doubts(**change)
     assert message in doubt
     assert doubt.endswith("the header is damaged")
+
+
+def test_a_mosaic_whose_place_in_the_file_is_not_said_is_named():
+    lost = {tag: value for tag, value in GOOD.items() if tag not in (273, 50706)}
+    (doubt,) = find_doubts(TiffTags(directories=(lost,), file_bytes=20000))
+    assert "does not say where the pixels" in doubt

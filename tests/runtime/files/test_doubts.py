@@ -113,6 +113,15 @@ def test_a_wrong_width_is_named():
     assert any("the width or the pixel data" in d for d in find_doubts(skewed, levels(), "RGGB"))
 
 
+def test_rows_in_another_order_are_named():
+    lost = np.roll(photograph(), 0)
+    for row in range(120, 256, 2):
+        lost[row : row + 2] = np.roll(lost[row : row + 2], row * 86, axis=1)
+    (doubt,) = find_doubts(cv2.blur(lost, (9, 1)), levels(), "RGGB")
+    assert "of the rows" in doubt
+    assert "damaged" in doubt
+
+
 def test_rows_of_noise_are_named():
     broken = photograph()
     broken[64:] = np.random.default_rng(3).integers(0, WHITE, (192, 320))
