@@ -47,6 +47,7 @@ _LONGEST_GAP: Final = 4
 _SHIFT_MATCH: Final = 0.8
 _LEAST_SHIFT: Final = 0.02
 _SHIFT_GAIN: Final = 0.15
+_LEAST_ROW_CONTRAST: Final = 1e-3
 _SHIFT_ROWS: Final = 24
 _NOISE_RATIO: Final = 0.8
 _NOISE_LEVEL: Final = 0.05
@@ -198,10 +199,14 @@ def _green_places(cfa: CfaPattern) -> list[tuple[int, int]]:
 
 
 def _unit_rows(rows: Cells) -> Cells:
-    """Give rows of mean 0 and length 1, so that their products are correlations."""
+    """Give rows of mean 0 and length 1, so that their products are correlations.
+
+    A row of next to no contrast stays short: it goes with none, for or against.
+    """
     rows = rows - rows.mean(axis=1, keepdims=True)
     length = np.sqrt(np.einsum("yx,yx->y", rows, rows))[:, None]
-    unit: Cells = np.divide(rows, np.maximum(length, np.float32(1e-9)), dtype=np.float32)
+    least = np.float32(_LEAST_ROW_CONTRAST * np.sqrt(rows.shape[1]))
+    unit: Cells = np.divide(rows, np.maximum(length, least), dtype=np.float32)
     return unit
 
 

@@ -37,6 +37,15 @@ def test_a_sound_photograph_raises_no_doubt(seed):
     assert find_doubts(planes, flat, None) == []
 
 
+def test_rows_of_one_level_each_are_no_damage():
+    ramp = np.linspace(300, 4000, 200)[:, None] * np.ones(240)
+    for turned in (ramp, np.ascontiguousarray(ramp.T)):
+        assert find_doubts(turned.astype(np.uint16), levels(), "RGGB") == []
+        planes = np.stack([turned.astype(np.uint16)] * 3)
+        flat = Levels(black=np.full(3, BLACK, np.float32), white=WHITE)
+        assert find_doubts(planes, flat, None) == []
+
+
 def test_flat_fields_dark_frames_and_night_are_no_damage():
     rng = np.random.default_rng(1)
     for level in (BLACK, 300, 2000, 4000):
