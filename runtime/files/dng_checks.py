@@ -7,6 +7,7 @@ compared (DNG specification 1.7, chapter 4; tags of the directory that holds the
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -96,6 +97,7 @@ def find_doubts(tags: TiffTags) -> list[str]:
         for picture in directories
         if picture.get(_PHOTOMETRIC) == (CFA,) and not any(t in picture for _, t, *_ in _CHUNKS)
     ]
+    found += [_depth_doubt(picture) for picture in directories]
     if not is_dng(tags):
         directories = []
     for picture in directories:
@@ -110,8 +112,10 @@ def _chunk_doubt(picture: Directory) -> str:
     for noun, offsets_tag, wide_tag, high_tag in _CHUNKS:
         count = len(_numbers(picture, offsets_tag))
         wide, high = _first(picture, wide_tag, width), _first(picture, high_tag, height)
-        if not count or min(wide, high) < 1:
+        if not count:
             continue
+        if min(wide, high) < 1:
+            return f"a {noun} of {wide:.0f}x{high:.0f} pixels holds nothing"
         needed = math.ceil(width / wide) * math.ceil(height / high)
         if count != needed:
             return f"{width:.0f}x{height:.0f} pixels need {needed} {noun}(s), there are {count}"
@@ -129,9 +133,25 @@ def _curve_doubt(picture: Directory) -> str:
     return "" if not lossy or any(tag in picture for tag in _CURVES) else "its curve is missing"
 
 
+def _depth_doubt(picture: Directory) -> str:
+    """See whether the bits of a mosaic hold its white; 8 may stand for more behind a curve."""
+    bits, white = _first(picture, _BITS), _first(picture, _WHITE)
+    mosaic = picture.get(_PHOTOMETRIC) == (CFA,) and _LINEARIZATION not in picture
+    if (
+        mosaic
+        and 8 < bits <= MOST_BITS
+        and white >= 2**bits
+        and _first(picture, _SAMPLE_FORMAT, 1) == 1
+    ):
+        return f"white {white:g} does not fit in {bits:.0f} bits"
+    return ""
+
+
 def _table_doubt(picture: Directory) -> str:
     """Compare white with the end of the table that makes light of the stored numbers."""
     table, white = _numbers(picture, _LINEARIZATION), _first(picture, _WHITE)
+    if any(after < before for before, after in pairwise(table)):
+        return "the table that makes light of the samples falls"
     if not table or not white or abs(max(table) / white - 1) <= TABLE_TOLERANCE:
         return ""
     return f"white is {white:g}, the table of the samples ends at {max(table):g}"
@@ -151,6 +171,8 @@ def _area_doubt(picture: Directory) -> str:
         if not (0 <= top < bottom <= height and 0 <= left < right <= width):
             return f"the active area {area} leaves the {width:.0f}x{height:.0f} pixels"
         width, height = right - left, bottom - top
+        if _numbers(picture, _CFA_REPEAT) == (2, 2) and (width % 2 or height % 2):
+            return f"an active area of {width:.0f}x{height:.0f} pixels holds no whole cells"
     origin, size = _numbers(picture, _CROP_ORIGIN) or (0.0, 0.0), _numbers(picture, _CROP_SIZE)
     if len(origin) != 2 or len(size) != 2:
         return ""
