@@ -45,6 +45,18 @@ def cfa_channels(cfa: CfaPattern) -> tuple[tuple[int, int], tuple[int, int]]:
     return (index[0], index[1]), (index[2], index[3])
 
 
+def shifted_cfa(cfa: CfaPattern, origin_px: tuple[int, int]) -> CfaPattern:
+    """Give the pattern that a crop of a mosaic begins with.
+
+    Args:
+        cfa: Letters in reading order of the cell whose corner is pixel (0, 0) of the sensor.
+        origin_px: (x, y) of the first pixel of the crop.
+    """
+    x, y = origin_px
+    letters = "".join(cfa[(y + dy) % 2 * 2 + (x + dx) % 2] for dy in (0, 1) for dx in (0, 1))
+    return next(known for known in CFA_PATTERNS if known == letters)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseModel:
     """Signal-dependent noise of a linear signal: variance = shot * signal + read_variance.

@@ -19,6 +19,7 @@ from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.cancel import Cancel, Cancelled
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
+from camkit.runtime.files.in_memory import FilePath, list_paths
 from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.job.choices import check_idle
 from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
@@ -60,7 +61,7 @@ class Task:
     before: tuple[int, int, int] | None = None
 
 
-def expand(files: Sequence[str | Path]) -> list[Path]:
+def expand(files: Sequence[FilePath]) -> list[Path]:
     """Give the captures named by files, folders and globs, each once, in the order given.
 
     A folder stands for the captures directly in it, by name, without the pictures that a sidecar
@@ -210,8 +211,8 @@ def process(
         BundleError: If the named bundle is refused.
     """
     options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
-    listed = [files] if isinstance(files, str | Path) else list(files)
-    tasks = list_tasks(expand(listed), bundle=None if bundle is None else str(bundle), write=write)
+    sources = expand(list_paths(files))
+    tasks = list_tasks(sources, bundle=None if bundle is None else str(bundle), write=write)
     if write.out_dir.exists() and not write.out_dir.is_dir():
         raise ContractError(f"{write.out_dir} is no folder; pictures need one as --out-dir")
     if write.format == "dng":

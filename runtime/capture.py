@@ -4,7 +4,9 @@ The samples stay as the file stores them (24 megapixels of uint16 are 48 MB); ro
 when a stage asks for them.
 """
 
+import math
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any, Final
 
 import numpy as np
@@ -27,28 +29,59 @@ COLOURS: Final = 3
 _SAMPLE_TYPES: Final = (np.uint8, np.uint16, np.float32)
 
 
+MAX_ISO: Final = 1e7
+"""Twice the largest that any camera offers."""
+
+BRIGHTEST: Final = 1e6
+"""In white levels; float samples beyond, as files hold them where nothing was computed, count as
+invalid: twenty stops above white no sample is light."""
+
+
+def check_iso(iso: Any) -> None:
+    """Refuse a sensitivity that no camera has.
+
+    Raises:
+        ContractError: If it is neither None nor a number that can be.
+    """
+    known: Any = iso if isinstance(iso, Real) else math.nan
+    if iso is not None and not 0 < known <= MAX_ISO:
+        raise ContractError(f"iso must be a number in 0..{MAX_ISO:g}; got {str(iso)[:20]}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MosaicOptions:
-    """What a headerless mosaic (single-channel PNG or TIFF) does not say of itself.
+    """What the caller says of a mosaic: all that a headerless one does not say, or a RAW's levels.
 
     Attributes:
-        cfa: Letters of the 2x2 cell at pixel (0, 0) in reading order.
-        black_level: Stored value without light.
-        white_level: Stored value at saturation.
+        cfa: Letters of the 2x2 cell at pixel (0, 0) in reading order, for a headerless mosaic
+            (single-channel PNG or TIFF); None for a RAW file, which says it itself.
+        black_level: Stored value without light; None for what the RAW file says.
+        white_level: Stored value at saturation; None for what the RAW file says.
     """
 
-    cfa: CfaPattern
-    black_level: float
-    white_level: float
+    cfa: CfaPattern | None = None
+    black_level: float | None = None
+    white_level: float | None = None
 
     def __post_init__(self) -> None:
-        if self.cfa not in CFA_PATTERNS:
+        black, white = self.black_level, self.white_level
+        if self.cfa is not None and self.cfa not in CFA_PATTERNS:
             raise ContractError(f"mosaic must be one of {CFA_PATTERNS}; got {self.cfa!r}")
-        if not 0 <= self.black_level < self.white_level < np.inf:
+        if self.cfa is not None and (black is None or white is None):
             raise ContractError(
-                "mosaic levels must be 0 <= black < white; "
-                f"got black {self.black_level}, white {self.white_level}"
+                "a headerless mosaic needs --mosaic, --black-level and --white-level"
             )
+        lower = 0.0 if black is None else black
+        if not 0 <= lower < (np.inf if white is None else white) or white == np.inf:
+            raise ContractError(
+                f"mosaic levels must be 0 <= black < white; got black {black}, white {white}"
+            )
+
+    @property
+    def levels(self) -> frozenset[str]:
+        """Name the levels that are said: "black", "white"."""
+        said = {"black": self.black_level, "white": self.white_level}
+        return frozenset(name for name, level in said.items() if level is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +135,7 @@ class Capture:
         self._check_samples()
         self._check_levels()
         self._check_color()
+        check_iso(self.iso)
         if self.orientation not in range(1, 9):
             raise ContractError(f"orientation must be an EXIF number 1..8; got {self.orientation}")
 
@@ -177,6 +211,8 @@ class Capture:
     def linear_rows(self, top: int, bottom: int) -> FloatArray:
         """Give rows top..bottom as a linear signal: black is 0, white level 1, negatives kept.
 
+        Float samples that are infinite or beyond `BRIGHTEST` are NaN, as invalid ones are.
+
         Returns:
             (bottom - top, w) float32 for a mosaic, (c, bottom - top, w) for planes.
 
@@ -185,6 +221,8 @@ class Capture:
         """
         self._check_rows(top, bottom)
         rows = self.samples[..., top:bottom, :].astype(np.float32, order="C")
+        if np.issubdtype(self.samples.dtype, np.floating):
+            rows[~(np.abs(rows) <= BRIGHTEST * self.white_level)] = np.nan
         black = self._black_rows(top)
         scale = np.float32(1) / (np.float32(self.white_level) - black)
         if self.cfa is None or (black == black[0, 0]).all():
@@ -200,14 +238,15 @@ class Capture:
     def saturated_rows(self, top: int, bottom: int) -> NDArray[np.bool_]:
         """Tell which samples of rows top..bottom are clipped (see `SATURATION_SHARE`).
 
-        Float pictures have no white level that clips, so none of their samples is.
+        Float planes have no white level that clips, so none of their samples is; a float mosaic
+        is in the numbers of its sensor, which does clip.
 
         Returns:
             bool of the shape of `linear_rows`.
         """
         self._check_rows(top, bottom)
         rows = self.samples[..., top:bottom, :]
-        if np.issubdtype(rows.dtype, np.floating):
+        if self.cfa is None and np.issubdtype(rows.dtype, np.floating):
             return np.zeros(rows.shape, dtype=bool)
         black = self._black_rows(top)
         limit = black + SATURATION_SHARE * (np.float32(self.white_level) - black)

@@ -1,7 +1,8 @@
 """What a caller may choose about a reconstruction, checked once."""
 
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from operator import index
+from typing import Any, Final, Literal, get_args
 
 from camkit.errors import ContractError
 from camkit.runtime.unit import Unit
@@ -42,6 +43,8 @@ class Options:
         exposure_ev: Factor 2**exposure_ev on the result.
         vignetting: Divide by the relative illumination.
         undistort: Undo the radial distortion.
+        origin_px: (x, y) on the sensor of the first pixel of a crop; None for what
+            the file records, else a whole frame.
         assume: What the caller vouches for where the capture's size does not match the sensor.
         force_bundle: Take the bundle also for captures that name another one.
         on_unsafe: What becomes of a capture outside the bundle's envelope, and of a tile whose
@@ -69,6 +72,7 @@ class Options:
     exposure_ev: float = 0.0
     vignetting: bool = True
     undistort: bool = True
+    origin_px: tuple[int, int] | None = None
     assume: Assumption | None = None
     force_bundle: bool = False
     on_unsafe: OnUnsafe = "warn"
@@ -98,6 +102,7 @@ class Options:
         _check_choice("on_unsafe", self.on_unsafe, get_args(OnUnsafe))
         if self.assume is not None:
             _check_choice("assume", self.assume, get_args(Assumption))
+        _check_origin(self.origin_px, self.assume)
         if self.white_balance is not None and not all(0 < g < 100 for g in self.white_balance):
             raise ContractError(f"white balance gains must lie in 0..100; got {self.white_balance}")
         if not -20 <= self.exposure_ev <= 20:
@@ -119,6 +124,26 @@ class Options:
 def _check_depth(depth_m: float | None) -> None:
     if depth_m is not None and not depth_m > 0:
         raise ContractError(f"the depth must be > 0 m; got {depth_m}")
+
+
+def checked_origin(origin_px: Any) -> tuple[int, int]:
+    """Give a place on a sensor as two whole numbers.
+
+    Raises:
+        ContractError: If it is anything else.
+    """
+    try:
+        x, y = (index(value) for value in origin_px)
+    except (TypeError, ValueError):
+        x = y = -1
+    if min(x, y) < 0:
+        raise ContractError(f"origin_px must be two whole numbers (x, y) >= 0; got {origin_px!r}")
+    return x, y
+
+
+def _check_origin(origin_px: tuple[int, int] | None, assume: str | None) -> None:
+    if origin_px is not None and checked_origin(origin_px) and assume is not None:
+        raise ContractError(f"origin_px and assume {assume} both say where a capture lies: choose")
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:

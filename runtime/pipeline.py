@@ -23,15 +23,16 @@ from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import BAYER
 from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.job.choices import check_choices
-from camkit.runtime.job.reconstruction import Reconstruction
+from camkit.runtime.job.reconstruction import Reconstruction, check_out
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import part_of, runtime_part
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Progress
-from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options, checked_origin
 from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
 from camkit.runtime.stage_finder import check_stages
@@ -147,17 +148,38 @@ class Pipeline:
             return replace(self._speed, network_s_per_mp=dict(self._speeds))
 
     def read(
-        self, file: Path, mosaic: MosaicOptions | None = None, *, cancel: Cancel | None = None
+        self,
+        file: Source,
+        mosaic: MosaicOptions | None = None,
+        *,
+        origin_px: tuple[int, int] | None = None,
+        cancel: Cancel | None = None,
     ) -> Capture:
         """Read a capture of the bundle's kind of camera.
+
+        Args:
+            file: A path, bytes, or a file opened in binary mode.
+            mosaic: What the caller says of a mosaic in place of the file.
+            origin_px: (x, y) of its first pixel on the sensor; None for the options', else the
+                file's own.
+            cancel: Asked ten times a second; true raises `Cancelled`.
 
         Raises:
             DecodeError: If the file cannot be read.
             Cancelled: If `cancel` said so.
+            ContractError: If a place is given and the sensor has no size.
         """
-        with cancellable(cancel):
-            manifest = None if self.bundle is None else self.bundle.manifest
-            return self._part.read(file, mosaic, manifest)
+        manifest = None if self.bundle is None else self.bundle.manifest
+        with cancellable(cancel), stored(file) as path:
+            capture = self._part.read(path, mosaic, manifest)
+        origin = self.options.origin_px if origin_px is None else checked_origin(origin_px)
+        if origin is None:
+            return capture
+        extent = None if manifest is None else manifest.sensor.extent
+        if extent is None:
+            raise ContractError("origin_px is a place on a sensor; it needs a bundle that has one")
+        whole = (extent.width_px, extent.height_px)
+        return replace(capture, origin_px=origin, sensor_size_px=whole)
 
     def start(
         self,
@@ -189,9 +211,10 @@ class Pipeline:
 
     def process(
         self,
-        file: str | Path,
+        file: Source,
         *,
         mosaic: MosaicOptions | None = None,
+        origin_px: tuple[int, int] | None = None,
         out: FloatArray | None = None,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
@@ -199,8 +222,9 @@ class Pipeline:
         """Read one capture and reconstruct it.
 
         Args:
-            file: RAW, DNG, EXR, TIFF or PNG.
-            mosaic: How to read a headerless mosaic.
+            file: RAW, DNG, EXR, TIFF or PNG: a path, bytes, or a file opened in binary mode.
+            mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
+            origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
             out: (3, h, w) float32 to fill; a new array when None.
             progress: Called with (work done, work in all), over all stages.
             cancel: Asked ten times a second; true raises `Cancelled`.
@@ -209,7 +233,11 @@ class Pipeline:
             DecodeError: If the file cannot be read.
             ContractError: If capture and bundle do not fit each other.
         """
-        work, decode_s = self._begin(file, mosaic, progress, cancel)
+        check_out(out)
+        began = time.perf_counter()
+        capture = self.read(file, mosaic, origin_px=origin_px, cancel=cancel)
+        decode_s = time.perf_counter() - began
+        work = self.start(capture, progress=progress, cancel=cancel)
         image = work.fill(out)
         return Picture(
             image=image,
@@ -220,19 +248,21 @@ class Pipeline:
 
     def stream(
         self,
-        file: str | Path,
+        file: Source,
         on_band: Callable[[int, FloatArray], None],
         *,
         mosaic: MosaicOptions | None = None,
+        origin_px: tuple[int, int] | None = None,
         progress: Progress | None = None,
         cancel: Cancel | None = None,
     ) -> Summary:
         """Read one capture and hand its picture on, band by band, without holding it.
 
         Args:
-            file: RAW, DNG, EXR, TIFF or PNG.
+            file: RAW, DNG, EXR, TIFF or PNG: a path, bytes, or a file opened in binary mode.
             on_band: Called with (first row, band (3, rows, w) float32) from top to bottom.
-            mosaic: How to read a headerless mosaic.
+            mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
+            origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
             progress: Called with (work done, work in all), over all stages.
             cancel: Asked ten times a second; true raises `Cancelled`.
 
@@ -240,7 +270,10 @@ class Pipeline:
             DecodeError: If the file cannot be read.
             ContractError: If capture and bundle do not fit each other.
         """
-        work, decode_s = self._begin(file, mosaic, progress, cancel)
+        began = time.perf_counter()
+        capture = self.read(file, mosaic, origin_px=origin_px, cancel=cancel)
+        decode_s = time.perf_counter() - began
+        work = self.start(capture, progress=progress, cancel=cancel)
         top = 0
         for band in work.bands():
             on_band(top, band)
@@ -251,19 +284,6 @@ class Pipeline:
             seconds={"decode": decode_s, **work.seconds},
             warnings=work.warnings,
         )
-
-    def _begin(
-        self,
-        file: str | Path,
-        mosaic: MosaicOptions | None,
-        progress: Progress | None,
-        cancel: Cancel | None,
-    ) -> tuple[Reconstruction, float]:
-        """Read a capture and plan its reconstruction; also give the seconds of reading."""
-        began = time.perf_counter()
-        capture = self.read(Path(file), mosaic, cancel=cancel)
-        decode_s = time.perf_counter() - began
-        return self.start(capture, progress=progress, cancel=cancel), decode_s
 
     def process_array(
         self,
@@ -283,7 +303,8 @@ class Pipeline:
                 (c, h, w) linear planes with 1.0 = white level.
             iso: For the noise model; None measures the noise.
             white_balance: Gains (R, G, B); None takes those of the bundle's illuminant.
-            origin_px: (x, y) of the first pixel on the sensor, for a crop; None for a whole frame.
+            origin_px: (x, y) of the first pixel on the sensor, for a crop; None for that of the
+                options, else a whole frame. An odd one begins with another pixel of the CFA.
             out: (3, H, W) float32 to fill; a new array when None.
             progress: Called with (work done, work in all), over all stages.
             cancel: Asked ten times a second; true raises `Cancelled`.
@@ -294,6 +315,9 @@ class Pipeline:
         Raises:
             ContractError: If shape, type or size do not fit the bundle.
         """
+        check_out(out)
+        if origin_px is None:
+            origin_px = self.options.origin_px
         capture = self.capture_of(image, iso=iso, white_balance=white_balance, origin_px=origin_px)
         return self.start(capture, progress=progress, cancel=cancel).fill(out)
 

@@ -28,6 +28,7 @@ from camkit.errors import ContractError, DecodeError
 from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
 from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.files.tiff_tags import read_tiff_tags
@@ -57,7 +58,7 @@ class _Limits:
 
 
 def read_capture(
-    path: str | os.PathLike[str],
+    path: Source,
     *,
     isolate: bool = True,
     timeout_s: float = DEFAULT_TIMEOUT_S,
@@ -67,36 +68,42 @@ def read_capture(
     """Read a RAW, DNG, EXR, TIFF or PNG file as a capture in sensor orientation.
 
     Args:
-        path: The file.
+        path: The file: a path, bytes, or a file opened in binary mode.
         isolate: Decode RAW in a child process; False for those who embed and accept that a crash
             in LibRaw is a crash of theirs (time and memory limits then do not apply).
         timeout_s: Time limit of the child.
         max_memory_mb: Address-space limit of the child (where the system has one).
-        mosaic: What a headerless single-channel picture does not say of itself.
+        mosaic: What a headerless single-channel picture does not say of itself, or the levels of a
+            RAW file where its own are wrong.
 
     Raises:
         DecodeError: If the file is missing, damaged, or not believable.
-        ContractError: If `mosaic` is given for a RAW file, which says it itself.
+        ContractError: If a pattern is given for a RAW file, which says it itself, or levels alone
+            for a picture.
     """
-    file = Path(path)
     limits = _Limits(timeout_s=timeout_s, max_memory_mb=max_memory_mb)
     if not (math.isfinite(timeout_s) and timeout_s > 0 and max_memory_mb > 0):
         raise ContractError(f"limits must be > 0; got {timeout_s} s, {max_memory_mb} MB")
+    with stored(path) as file:
+        return _read(file, isolate=isolate, limits=limits, mosaic=mosaic)
+
+
+def _read(file: Path, *, isolate: bool, limits: _Limits, mosaic: MosaicOptions | None) -> Capture:
     try:
         check_regular(file)
-        picture = is_picture(file)
-        if picture:
+        if is_picture(file):
             capture = _read_picture(file, mosaic)
             return replace(capture, sha256=file_sha256(file))
-        if mosaic is not None:
+        if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
-                f"mosaic options are for headerless PNG or TIFF; {file.name} needs none, omit them"
+                f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit --mosaic"
             )
+        said = mosaic or MosaicOptions()
         if isolate:
-            return _read_isolated(file, limits)
+            return _read_isolated(file, limits, said)
         from camkit.runtime.raw_worker import decode_raw
 
-        return replace(decode_raw(file), sha256=file_sha256(file))
+        return replace(decode_raw(file, said), sha256=file_sha256(file))
     except OSError as error:
         raise DecodeError(f"cannot read {file}: {error.strerror or error}") from error
     except DecodeError as error:
@@ -142,10 +149,17 @@ def file_sha256(path: Path) -> str:
 def _read_picture(path: Path, mosaic: MosaicOptions | None) -> Capture:
     from camkit.runtime.files.picture import read_mosaic, read_picture
 
-    return read_picture(path) if mosaic is None else read_mosaic(path, mosaic)
+    if mosaic is None:
+        return read_picture(path)
+    if mosaic.cfa is None:
+        raise ContractError(
+            f"{path.name} is a picture, levels are for RAW files; say --mosaic too if it is a "
+            "headerless mosaic"
+        )
+    return read_mosaic(path, mosaic)
 
 
-def _read_isolated(path: Path, limits: _Limits) -> Capture:
+def _read_isolated(path: Path, limits: _Limits, said: MosaicOptions) -> Capture:
     """Decode in a child; the hash is computed here while it works."""
     command = [
         sys.executable,
@@ -155,6 +169,7 @@ def _read_isolated(path: Path, limits: _Limits) -> Capture:
         str(path.resolve()),
         str(limits.max_memory_mb),
         str(os.getpid()),
+        json.dumps([said.black_level, said.white_level]),
     ]
     with (
         tempfile.TemporaryFile() as complaints,

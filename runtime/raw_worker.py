@@ -1,6 +1,6 @@
 """The decoding child, and the one module that touches rawpy.
 
-    python -P -m camkit.runtime.raw_worker PATH MAX_MEMORY_MB PARENT
+    python -P -m camkit.runtime.raw_worker PATH MAX_MEMORY_MB PARENT [BLACK, WHITE]
       -> stdout: one line of JSON, then the samples as plain bytes
 
 Run as a process of its own so that a crash, a hang or an allocation storm in LibRaw costs one
@@ -24,10 +24,13 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.capture import Capture
+from camkit.runtime.capture import MAX_ISO, Capture, MosaicOptions
 from camkit.runtime.files import dng_checks, raw_checks, raw_tags
+from camkit.runtime.files.doubts import find_doubts
+from camkit.runtime.files.lone_pixels import count_lone
 from camkit.runtime.files.raw_metadata import raw_metadata
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
+from camkit.runtime.files.white_level import believable_white, check_said_white
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.metadata import Metadata
 
@@ -36,11 +39,17 @@ FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
 WRITE_ROWS: Final = 256
 PR_SET_PDEATHSIG: Final = 1
 BELIEVABLE_GAIN_STOPS: Final = 6.0
-OUTLIER_NOTE_SHARE: Final = 2e-5
+MASKED_RIM_PX: Final = 2
+NOTHING_SAID: Final = MosaicOptions()
+LONE_NOTE_SHARE: Final = 2e-5
 
 
-def decode_raw(path: Path) -> Capture:
+def decode_raw(path: Path, said: MosaicOptions = NOTHING_SAID) -> Capture:
     """Decode a RAW or DNG file with LibRaw in this process.
+
+    Args:
+        path: The file.
+        said: Levels that the caller says in place of the file's.
 
     Returns:
         The visible area in sensor orientation. Planes of a monochrome sensor are one plane seen
@@ -50,7 +59,7 @@ def decode_raw(path: Path) -> Capture:
         DecodeError: If LibRaw refuses the file or its answer is not believable.
         OSError: If the file cannot be read.
     """
-    with _decoded(path) as capture:
+    with _decoded(path, said) as capture:
         samples = capture.samples
         if _is_repeated(samples):
             return replace(capture, samples=np.broadcast_to(samples[0].copy(), samples.shape))
@@ -58,7 +67,7 @@ def decode_raw(path: Path) -> Capture:
 
 
 @contextmanager
-def _decoded(path: Path) -> Iterator[Capture]:
+def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
     """Give a capture whose samples lie in LibRaw's memory, which ends with the block."""
     import rawpy
 
@@ -66,7 +75,7 @@ def _decoded(path: Path) -> Iterator[Capture]:
     raw_checks.check_chunks_inside(tags)
     try:
         with _named_in_utf8(path) as name, rawpy.imread(name) as raw:
-            yield _to_capture(raw, tags)
+            yield _to_capture(raw, tags, said)
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         text = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
         raise DecodeError(f"LibRaw cannot decode the file: {text}") from error
@@ -88,7 +97,7 @@ def _named_in_utf8(path: Path) -> Iterator[str]:
         yield str(path)
 
 
-def _to_capture(raw: Any, tags: TiffTags) -> Capture:
+def _to_capture(raw: Any, tags: TiffTags, said: MosaicOptions) -> Capture:
     sizes = raw.sizes
     raw_checks.check_size(sizes.height, sizes.width, tags.file_bytes)
     raw_checks.check_size(sizes.raw_height, sizes.raw_width, tags.file_bytes)
@@ -99,13 +108,19 @@ def _to_capture(raw: Any, tags: TiffTags) -> Capture:
         notes.append("floating-point DNG: LibRaw rescales it to 14-bit integers")
     cfa = _cfa(raw)
     # black levels are read before any postprocess, which subtracts and overwrites them
-    black, white = _black_level(raw, cfa), float(raw.white_level)
-    levels = raw_checks.Levels(black=black, white=white)
+    levels = _levels(raw, cfa, said)
     raw_checks.check_levels(levels)
-    dng_checks.check_dng(tags, cfa, levels)
-    samples, levels = _samples(raw, cfa, levels, notes)
+    dng_checks.check_dng(tags, cfa, levels, said.levels)
+    notes += dng_checks.find_doubts(tags)
+    samples, levels = _samples(raw, cfa, levels, notes, said)
+    if said.white_level is None:
+        levels, note = believable_white(samples, levels, cfa, raw_tags.sample_bits(tags))
+        notes += [note] if note else []
+    else:
+        check_said_white(samples, levels.white)
     raw_checks.check_content(samples, levels)
-    _note_outliers(samples, levels, cfa, notes)
+    _note_lone(samples, levels, cfa, notes)
+    notes += find_doubts(samples, levels, cfa, _masked(raw))
     place = raw_tags.sensor_place(tags)
     metadata = raw_metadata(raw, tags)
     return Capture(
@@ -116,7 +131,7 @@ def _to_capture(raw: Any, tags: TiffTags) -> Capture:
         white_balance=_white_balance(raw, tags, notes),
         color_matrix=_color_matrix(raw, tags, notes),
         orientation=FLIP_TO_EXIF.get(sizes.flip, 1),
-        iso=metadata.iso,
+        iso=_believable_iso(metadata.iso),
         exposure_time_s=metadata.exposure_time_s,
         noise=raw_tags.noise_profile(tags, cfa),
         origin_px=place.origin_px,
@@ -152,8 +167,33 @@ def _black_level(raw: Any, cfa: CfaPattern | None) -> NDArray[np.float32]:
     return np.asarray(by_color[np.array(cell)])
 
 
+def _levels(raw: Any, cfa: CfaPattern | None, said: MosaicOptions) -> raw_checks.Levels:
+    """Give the levels of the file where the caller says no others."""
+    black, white = _black_level(raw, cfa), float(raw.white_level)
+    if said.black_level is not None:
+        black = np.full_like(black, said.black_level)
+    return raw_checks.Levels(
+        black=black, white=white if said.white_level is None else said.white_level
+    )
+
+
+def _masked(raw: Any) -> list[NDArray[Any]]:
+    """Give the areas left of and above the picture, which see no light; not their rims."""
+    import rawpy
+
+    if raw.raw_type != rawpy.RawType.Flat:
+        return []
+    top, left, whole = raw.sizes.top_margin, raw.sizes.left_margin, raw.raw_image
+    rim = MASKED_RIM_PX
+    return [whole[top:, rim : max(left - rim, rim)], whole[rim : max(top - rim, rim)]]
+
+
 def _samples(
-    raw: Any, cfa: CfaPattern | None, levels: raw_checks.Levels, notes: list[str]
+    raw: Any,
+    cfa: CfaPattern | None,
+    levels: raw_checks.Levels,
+    notes: list[str],
+    said: MosaicOptions,
 ) -> tuple[NDArray[Any], raw_checks.Levels]:
     """Give the samples, as far as possible in LibRaw's own memory, and their levels."""
     import rawpy
@@ -168,10 +208,12 @@ def _samples(
         notes.append("monochrome sensor: one plane stands for all three colours")
         plane = raw.raw_image_visible
         return np.broadcast_to(plane, (3, *plane.shape)), levels
-    return develop_linear(raw, notes)
+    return develop_linear(raw, notes, said)
 
 
-def develop_linear(raw: Any, notes: list[str]) -> tuple[NDArray[Any], raw_checks.Levels]:
+def develop_linear(
+    raw: Any, notes: list[str], said: MosaicOptions = NOTHING_SAID
+) -> tuple[NDArray[Any], raw_checks.Levels]:
     """Let LibRaw demosaic what is no Bayer mosaic (X-Trans, sRAW, four colours).
 
     Returns:
@@ -187,6 +229,8 @@ def develop_linear(raw: Any, notes: list[str]) -> tuple[NDArray[Any], raw_checks
         adjust_maximum_thr=0.0,
         user_wb=[1.0, 1.0, 1.0, 1.0],
         user_flip=0,
+        user_black=None if said.black_level is None else round(said.black_level),
+        user_sat=None if said.white_level is None else round(said.white_level),
     )
     notes.append(
         "not a Bayer mosaic: decoded by LibRaw's own demosaic (values below black are cut)"
@@ -195,14 +239,14 @@ def develop_linear(raw: Any, notes: list[str]) -> tuple[NDArray[Any], raw_checks
     return np.moveaxis(picture, -1, 0), raw_checks.Levels(black=black, white=65535.0)
 
 
-def _note_outliers(
+def _note_lone(
     samples: NDArray[Any], levels: raw_checks.Levels, cfa: CfaPattern | None, notes: list[str]
 ) -> None:
     planes, cell = ([samples], 2) if cfa is not None else (list(samples), 1)
-    count = sum(raw_checks.count_outliers(plane, levels, cell) for plane in planes)
+    count = sum(count_lone(plane, levels, cell) for plane in planes)
     share = count / samples.size
-    if share >= OUTLIER_NOTE_SHARE:
-        notes.append(f"{count} pixels ({share:.4%}) stand out alone: hot pixels, noise or damage")
+    if share >= LONE_NOTE_SHARE:
+        notes.append(f"{count} pixels ({share:.4%}) stand out alone: hot pixels or damage")
 
 
 def _white_balance(raw: Any, tags: TiffTags, notes: list[str]) -> tuple[float, float, float] | None:
@@ -228,6 +272,10 @@ def _color_matrix(raw: Any, tags: TiffTags, notes: list[str]) -> NDArray[np.floa
         return table
     notes.append("no colour matrix is known for this camera")
     return None
+
+
+def _believable_iso(iso: float | None) -> float | None:
+    return iso if iso is not None and iso <= MAX_ISO else None
 
 
 def header_of(capture: Capture) -> dict[str, Any]:
@@ -310,13 +358,15 @@ def end_with(parent: int) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Decode one file for the parent; every refusal becomes a line of JSON."""
     path, max_memory_mb = Path(arguments[0]), int(arguments[1])
+    black, white = json.loads(arguments[3])
+    said = MosaicOptions(black_level=black, white_level=white)
     end_with(int(arguments[2]))
     # LibRaw may print: keep the pipe to ourselves and send strays to stderr
     with os.fdopen(os.dup(1), "wb", buffering=1 << 20) as out:
         os.dup2(2, 1)
         _limit_memory(max_memory_mb)
         try:
-            with _decoded(path) as capture:
+            with _decoded(path, said) as capture:
                 _send(capture, out)
         except BrokenPipeError:
             return 1  # the parent is gone or gave up

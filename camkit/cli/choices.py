@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from camkit.errors import ContractError
+
 Debug = Annotated[
     bool, typer.Option("--debug", help="Show tracebacks and what the modules log on stderr.")
 ]
@@ -30,3 +32,15 @@ GlassFiles = Annotated[
     list[Path] | None,
     typer.Option("--glass", help="A glass catalogue (.agf) of yours; may be given again."),
 ]
+
+
+def whole_pair(text: str, option: str) -> tuple[int, int]:
+    """Read two whole numbers A,B.
+
+    Raises:
+        ContractError: If the text is anything else.
+    """
+    parts = text.split(",")
+    if len(parts) != 2 or not all(p.strip().lstrip("-").isdigit() for p in parts):
+        raise ContractError(f"{option} takes two whole numbers A,B; got {text!r}")
+    return int(parts[0]), int(parts[1])

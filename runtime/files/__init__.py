@@ -4,7 +4,11 @@ tiff_tags     tags of TIFF-based files, read within bounds
 exif_tags     what a photograph says of itself, from EXIF anywhere
 raw_metadata  the same of a RAW file, with LibRaw's help
 raw_tags      noise, colour and place of a RAW file from its tags
+in_memory     bytes and open files, stored while they are read
 raw_checks    refuses unbelievable decodes
+lone_pixels   hot or damaged pixels counted
+doubts        what of a decode is not likely, as notes
+white_level   white where the data contradict the file
 dng_checks    a DNG against itself and against LibRaw
 mapped_tiff   large plain TIFF files read in place
 picture       EXR, TIFF and PNG as captures or scenes

@@ -5,7 +5,9 @@ A flipped byte in the header often makes LibRaw skip a tag without a word: the b
 compared (DNG specification 1.7, chapter 4; tags of the directory that holds the sensor picture).
 """
 
+import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -20,9 +22,16 @@ UNCOMPRESSED: Final = 1
 LOSSY_JPEG: Final = 34892
 LEVEL_TOLERANCE: Final = 1.0
 ROW_PADDING_BYTES: Final = 16
+MOST_BITS: Final = 64
+TABLE_TOLERANCE: Final = 0.1
+CFA: Final = 32803
 
 _BITS, _COMPRESSION, _SAMPLES, _SAMPLE_FORMAT = 258, 259, 277, 339
 _WIDTH, _HEIGHT, _STRIP_BYTES = 256, 257, 279
+_PHOTOMETRIC: Final = 262
+_CHUNKS: Final = (("strip", 273, 0, 278), ("tile", 324, 322, 323))
+_CROP_ORIGIN, _CROP_SIZE, _ACTIVE_AREA = 50719, 50720, 50829
+_CURVES: Final = (50712, 51008, 51009)  # LinearizationTable, OpcodeList1, OpcodeList2
 _CFA_REPEAT, _LINEARIZATION = 33421, 50712
 _BLACK_REPEAT, _BLACK, _BLACK_DELTAS, _WHITE = 50713, 50714, (50715, 50716), 50717
 _WHITE_BALANCES: Final = (50728, 50729)  # AsShotNeutral, AsShotWhiteXY
@@ -48,13 +57,19 @@ def is_float(tags: TiffTags) -> bool:
     )
 
 
-def check_dng(tags: TiffTags, cfa: CfaPattern | None, levels: Levels) -> None:
+def check_dng(
+    tags: TiffTags,
+    cfa: CfaPattern | None,
+    levels: Levels,
+    said: frozenset[str] = frozenset(),
+) -> None:
     """Compare a decode with the tags of its DNG; other files pass.
 
     Args:
         tags: The directories of the file.
         cfa: The pattern that LibRaw found; None for planes.
         levels: The levels that LibRaw found.
+        said: Which levels ("black", "white") the caller says, so that the file's do not matter.
 
     Raises:
         DecodeError: If they contradict each other.
@@ -68,8 +83,102 @@ def check_dng(tags: TiffTags, cfa: CfaPattern | None, levels: Levels) -> None:
     _check_strip_bytes(picture)
     if _numbers(picture, _CFA_REPEAT) == (2, 2) and cfa is None:
         raise DecodeError("the DNG states a 2x2 CFA, LibRaw found none; its header is damaged")
-    _check_black(picture, levels)
-    _check_white(picture, levels)
+    if "black" not in said:
+        _check_black(picture, levels)
+    if "white" not in said:
+        _check_white(picture, levels)
+
+
+def find_doubts(tags: TiffTags) -> list[str]:
+    """Say where the sensor picture of a DNG contradicts itself, or of any file has no data."""
+    directories = [d for d in sensor_directories(tags.directories) if _numbers(d, _WIDTH)]
+    found = [
+        "the header does not say where the pixels of the mosaic lie"
+        for picture in directories
+        if picture.get(_PHOTOMETRIC) == (CFA,) and not any(t in picture for _, t, *_ in _CHUNKS)
+    ]
+    found += [_depth_doubt(picture) for picture in directories]
+    if not is_dng(tags):
+        directories = []
+    for picture in directories:
+        found += [_chunk_doubt(picture), _area_doubt(picture), _curve_doubt(picture)]
+        found.append(_table_doubt(picture))
+    return [f"{doubt}: the header is damaged" for doubt in found if doubt]
+
+
+def _chunk_doubt(picture: Directory) -> str:
+    """Compare the number of strips or tiles with the size (TIFF 6.0, sections 3 and 15)."""
+    width, height = _first(picture, _WIDTH), _first(picture, _HEIGHT)
+    for noun, offsets_tag, wide_tag, high_tag in _CHUNKS:
+        count = len(_numbers(picture, offsets_tag))
+        wide, high = _first(picture, wide_tag, width), _first(picture, high_tag, height)
+        if not count:
+            continue
+        if min(wide, high) < 1:
+            return f"a {noun} of {wide:.0f}x{high:.0f} pixels holds nothing"
+        needed = math.ceil(width / wide) * math.ceil(height / high)
+        if count != needed:
+            return f"{width:.0f}x{height:.0f} pixels need {needed} {noun}(s), there are {count}"
+    stated = sum(_numbers(picture, _STRIP_BYTES))
+    if _first(picture, _COMPRESSION) == UNCOMPRESSED and height and stated:
+        rest = stated % height
+        if min(rest, height - rest) > ROW_PADDING_BYTES:
+            return f"{stated:.0f} bytes of pixels are no whole number for each of {height:.0f} rows"
+    return ""
+
+
+def _curve_doubt(picture: Directory) -> str:
+    """See whether 8 bits of lossy JPEG come with the curve that makes light of them."""
+    lossy = _first(picture, _COMPRESSION) == LOSSY_JPEG
+    return "" if not lossy or any(tag in picture for tag in _CURVES) else "its curve is missing"
+
+
+def _depth_doubt(picture: Directory) -> str:
+    """See whether the bits of a mosaic hold its white; 8 may stand for more behind a curve."""
+    bits, white = _first(picture, _BITS), _first(picture, _WHITE)
+    mosaic = picture.get(_PHOTOMETRIC) == (CFA,) and _LINEARIZATION not in picture
+    if (
+        mosaic
+        and 8 < bits <= MOST_BITS
+        and white >= 2**bits
+        and _first(picture, _SAMPLE_FORMAT, 1) == 1
+    ):
+        return f"white {white:g} does not fit in {bits:.0f} bits"
+    return ""
+
+
+def _table_doubt(picture: Directory) -> str:
+    """Compare white with the end of the table that makes light of the stored numbers."""
+    table, white = _numbers(picture, _LINEARIZATION), _first(picture, _WHITE)
+    if any(after < before for before, after in pairwise(table)):
+        return "the table that makes light of the samples falls"
+    if not table or not white or abs(max(table) / white - 1) <= TABLE_TOLERANCE:
+        return ""
+    return f"white is {white:g}, the table of the samples ends at {max(table):g}"
+
+
+def _area_doubt(picture: Directory) -> str:
+    """See whether the active area lies in the picture and the crop in the active area."""
+    width, height = _first(picture, _WIDTH), _first(picture, _HEIGHT)
+    if _numbers(picture, _CFA_REPEAT) == (2, 2) and (width % 2 or height % 2):
+        return f"a mosaic of {width:.0f}x{height:.0f} pixels holds no whole cells"
+    samples = _first(picture, _SAMPLES, 1)
+    if picture.get(_CFA_REPEAT) and samples != 1:
+        return f"a mosaic has one sample in each pixel, not {samples:.0f}"
+    area = _numbers(picture, _ACTIVE_AREA)
+    if len(area) == 4:
+        top, left, bottom, right = area
+        if not (0 <= top < bottom <= height and 0 <= left < right <= width):
+            return f"the active area {area} leaves the {width:.0f}x{height:.0f} pixels"
+        width, height = right - left, bottom - top
+        if _numbers(picture, _CFA_REPEAT) == (2, 2) and (width % 2 or height % 2):
+            return f"an active area of {width:.0f}x{height:.0f} pixels holds no whole cells"
+    origin, size = _numbers(picture, _CROP_ORIGIN) or (0.0, 0.0), _numbers(picture, _CROP_SIZE)
+    if len(origin) != 2 or len(size) != 2:
+        return ""
+    if min(size) < 1 or origin[0] + size[0] > width or origin[1] + size[1] > height:
+        return f"the crop {size} at {origin} leaves the {width:.0f}x{height:.0f} pixels"
+    return ""
 
 
 def _numbers(directory: Directory, tag: int) -> tuple[float, ...]:
@@ -78,7 +187,8 @@ def _numbers(directory: Directory, tag: int) -> tuple[float, ...]:
 
 
 def _first(directory: Directory, tag: int, default: float = 0.0) -> float:
-    return next(iter(_numbers(directory, tag)), default)
+    value = next(iter(_numbers(directory, tag)), default)
+    return value if math.isfinite(value) else default
 
 
 def _check_strip_bytes(picture: Directory) -> None:
@@ -121,7 +231,7 @@ def _check_white(picture: Directory, levels: Levels) -> None:
             f"the DNG states white {max(stated):g}, LibRaw found {levels.white:g}; "
             "its header is damaged"
         )
-    if not _numbers(picture, _LINEARIZATION) and levels.white > 2**bits - 1:
+    if not _numbers(picture, _LINEARIZATION) and levels.white > 2.0 ** min(bits, MOST_BITS) - 1:
         raise DecodeError(
             f"white level {levels.white:g} does not fit in the {bits:.0f} bits of the DNG; "
             "its header is damaged"

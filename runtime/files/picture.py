@@ -36,8 +36,8 @@ from camkit.runtime.files.exif_tags import exif_of_picture, metadata_of, orienta
 from camkit.runtime.files.exr_attributes import metadata_of_exr
 from camkit.runtime.files.mapped_tiff import map_plain_tiff
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
+from camkit.runtime.files.white_level import check_said_white
 from camkit.runtime.geometry.turning import turn_back
-from camkit.runtime.machine.memory import release_pages
 from camkit.runtime.metadata import Metadata
 
 EXR_MAGIC: Final = b"\x76\x2f\x31\x01"
@@ -48,7 +48,6 @@ MOSAIC_ADVICE: Final = (
 )
 _JPEG_MAGIC: Final = b"\xff\xd8"
 _CHROMATICITY_TOLERANCE: Final = 2e-3
-_BAND_ROWS: Final = 64
 
 # OpenEXR.File prints its warnings; they must not land in stdout, which may carry JSON
 _exr_lock = threading.Lock()
@@ -118,34 +117,23 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
             f"a headerless mosaic must have one 8- or 16-bit channel; got {samples.dtype} "
             f"{samples.shape}; omit the mosaic options for an RGB picture"
         )
+    if options.black_level is None or options.white_level is None:
+        raise DecodeError(f"levels alone are for RAW files; {MOSAIC_ADVICE}")
     levels = raw_checks.Levels(
         black=np.full((2, 2), options.black_level, dtype=np.float32), white=options.white_level
     )
     raw_checks.check_levels(levels, int(np.iinfo(samples.dtype).max))
-    over = _share_above(samples, options.white_level * raw_checks.OVER_WHITE_FACTOR)
-    if over > raw_checks.OVER_WHITE_SHARE:
-        raise DecodeError(
-            f"{over:.0%} of the samples lie above --white-level {options.white_level:g} "
-            f"(largest {samples.max()}); give the true white level"
-        )
+    check_said_white(samples, levels.white)
     return Capture(
         samples=samples,
         cfa=options.cfa,
         black_level=levels.black,
-        white_level=options.white_level,
+        white_level=levels.white,
         orientation=picture.orientation,
         camera=picture.metadata.camera,
         metadata=picture.metadata,
         notes=("headerless mosaic: pattern and levels as given",),
     )
-
-
-def _share_above(samples: NDArray[Any], limit: float) -> float:
-    """Give the share of samples above a limit, in bands that stay in cache."""
-    tops = range(0, samples.shape[0], _BAND_ROWS)
-    count = sum(int(np.count_nonzero(samples[top : top + _BAND_ROWS] > limit)) for top in tops)
-    release_pages(samples)
-    return count / samples.size
 
 
 def read_scene(path: Path) -> FloatArray:

@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.files.tiff_tags import TagValue, TiffTags
+from camkit.runtime.machine.memory import release_pages
 
 MAX_PIXELS: Final = 1_000_000_000
 MAX_PIXELS_PER_BYTE: Final = 256
 MIN_SIDE_PX: Final = 2
 OVER_WHITE_SHARE: Final = 0.05
+_BAND_ROWS: Final = 64
 OVER_WHITE_FACTOR: Final = 1.1
 ZERO_SHARE: Final = 0.02
 LIVE_SIGNAL: Final = 0.02
-OUTLIER_STEP: Final = 0.1
-BAND_ROWS: Final = 32
 
 _WIDTH: Final = 256
 _HEIGHT: Final = 257
@@ -46,10 +46,11 @@ class Levels:
 
 
 def check_chunks_inside(tags: TiffTags) -> None:
-    """Refuse a file whose pixel strips or tiles reach beyond its end.
+    """Refuse a file whose pixel strips or tiles reach beyond its end or over its header.
 
     Raises:
-        DecodeError: If a sensor picture (CFA or LinearRaw, else the largest) is cut off.
+        DecodeError: If a sensor picture (CFA or LinearRaw, else the largest) is cut off, or its
+            data cannot lie where the header says.
     """
     for directory in sensor_directories(tags.directories):
         for offsets_tag, lengths_tag, noun in _CHUNKS:
@@ -66,7 +67,13 @@ def check_chunks_inside(tags: TiffTags) -> None:
                     f"the file lists {len(offsets)} {noun} offsets but {len(lengths)} lengths; "
                     "its header is damaged, copy it again from the camera"
                 )
-            end = max(o + n for o, n in zip(offsets, lengths, strict=True))
+            spans = [(o, o + n) for o, n in zip(offsets, lengths, strict=True)]
+            if any(first <= at < end for first, end in spans for at in (0, *tags.starts)):
+                raise DecodeError(
+                    "the pixel data begin before the header ends; it is damaged, copy the file "
+                    "again from the camera"
+                )
+            end = max(end for _, end in spans)
             if end > tags.file_bytes:
                 raise DecodeError(
                     f"pixel data should reach byte {end:.0f}, the file ends at {tags.file_bytes}; "
@@ -155,15 +162,24 @@ def check_content(samples: Samples, levels: Levels) -> None:
             f"no pixel exceeds the black level {levels.black.min():g} (largest is {high}); "
             "the black level or the pixel data are damaged"
         )
-    if high > levels.white * OVER_WHITE_FACTOR:
-        over = float(np.mean(samples > levels.white * OVER_WHITE_FACTOR))
-        if over > OVER_WHITE_SHARE:
-            raise DecodeError(
-                f"{over:.0%} of the pixels lie above the white level {levels.white:g}; "
-                "the white level or the pixel data are damaged"
-            )
+    over = share_over_white(samples, levels.white) if high > levels.white else 0.0
+    if over > OVER_WHITE_SHARE:
+        raise DecodeError(
+            f"{over:.0%} of the pixels lie above the white level {levels.white:g}; "
+            "the white level or the pixel data are damaged (--white-level says it)"
+        )
     if low == 0:
         _check_unread(samples, levels)
+
+
+def share_over_white(samples: Samples, white: float) -> float:
+    """Give the share of samples clearly above white, in bands that stay in cache."""
+    rows = samples.shape[-2]
+    limit = white * OVER_WHITE_FACTOR
+    bands = (samples[..., top : top + _BAND_ROWS, :] for top in range(0, rows, _BAND_ROWS))
+    count = sum(int(np.count_nonzero(band > limit)) for band in bands)
+    release_pages(samples)
+    return count / samples.size
 
 
 def _check_unread(samples: Samples, levels: Levels) -> None:
@@ -184,44 +200,3 @@ def _check_unread(samples: Samples, levels: Levels) -> None:
             raise DecodeError(
                 f"the last {tail} rows are 0 after a bright row: the data are cut off"
             )
-
-
-def count_outliers(samples: Samples, levels: Levels, cell: int) -> int:
-    """Count pixels that stand out alone: hot pixels, or damage within the pixel data.
-
-    A pixel counts if it lies above the largest or below the smallest of its four neighbours of
-    the same colour by more than `OUTLIER_STEP` of the range.
-
-    Args:
-        samples: (h, w) uint8 or uint16.
-        levels: Black and white level.
-        cell: Distance to the next pixel of the same colour: 2 in a Bayer mosaic, 1 in a plane.
-    """
-    height, width = samples.shape
-    if height <= 2 * cell or width <= 2 * cell:
-        return 0
-    step = max(1, round(OUTLIER_STEP * (levels.white - float(levels.black.min()))))
-    return sum(
-        _outliers(samples[top - cell : min(top + BAND_ROWS, height - cell) + cell], cell, step)
-        for top in range(cell, height - cell, BAND_ROWS)
-    )
-
-
-def _outliers(band: Samples, cell: int, step: int) -> int:
-    if band.dtype != np.uint16:
-        band = band.astype(np.uint16)
-    inner = band[cell:-cell, cell:-cell]
-    neighbours = (
-        band[: -2 * cell, cell:-cell],
-        band[2 * cell :, cell:-cell],
-        band[cell:-cell, : -2 * cell],
-        band[cell:-cell, 2 * cell :],
-    )
-    above = np.maximum(neighbours[0], neighbours[1])
-    np.maximum(above, np.maximum(neighbours[2], neighbours[3]), out=above)
-    below = np.minimum(neighbours[0], neighbours[1])
-    np.minimum(below, np.minimum(neighbours[2], neighbours[3]), out=below)
-    # unsigned numbers wrap, so each difference is taken from a bound that is never crossed
-    high = np.maximum(inner, above) - above > step
-    low = below - np.minimum(inner, below) > step
-    return int(np.count_nonzero(high)) + int(np.count_nonzero(low))

@@ -13,9 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, NoiseModel, cfa_channels
+from camkit.runtime.files.raw_checks import sensor_directories
 from camkit.runtime.files.tiff_tags import TiffTags
 from camkit.runtime.metadata import Metadata, clean_text
 
+MAX_FACTOR: Final = 1e3
+"""Of a colour matrix or a balance that a camera can have."""
+
+BITS_PER_SAMPLE: Final = 258
 IMAGE_DESCRIPTION: Final = 270
 UNIQUE_CAMERA_MODEL: Final = 50708
 CFA_PLANE_COLOR: Final = 50710
@@ -45,6 +50,13 @@ class SensorPlace:
 def camera_name(tags: TiffTags, metadata: Metadata) -> str:
     """Give the camera as people read it; empty if not stated."""
     return clean_text(tags.text(UNIQUE_CAMERA_MODEL)) or metadata.camera
+
+
+def sample_bits(tags: TiffTags) -> int:
+    """Give the bits of a sample of the sensor picture; 0 if not stated or not believable."""
+    stated = [d.get(BITS_PER_SAMPLE, b"") for d in sensor_directories(tags.directories)]
+    bits = [value[0] for value in stated if value and not isinstance(value, bytes)]
+    return int(max(bits)) if bits and 1 <= max(bits) <= 16 else 0
 
 
 def noise_profile(tags: TiffTags, cfa: CfaPattern | None) -> NoiseModel | None:
@@ -94,7 +106,7 @@ def color_matrix(tags: TiffTags) -> tuple[NDArray[np.float64], str | None] | Non
     found = []
     for matrix_tag, light_tag in COLOR_MATRICES:
         values = tags.numbers(matrix_tag)
-        if values is None or len(values) != 9 or not np.isfinite(values).all():
+        if values is None or len(values) != 9 or not (np.abs(values) < MAX_FACTOR).all():
             continue
         light = int((tags.numbers(light_tag) or (0,))[0])
         kelvin = _ILLUMINANT_KELVIN.get(light, 0)
@@ -104,12 +116,7 @@ def color_matrix(tags: TiffTags) -> tuple[NDArray[np.float64], str | None] | Non
     distance, light, values = min(found, key=lambda item: item[0])
     matrix = np.array(values, dtype=np.float64).reshape(3, 3)
     balance = tags.numbers(ANALOG_BALANCE)
-    if (
-        balance is not None
-        and len(balance) == 3
-        and np.isfinite(balance).all()
-        and min(balance) > 0
-    ):
+    if balance is not None and len(balance) == 3 and min(balance) > 0 and max(balance) < MAX_FACTOR:
         matrix = np.array(balance)[:, None] * matrix
     if abs(np.linalg.det(matrix)) < 1e-9:
         return None

@@ -40,10 +40,12 @@ class TiffTags:
     Attributes:
         directories: Tag number -> numbers, or bytes for text and opaque values.
         file_bytes: Size of the file.
+        starts: Where each directory lies in the file.
     """
 
     directories: tuple[Mapping[int, TagValue], ...]
     file_bytes: int
+    starts: tuple[int, ...] = ()
 
     def numbers(self, tag: int) -> tuple[float, ...] | None:
         """Give the numbers of a tag from the first directory that has it."""
@@ -73,7 +75,7 @@ class _Reader:
     entries_left: int = MAX_ALL_ENTRIES
     bytes_left: int = MAX_ALL_BYTES
     seen: set[int] = field(default_factory=set)
-    found: list[Mapping[int, TagValue]] = field(default_factory=list)
+    found: dict[int, Mapping[int, TagValue]] = field(default_factory=dict)
 
     def unpack(self, code: str, offset: int) -> tuple[float, ...] | None:
         """Give numbers at an offset, or None where the file does not reach."""
@@ -93,7 +95,7 @@ class _Reader:
                 continue
             self.seen.add(at)
             tags, following = self.directory(at)
-            self.found.append(tags)
+            self.found[at] = tags
             pointers = (SUB_IFDS, EXIF_POINTER, GPS_POINTER)
             children = [at for tag in pointers for at in _whole(tags.get(tag))]
             pending = [*children[:MAX_DIRECTORIES], *pending, following]
@@ -163,7 +165,9 @@ def _read(file: BinaryIO, file_bytes: int) -> TiffTags:
         order + ("Q" if reader.big else "I"), head[8:] if reader.big else head[4:8]
     )
     reader.walk(first)
-    return TiffTags(directories=tuple(reader.found), file_bytes=file_bytes)
+    return TiffTags(
+        directories=tuple(reader.found.values()), file_bytes=file_bytes, starts=tuple(reader.found)
+    )
 
 
 def _values(raw: tuple[float, ...], per_value: int) -> tuple[float, ...]:

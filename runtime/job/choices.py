@@ -18,7 +18,7 @@ from camkit.runtime.plan.ways import LEFT_OUT, offered_methods, ways_of
 from camkit.runtime.stage_finder import stage_module
 
 GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method", "unit"})
-ON_A_SENSOR: Final = frozenset({"assume"})
+ON_A_SENSOR: Final = frozenset({"assume", "origin_px"})
 """What means something wherever the size of the sensor is known."""
 WITH_A_BUNDLE: Final = frozenset({"force_bundle"})
 

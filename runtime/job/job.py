@@ -11,7 +11,8 @@ from typing import Any
 
 from camkit.bundle.plane import Plane
 from camkit.bundle.reader import Bundle
-from camkit.contracts import NoiseModel
+from camkit.bundle.sensor import BayerSensor
+from camkit.contracts import CfaPattern, NoiseModel, shifted_cfa
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import COLOURS, Capture
@@ -130,6 +131,8 @@ class Job:
                 f"bundle {bundle.manifest.name} takes {' or '.join(wanted)}, the capture is "
                 f"{self.capture.contract}; use another bundle or --bundle none"
             )
+        if isinstance(bundle.manifest.sensor, BayerSensor):
+            self._check_cfa(bundle.manifest.sensor.cfa)
         if self.capture.contract != wanted[0]:
             self.notes.append(f"a linear RGB capture in a {wanted[0]} bundle: not demosaicked")
 
@@ -145,6 +148,18 @@ class Job:
             self.notes.append(
                 f"the file names the camera {capture.camera}: unless the lens of bundle {name} was "
                 "on it, the blur of another lens is undone"
+            )
+
+    def _check_cfa(self, cfa: CfaPattern) -> None:
+        """Refuse a mosaic that does not begin as the sensor does at the place of the capture."""
+        found, origin = self.capture.cfa, self.capture.origin_px
+        if found is None or origin is None or self.options.assume is not None:
+            return
+        expected = shifted_cfa(cfa, origin)
+        if found != expected:
+            raise ContractError(
+                f"the mosaic begins with {found}, the sensor (CFA {cfa}) has {expected} at "
+                f"{origin}: the place of the crop (origin_px) or the pattern is wrong"
             )
 
     @cached_property

@@ -223,13 +223,17 @@ class Reconstruction:
         """Collect all bands of a product in one (c, h, w) array.
 
         Raises:
-            ContractError: If `out` has another shape or type.
+            ContractError: If `out` has another shape or type, cannot be written, or shares memory
+                with the capture.
         """
         shape = self.shape_of(product)
         if out is None:
             out = np.empty(shape, dtype=np.float32)
-        if out.shape != shape or out.dtype != np.float32:
+        check_out(out)
+        if out.shape != shape:
             raise ContractError(f"out must be float32 {shape}; got {out.dtype} {out.shape}")
+        if np.may_share_memory(out, self.capture.samples):
+            raise ContractError("out shares memory with the capture, which is read while it fills")
         top = 0
         for band in self.bands(product):
             out[:, top : top + band.shape[1]] = band
@@ -297,3 +301,18 @@ class Reconstruction:
             content = measure_content(self.capture, noise, job.white_balance, job.placement.window)
         self.record["scene"] = content.to_json()
         return content
+
+
+def check_out(out: FloatArray | None) -> None:
+    """Refuse an array that cannot be filled, as far as that is known before any capture.
+
+    Raises:
+        ContractError: If it is no writable float32 array of three axes.
+    """
+    if out is None:
+        return
+    if not isinstance(out, np.ndarray) or out.ndim != 3 or out.dtype != np.float32:
+        got = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+        raise ContractError(f"out must be float32 (c, h, w); got {got}")
+    if not out.flags.writeable:
+        raise ContractError("out is read-only: give an array that can be written, or None")

@@ -1,6 +1,7 @@
 """The signal before and behind the restoration, in the order of one photograph.
 
 noise         noise of a capture that states none; repair of broken samples
+glow          whether a sample that stands out is light
 demosaic      mosaic to three planes; `directional` is its slower, better method
 front_rows    repair, white balance and demosaic joined, as rows
 stabilise     k-sigma and square root around the network

@@ -18,16 +18,14 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
+from camkit.runtime.signal.glow import MARGIN_PX, OUTLIER_SPREADS, glows, neighbours
 
 BoolArray = NDArray[np.bool_]
 
-REPAIR_MARGIN_PX: Final = 2
+REPAIR_MARGIN_PX: Final = MARGIN_PX
 """Rows of context that a band needs above and below for the same repair as the whole."""
 
-_OUTLIER_SPREADS: Final = 2.0
-"""Of pure noise one sample in a hundred thousand is replaced by the median around it."""
 _OUTLIER_LEAST: Final = 0.02
-_GLOW_SHARE: Final = 0.1
 _CACHED_ROWS: Final = 16
 """Rows looked at together: what is made of them stays in cache."""
 
@@ -104,7 +102,7 @@ def _repair(plane: FloatArray, step: int) -> tuple[FloatArray, BoolArray]:
     if not broken.any():
         return plane, broken
     rows, cols = np.nonzero(broken)
-    around = _neighbours(padded, rows, cols, step)
+    around = neighbours(padded, rows, cols, step)
     repaired = plane.copy()
     repaired[rows, cols] = _median(around)
     return repaired, broken
@@ -124,7 +122,7 @@ def _outliers(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
         alone[top:bottom] = _apart(plane[top:bottom], padded[top : bottom + 4], step)
     if step == 2 and alone.any():
         rows, cols = np.nonzero(alone)
-        alone[rows, cols] = ~_glows(padded, rows, cols)
+        alone[rows, cols] = ~glows(padded, rows, cols)
     return alone
 
 
@@ -133,7 +131,7 @@ def _apart(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
     high = _extreme(padded, step, np.maximum)
     low = _extreme(padded, step, np.minimum)
     limit = high - low
-    limit *= _OUTLIER_SPREADS
+    limit *= OUTLIER_SPREADS
     limit += _OUTLIER_LEAST
     high += limit
     low -= limit
@@ -151,27 +149,6 @@ def _extreme(padded: FloatArray, step: int, choose: np.ufunc) -> FloatArray:
     row = choose(beside, centre)
     result: FloatArray = choose(row[: -2 * step], row[2 * step :])
     return np.asarray(choose(result, beside[step:-step], out=result))
-
-
-def _glows(padded: FloatArray, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> BoolArray:
-    """Tell where the other colours beside a sample rise with it, as they do for light."""
-
-    def at(dy: int, dx: int) -> FloatArray:
-        return np.asarray(padded[rows + 2 + dy, cols + 2 + dx])
-
-    beside = at(0, -1) + at(0, 1) - 0.5 * (at(-2, -1) + at(-2, 1) + at(2, -1) + at(2, 1))
-    above = at(-1, 0) + at(1, 0) - 0.5 * (at(-1, -2) + at(-1, 2) + at(1, -2) + at(1, 2))
-    same = np.median(_neighbours(padded, rows, cols, 2), axis=0)
-    excess = at(0, 0) - same
-    return np.asarray((beside + above) * np.sign(excess) > _GLOW_SHARE * np.abs(excess))
-
-
-def _neighbours(
-    padded: FloatArray, rows: NDArray[np.intp], cols: NDArray[np.intp], step: int
-) -> FloatArray:
-    """Give (8, n): the neighbours at a distance of `step`."""
-    offsets = [(dy, dx) for dy in (-step, 0, step) for dx in (-step, 0, step) if dy or dx]
-    return np.stack([padded[rows + 2 + dy, cols + 2 + dx] for dy, dx in offsets])
 
 
 def _median(around: FloatArray) -> FloatArray:

@@ -113,3 +113,26 @@ def test_photon_counts_are_for_the_kind_of_their_camera() -> None:
     diodes = SpadSensor(extent=Extent(width_px=8, height_px=6, pixel_pitch_um=6.0))
     with pytest.raises(UnsupportedError, match="photon counts"):
         _taken(np.zeros((6, 8), np.uint16), diodes)
+
+
+@pytest.mark.parametrize(
+    ("origin", "cfa"), [((0, 0), "RGGB"), ((3, 2), "GRBG"), ((2, 5), "GBRG"), ((7, 1), "BGGR")]
+)
+def test_a_crop_begins_with_the_pixel_of_the_cfa_at_its_place(
+    origin: tuple[int, int], cfa: str
+) -> None:
+    crop = _taken(np.full((6, 8), 200, np.uint16), origin_px=origin)
+    assert (crop.cfa, crop.origin_px) == (cfa, origin)
+
+
+def test_a_float_mosaic_clips_at_the_white_level_of_its_sensor_and_planes_do_not() -> None:
+    mosaic = np.full((6, 8), 200, np.float32)
+    mosaic[2, 2] = 1023
+    assert _taken(mosaic).saturated_rows(0, 6).sum() == 1
+    assert _taken(np.full((3, 6, 8), 5, np.float32)).saturated_rows(0, 6).sum() == 0
+
+
+def test_a_float_mosaic_that_holds_light_in_place_of_numbers_is_refused() -> None:
+    with pytest.raises(ContractError, match=r"reaches 0\.9: multiply light by white - black"):
+        _taken(np.linspace(-0.1, 0.9, 48, dtype=np.float32).reshape(6, 8))
+    assert _taken(np.zeros((6, 8), np.float32)).linear_rows(0, 6).max() < 0

@@ -12,8 +12,10 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
+from camkit.runtime.batch import process
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.options import Options
+from camkit.runtime.output.dng import DngTags, write_bayer_dng
 from camkit.runtime.pipeline import Pipeline, load
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
@@ -283,3 +285,99 @@ def test_a_depth_without_kernels_is_refused_before_any_work(bundle: Path, deep: 
 
 def test_the_only_depth_may_be_named(bundle: Path, mosaic: np.ndarray) -> None:
     np.testing.assert_array_equal(_run(bundle, mosaic, depth_m=np.inf), _run(bundle, mosaic))
+
+
+@pytest.mark.parametrize("origin", [(4, 4), (5, 4), (4, 7), (9, 7)])
+def test_an_odd_origin_begins_with_the_pixel_that_the_sensor_has_there(
+    bundle: Path, mosaic: np.ndarray, origin: tuple[int, int]
+) -> None:
+    red_is_darker = mosaic.copy()
+    red_is_darker[::2, ::2] //= 2
+    pipeline, (x, y) = load(bundle, method="wiener", undistort=False, vignetting=False), origin
+    crop = np.ascontiguousarray(red_is_darker[y : y + 40, x : x + 60])
+    found = pipeline.process_array(crop, iso=100.0, origin_px=origin)
+    whole = pipeline.process_array(red_is_darker, iso=100.0)[:, y : y + 40, x : x + 60]
+    inner = np.s_[:, 12:28, 18:42]
+    np.testing.assert_allclose(found[inner].mean((1, 2)), whole[inner].mean((1, 2)), rtol=0.03)
+
+
+@pytest.mark.parametrize("origin", [(1.5, 2), (-2, 0), (1,), "ab"])
+def test_an_origin_that_is_no_place_is_refused(
+    bundle: Path, mosaic: np.ndarray, origin: object
+) -> None:
+    with pytest.raises(ContractError, match="origin_px must be two whole numbers"):
+        load(bundle).process_array(mosaic[:20, :32], iso=100.0, origin_px=origin)  # type: ignore[arg-type]
+
+
+def test_a_crop_without_a_place_is_taken_where_the_caller_says(tmp_path: Path) -> None:
+    path = write_tiny_captures(tmp_path, ["a"])
+    whole = load(path, method="wiener")
+    capture = whole.read(tmp_path / "a.dng")
+    dng = tmp_path / "crop.dng"
+    tags = DngTags(
+        cfa="RGGB",
+        black=64,
+        white=1023,
+        color_matrix=None,
+        as_shot_neutral=(0.5, 1.0, 0.6),
+        camera_model="another camera",
+    )
+    write_bayer_dng(dng, np.array(capture.samples[8:48, 10:70]), tags=tags)
+    with pytest.raises(ContractError, match="say where it lies"):
+        whole.process(dng)
+    once = whole.process(dng, origin_px=(10, 8)).image
+    always = load(path, method="wiener", origin_px=(10, 8)).process(dng).image
+    assert once.shape == (3, 40, 60)
+    np.testing.assert_array_equal(once, always)
+    with pytest.raises(ContractError, match=r"begins with RGGB.*has GRBG at \(11, 8\)"):
+        whole.process(dng, origin_px=(11, 8))
+    with pytest.raises(ContractError, match="needs a bundle"):
+        load(None).process(dng, origin_px=(10, 8))
+    with pytest.raises(ContractError, match="choose"):
+        Options(origin_px=(10, 8), assume="centre")
+
+
+def test_a_capture_in_memory_gives_the_picture_of_its_file(tmp_path: Path) -> None:
+    pipeline = load(write_tiny_captures(tmp_path, ["a"]), method="wiener")
+    known = pipeline.process(tmp_path / "a.dng").image
+    data = (tmp_path / "a.dng").read_bytes()
+    np.testing.assert_array_equal(pipeline.process(data).image, known)
+    with (tmp_path / "a.dng").open("rb") as file:
+        np.testing.assert_array_equal(pipeline.process(file).image, known)
+    with pytest.raises(ContractError, match=r"Pipeline\.process"):
+        process(data, bundle="none", out_dir=tmp_path)
+
+
+def test_an_array_that_cannot_be_filled_is_refused_before_work(
+    bundle: Path, mosaic: np.ndarray, tmp_path: Path
+) -> None:
+    pipeline = load(bundle)
+    fixed = np.empty((3, 64, 96), np.float32)
+    fixed.flags.writeable = False
+    for out, message in ((fixed, "read-only"), ([1.0], "got list"), (mosaic, "got uint16")):
+        with pytest.raises(ContractError, match=message):
+            pipeline.process(tmp_path / "none.dng", out=out)  # type: ignore[arg-type]
+        with pytest.raises(ContractError, match=message):
+            pipeline.process_array(mosaic, iso=100.0, out=out)  # type: ignore[arg-type]
+    planes = np.full((3, 64, 96), 0.25, np.float32)
+    with pytest.raises(ContractError, match="shares memory"):
+        pipeline.process_array(planes, iso=100.0, out=planes)
+
+
+@pytest.mark.parametrize("iso", [1e300, 10**400, float("nan"), 0, -1, "100"])
+def test_a_sensitivity_that_no_camera_has_is_refused(
+    bundle: Path, mosaic: np.ndarray, iso: object
+) -> None:
+    with pytest.raises(ContractError, match="iso must be a number in"):
+        load(bundle).process_array(mosaic, iso=iso)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 3e38, -3e38, -500.0])
+@pytest.mark.parametrize("iso", [100.0, None])
+def test_samples_that_are_no_light_give_a_finite_picture_without_a_warning(
+    bundle: Path, mosaic: np.ndarray, value: float, iso: float | None
+) -> None:
+    broken = mosaic.astype(np.float32)
+    broken.ravel()[np.random.default_rng(0).choice(broken.size, 300, replace=False)] = value
+    assert np.isfinite(load(bundle).process_array(broken, iso=iso)).all()
+    assert np.isfinite(load(bundle).process_array(np.stack([broken / 1023] * 3), iso=iso)).all()

@@ -24,8 +24,8 @@ def info(
     mosaic: Annotated[
         str | None, typer.Option(help="Headerless mosaic: RGGB, BGGR, GRBG or GBRG.")
     ] = None,
-    black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
-    white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
+    black_level: Annotated[float | None, typer.Option(help="Black, DN, not the file's.")] = None,
+    white_level: Annotated[float | None, typer.Option(help="White, DN, not the file's.")] = None,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:

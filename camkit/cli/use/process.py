@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality
+from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality, whole_pair
 from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
 from camkit.errors import ContractError
@@ -49,8 +49,8 @@ def process(
     mosaic: Annotated[
         str | None, typer.Option(help="Headerless mosaic: RGGB, BGGR, GRBG or GBRG.")
     ] = None,
-    black_level: Annotated[float | None, typer.Option(help="With --mosaic: black, DN.")] = None,
-    white_level: Annotated[float | None, typer.Option(help="With --mosaic: white, DN.")] = None,
+    black_level: Annotated[float | None, typer.Option(help="Black, DN, not the file's.")] = None,
+    white_level: Annotated[float | None, typer.Option(help="White, DN, not the file's.")] = None,
     depth_m: DepthM = None,
     method: Annotated[
         str | None,
@@ -59,6 +59,9 @@ def process(
     mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",
     unit: Annotated[
         Path | None, typer.Option(help="The camera body: a TOML with the bundle's sha256.")
+    ] = None,
+    origin_px: Annotated[
+        str | None, typer.Option(help="X,Y on the sensor of a crop that records no place.")
     ] = None,
     assume: Annotated[
         str | None, typer.Option(help="centre or scale, for a picture that is no full frame.")
@@ -104,6 +107,7 @@ def process(
         exposure_ev=exposure,
         vignetting=vignetting,
         undistort=undistort,
+        origin_px=None if origin_px is None else whole_pair(origin_px, "--origin-px"),
         assume=assume,  # type: ignore[arg-type]
         force_bundle=force_bundle,
         on_unsafe=on_unsafe,  # type: ignore[arg-type]

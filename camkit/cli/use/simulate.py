@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from camkit.cli.choices import Debug, DepthM, Overwrite
+from camkit.cli.choices import Debug, DepthM, Overwrite, whole_pair
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.units import MM_PER_M
@@ -49,11 +49,12 @@ def simulate(
             f"a simulated capture of this camera is a {part.suffix[1:].upper()}; expected a name "
             f"in {part.suffix}, got {out}"
         )
-    size = (sensor.width_px, sensor.height_px) if size_px is None else _pair(size_px, "--size-px")
+    whole = (sensor.width_px, sensor.height_px)
+    size = whole if size_px is None else whole_pair(size_px, "--size-px")
     options = SimulationOptions(
         iso=iso,
         seed=seed,
-        origin_px=None if origin_px is None else _pair(origin_px, "--origin-px"),
+        origin_px=None if origin_px is None else whole_pair(origin_px, "--origin-px"),
         exposure=exposure,
         depth_mm=_depth_mm(opened) if depth_m is None else depth_m * MM_PER_M,
         workers=available_threads(None),
@@ -82,10 +83,3 @@ def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def
     from camkit.runtime.files.picture import read_scene
 
     return read_scene(Path(scene))
-
-
-def _pair(text: str, option: str) -> tuple[int, int]:
-    parts = text.split(",")
-    if len(parts) != 2 or not all(p.strip().lstrip("-").isdigit() for p in parts):
-        raise ContractError(f"{option} takes two whole numbers A,B; got {text!r}")
-    return int(parts[0]), int(parts[1])

@@ -2,13 +2,14 @@ import numpy as np
 import pytest
 
 from camkit.errors import DecodeError
-from camkit.runtime.files.dng_checks import check_dng, states_white_balance
+from camkit.runtime.files.dng_checks import check_dng, find_doubts, states_white_balance
 from camkit.runtime.files.raw_checks import Levels
 from camkit.runtime.files.tiff_tags import TiffTags
 
 GOOD = {
     256: (80,),
     257: (60,),
+    273: (8,),
     258: (16,),
     259: (1,),
     262: (32803,),
@@ -76,3 +77,57 @@ def test_other_files_are_left_alone():
 def test_white_balance_is_stated_by_either_tag():
     assert states_white_balance(TiffTags(directories=({50729: (0.3, 0.3)},), file_bytes=1))
     assert not states_white_balance(TiffTags(directories=({},), file_bytes=1))
+
+
+def doubts(**change):
+    directory = GOOD | {int(tag.removeprefix("t")): value for tag, value in change.items()}
+    return find_doubts(TiffTags(directories=(directory,), file_bytes=20000))
+
+
+def test_levels_that_the_caller_says_are_not_compared():
+    said = Levels(black=np.full((2, 2), 90, dtype=np.float32), white=1023.0)
+    tags = TiffTags(directories=(GOOD,), file_bytes=20000)
+    check_dng(tags, "RGGB", said, frozenset({"black", "white"}))
+    with pytest.raises(DecodeError, match="white"):
+        check_dng(tags, "RGGB", said, frozenset({"black"}))
+
+
+def test_a_sound_layout_raises_no_doubt():
+    assert doubts() == []
+    assert doubts(t278=(20,), t273=(8, 3208, 6408), t279=(3200,) * 3) == []
+    assert doubts(t322=(48,), t323=(32,), t324=(1, 2, 3, 4)) == []
+    assert doubts(t259=(34892,), t50712=(0, 100, 4000)) == []
+    assert doubts(t50829=(4, 8, 60, 80), t50719=(2, 2), t50720=(68, 52)) == []
+    assert find_doubts(TiffTags(directories=({256: (9,), 257: (7,)},), file_bytes=9)) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"t278": (20,), "t273": (8, 3208)}, "need 3 strip(s), there are 2"),
+        ({"t322": (48,), "t323": (60,), "t324": (1, 2, 3)}, "need 2 tile(s), there are 3"),
+        ({"t279": (9640,)}, "no whole number"),
+        ({"t256": (79,)}, "no whole cells"),
+        ({"t50829": (4, 8, 61, 80)}, "active area (4, 8, 61, 80) leaves"),
+        ({"t50829": (4, 8, 4, 80)}, "active area"),
+        ({"t50829": (4, 8, 60, 80), "t50720": (73, 56)}, "crop (73, 56) at (0.0, 0.0) leaves"),
+        ({"t50719": (20, 0), "t50720": (70, 60)}, "crop"),
+        ({"t259": (34892,)}, "curve is missing"),
+        ({"t322": (0,), "t323": (60,), "t324": (1,)}, "tile of 0x60 pixels holds nothing"),
+        ({"t50829": (3, 8, 60, 80)}, "active area of 72x57 pixels holds no whole cells"),
+        ({"t50712": (0, 900, 100, 4095)}, "samples falls"),
+        ({"t50717": (65536,)}, "white 65536 does not fit in 16 bits"),
+        ({"t50712": (0, 100, 2000), "t50717": (4095,)}, "the table of the samples ends at 2000"),
+        ({"t259": (7,), "t277": (2,)}, "one sample in each pixel, not 2"),
+    ],
+)
+def test_a_layout_that_contradicts_its_size_is_named(change, message):
+    (doubt,) = doubts(**change)
+    assert message in doubt
+    assert doubt.endswith("the header is damaged")
+
+
+def test_a_mosaic_whose_place_in_the_file_is_not_said_is_named():
+    lost = {tag: value for tag, value in GOOD.items() if tag not in (273, 50706)}
+    (doubt,) = find_doubts(TiffTags(directories=(lost,), file_bytes=20000))
+    assert "does not say where the pixels" in doubt

@@ -34,6 +34,7 @@ CHANGED: dict[str, Any] = {
     "undistort": False,
     "assume": "centre",
     "force_bundle": True,
+    "origin_px": (2, 4),
     "on_unsafe": "fallback",
     "max_mem_bytes": 500_000_000,
     "threads": 1,
@@ -80,7 +81,7 @@ def _refused(bundle: Bundle | None, **choices: Any) -> str:
 def test_every_option_is_in_the_list_of_this_test() -> None:
     assert set(CHANGED) == {field.name for field in dataclasses.fields(Options)}
     claimed = set.union(*OF_STAGE.values())
-    assert set(CHANGED) == claimed | FREE | {"assume", "force_bundle", "unit"}
+    assert set(CHANGED) == claimed | FREE | {"assume", "force_bundle", "origin_px", "unit"}
 
 
 @pytest.mark.parametrize("name", CHANGED)

@@ -1,0 +1,307 @@
+"""What of a decode is possible but not likely: each doubt is one sentence that names the damage.
+
+    levels    samples above white, below black, far above black; masked pixels beside black
+    pattern   two greens that disagree
+    order     rows that go on shifted, rows of pure noise, rims without light
+
+`camkit.runtime.files.raw_checks` refuses what cannot be; this file only warns, since a photograph
+may be odd. Every limit lies beyond what the sound RAW files at hand and simulated captures show.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import CfaPattern
+from camkit.runtime.files.raw_checks import Levels, Samples
+
+ABOVE_WHITE: Final = 1.02
+ABOVE_WHITE_SHARE: Final = 2e-5
+LEAST_ABOVE_WHITE: Final = 20
+PILE_SHARE: Final = 0.5
+DARKEST_SHARE: Final = 1e-3
+FAR_ABOVE_BLACK: Final = 0.08
+LEAST_CONTRAST: Final = 0.2
+FAR_BELOW_BLACK: Final = 0.02
+NEVER_BRIGHT: Final = 0.03
+MASKED_SPREAD: Final = 0.01
+MASKED_OFFSET: Final = 0.005
+GREEN_OFFSET: Final = 0.15
+LEAST_GREEN: Final = 0.01
+LEAST_SIDE_PX: Final = 64
+"""Smaller pictures show too little of themselves."""
+
+_SAMPLED_ROWS: Final = 256
+_COLUMN_STEP: Final = 3
+_CELL_COLUMNS: Final = 1024
+_BAND_CELLS: Final = 32
+_JOINED: Final = 0.8
+_BROKEN: Final = 0.6
+_STRANGE: Final = 0.3
+_SCRAMBLED_SHARE: Final = 0.02
+_LEAST_RUN: Final = 3
+_LONGEST_GAP: Final = 4
+_SHIFT_MATCH: Final = 0.8
+_LEAST_SHIFT: Final = 0.02
+_SHIFT_GAIN: Final = 0.15
+_LEAST_ROW_CONTRAST: Final = 1e-3
+_SHIFT_ROWS: Final = 24
+_NOISE_RATIO: Final = 0.8
+_NOISE_LEVEL: Final = 0.05
+_DARK_EDGE_CELLS: Final = 4
+_DARK_EDGE_LEVEL: Final = 0.01
+
+Cells = NDArray[np.float32]
+
+
+def find_doubts(
+    samples: Samples, levels: Levels, cfa: CfaPattern | None, masked: Sequence[Samples] = ()
+) -> list[str]:
+    """Say what makes a decode hard to believe; nothing for a sound photograph.
+
+    Args:
+        samples: (h, w) mosaic or (c, h, w) planes, unsigned integers.
+        levels: Black and white level of the same file.
+        cfa: Pattern of a mosaic; None for planes.
+        masked: Areas of the sensor that see no light, where the file has them.
+    """
+    if min(samples.shape[-2:]) < LEAST_SIDE_PX:
+        return []
+    cells = _cells(samples, levels, cfa)
+    found = (
+        *_level_doubts(samples, levels),
+        _masked_doubt(masked, levels),
+        _green_doubt(samples, levels, cfa),
+        _order_doubt(cells) or _scramble_doubt(cells),
+        _noise_doubt(cells),
+        _edge_doubt(cells),
+    )
+    return [doubt for doubt in found if doubt]
+
+
+def is_noise(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> bool:
+    """Tell whether most of a picture is noise of a large part of its range, white left aside.
+
+    So damaged streams decode. Arguments as for `find_doubts`.
+    """
+    if min(samples.shape[-2:]) < LEAST_SIDE_PX:
+        return False
+    reached = replace(levels, white=float(max(samples.max(), levels.black.max() + 1)))
+    return _noise_share(_cells(samples, reached, cfa)) > 0.5
+
+
+def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
+    step = max(1, samples.shape[-2] // _SAMPLED_ROWS)
+    some = samples[..., step // 2 :: step, ::_COLUMN_STEP]
+    black, span = float(levels.black.mean()), levels.white - float(levels.black.mean())
+    low, high = (
+        (float(value) - black) / span
+        for value in np.quantile(some, (DARKEST_SHARE, 1 - DARKEST_SHARE))
+    )
+    top = (float(samples.max()) - black) / span
+    found = [_above_white_doubt(samples, levels)]
+    if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
+        found.append(
+            f"nothing is darker than {low:.0%} of the range above black {black:g}: fog, or a "
+            "damaged black level (--black-level says it)"
+        )
+    if low < -FAR_BELOW_BLACK:
+        found.append(
+            f"the darkest samples lie {-low:.0%} of the range below black {black:g}: the black "
+            "level or the pixel data are damaged (--black-level says it)"
+        )
+    if top < NEVER_BRIGHT:
+        found.append(
+            f"nothing is brighter than {top:.1%} of white {levels.white:g}: a dark picture, or a "
+            "damaged white level (--white-level says it)"
+        )
+    return found
+
+
+def _above_white_doubt(samples: Samples, levels: Levels) -> str:
+    """Tell samples that go on beyond white from those that pile up a little above it."""
+    top = int(samples.max())
+    if top <= levels.white * ABOVE_WHITE:
+        return ""
+    above = int(np.count_nonzero(samples > levels.white * ABOVE_WHITE))
+    piled = int(np.count_nonzero(samples >= 0.99 * top))
+    if above < max(LEAST_ABOVE_WHITE, ABOVE_WHITE_SHARE * samples.size):
+        return ""
+    if piled > PILE_SHARE * above:
+        return ""
+    return (
+        f"{above} samples lie above white {levels.white:g}, up to {top}: the white level or the "
+        "pixel data are damaged (--white-level says it)"
+    )
+
+
+def _masked_doubt(masked: Sequence[Samples], levels: Levels) -> str:
+    """Compare black with pixels that see no light, where these are quiet."""
+    black, span = float(levels.black.mean()), levels.white - float(levels.black.mean())
+    for area in masked:
+        if area.size < LEAST_SIDE_PX**2:
+            continue
+        low, middle, high = np.quantile(area, (0.05, 0.5, 0.95))
+        if high - low < MASKED_SPREAD * span and abs(middle - black) > MASKED_OFFSET * span:
+            return (
+                f"black is {black:g}, the masked pixels of the sensor lie at {middle:g}: the black "
+                "level is damaged (--black-level says it)"
+            )
+    return ""
+
+
+def _green_doubt(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> str:
+    """Compare the two greens of the cells, which see the same light."""
+    if cfa is None:
+        return ""
+    height, width = (side // 2 * 2 for side in samples.shape)
+    step = 2 * max(1, height // 2 // _SAMPLED_ROWS)
+    first, second = _green_places(cfa)
+    pair = [
+        samples[dy:height:step, dx:width:2].astype(np.float32) - levels.black[dy, dx]
+        for dy, dx in (first, second)
+    ]
+    apart, level = np.median(np.abs(pair[0] - pair[1])), np.median(pair[0] + pair[1]) / 2
+    bias = abs(float(np.median(pair[0] - pair[1])))
+    bright = level > LEAST_GREEN * (levels.white - float(levels.black.mean()))
+    if bright and bias > GREEN_OFFSET * level and bias > 0.5 * apart:
+        return f"the two greens of the CFA {cfa} differ by {bias / level:.0%}: the CFA is damaged"
+    return ""
+
+
+def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
+    """Give (h, w) float32 green light of the cells, or the middle plane; white is 1.
+
+    Columns between are left out of a wide picture.
+    """
+    cells: Cells
+    if cfa is None:
+        plane = samples[samples.shape[0] // 2]
+        cells = plane[:, :: max(1, plane.shape[1] // _CELL_COLUMNS)].astype(np.float32)
+    else:
+        height, width = (side // 2 * 2 for side in samples.shape)
+        step = 2 * max(1, width // 2 // _CELL_COLUMNS)
+        first, second = _green_places(cfa)
+        cells = samples[first[0] : height : 2, first[1] : width : step].astype(np.float32)
+        cells += samples[second[0] : height : 2, second[1] : width : step]
+        cells *= np.float32(0.5)
+    black = float(levels.black.mean())
+    cells -= np.float32(black)
+    cells *= np.float32(1 / (levels.white - black))
+    return cells
+
+
+def _green_places(cfa: CfaPattern) -> list[tuple[int, int]]:
+    return [divmod(n, 2) for n, letter in enumerate(cfa) if letter == "G"]
+
+
+def _unit_rows(rows: Cells) -> Cells:
+    """Give rows of mean 0 and length 1, so that their products are correlations.
+
+    A row of next to no contrast stays short: it goes with none, for or against.
+    """
+    rows = rows - rows.mean(axis=1, keepdims=True)
+    length = np.sqrt(np.einsum("yx,yx->y", rows, rows))[:, None]
+    least = np.float32(_LEAST_ROW_CONTRAST * np.sqrt(rows.shape[1]))
+    unit: Cells = np.divide(rows, np.maximum(length, least), dtype=np.float32)
+    return unit
+
+
+def _order_doubt(cells: Cells) -> str:
+    """Find rows that go on at another place than the rows above them ended."""
+    for above, below in _gaps(cells):
+        shift = _shift(cells[above], cells[below])
+        # an edge along a whole row breaks off too, but what lies below it matches nowhere
+        if shift:
+            return (
+                f"from {below / len(cells):.0%} of the height on the rows are shifted by "
+                f"{shift / cells.shape[1]:.0%} of the width: the pixel data are damaged"
+            )
+    skewed = [_shift(cells[row], cells[row + 1]) for row in _spread(len(cells) - 1)]
+    usual = float(np.median(skewed))
+    if usual and np.count_nonzero(np.abs(np.array(skewed) - usual) <= 1) > len(skewed) // 2:
+        return (
+            f"every row is shifted by about {usual / cells.shape[1]:.1%} of the width against the "
+            "one above: the width or the pixel data are damaged"
+        )
+    return ""
+
+
+def _scramble_doubt(cells: Cells) -> str:
+    """Find rows that are smooth along themselves and have nothing in common with the next."""
+    rows = _unit_rows(cells[:, :: max(1, cells.shape[1] // 512)])
+    alike = np.einsum("yx,yx->y", rows[:-1], rows[1:])
+    smooth = np.einsum("yx,yx->y", rows[:, :-1], rows[:, 1:]) > _JOINED
+    share = float(np.mean((alike < _STRANGE) & smooth[:-1] & smooth[1:]))
+    if share > _SCRAMBLED_SHARE:
+        return f"{share:.0%} of the rows do not go with the next: the pixel data are damaged"
+    return ""
+
+
+def _gaps(cells: Cells) -> list[tuple[int, int]]:
+    """Give (last row above, first row below) of gaps between rows that go together on both sides.
+
+    What lies in the gap may be a row of two parts, or a few rows of rubbish.
+    """
+    rows = _unit_rows(cells[:, :: max(1, cells.shape[1] // 512)])
+    joined = np.einsum("yx,yx->y", rows[:-1], rows[1:]) > _JOINED
+    ends = np.nonzero(np.diff(np.concatenate([[False], joined, [False]]).astype(np.int8)))[0]
+    runs = ends.reshape(-1, 2)
+    runs = runs[runs[:, 1] - runs[:, 0] >= _LEAST_RUN]
+    pairs = zip(runs[:-1, 1], runs[1:, 0], strict=True)
+    return [
+        (int(above), int(below))
+        for above, below in pairs
+        if below - above <= _LONGEST_GAP and float(rows[above] @ rows[below]) < _BROKEN
+    ]
+
+
+def _spread(count: int) -> list[int]:
+    return [int(n) for n in np.linspace(0, count - 1, _SHIFT_ROWS)]
+
+
+def _shift(above: NDArray[np.float32], below: NDArray[np.float32]) -> int:
+    """Give by how many cells a row matches the one above better than as it lies; 0 for no shift."""
+    one, two = _unit_rows(np.stack([above, below]))
+    match = np.fft.irfft(np.fft.rfft(two) * np.conj(np.fft.rfft(one)), one.size)
+    best = int(np.argmax(match))
+    clear = match[best] > max(_SHIFT_MATCH, float(one @ two) + _SHIFT_GAIN)
+    # a slanting edge moves by a little from row to row too
+    far = _LEAST_SHIFT * one.size < best < (1 - _LEAST_SHIFT) * one.size
+    return best if clear and far else 0
+
+
+def _noise_doubt(cells: Cells) -> str:
+    share = _noise_share(cells)
+    return f"{share:.0%} of the rows are noise: the pixel data are damaged" if share else ""
+
+
+def _noise_share(cells: Cells) -> float:
+    """Give the share of bands in which a cell has nothing in common with the one beside it."""
+    half, step = cells.shape[1] // 2, max(1, cells.shape[1] // 512)
+    noisy = []
+    for top in range(0, len(cells) - _BAND_CELLS + 1, _BAND_CELLS):
+        here = cells[top : top + _BAND_CELLS : 2, : half - 1 : step]
+        beside = cells[top : top + _BAND_CELLS : 2, 1:half:step]
+        away = cells[top : top + _BAND_CELLS : 2, half : 2 * half - 1 : step]
+        near, far = (float(np.median(np.abs(other - here))) for other in (beside, away))
+        noisy.append(near > max(_NOISE_LEVEL, _NOISE_RATIO * far))
+    return float(np.mean(noisy)) if noisy else 0.0
+
+
+def _edge_doubt(cells: Cells) -> str:
+    """Find a dark rim: masked pixels that were taken for a part of the picture."""
+    for name, picture in (("left", cells.T), ("right", cells.T[::-1]), ("upper", cells)):
+        step = max(1, picture.shape[1] // 512)
+        level = np.quantile(picture[: len(picture) // 4, ::step], 0.9, axis=1)
+        dark = int(np.argmax(level > _DARK_EDGE_LEVEL))
+        inner = level[dark + 2 : dark + 2 + _DARK_EDGE_CELLS]
+        if dark >= _DARK_EDGE_CELLS and inner.size and inner.min() > 3 * _DARK_EDGE_LEVEL:
+            return (
+                f"the {name} {2 * dark} columns or rows see no light: the active area of the "
+                "header is damaged"
+            )
+    return ""

@@ -1,0 +1,152 @@
+"""A sound photograph raises no doubt; each kind of damage that LibRaw lets pass raises its own."""
+
+import cv2
+import numpy as np
+import pytest
+
+from camkit.runtime.files.doubts import LEAST_SIDE_PX, find_doubts, is_noise
+from camkit.runtime.files.raw_checks import Levels
+
+BLACK, WHITE = 256, 4095
+COLOURS = np.array([[0.5, 1.0], [1.0, 0.6]])  # what RGGB gets of a grey light
+
+
+def levels(black=BLACK, white=WHITE):
+    return Levels(black=np.full((2, 2), black, dtype=np.float32), white=white)
+
+
+def photograph(height=256, width=320, seed=0, light=1.0):
+    """Give a mosaic of blobs of every size, deep shadows, highlights and noise."""
+    rng = np.random.default_rng(seed)
+    scene = sum(
+        cv2.GaussianBlur(rng.standard_normal((height, width)), (0, 0), size) * size
+        for size in (2, 6, 18)
+    )
+    scene = (scene - scene.min()) / np.ptp(scene)
+    linear = light * scene**2 * np.tile(COLOURS, (height // 2, width // 2))
+    dn = BLACK + (WHITE - BLACK) * linear + rng.normal(0, 4, linear.shape)
+    return np.clip(np.round(dn), 0, WHITE).astype(np.uint16)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sound_photograph_raises_no_doubt(seed):
+    mosaic = photograph(seed=seed)
+    assert find_doubts(mosaic, levels(), "RGGB") == []
+    planes = np.stack([mosaic[::2, ::2], mosaic[::2, 1::2], mosaic[1::2, 1::2]])
+    flat = Levels(black=np.full(3, BLACK, np.float32), white=WHITE)
+    assert find_doubts(planes, flat, None) == []
+
+
+def test_rows_of_one_level_each_are_no_damage():
+    ramp = np.linspace(300, 4000, 200)[:, None] * np.ones(240)
+    for turned in (ramp, np.ascontiguousarray(ramp.T)):
+        assert find_doubts(turned.astype(np.uint16), levels(), "RGGB") == []
+        planes = np.stack([turned.astype(np.uint16)] * 3)
+        flat = Levels(black=np.full(3, BLACK, np.float32), white=WHITE)
+        assert find_doubts(planes, flat, None) == []
+
+
+def test_flat_fields_dark_frames_and_night_are_no_damage():
+    rng = np.random.default_rng(1)
+    for level in (BLACK, 300, 2000, 4000):
+        flat = rng.normal(level, 6, (200, 200)).astype(np.uint16)
+        doubts = find_doubts(flat, levels(), "RGGB")
+        assert [d for d in doubts if "dark picture" not in d] == []
+    night = rng.normal(BLACK, 3, (200, 200)).astype(np.uint16)
+    night[90:110, 90:110] = WHITE
+    assert find_doubts(night, levels(), "RGGB") == []
+
+
+def test_a_sharp_edge_along_the_whole_row_is_no_damage():
+    scene = photograph()
+    scene[128:] = photograph(seed=9)[128:]
+    assert find_doubts(scene, levels(), "RGGB") == []
+
+
+def test_saturation_a_little_above_white_is_no_damage():
+    bright = photograph(light=2.5).astype(np.int64)
+    assert (
+        find_doubts(np.minimum(bright, WHITE).astype(np.uint16), levels(white=3900), "RGGB") == []
+    )
+
+
+@pytest.mark.parametrize(
+    ("black", "white", "message"),
+    [
+        (BLACK, 2000, "lie above white 2000, up to"),
+        (BLACK, 65535, "of the range"),
+        (900, WHITE, "below black 900"),
+    ],
+)
+def test_levels_that_do_not_fit_the_data_are_named(black, white, message):
+    mosaic = photograph(light=0.03 if white == 65535 else 1.0)
+    doubts = find_doubts(mosaic, levels(black, white), "RGGB")
+    if white == 65535:
+        message = "nothing is brighter"
+    assert any(message in doubt and "damaged" in doubt for doubt in doubts)
+
+
+def test_a_black_level_of_zero_in_data_that_never_come_near_is_named():
+    mosaic = photograph() + np.uint16(500)
+    (doubt,) = find_doubts(mosaic, levels(0, 4600), "RGGB")
+    assert "nothing is darker than" in doubt
+
+
+def test_masked_pixels_say_what_black_is():
+    rng = np.random.default_rng(2)
+    dark = rng.normal(BLACK, 4, (200, 40)).astype(np.uint16)
+    assert find_doubts(photograph(), levels(), "RGGB", [dark]) == []
+    assert find_doubts(photograph(), levels(), "RGGB", [dark[:, :2]]) == []
+    (doubt,) = find_doubts(photograph(), levels(BLACK - 30), "RGGB", [dark])
+    assert "the masked pixels of the sensor lie at 256" in doubt
+    lit = photograph()[:, :40]
+    assert find_doubts(photograph(), levels(), "RGGB", [lit]) == []
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", "GBRG"])
+def test_a_pattern_whose_greens_disagree_is_named(cfa):
+    (doubt,) = find_doubts(photograph(), levels(), cfa)
+    assert f"two greens of the CFA {cfa}" in doubt
+
+
+def test_rows_that_go_on_shifted_are_named_with_the_place():
+    lost = photograph().ravel()
+    lost = np.concatenate([lost[: 128 * 320], lost[128 * 320 + 74 :], lost[:74]]).reshape(256, 320)
+    (doubt,) = find_doubts(lost, levels(), "RGGB")
+    assert "from 50% of the height on the rows are shifted" in doubt
+
+
+def test_a_wrong_width_is_named():
+    wide = photograph(256, 320).ravel()
+    skewed = wide[: 256 * 320 // 310 * 310].reshape(-1, 310)[:256]
+    assert any("the width or the pixel data" in d for d in find_doubts(skewed, levels(), "RGGB"))
+
+
+def test_rows_in_another_order_are_named():
+    lost = np.roll(photograph(), 0)
+    for row in range(120, 256, 2):
+        lost[row : row + 2] = np.roll(lost[row : row + 2], row * 86, axis=1)
+    (doubt,) = find_doubts(cv2.blur(lost, (9, 1)), levels(), "RGGB")
+    assert "of the rows" in doubt
+    assert "damaged" in doubt
+
+
+def test_rows_of_noise_are_named():
+    broken = photograph()
+    broken[64:] = np.random.default_rng(3).integers(0, WHITE, (192, 320))
+    assert any("of the rows are noise" in doubt for doubt in find_doubts(broken, levels(), "RGGB"))
+    assert is_noise(broken, levels(), "RGGB")
+    assert not is_noise(photograph(), levels(), "RGGB")
+
+
+@pytest.mark.parametrize("side", ["left", "right", "upper"])
+def test_a_rim_without_light_is_named(side):
+    mosaic = photograph(light=0.8) // 2 + np.uint16(600)
+    place = {"left": np.s_[:, :24], "right": np.s_[:, -24:], "upper": np.s_[:24]}[side]
+    mosaic[place] = BLACK
+    assert any(f"the {side} 24" in doubt for doubt in find_doubts(mosaic, levels(), "RGGB"))
+
+
+def test_pictures_too_small_to_judge_raise_no_doubt():
+    noise = np.random.default_rng(0).integers(0, 60000, (LEAST_SIDE_PX - 2, 200)).astype(np.uint16)
+    assert find_doubts(noise, levels(), "RGGB") == []
