@@ -17,7 +17,7 @@ from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY, PictureFormat
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, sidecar_text
-from camkit.runtime.output.writer import SUFFIXES, open_writer
+from camkit.runtime.output.writer import SUFFIXES, held_bytes, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
 
@@ -166,7 +166,9 @@ def develop_file(
     decode_s = time.perf_counter() - began
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
-    work = pipeline.start(capture, progress=progress, cancel=cancel)
+    pixels, turned = capture.height * capture.width, capture.orientation
+    reserved_bytes = held_bytes(write.format, pixels=pixels, orientation=turned)
+    work = pipeline.start(capture, progress=progress, cancel=cancel, reserved_bytes=reserved_bytes)
     # who asks for a time has had the machine timed; nobody else waits for it
     estimate = None if pipeline.options.max_seconds is None else work.explain()
     with atomic_outputs(sidecar_path(target), target) as (proof, part):

@@ -188,6 +188,7 @@ class Pipeline:
         progress: Progress | None = None,
         cancel: Cancel | None = None,
         known: Mapping[str, Stream] | None = None,
+        reserved_bytes: int = 0,
     ) -> Reconstruction:
         """Plan the reconstruction of one capture; its bands do the work.
 
@@ -196,6 +197,7 @@ class Pipeline:
             progress: Called with (work done, work in all), over all stages.
             cancel: Asked ten times a second; true raises `Cancelled`.
             known: Planes of this capture that another reconstruction kept, by name.
+            reserved_bytes: Of the memory cap, what the caller needs for what becomes of the bands.
 
         Raises:
             ContractError: If capture and bundle do not fit each other.
@@ -207,7 +209,14 @@ class Pipeline:
             speed=self.speed,
             threads=self.threads,
         )
-        return Reconstruction(setup, capture, progress=progress, cancel=cancel, known=known)
+        return Reconstruction(
+            setup,
+            capture,
+            progress=progress,
+            cancel=cancel,
+            known=known,
+            reserved_bytes=reserved_bytes,
+        )
 
     def process(
         self,

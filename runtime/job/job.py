@@ -54,6 +54,7 @@ class Job:
         probe: Gives the rows of a plane by name, made for the asking stage alone and equal to those
             that it will be given; to be called when the first row is asked for, set by the walker.
         known: Planes of this capture that were made before; what gives them does not run.
+        reserved_bytes: Of the memory cap, what somebody else needs for what becomes of the bands.
         clipped_fraction: Share of clipped samples in the rows read so far.
     """
 
@@ -65,6 +66,7 @@ class Job:
         progress: Progress | None = None,
         cancel: Cancel | None = None,
         known: Mapping[str, Stream] | None = None,
+        reserved_bytes: int = 0,
     ) -> None:
         self.setup = setup
         self.capture = capture
@@ -81,6 +83,7 @@ class Job:
         self.windows: dict[str, NetworkWindows] = {}
         self.probe: Callable[[str], RowSource] | None = None
         self.known = dict(known or {})
+        self.reserved_bytes = reserved_bytes
         self.clipped_fraction = 0.0
         self._check_input()
 

@@ -55,6 +55,7 @@ class Reconstruction:
         progress: Progress | None = None,
         cancel: Cancel | None = None,
         known: Mapping[str, Stream] | None = None,
+        reserved_bytes: int = 0,
     ) -> None:
         """Plan everything that is known before the first row.
 
@@ -63,7 +64,14 @@ class Reconstruction:
         """
         self.capture = capture
         self._setup = setup
-        self.job = Job(setup, capture, progress=progress, cancel=cancel, known=known)
+        self.job = Job(
+            setup,
+            capture,
+            progress=progress,
+            cancel=cancel,
+            known=known,
+            reserved_bytes=reserved_bytes,
+        )
         self._walk = Walk(self.job)
         self.plan = self._decide()
         self._walk.settle()

@@ -89,7 +89,8 @@ class Walk:
 
     def _fixed_bytes(self, running: list[StageWork]) -> int:
         held = sum(work.held_bytes for work in running)
-        return FIXED_BYTES + self._job.capture.resident_bytes + held
+        job = self._job
+        return FIXED_BYTES + job.capture.resident_bytes + job.reserved_bytes + held
 
     def warnings(self) -> tuple[str, ...]:
         """Give what the stages have to say once the last row is out."""

@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import ColorStage
-from camkit.runtime.geometry.turning import turn
+from camkit.runtime.geometry.turning import turn_back
 from camkit.runtime.output.origin import Origin
 
 Tone = Literal["srgb", "linear"]
 Codes = NDArray[Any]
 
 UPRIGHT: Final = 1
+TURNED_ROWS: Final = 128
+"""Rows of a turned picture that are stored at a time."""
 DEFAULT_JPEG_QUALITY: Final = 92
 
 
@@ -72,7 +74,7 @@ class PictureWriter(ABC):
         self.path = path
         self.picture = picture
         self._rows = 0
-        self._held: list[Codes] = []
+        self._turned: Codes | None = None
         self._failure: Exception | None = None
 
     @abstractmethod
@@ -100,7 +102,7 @@ class PictureWriter(ABC):
         if kind is None:
             self.close()
         else:
-            self._held.clear()
+            self._turned = None
             self.release()
 
     @final
@@ -129,20 +131,31 @@ class PictureWriter(ABC):
         """
         if self._rows != self.picture.height:
             raise ContractError(f"{self.picture.height} rows expected; got {self._rows}")
-        if self._held:
-            whole = np.concatenate(self._held, axis=1)
-            self._held.clear()
-            self.store(np.ascontiguousarray(turn(whole, self.picture.orientation)))
+        if self._turned is not None:
+            for top in range(0, self._turned.shape[1], TURNED_ROWS):
+                self.store(np.ascontiguousarray(self._turned[:, top : top + TURNED_ROWS]))
+            self._turned = None
         self.finish()
 
     def _append(self, band: FloatArray) -> None:
         self._check(band)
+        top = self._rows
         self._rows += band.shape[1]
         coded = self.encode(band)
         if self.picture.orientation == UPRIGHT:
             self.store(coded)
         else:
-            self._held.append(coded)
+            self._keep(coded, top)
+
+    def _keep(self, coded: Codes, top: int) -> None:
+        """Put rows where they belong in the picture as it will be turned."""
+        width, height = self.picture.file_size
+        if self._turned is None:
+            self._turned = np.empty((3, height, width), dtype=coded.dtype)
+        elif not np.can_cast(coded.dtype, self._turned.dtype):
+            self._turned = self._turned.astype(coded.dtype)  # EXR beyond the range of half
+        stored = turn_back(self._turned, self.picture.orientation)
+        stored[:, top : top + coded.shape[1]] = coded
 
     def _check(self, band: FloatArray) -> None:
         width, left = self.picture.width, self.picture.height - self._rows

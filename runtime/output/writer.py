@@ -6,7 +6,7 @@ from typing import Final
 
 from camkit.bundle.golden import IMAGE
 from camkit.errors import ContractError
-from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
+from camkit.runtime.output.picture_writer import UPRIGHT, PictureFormat, PictureWriter
 
 SUFFIXES: Final = {"exr": "exr", "tiff": "tif", "png": "png", "jpeg": "jpg", "dng": "dng"}
 Open = Callable[[Path, PictureFormat], PictureWriter]
@@ -46,6 +46,24 @@ WRITERS: Final[dict[str, dict[str, Open]]] = {
     IMAGE: {"exr": _exr, "tiff": _tiff, "png": _png, "jpeg": _jpeg, "dng": _dng},
 }
 """Product -> format -> what opens its writer."""
+
+
+HELD_WHOLE: Final = {"jpeg": 4.5}
+"""Bytes per pixel of formats that cannot be streamed: the picture, and what it is coded to."""
+HELD_TURNED: Final = {"exr": 6.0, "tiff": 6.0, "png": 6.0, "jpeg": 3.0, "dng": 0.0}
+"""Bytes per pixel of a picture that is turned upright; a DNG never is."""
+
+
+def held_bytes(format_: str, *, pixels: int, orientation: int) -> int:
+    """Give the memory of a writer that cannot hand on every row at once.
+
+    Args:
+        format_: As `open_writer` takes it.
+        pixels: Of the picture.
+        orientation: EXIF orientation of the capture.
+    """
+    turned = 0.0 if orientation == UPRIGHT else HELD_TURNED[format_]
+    return int(pixels * (HELD_WHOLE.get(format_, 0.0) + turned))
 
 
 def open_writer(

@@ -1,6 +1,8 @@
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from camkit.contracts import FloatArray
@@ -8,7 +10,7 @@ from camkit.errors import ContractError
 from camkit.runtime.color import color_stage
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
-from camkit.runtime.output.writer import SUFFIXES, open_writer
+from camkit.runtime.output.writer import SUFFIXES, held_bytes, open_writer
 
 STAGE = color_stage(None)
 
@@ -132,3 +134,40 @@ def test_after_an_error_nothing_is_written_any_more(monkeypatch: pytest.MonkeyPa
         with pytest.raises(OSError, match="disk full"):
             writer.write(planes()[:, :2])
     assert calls == [2]
+
+
+@pytest.mark.parametrize("orientation", [1, 3, 6])
+@pytest.mark.parametrize("format_", ["exr", "tiff", "png", "jpeg"])
+def test_what_a_writer_holds_is_what_it_says(
+    tmp_path: Path, format_: str, orientation: int
+) -> None:
+    height, width = 768, 1024
+    picture = PictureFormat(
+        width=width,
+        height=height,
+        color=STAGE,
+        orientation=orientation,
+    )
+    stated = held_bytes(format_, pixels=height * width, orientation=orientation)
+    band = np.full((3, 64, width), 0.3, np.float32)
+    tracemalloc.start()
+    with open_writer(tmp_path / "a.part", format_, picture) as writer:
+        for _ in range(height // 64):
+            writer.write(band)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    few_rows = 40 * 128 * width
+    assert peak < stated + few_rows
+
+
+def test_a_turned_picture_beyond_half_is_kept_whole(tmp_path: Path) -> None:
+    """The first bands fit half floats, a later one does not."""
+    picture = PictureFormat(width=8, height=6, color=STAGE, orientation=6)
+    bands = np.full((3, 6, 8), 0.5, np.float32)
+    bands[:, 4:] = 1e6
+    with open_writer(tmp_path / "a.exr", "exr", picture) as writer:
+        writer.write(bands[:, :4])
+        writer.write(bands[:, 4:])
+    with OpenEXR.File(str(tmp_path / "a.exr")) as file:
+        found = file.channels()["RGB"].pixels
+    np.testing.assert_array_equal(found[..., 0], turn(bands[0], 6))
