@@ -71,7 +71,7 @@ def examine() -> dict[str, Any]:
         ),
         "raw_decoder": _try_decoder(),
         "design_time": (
-            "ready" if util.find_spec("torch") else "not installed: pip install camkit[train]"
+            "ready" if util.find_spec("torch") else "not installed: pip install torch onnxscript"
         ),
         "bundles": {name: str(path) for name, path in sorted(built_in_bundles().items())},
         "packages": {name: package_version(name) or "not installed" for name in PACKAGES},

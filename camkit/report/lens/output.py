@@ -36,7 +36,7 @@ def write_lens_page(facts: LensFacts, folder: Path, name: str) -> list[Path]:
     """
     if util.find_spec("matplotlib") is None:
         raise UnsupportedError(
-            "pictures need matplotlib; install it with: pip install camkit[train]"
+            "pictures need matplotlib; install it with: pip install matplotlib"
         )
     folder.mkdir(parents=True, exist_ok=True)
     page, written, pictures = page_path(folder, name), [], {}
