@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from camkit.runtime.batch import process
     from camkit.runtime.cancel import Cancelled
+    from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import FileResult
     from camkit.runtime.pipeline import Pipeline, load
 
@@ -36,6 +37,7 @@ __all__ = [
     "ContractError",
     "DecodeError",
     "FileResult",
+    "MosaicOptions",
     "ParityError",
     "Pipeline",
     "UnsupportedError",
@@ -52,6 +54,7 @@ _HOMES = {
     "process": "camkit.runtime.batch",
     "FileResult": "camkit.runtime.development",
     "Cancelled": "camkit.runtime.cancel",
+    "MosaicOptions": "camkit.runtime.capture",
 }
 
 

@@ -321,7 +321,10 @@ def _run_task(task: Task, pipelines: _Pipelines, common: _Common) -> FileResult:
         raise
     except (CamkitError, OSError) as error:
         logger.debug("%s failed", task.source, exc_info=error)
-        return FileResult.failure(task.source, named, f"{error}")
+        told = f"{error}"
+        if isinstance(error, OSError) and error.strerror is not None:
+            told = f"cannot write {task.target}: {error.strerror}"
+        return FileResult.failure(task.source, named, told)
     except MemoryError as error:
         logger.debug("%s failed", task.source, exc_info=error)
         return FileResult.failure(task.source, named, f"not enough memory: {error}".rstrip(": "))

@@ -33,8 +33,8 @@ from camkit.runtime.plan.speed import Speed
 
 METHODS: Final = ("wiener", "rl", "admm-tv")
 OPTIONS: Final = ("depth_m",)
-BLOCK_SET_UP: Final = 1.25
-"""A block with its kernel, window and sum over a block that is only filtered."""
+KERNEL_BLOCKS: Final = 3.2
+"""A kernel of another place with its transform, in blocks that are only filtered (measured)."""
 LIGHTS_AT_LEAST: Final = 1 / 7
 """Of explaining a block as a whole, what it costs however small the windows (two transforms)."""
 PLANES_HELD: Final = 5
@@ -139,7 +139,8 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     size_px = subject.height_px, subject.width_px
     block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
     rows, columns = (lay_spans(side, block_px, entry.overlap_px) for side in size_px)
-    blocks = np.full((len(rows), len(columns)), speed.block_s)
+    set_up = 1 + KERNEL_BLOCKS * _kernel_share(subject, columns)
+    blocks = np.full((len(rows), len(columns)), set_up * speed.block_s)
     if subject.content is not None and entry.clip_iterations:
         kernel_px = window_px(entry, max(subject.bundle.psf.kernels.shape[-2:]))
         work_share = _light_work(subject.content.lights, (rows, columns), block_px, kernel_px)
@@ -149,7 +150,14 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
         test = plain_blocks(work.labels, reach)
         if test is not None:
             blocks *= [[not test(row, column) for column in columns] for row in rows]
-    return float(blocks.sum()) * BLOCK_SET_UP / speed.threads
+    return float(blocks.sum()) / speed.threads
+
+
+def _kernel_share(subject: Subject, columns: Sequence[Span]) -> float:
+    """Give the share of blocks with a kernel of their own; mirrored places share one."""
+    kernels = subject.bundle.psf.field_heights_mm.size
+    places = {round(abs(subject.placement.window.to_mm(c.centre, 0)[0]), 6) for c in columns}
+    return 0.0 if kernels == 1 else len(places) / len(columns)
 
 
 def _light_work(

@@ -16,6 +16,7 @@ PUBLIC = [
     "ContractError",
     "DecodeError",
     "FileResult",
+    "MosaicOptions",
     "ParityError",
     "Pipeline",
     "UnsupportedError",

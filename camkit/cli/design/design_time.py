@@ -16,7 +16,9 @@ def require_torch(command: str) -> None:
         UnsupportedError: If torch cannot be imported.
     """
     if util.find_spec("torch") is None:
-        raise UnsupportedError(f"{command} needs torch; install it with: pip install torch onnxscript")
+        raise UnsupportedError(
+            f"{command} needs torch; install it with: pip install torch onnxscript"
+        )
 
 
 def refuse_existing(paths: Iterable[Path | None], *, overwrite: bool) -> None:

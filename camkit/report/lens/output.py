@@ -35,9 +35,7 @@ def write_lens_page(facts: LensFacts, folder: Path, name: str) -> list[Path]:
         UnsupportedError: If matplotlib is not installed.
     """
     if util.find_spec("matplotlib") is None:
-        raise UnsupportedError(
-            "pictures need matplotlib; install it with: pip install matplotlib"
-        )
+        raise UnsupportedError("pictures need matplotlib; install it with: pip install matplotlib")
     folder.mkdir(parents=True, exist_ok=True)
     page, written, pictures = page_path(folder, name), [], {}
     for chart, draw in _charts(facts).items():

@@ -10,7 +10,14 @@ from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
-from camkit.runtime.plan.speed import ROUNDS, WINDOW_PX, Speed, measure_speed
+from camkit.runtime.plan.speed import (
+    LARGE_WINDOW,
+    REST_BLOCKS_PER_MP,
+    ROUNDS,
+    WINDOW_PX,
+    Speed,
+    measure_speed,
+)
 from tests.bundle_factory import tiny_facts, tiny_network
 
 STAGE = Wiener(block_px=64, overlap_px=16, prior_scale=1e-3, prior_exponent=2.0)
@@ -81,8 +88,8 @@ def test_a_window_counts_with_its_best_round_per_megapixel(
     }
     speed = measure_speed(_with_facts(engines), STAGE, threads=2)
     megapixels = WINDOW_PX**2 / 1e6
-    assert speed.network_s_per_mp["split", "M"] == pytest.approx(0.6 / megapixels)
-    assert speed.network_s_per_mp["fuse", "M"] == pytest.approx(0.2 / megapixels)
+    assert speed.network_s_per_mp["split", "M"] == pytest.approx(LARGE_WINDOW * 0.6 / megapixels)
+    assert speed.network_s_per_mp["fuse", "M"] == pytest.approx(LARGE_WINDOW * 0.2 / megapixels)
     assert engines["split", "M"].shapes == [(1, 6, WINDOW_PX, WINDOW_PX)] * ROUNDS
     assert engines["fuse", "M"].shapes == [(1, 4, WINDOW_PX, WINDOW_PX)] * ROUNDS
     assert speed.threads == 2
@@ -99,8 +106,12 @@ def test_the_rest_is_given_in_blocks_of_one_size_whatever_the_bank_has() -> None
     small = measure_speed({}, STAGE, threads=1)
     large = measure_speed({}, STAGE.model_copy(update={"block_px": 256}), threads=1)
     assert large.block_s > small.block_s
-    assert small.rest_s_per_mp / small.block_s == pytest.approx(10 * (384 / 64) ** 2)
-    assert large.rest_s_per_mp / large.block_s == pytest.approx(10 * (384 / 256) ** 2)
+    assert small.rest_s_per_mp / small.block_s == pytest.approx(
+        REST_BLOCKS_PER_MP * (384 / 64) ** 2
+    )
+    assert large.rest_s_per_mp / large.block_s == pytest.approx(
+        REST_BLOCKS_PER_MP * (384 / 256) ** 2
+    )
 
 
 @pytest.mark.parametrize(
