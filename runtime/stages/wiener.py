@@ -156,7 +156,8 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
 def _kernel_share(subject: Subject, columns: Sequence[Span]) -> float:
     """Give the share of blocks with a kernel of their own; mirrored places share one."""
     kernels = subject.bundle.psf.field_heights_mm.size
-    places = {round(abs(subject.placement.window.to_mm(c.centre, 0)[0]), 6) for c in columns}
+    window = subject.placement.window
+    places = {round(abs(float(window.to_mm(c.centre, 0)[0])), 6) for c in columns}
     return 0.0 if kernels == 1 else len(places) / len(columns)
 
 
