@@ -73,9 +73,9 @@ class MosaicOptions:
             )
         lower = 0.0 if black is None else black
         if not 0 <= lower < (np.inf if white is None else white) or white == np.inf:
-            raise ContractError(
-                f"mosaic levels must be 0 <= black < white; got black {black}, white {white}"
-            )
+            known = (("black", black), ("white", white))
+            given = ", ".join(f"{name} {value}" for name, value in known if value is not None)
+            raise ContractError(f"levels must be 0 <= black < white; got {given}")
 
     @property
     def levels(self) -> frozenset[str]:

@@ -53,6 +53,8 @@ def stored(source: Source) -> Iterator[Path]:
         raise ContractError(
             f"expected a path, bytes or a file opened in binary mode; got {type(source).__name__}"
         )
+    if getattr(source, "closed", False):
+        raise ContractError("the file is closed; open it in binary mode and keep it open")
     with tempfile.TemporaryDirectory(prefix="camkit-") as folder:
         path = Path(folder) / "data"
         with path.open("wb") as file:

@@ -115,3 +115,8 @@ def test_mosaic_options_that_cannot_be_are_refused(cfa, black, white):
 def test_all_patterns_are_taken():
     for cfa in CFA_PATTERNS:
         assert MosaicOptions(cfa=cfa, black_level=0, white_level=1).cfa == cfa
+
+
+def test_levels_that_cannot_be_are_named_as_they_were_given() -> None:
+    with pytest.raises(ContractError, match=r"black < white; got white nan$"):
+        MosaicOptions(white_level=float("nan"))

@@ -83,3 +83,10 @@ def test_pictures_that_would_have_no_name_are_refused():
     for data in (b"II*", io.BytesIO(), ["a.dng", b"II*"]):
         with pytest.raises(ContractError, match=r"Pipeline\.process"):
             list_paths(data)
+
+
+def test_a_closed_file_is_refused_in_words():
+    file = io.BytesIO(b"II*")
+    file.close()
+    with pytest.raises(ContractError, match="the file is closed"), stored(file):
+        pass
