@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.ndimage
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from camkit.contracts import NoiseModel
@@ -52,6 +52,7 @@ def _signal(capture: Capture) -> np.ndarray:
     return np.asarray((capture.samples.astype(np.float64) - BLACK) / (WHITE - BLACK))
 
 
+@example(level=1.0, is_flat=False, shot=1e-4, read_e=1.0, told="nothing", seed=122)
 @given(
     level=st.floats(0.0, 1.0),
     is_flat=st.booleans(),
@@ -83,7 +84,8 @@ def test_a_picture_stays_within_what_the_capture_holds(
     signal = _signal(capture)
     assert np.isfinite(picture).all()
     most = signal.max() + 0.02
-    assert -most <= picture.min()
+    # around a pattern sharper than the lens passes, the filter alone falls 1.1 times below black
+    assert -1.5 * most <= picture.min()
     assert picture.max() <= 4 * most, "sharper than its capture, and no more than that"
 
 

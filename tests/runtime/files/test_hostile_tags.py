@@ -4,7 +4,7 @@ import contextlib
 import math
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import DecodeError
@@ -54,6 +54,7 @@ LEVELS = raw_checks.Levels(black=np.full((2, 2), 64, np.float32), white=1023.0)
 
 @settings(max_examples=100, deadline=None)
 @given(directories=DIRECTORIES)
+@example(directories=[SOUND | {50714: (math.inf, -math.inf)}])
 def test_no_tags_end_in_anything_but_values_doubts_and_refusals(directories):
     tags = TiffTags(directories=tuple(directories), file_bytes=5000, starts=(8, 300))
     for check in (
