@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.blocks import Block, taper_edges
-from camkit.runtime.bank.richardson_lucy import richardson_lucy, spread_clipped
+from camkit.runtime.bank.richardson_lucy import richardson_lucy
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
 
 MARGIN_PX: Final = 32
@@ -34,12 +34,17 @@ Mask = NDArray[np.bool_]
 
 
 def explain_lights(
-    block: Block, background: FloatArray, settings: Wiener, kernel_px: int | None
+    block: Block,
+    unknown: Mask,
+    background: FloatArray,
+    settings: Wiener,
+    kernel_px: int | None,
 ) -> tuple[FloatArray, NDArray[np.float64]]:
     """Explain the light around the clipped samples of a block.
 
     Args:
-        block: With unknown samples.
+        block: With clipped samples.
+        unknown: Those and what the demosaic made of them, see `spread_clipped`.
         background: (c, 1, 1), read_variance / shot.
         settings: Rounds of Richardson-Lucy, and how far their result counts.
         kernel_px: Side of the kernel; None for one that fits no window.
@@ -50,7 +55,7 @@ def explain_lights(
     """
     assert block.unknown is not None
     samples, side = block.samples, block.samples.shape[-1]
-    clipped, unknown = block.unknown, spread_clipped(block.unknown)
+    clipped = block.unknown
     rounds, reach_px = settings.clip_iterations, settings.clip_reach_px
     chosen = choose_windows(np.asarray(clipped.any(axis=0)), side, window_px(settings, kernel_px))
     if chosen is None or reach_px is None:

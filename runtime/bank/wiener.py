@@ -54,9 +54,10 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
         if block.unknown is None or settings.clip_iterations == 0:
             gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
             return apply_transfer(block.samples, gain)
-        lights, unexplained = explain_lights(block, background, settings, kernel_px)
+        unknown = spread_clipped(block.unknown)
+        lights, unexplained = explain_lights(block, unknown, background, settings, kernel_px)
         residual = block.samples - apply_transfer(lights, block.otf)
-        np.copyto(residual, 0, where=spread_clipped(block.unknown))
+        np.copyto(residual, 0, where=unknown)
         variance = np.maximum(variance, unexplained)
         gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
         return lights + apply_transfer(residual, gain)

@@ -1,5 +1,6 @@
 """The noise-stabilising transform before and behind the network: k-sigma, then square root."""
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -12,6 +13,12 @@ from camkit.runtime.machine.slices import run_chunks
 from camkit.runtime.rows import PiecedRows
 
 DEFAULT_SCALE: Final = 64.0
+FAMILIAR_READ: Final = 3.0
+"""Stabilised black lies at the read noise in electrons, so a network knows black by it. `duet`,
+trained with 3 electrons, gives a dark frame its mean within 0.2 of its noise for 3 to 10 electrons;
+told 15 electrons it is off by 1.3 times the noise, told 20 by 2.9 times and told 0.5 by 3.6 times.
+"""
+LEAST_FAMILIAR_E: Final = 1.0
 
 
 def stabilise(
@@ -72,6 +79,29 @@ def unstabilise(
     planes -= offset
     planes /= slope
     return np.asarray(planes)
+
+
+def familiar_noise(noise: NoiseModel, trained_reads_e: Sequence[float]) -> NoiseModel:
+    """Give the noise closest to a capture's whose read noise a network has been trained with.
+
+    Planes are stabilised by it and taken back by it: what the network makes of them changes, the
+    light they stand for does not. Where a capture has less read noise, black is lifted to where the
+    network knows it. Where it has more, the noise at black stays and counts as fewer electrons.
+
+    Args:
+        noise: Of the capture, at any gain; shot > 0.
+        trained_reads_e: Read noises of the sensor, in electrons, >= 0; at least one.
+
+    Returns:
+        `noise` itself where it is familiar.
+    """
+    low_e = min(trained_reads_e)
+    high_e = max(FAMILIAR_READ * max(trained_reads_e), LEAST_FAMILIAR_E)
+    shots, reads = [], []
+    for shot, read in zip(noise.shot, noise.read_variance, strict=True):
+        shots.append(max(shot, math.sqrt(read) / high_e))
+        reads.append(max(read, (low_e * shot) ** 2))
+    return NoiseModel(shot=tuple(shots), read_variance=tuple(reads))
 
 
 class StackedRows:

@@ -29,7 +29,7 @@ from camkit.runtime.plan.estimate import network_seconds, role_window_mp
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
-from camkit.runtime.signal.stabilise import StackedRows, unstabilise
+from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, unstabilise
 
 METHODS: Final = ("net",)
 TRIM_SHARE: Final = 0.7
@@ -81,10 +81,18 @@ def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
     """Give the rows that the network of a stage is given: its planes stacked and stabilised."""
     noises = None
     if entry.transform == "stabilise":
-        noises = [job.noise.with_gains(stream.gains) for stream in taken]
+        noises = [_familiar_noise(job, stream) for stream in taken]
     return StackedRows(
         [stream.pieced() for stream in taken], noises, scale=entry.scale, threads=job.threads
     )
+
+
+def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
+    """Give the noise by which a stream is stabilised."""
+    noise, sensor = job.noise.with_gains(stream.gains), job.known_bundle.manifest.sensor
+    if sensor.type == "spad":
+        return noise
+    return familiar_noise(noise, [entry.read_noise_e for entry in sensor.noise])
 
 
 class _NetworkStage:
@@ -173,7 +181,7 @@ class _NetworkStage:
         """Give the noise by which outputs are taken back: every port by that of the last input."""
         if self._entry.transform != "stabilise":
             return None
-        one = self._job.noise.with_gains(last.gains)
+        one = _familiar_noise(self._job, last)
         return NoiseModel(shot=one.shot * ports, read_variance=one.read_variance * ports)
 
     def _linear(self, bands: Iterator[FloatArray], noise: NoiseModel) -> Iterator[FloatArray]:

@@ -85,9 +85,10 @@ def test_windows_are_chosen_by_kernel_and_work(
 
 def test_windows_explain_what_the_whole_block_explains() -> None:
     block, _ = clipped_block([(60, 70), (62, 100), (250, 300)])
-    background = background_of(ISO_100)
-    whole, left = explain_lights(block, background, SETTINGS, None)
-    windows, left_there = explain_lights(block, background, SETTINGS, KERNEL_PX)
+    assert block.unknown is not None
+    unknown, background = spread_clipped(block.unknown), background_of(ISO_100)
+    whole, left = explain_lights(block, unknown, background, SETTINGS, None)
+    windows, left_there = explain_lights(block, unknown, background, SETTINGS, KERNEL_PX)
     assert whole.max() > 1.2
     assert np.square(windows - whole).mean() < 0.01 * np.square(whole).mean()
     assert windows.sum() == pytest.approx(whole.sum(), rel=0.05)
@@ -102,9 +103,9 @@ def test_windows_explain_what_the_whole_block_explains() -> None:
 def test_without_a_reach_the_whole_block_is_explained_as_bundles_of_2_0_mean_it() -> None:
     block, _ = clipped_block([(60, 70)])
     old = SETTINGS.model_copy(update={"clip_reach_px": None})
-    found, _ = explain_lights(block, background_of(ISO_100), old, KERNEL_PX)
     assert block.unknown is not None
     clipped = spread_clipped(block.unknown)
+    found, _ = explain_lights(block, clipped, background_of(ISO_100), old, KERNEL_PX)
     whole = richardson_lucy(block.samples, block.otf, background_of(ISO_100), 6, clipped)
     np.testing.assert_array_equal(found, whole)
 

@@ -61,6 +61,15 @@ def test_one_level_gives_the_noise_of_that_level_and_a_sensor_that_exists(level,
         assert 0.05 * shot < noise.shot[1] < 20 * shot
 
 
+@pytest.mark.parametrize("sigma", [1e-3, 3e-3, 13e-3])
+def test_chance_among_the_few_blocks_of_a_small_dark_frame_is_no_slope(sigma):
+    rng = np.random.default_rng(5)
+    noises = [measure_noise(capture_of(sigma * rng.standard_normal((192, 192)))) for _ in range(20)]
+    reads_e = [noise.read_variance[1] ** 0.5 / noise.shot[1] for noise in noises]
+    assert 2 < np.median(reads_e) < 5, "usual read noise, where nothing tells it"
+    assert min(reads_e) > 0.5
+
+
 @pytest.mark.parametrize("read_e", [0.5, 15.0, 40.0])
 def test_read_noise_is_told_from_shot_noise_where_the_levels_differ(read_e):
     shot, ratios = 2e-4, []

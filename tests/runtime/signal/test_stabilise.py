@@ -4,7 +4,7 @@ import pytest
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.rows import ArrayRows
-from camkit.runtime.signal.stabilise import StackedRows, stabilise, unstabilise
+from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, stabilise, unstabilise
 from tests.psf_factory import with_noise
 
 NOISE = NoiseModel(shot=(4e-5, 2e-5, 3e-5), read_variance=(4e-8, 1e-8, 2e-8))
@@ -101,3 +101,28 @@ def test_undoing_in_place_gives_the_bits_of_a_new_array():
     expected = unstabilise(stable, NOISE, scale=32.0)
     assert unstabilise(stable, NOISE, scale=32.0, out=stable) is stable
     np.testing.assert_array_equal(stable, expected)
+
+
+@pytest.mark.parametrize(
+    ("read_e", "trained", "black_e"),
+    [
+        (3.0, [3.0], 3.0),
+        (9.0, [3.0], 9.0),
+        (0.5, [3.0], 3.0),
+        (20.0, [3.0], 9.0),
+        (1.5, [1.0, 2.0], 1.5),
+        (4.0, [0.0], 1.0),
+        (0.0, [0.0], 0.0),
+    ],
+)
+def test_black_lies_where_a_network_knows_it(read_e, trained, black_e):
+    shot = 1e-3
+    noise = NoiseModel(shot=(shot,), read_variance=((read_e * shot) ** 2,))
+    familiar = familiar_noise(noise, trained)
+    black = np.zeros((1, 1, 1), dtype=np.float32)
+    assert stabilise(black, familiar, scale=1).item() == pytest.approx(black_e)
+    assert familiar.read_variance[0] >= noise.read_variance[0] * (1 - 1e-12)
+    light = np.linspace(0, 1, 50, dtype=np.float32)[None, None]
+    np.testing.assert_allclose(unstabilise(stabilise(light, familiar), familiar), light, atol=1e-6)
+    if read_e == black_e:
+        assert familiar == noise

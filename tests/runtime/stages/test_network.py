@@ -175,7 +175,10 @@ def test_two_ports_read_at_different_pace_are_parts_of_one_run(tmp_path: Path) -
     split = NetworkEngine(data, threads=1, scale=2).run(light[None])[0]
     fused = NetworkEngine(join, threads=1).run(np.ascontiguousarray(split[::-1])[None])[0]
     np.testing.assert_array_equal(picture, np.repeat(fused, 3, axis=0))
-    assert len(ticks) > sum(windows.to_json()["windows"] for windows in made.windows.values())
+    windows = sum(windows.to_json()["windows"] for windows in made.windows.values())
+    assert len(set(ticks)) == len(ticks) >= windows, "every window, and what other stages give"
+    assert ticks == sorted(ticks)
+    assert ticks[-1][0] == ticks[-1][1]
 
 
 # ------------------------------------------------------------------------------- guard
