@@ -1,0 +1,16 @@
+"""Many captures: which files, which bundle for each, where the pictures go, what is done already.
+
+sources     files, folders, globs -> captures
+tasks       bundle, name of the picture, clashes: errors before any work
+making      one capture claimed, made, told as a result
+processing  all of them, `jobs` at once
+
+Pictures and sidecars are claimed, written to part files and renamed. One file's failure never stops
+the others; `resume` skips only what a sidecar proves done.
+"""
+
+from camkit.runtime.batch.processing import process
+from camkit.runtime.batch.sources import expand
+from camkit.runtime.batch.tasks import Task, list_tasks
+
+__all__ = ["Task", "expand", "list_tasks", "process"]

@@ -1,0 +1,115 @@
+"""One capture of many: claimed, made by the pipeline of its bundle, told as a result."""
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from camkit.errors import CamkitError, ContractError
+from camkit.runtime.batch.tasks import NO_BUNDLE, Task, state_of
+from camkit.runtime.cancel import Cancel, Cancelled
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
+from camkit.runtime.job.choices import check_idle
+from camkit.runtime.options import Options
+from camkit.runtime.output.claim import claimed
+from camkit.runtime.pipeline import Pipeline, load
+
+logger = logging.getLogger(__name__)
+
+FileProgress = Callable[[Path, int, int], None]
+
+ELSEWHERE: Final = "another process makes this picture"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Common:
+    """What all tasks of a run share."""
+
+    write: WriteOptions
+    mosaic: MosaicOptions | None
+    progress: FileProgress | None
+    cancel: Cancel | None
+
+
+class Pipelines:
+    """One pipeline per bundle, made when first needed."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self._made: dict[str, Pipeline] = {}
+        self._lock = threading.Lock()
+
+    def get(self, bundle: str) -> Pipeline:
+        """Give the pipeline of a bundle, "none" for one that only develops.
+
+        Raises:
+            BundleError: If the bundle is refused.
+            ContractError: If it cannot do what the options ask.
+        """
+        with self._lock:
+            if bundle not in self._made:
+                name = None if bundle.lower() == NO_BUNDLE else bundle
+                made = load(name, options=self._options)
+                check_idle(made.bundle, self._options)
+                self._made[bundle] = made
+            return self._made[bundle]
+
+
+def run_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult:
+    """Make the picture of one task; whatever stops it is told as its result.
+
+    Raises:
+        Cancelled: If the caller wished so.
+    """
+    if task.refusal is not None:
+        return FileResult.failure(task.source, None, task.refusal)
+    named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
+    try:
+        pipeline = pipelines.get(task.bundle)
+        with claimed(task.target) as ours:
+            if not ours:
+                return FileResult.skip(task.source, task.target, pipeline, ELSEWHERE)
+            return _make(task, pipeline, common)
+    except Cancelled:
+        raise
+    except (CamkitError, OSError) as error:
+        logger.debug("%s failed", task.source, exc_info=error)
+        told = f"{error}"
+        if isinstance(error, OSError) and error.strerror is not None:
+            told = f"cannot write {task.target}: {error.strerror}"
+        return FileResult.failure(task.source, named, told)
+    except MemoryError as error:
+        logger.debug("%s failed", task.source, exc_info=error)
+        return FileResult.failure(task.source, named, f"not enough memory: {error}".rstrip(": "))
+
+
+def _make(task: Task, pipeline: Pipeline, common: Common) -> FileResult:
+    """Make a picture that nobody else makes now, unless it is done already.
+
+    Raises:
+        ContractError: If somebody put another file in its place since the run began.
+    """
+    write = common.write
+    appeared = state_of(task.target) != task.before
+    if write.resume or appeared:
+        if proved_done(task.source, task.target, pipeline, write, common.mosaic):
+            return FileResult.skip(task.source, task.target, pipeline, *[ELSEWHERE][:appeared])
+        if appeared and task.target.exists() and not write.overwrite:
+            raise ContractError(f"{task.target} appeared since the run began; it is left as it is")
+    tick = None if common.progress is None else _tick(common.progress, task.source)
+    return develop_file(
+        task.source,
+        task.target,
+        pipeline,
+        write,
+        mosaic=common.mosaic,
+        progress=tick,
+        cancel=common.cancel,
+    )
+
+
+def _tick(progress: FileProgress, source: Path) -> Callable[[int, int], None]:
+    return lambda done, total: progress(source, done, total)

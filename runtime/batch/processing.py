@@ -1,0 +1,117 @@
+"""Many captures become pictures: planned before any work, then made, `jobs` at once."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+from camkit.errors import ContractError
+from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
+from camkit.runtime.batch.sources import expand
+from camkit.runtime.batch.tasks import Task, list_tasks
+from camkit.runtime.cancel import Cancel
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.development import FileResult, WriteOptions
+from camkit.runtime.files.in_memory import list_paths
+from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
+
+
+def process(
+    files: Sequence[str | Path] | str | Path,
+    *,
+    bundle: str | Path | None = None,
+    options: Options | None = None,
+    write: WriteOptions | None = None,
+    mosaic: MosaicOptions | None = None,
+    progress: FileProgress | None = None,
+    cancel: Cancel | None = None,
+    on_result: Callable[[FileResult], None] | None = None,
+    **choices: object,
+) -> list[FileResult]:
+    """Turn captures into pictures, each with its sidecar.
+
+    Args:
+        files: Captures, folders or globs.
+        bundle: Name or path; None takes the bundle each file names; "none" only develops.
+        options: What changes the pixels. Single fields may also be given by name (size="S").
+        write: Where and how to write, how many at once. Single fields also by name (jobs=2).
+        mosaic: How to read headerless mosaics.
+        progress: Called with (file, work done, work in all) from the working thread.
+        cancel: Asked ten times a second; true ends the run with `Cancelled`, finished files stay.
+        on_result: Called with each result as it is ready.
+        **choices: Single fields of `Options` and `WriteOptions` by name.
+
+    Returns:
+        One result per input, in their order; failures carry their message.
+
+    Raises:
+        ContractError: For what can be refused before any work (see `list_tasks`).
+        BundleError: If the named bundle is refused.
+    """
+    options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
+    sources = expand(list_paths(files))
+    tasks = list_tasks(sources, bundle=None if bundle is None else str(bundle), write=write)
+    if write.out_dir.exists() and not write.out_dir.is_dir():
+        raise ContractError(f"{write.out_dir} is no folder; pictures need one as --out-dir")
+    if write.format == "dng":
+        if options.color == "acescg":
+            raise ContractError("a DNG holds camera RGB; leave --color out or say camera")
+        options = replace(options, color="camera")
+    pipelines = Pipelines(_shared(options, write.jobs))
+    if bundle is not None and tasks:
+        pipelines.get(str(bundle))
+    write.out_dir.mkdir(parents=True, exist_ok=True)
+
+    common = Common(write=write, mosaic=mosaic, progress=progress, cancel=cancel)
+
+    def run(task: Task) -> FileResult:
+        result = run_task(task, pipelines, common)
+        if on_result is not None:
+            on_result(result)
+        return result
+
+    if write.jobs == 1:
+        return [run(task) for task in tasks]
+    with ThreadPoolExecutor(write.jobs, thread_name_prefix="camkit") as pool:
+        return list(pool.map(run, tasks))
+
+
+def _with_choices(
+    options: Options, write: WriteOptions, choices: dict[str, object]
+) -> tuple[Options, WriteOptions]:
+    names = set(Options.__dataclass_fields__), set(WriteOptions.__dataclass_fields__)
+    unknown = set(choices) - names[0] - names[1]
+    if unknown:
+        raise ContractError(
+            f"unknown option(s) {', '.join(sorted(unknown))}; known are "
+            f"{', '.join(sorted(names[0] | names[1]))}"
+        )
+    if "out_dir" in choices:
+        choices = {**choices, "out_dir": Path(str(choices["out_dir"]))}
+    return (
+        replace(options, **{k: v for k, v in choices.items() if k in names[0]}),  # type: ignore[arg-type]
+        replace(write, **{k: v for k, v in choices.items() if k in names[1]}),  # type: ignore[arg-type]
+    )
+
+
+def _shared(options: Options, jobs: int) -> Options:
+    """Share threads and memory among the jobs, so that together they keep to the caller's.
+
+    What the process holds anyway counts once; without a cap every job takes the default.
+    """
+    if jobs == 1:
+        return options
+    from camkit.runtime.job.walker import FIXED_BYTES
+    from camkit.runtime.network.engine import available_threads
+
+    threads = max(1, available_threads(options.threads) // jobs)
+    if options.max_mem_bytes is None:
+        return replace(options, threads=threads)
+    each = FIXED_BYTES + (options.max_mem_bytes - FIXED_BYTES) // jobs
+    if each < LEAST_MAX_MEM_BYTES:
+        raise ContractError(
+            f"{options.max_mem_bytes // 10**6} MB shared by {jobs} jobs are {each // 10**6} MB "
+            f"each, {FIXED_BYTES // 10**6} of them in common; a job needs at least "
+            f"{LEAST_MAX_MEM_BYTES // 10**6} MB: raise --max-mem or lower --jobs"
+        )
+    return replace(options, threads=threads, max_mem_bytes=each)

@@ -1,0 +1,68 @@
+"""Which captures are meant: files, folders and globs, each capture once."""
+
+import glob
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from camkit.errors import DecodeError
+from camkit.runtime.files.in_memory import FilePath
+from camkit.runtime.files.regular_file import check_regular
+from camkit.runtime.output.sidecar import read_sidecar
+
+RAW_SUFFIXES: Final = frozenset(
+    {".dng", ".arw", ".cr2", ".cr3", ".crw", ".nef", ".nrw", ".raf", ".rw2", ".orf", ".pef"}
+    | {".srw", ".kdc", ".dcr", ".3fr", ".iiq", ".rwl"}
+)
+CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
+
+
+def expand(files: Sequence[FilePath]) -> list[Path]:
+    """Give the captures named by files, folders and globs, each once, in the order given.
+
+    A folder stands for the captures directly in it, by name, without the pictures that a sidecar
+    beside them calls its output; a glob that matches nothing and a
+    folder without captures stand for nothing; a file that does not exist is kept and fails later.
+    """
+    found: dict[Path, None] = {}
+    for item in files:
+        path = Path(item)
+        if _is_unreachable(path):
+            found[path] = None
+        elif path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in CAPTURE_SUFFIXES)
+            found.update(dict.fromkeys(p for p in inside if p.is_file() and not _is_result(p)))
+        elif not path.exists() and glob.has_magic(str(item)):
+            # pathlib has no glob that takes an absolute pattern
+            matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))  # noqa: PTH207
+            found.update(dict.fromkeys(p for p in matches if p.is_file()))
+        else:
+            found[path] = None
+    return list(found)
+
+
+def _is_unreachable(path: Path) -> bool:
+    """Tell a path that no file can have: a name that is too long, a byte 0, a loop of links."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return False
+    except (OSError, ValueError):
+        return True
+    return False
+
+
+def _is_result(path: Path) -> bool:
+    record = read_sidecar(path)
+    return record is not None and Path(str(record["output"])).name == path.name
+
+
+def refusal_of(source: Path) -> str | None:
+    """Say why an input cannot be read, as far as that is known without opening it."""
+    try:
+        check_regular(source)
+    except OSError as error:
+        return f"cannot read {source}: {error.strerror or error}"
+    except (DecodeError, ValueError) as error:
+        return f"cannot read {source}: {error}"
+    return None
