@@ -64,15 +64,25 @@ def run_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult:
     Raises:
         Cancelled: If the caller wished so.
     """
+    result = try_task(task, pipelines, common)
+    if result is None:
+        return FileResult.skip(task.source, task.target, pipelines.get(task.bundle), ELSEWHERE)
+    return result
+
+
+def try_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult | None:
+    """Make the picture of one task unless another process is at it now: then give None.
+
+    Raises:
+        Cancelled: If the caller wished so.
+    """
     if task.refusal is not None:
         return FileResult.failure(task.source, None, task.refusal)
     named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
     try:
         pipeline = pipelines.get(task.bundle)
         with claimed(task.target) as ours:
-            if not ours:
-                return FileResult.skip(task.source, task.target, pipeline, ELSEWHERE)
-            return _make(task, pipeline, common)
+            return _make(task, pipeline, common) if ours else None
     except Cancelled:
         raise
     except (CamkitError, OSError) as error:

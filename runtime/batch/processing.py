@@ -1,9 +1,11 @@
 """Many captures become pictures: planned before any work, then made, `jobs` at once."""
 
+import logging
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from camkit.errors import ContractError
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
@@ -15,8 +17,13 @@ from camkit.runtime.development import FileResult, WriteOptions
 from camkit.runtime.files.in_memory import list_paths
 from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
 
+if TYPE_CHECKING:
+    from distributed import Client
 
-def process(
+logger = logging.getLogger(__name__)
+
+
+def process(  # noqa: PLR0913 - each says one thing to its caller
     files: Sequence[str | Path] | str | Path,
     *,
     bundle: str | Path | None = None,
@@ -26,6 +33,8 @@ def process(
     progress: FileProgress | None = None,
     cancel: Cancel | None = None,
     on_result: Callable[[FileResult], None] | None = None,
+    client: "Client | None" = None,
+    on_notice: Callable[[str], None] | None = None,
     **choices: object,
 ) -> list[FileResult]:
     """Turn captures into pictures, each with its sidecar.
@@ -39,6 +48,11 @@ def process(
         progress: Called with (file, work done, work in all) from the working thread.
         cancel: Asked ten times a second; true ends the run with `Cancelled`, finished files stay.
         on_result: Called with each result as it is ready.
+        client: Of dask.distributed; its workers make the pictures, each file a task. They must see
+            captures and `out_dir` under the same absolute names. `threads` and `max_mem_bytes` are
+            those of a file then.
+        on_notice: Called with what concerns no single file, such as a worker that is left out;
+            None logs it.
         **choices: Single fields of `Options` and `WriteOptions` by name.
 
     Returns:
@@ -47,6 +61,7 @@ def process(
     Raises:
         ContractError: For what can be refused before any work (see `list_tasks`).
         BundleError: If the named bundle is refused.
+        CamkitError: If scheduler or workers of `client` are lost and do not come back.
     """
     options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
     sources = expand(list_paths(files))
@@ -57,10 +72,25 @@ def process(
         if options.color == "acescg":
             raise ContractError("a DNG holds camera RGB; leave --color out or say camera")
         options = replace(options, color="camera")
+    if client is not None and write.jobs > 1:
+        raise ContractError("jobs are those of one process; leave them out with a client")
     pipelines = Pipelines(_shared(options, write.jobs))
     if bundle is not None and tasks:
         pipelines.get(str(bundle))
     write.out_dir.mkdir(parents=True, exist_ok=True)
+    if client is not None:
+        from camkit.runtime.batch.cluster.run import Wishes, process_on_cluster
+
+        wishes = Wishes(
+            options=options,
+            write=write,
+            mosaic=mosaic,
+            progress=progress,
+            cancel=cancel,
+            on_result=on_result,
+            notice=on_notice or logger.warning,
+        )
+        return process_on_cluster(client, tasks, wishes)
 
     common = Common(write=write, mosaic=mosaic, progress=progress, cancel=cancel)
 

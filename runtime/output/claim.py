@@ -46,6 +46,11 @@ def claimed(output: Path) -> Iterator[bool]:
         os.close(descriptor)
 
 
+def was_claimed(output: Path) -> bool:
+    """Tell whether an output is claimed now, or whoever claimed it last has died of it."""
+    return output.with_name(output.name + CLAIM_SUFFIX).exists()
+
+
 def _lock(path: Path) -> int | None:
     """Open and lock the file of a claim; None if another holds it."""
     while True:

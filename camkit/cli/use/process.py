@@ -76,6 +76,12 @@ def process(
     max_mem: Annotated[str | None, typer.Option(help="Memory cap, such as 2G or 900M.")] = None,
     threads: Annotated[int | None, typer.Option(help="Threads in all.")] = None,
     jobs: Annotated[int, typer.Option(help="Captures at once.")] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler, such as tcp://HOST:8786.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Worker processes of dask on this machine.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Skip what is proved done.")] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace pictures that exist.")
@@ -85,6 +91,7 @@ def process(
     _debug: Debug = False,
 ) -> None:
     """Turn captures into pictures through the camera's bundle."""
+    from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.mosaic import mosaic_options
     from camkit.cli.use.progress import TileProgress
     from camkit.runtime.batch import expand
@@ -135,7 +142,7 @@ def process(
 
         done = print_plans(sources, bundle, options, write, headerless, as_json=json_)
     else:
-        with TileProgress() as progress:
+        with cluster_client(scheduler, workers) as client, TileProgress() as progress:
             results = run(
                 sources,
                 bundle=bundle,
@@ -144,6 +151,8 @@ def process(
                 mosaic=headerless,
                 progress=progress.tile,
                 on_result=lambda result: progress.result(result, as_json=json_),
+                client=client,
+                on_notice=progress.notice,
             )
         done = all(result.status != "failed" for result in results)
     if not done:

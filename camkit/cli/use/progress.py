@@ -3,6 +3,8 @@
 import json
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -65,11 +67,23 @@ class TileProgress:
             bar = self._bars.pop(result.input, None)
             if self._live is not None and bar is not None:
                 self._live.remove_task(bar)
-            if self._live is not None:
-                self._live.stop()  # so that bars and results do not share a line
-            _print(result, as_json=as_json)
-            if self._live is not None:
-                self._live.start()
+            with self._apart():
+                _print(result, as_json=as_json)
+
+    def notice(self, text: str) -> None:
+        """Print what concerns no single file."""
+        with self._lock, self._apart():
+            say(f"camkit: {text}", err=True)
+
+    @contextmanager
+    def _apart(self) -> Iterator[None]:
+        """Let bars and lines not share a line."""
+        if self._live is None:
+            yield
+            return
+        self._live.stop()
+        yield
+        self._live.start()
 
 
 def _print(result: "FileResult", *, as_json: bool) -> None:

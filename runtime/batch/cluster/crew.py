@@ -1,0 +1,192 @@
+"""The workers of a run: looked at before they are given work, named if they do not fit."""
+
+import importlib.metadata
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from camkit.runtime.batch.cluster import remote
+from camkit.runtime.batch.cluster.connection import NoAnswer, within
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+LOOK_S: Final = 1.0
+"""So often new workers are looked for."""
+REPLY_S: Final = 8.0
+TRAVEL_S: Final = 120.0
+"""A bundle has as long to reach every worker that lacks it."""
+
+
+class Crew:
+    """The workers that serve a run.
+
+    Attributes:
+        slots: Address -> files that it makes at once, of workers that fit.
+        unfit: Address -> why it does not.
+        has_losses: Whether a worker that served the run has gone.
+    """
+
+    def __init__(
+        self,
+        needs: remote.Needs,
+        bundles: Mapping[str, Callable[[], bytes]],
+        notice: Callable[[str], None],
+    ) -> None:
+        """Say what workers must have.
+
+        Args:
+            needs: Of the run.
+            bundles: SHA-256 -> gives the bytes.
+            notice: Called with a line for every worker that does not fit.
+        """
+        self.slots: dict[str, int] = {}
+        self.unfit: dict[str, str] = {}
+        self.has_losses = False
+        self._needs = needs
+        self._bundles = bundles
+        self._notice = notice
+        self._looked_s = float("-inf")
+
+    @property
+    def flag(self) -> str:
+        """Name the resource of workers that fit."""
+        return self._needs.flag
+
+    def forget(self) -> None:
+        """Look at every worker anew: the scheduler is another one."""
+        self.slots.clear()
+        self.has_losses = True
+        self._looked_s = float("-inf")
+
+    def room(self) -> int:
+        """Give how many files may be under way: those in the making, and one waiting per worker."""
+        return sum(self.slots.values()) + len(self.slots)
+
+    def look(self, client: "Client", *, now: bool = False) -> bool:
+        """Take in workers that are new and drop those that are gone, at most once a second.
+
+        Args:
+            client: A connected one.
+            now: Also where that second is not over.
+
+        Returns:
+            Whether it looked.
+
+        Raises:
+            NoAnswer: If the scheduler does not answer.
+            OSError: If it is lost.
+        """
+        if not now and time.monotonic() - self._looked_s < LOOK_S:
+            return False
+        found = within(REPLY_S, lambda: client.scheduler_info(n_workers=-1))["workers"]
+        self._looked_s = time.monotonic()
+        for gone in set(self.slots) - set(found):
+            del self.slots[gone]
+            self.has_losses = True
+        for gone in set(self.unfit) - set(found):
+            del self.unfit[gone]
+        if new := [address for address in found if address not in {**self.slots, **self.unfit}]:
+            self._take_in(client, new)
+        return True
+
+    def placed(self, client: "Client") -> dict[str, frozenset[str]]:
+        """Give the tasks that every worker has got, by its address.
+
+        Raises:
+            NoAnswer: If the scheduler does not answer.
+            OSError: If it is lost.
+        """
+        found = within(REPLY_S, client.processing)
+        return {address: frozenset(map(str, keys)) for address, keys in found.items()}
+
+    def _take_in(self, client: "Client", new: Sequence[str]) -> None:
+        """Ask new workers in turn what they are; each question goes to those that are left."""
+        from camkit import __version__
+
+        # asked with what every worker has: it may hold no camkit to ask with
+        left = self._asked(client, new, importlib.metadata.version, "camkit")
+        left = self._keep(
+            left, lambda got: got == __version__, f"has camkit {{}}, not {__version__}"
+        )
+        here = platform.machine()
+        left = self._asked(client, left, platform.machine)
+        left = self._keep(
+            left, lambda got: got == here, f"is {{}}, this machine {here}: other bits"
+        )
+        looked = self._asked(client, left, remote.look, self._needs)
+        left = {address: lacks for address, (reason, lacks) in looked.items() if reason is None}
+        for address, (reason, _) in looked.items():
+            if reason is not None:
+                self._leave_out(address, reason)
+        for sha256, read in self._bundles.items():
+            lacking = [address for address, lacks in left.items() if sha256 in lacks]
+            got = self._asked(client, lacking, remote.take_bundle, sha256, read, seconds=TRAVEL_S)
+            for address in set(lacking) - set(got):
+                del left[address]
+        self.slots |= self._asked(client, left, remote.offer, self._needs)
+
+    def _asked(
+        self,
+        client: "Client",
+        workers: Sequence[str] | Mapping[str, Any],
+        function: Callable[..., Any],
+        *args: Any,
+        seconds: float = REPLY_S,
+    ) -> dict[str, Any]:
+        """Run a function on workers; give what it gave, leave out those on which it failed."""
+        if not workers:
+            return {}
+        ready = [arg() if callable(arg) else arg for arg in args]
+        asked = list(workers)
+        try:
+            answers = within(
+                seconds, lambda: client.run(function, *ready, workers=asked, on_error="return")
+            )
+        except NoAnswer:
+            answers = {}
+        kept = {}
+        for address in asked:
+            answer = answers.get(address, NoAnswer(f"does not answer within {seconds:.0f} s"))
+            if isinstance(answer, BaseException):
+                self._leave_out(address, _trouble(answer))
+            else:
+                kept[address] = answer
+        return kept
+
+    def _keep(
+        self, answers: Mapping[str, Any], fits: Callable[[Any], bool], reason: str
+    ) -> dict[str, Any]:
+        for address, answer in answers.items():
+            if not fits(answer):
+                self._leave_out(address, reason.format(answer))
+        return {address: answer for address, answer in answers.items() if fits(answer)}
+
+    def _leave_out(self, address: str, reason: str) -> None:
+        self.unfit[address] = reason
+        self._notice(f"worker {address} is left out: {reason}")
+
+    def dismiss(self, client: "Client") -> None:
+        """Let the workers forget the run."""
+        workers = list(self.slots)
+        within(
+            REPLY_S,
+            lambda: client.run(remote.forget, self._needs.run, workers=workers, on_error="ignore"),
+        )
+
+    def busy(self, client: "Client") -> int:
+        """Give how many files of the run are in the making."""
+        workers = list(self.slots)
+        answers = within(
+            REPLY_S,
+            lambda: client.run(remote.busy, self._needs.run, workers=workers, on_error="ignore"),
+        )
+        return sum(answers.values())
+
+
+def _trouble(error: BaseException) -> str:
+    """Say in words what a worker answered with."""
+    if isinstance(error, ModuleNotFoundError | importlib.metadata.PackageNotFoundError):
+        return f"lacks {error.name}"
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,486 @@
+"""The queue of a run on a cluster: kept by the caller, so that nothing is lost with a scheduler."""
+
+import contextlib
+import queue
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from camkit.bundle.reader import find_bundle, open_bundle
+from camkit.errors import CamkitError, ContractError
+from camkit.runtime.batch.cluster import remote
+from camkit.runtime.batch.cluster.connection import NoAnswer, close_client, open_client
+from camkit.runtime.batch.cluster.crew import Crew
+from camkit.runtime.batch.making import ELSEWHERE, FileProgress
+from camkit.runtime.batch.tasks import NO_BUNDLE, Task
+from camkit.runtime.cancel import Cancel, Cancelled, check_cancelled
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.development import FileResult, WriteOptions
+from camkit.runtime.machine.memory import peak_rss_mb
+from camkit.runtime.options import Options
+from camkit.runtime.output.claim import claimed, was_claimed
+from camkit.runtime.output.sidecar import read_sidecar
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+POLL_S: Final = 0.1
+WAIT_S: Final = 300.0
+"""A scheduler that is lost, or workers that are, may take so long to come back."""
+TELL_S: Final = 5.0
+"""A worker that starts again at once is not worth a word."""
+STOP_S: Final = 5.0
+"""Files in the making have so long to be given up."""
+CLAIMED_S: Final = 30.0
+"""A file that somebody else has claimed for so long is left to him."""
+RETRY_S: Final = 1.0
+TRIES: Final = 3
+"""Of a file whose task failed for no reason of its own."""
+SUSPECT: Final = 2
+HOPELESS: Final = 4
+"""Workers that a file lost: then it is tried with no other under way; then it has failed."""
+SAMPLE: Final = 3
+
+Notice = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wishes:
+    """What a caller wants of a run.
+
+    Attributes:
+        options: What changes the pixels.
+        write: Where and how pictures are written.
+        mosaic: How to read headerless mosaics.
+        progress: Called with (file, work done, work in all).
+        cancel: The wish to stop.
+        on_result: Called with each result as it is ready.
+        notice: Called with what concerns no single file.
+    """
+
+    options: Options
+    write: WriteOptions
+    mosaic: MosaicOptions | None
+    progress: FileProgress | None
+    cancel: Cancel | None
+    on_result: Callable[[FileResult], None] | None
+    notice: Notice
+
+
+def process_on_cluster(client: "Client", tasks: Sequence[Task], wishes: Wishes) -> list[FileResult]:
+    """Make the pictures of tasks on the workers of a scheduler.
+
+    Args:
+        client: Of dask.distributed, not asynchronous.
+        tasks: From `list_tasks`.
+        wishes: What the caller wants.
+
+    Returns:
+        One result per task, in their order.
+
+    Raises:
+        ContractError: If no worker fits, before any work.
+        CamkitError: If scheduler or workers are lost and do not come back; what is done stays done.
+        Cancelled: If the caller wished so.
+    """
+    if client.asynchronous:
+        raise ContractError("an asynchronous client cannot be waited for; give one that is not")
+    run = _Run(client, tasks, wishes)
+    with _token(wishes.write.out_dir, run.name) as token:
+        return run.results(token)
+
+
+@contextlib.contextmanager
+def _token(folder: Path, run: str) -> Iterator[Path]:
+    """Lay a file beside the pictures by which workers know that they see the same folder."""
+    path = folder.absolute() / f".camkit-run-{run}"
+    path.touch()
+    try:
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
+
+
+class _Run:
+    """One run: files that wait, files under way, results."""
+
+    def __init__(self, client: "Client", tasks: Sequence[Task], wishes: Wishes) -> None:
+        self.name = uuid.uuid4().hex[:12]
+        self._client = client
+        self._address = str(getattr(client.scheduler, "address", ""))
+        self._security = client.security
+        self._ours = False
+        self._tasks, self._wishes = tasks, wishes
+        self._results: list[FileResult | None] = [None] * len(tasks)
+        self._waiting: deque[int] = deque()
+        self._later: deque[tuple[float, int]] = deque()
+        self._alone: deque[int] = deque()
+        self._open: dict[Future[FileResult | None], int] = {}
+        self._done: queue.SimpleQueue[Future[FileResult | None]] = queue.SimpleQueue()
+        self._tries = [0] * len(tasks)
+        self._claimed_s: dict[int, float] = {}
+        self._unplaced: set[str] = set()
+        self._at: dict[str, str] = {}
+        self._losses = [0] * len(tasks)
+        self._idle_since: float | None = None
+        self._told_since: float | None = None
+        self._shas: dict[str, str] = {NO_BUNDLE: NO_BUNDLE}
+        self._bytes = remote.file_bytes(wishes.options)
+
+    # ------------------------------------------------------------------------------ a run
+
+    def results(self, token: Path) -> list[FileResult]:
+        """Make everything."""
+        bundles = self._find_bundles()
+        for number, task in enumerate(self._tasks):
+            if task.refusal is not None:
+                self._settle(number, FileResult.failure(task.source, None, task.refusal))
+            elif self._results[number] is None:
+                self._waiting.append(number)
+        if not self._waiting:
+            return self._all()
+        needs = remote.Needs(
+            run=self.name,
+            bundles=tuple(bundles),
+            file_bytes=self._bytes,
+            token=token,
+            sources=tuple(self._tasks[n].source.absolute() for n in list(self._waiting)[:SAMPLE]),
+        )
+        self._crew = Crew(needs, bundles, self._wishes.notice)
+        self._topic = None if self._wishes.progress is None else f"camkit-{self.name}"
+        try:
+            self._begin()
+            while self._waiting or self._later or self._alone or self._open:
+                check_cancelled(self._wishes.cancel)
+                self._step()
+        except BaseException:
+            self._give_up()
+            raise
+        finally:
+            self._end()
+        return self._all()
+
+    def _begin(self) -> None:
+        self._subscribe()
+        self._crew.look(self._client)
+        if not self._crew.slots:
+            raise ContractError(
+                f"no worker of {self._address} can make these files"
+                if self._crew.unfit
+                else f"the scheduler at {self._address} has no workers"
+            )
+
+    def _step(self) -> None:
+        try:
+            if self._client.status in ("closed", "closing"):
+                raise ConnectionError("the connection is closed")
+            if self._client.status == "running":
+                if self._crew.look(self._client):
+                    self._follow()
+                self._submit()
+        except (OSError, NoAnswer) as error:
+            self._find_again(error)
+        self._collect()
+        self._watch()
+
+    def _end(self) -> None:
+        with contextlib.suppress(Exception):
+            if self._topic is not None:
+                self._client.unsubscribe_topic(self._topic)
+        with contextlib.suppress(Exception):
+            self._crew.dismiss(self._client)
+        if self._ours:
+            close_client(self._client)
+
+    def _all(self) -> list[FileResult]:
+        return [result for result in self._results if result is not None]
+
+    # ----------------------------------------------------------------------------- bundles
+
+    def _find_bundles(self) -> dict[str, Callable[[], bytes]]:
+        """Find the bundles that tasks name; tasks of one that is refused have failed.
+
+        Returns:
+            SHA-256 -> gives the bytes.
+        """
+        found: dict[str, Callable[[], bytes]] = {}
+        trouble: dict[str, str] = {}
+        for number, task in enumerate(self._tasks):
+            name = task.bundle
+            if task.refusal is None and name not in self._shas and name not in trouble:
+                try:
+                    path = find_bundle(name)
+                    sha256 = open_bundle(path).sha256
+                except CamkitError as error:
+                    trouble[name] = str(error)
+                else:
+                    self._shas[name] = sha256
+                    found[sha256] = path.read_bytes
+            if task.refusal is None and name in trouble:
+                self._settle(number, FileResult.failure(task.source, name, trouble[name]))
+        return found
+
+    # ------------------------------------------------------------------------------- files
+
+    def _submit(self) -> None:
+        """Hand out files, as many as there is room for."""
+        now = time.monotonic()
+        while self._later and self._later[0][0] <= now:
+            self._waiting.append(self._later.popleft()[1])
+        room = self._crew.room()
+        while self._waiting and len(self._open) < room:
+            self._send(self._waiting.popleft())
+        if self._alone and not (self._open or self._waiting or self._later) and room:
+            self._send(self._alone.popleft())
+
+    def _send(self, number: int) -> None:
+        task, wishes = self._tasks[number], self._wishes
+        bundle = self._shas[NO_BUNDLE if task.bundle.lower() == NO_BUNDLE else task.bundle]
+        order = remote.Order(
+            task=replace(
+                task,
+                source=task.source.absolute(),
+                target=task.target.absolute(),
+                bundle=bundle,
+            ),
+            options=wishes.options,
+            write=wishes.write,
+            mosaic=wishes.mosaic,
+            run=self.name,
+            topic=self._topic,
+            number=number,
+            file_bytes=self._bytes,
+        )
+        try:
+            future = self._client.submit(
+                remote.make,
+                order,
+                key=f"camkit-{self.name}-{number}-{uuid.uuid4().hex[:6]}",
+                resources={remote.MEMORY: self._bytes, self._crew.flag: 1},
+                pure=False,
+            )
+        except BaseException:
+            self._waiting.appendleft(number)
+            raise
+        self._open[future] = number
+        future.add_done_callback(self._done.put)
+
+    def _collect(self) -> None:
+        """Take what is ready; wait a moment if nothing is."""
+        try:
+            ready = [self._done.get(timeout=POLL_S)]
+        except queue.Empty:
+            return
+        with contextlib.suppress(queue.Empty):
+            while True:
+                ready.append(self._done.get_nowait())
+        for future in ready:
+            number = self._open.pop(future, None)
+            if number is not None:
+                self._take(number, future)
+
+    def _take(self, number: int, future: "Future[FileResult | None]") -> None:
+        """Settle a file, or put it back."""
+        from distributed import KilledWorker
+
+        if future.status == "finished":
+            try:
+                result = future.result(timeout=STOP_S)
+            except Exception:  # noqa: BLE001 - its worker went with the result: it is made or proved again
+                self._waiting.append(number)
+                return
+            self._idle_since = None
+            if result is None:
+                self._wait_for_claim(number)
+            else:
+                self._settle(number, self._as_asked(number, result))
+            return
+        error = future.exception(timeout=STOP_S) if future.status == "error" else None
+        if isinstance(error, KilledWorker):
+            self._losses[number] = HOPELESS if self._losses[number] > SUSPECT else SUSPECT
+            self._send_again(number)
+        elif error is None or isinstance(error, Cancelled):
+            self._waiting.append(number)
+            self._crew.forget()
+        else:
+            self._after_error(number, error)
+
+    def _wait_for_claim(self, number: int) -> None:
+        """Try a file again that somebody else is making: he may be a worker that was lost."""
+        task, now = self._tasks[number], time.monotonic()
+        since = self._claimed_s.setdefault(number, now)
+        if now - since < CLAIMED_S:
+            self._later.append((now + RETRY_S, number))
+            return
+        self._settle(
+            number,
+            FileResult(
+                input=task.source,
+                output=task.target,
+                status="skipped",
+                bundle=None if task.bundle == NO_BUNDLE else task.bundle,
+                seconds={},
+                peak_rss_mb=peak_rss_mb(),
+                warnings=(ELSEWHERE,),
+            ),
+        )
+
+    def _after_error(self, number: int, error: BaseException) -> None:
+        self._tries[number] += 1
+        if self._tries[number] < TRIES:
+            self._later.append((time.monotonic() + RETRY_S, number))
+        else:
+            self._fail(number, f"{type(error).__name__}: {error}")
+
+    def _fail(self, number: int, error: str) -> None:
+        task = self._tasks[number]
+        with contextlib.suppress(OSError), claimed(task.target):
+            pass  # sweeps up what workers that died have left
+        named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
+        self._settle(number, FileResult.failure(task.source, named, error))
+
+    def _as_asked(self, number: int, result: FileResult) -> FileResult:
+        """Give a result under the names that the caller gave."""
+        task = self._tasks[number]
+        bundle = result.bundle
+        if bundle is not None and result.status == "failed":
+            bundle = task.bundle
+        output = None if result.output is None else task.target
+        result = replace(result, input=task.source, output=output, bundle=bundle)
+        return self._told_late(result) if ELSEWHERE in result.warnings else result
+
+    def _told_late(self, result: FileResult) -> FileResult:
+        """Give the result of a picture that was there already when it was asked for again.
+
+        Where workers were lost it was made by one of them, which could not tell: its sidecar does.
+        """
+        with contextlib.suppress(OSError, NoAnswer):
+            self._crew.look(self._client, now=True)
+        record = None if result.output is None else read_sidecar(result.output)
+        if record is None or not self._crew.has_losses:
+            return result
+        return replace(
+            result,
+            status="ok",
+            seconds=record["seconds"],
+            peak_rss_mb=record["peak_rss_mb"],
+            warnings=tuple(record["warnings"]),
+        )
+
+    def _settle(self, number: int, result: FileResult) -> None:
+        self._results[number] = result
+        if self._wishes.on_result is not None:
+            self._wishes.on_result(result)
+
+    # ------------------------------------------------------------------------------ losses
+
+    def _find_again(self, error: BaseException) -> None:
+        """Connect anew to a scheduler that was lost, while there is time."""
+        if self._told_since is None or self._told_since != self._idle_since:
+            self._idle_since = self._told_since = time.monotonic()
+            self._wishes.notice(
+                f"the scheduler at {self._address} is lost ({error}); waiting for it"
+            )
+        self._put_back()
+        self._crew.forget()
+        if self._client.status == "running":
+            return
+        try:
+            client = open_client(self._address, self._security)
+        except ContractError:
+            return
+        if self._ours:
+            close_client(self._client)
+        self._client, self._ours = client, True
+        self._subscribe()
+        self._crew.forget()
+
+    def _follow(self) -> None:
+        """See where files are: count the workers each has lost, take back what nobody has got.
+
+        The scheduler looks for a worker when a task comes and when a worker comes; what a worker
+        is given by `offer` later makes it look no more.
+        """
+        placed = self._crew.placed(self._client)
+        at = {key: address for address, keys in placed.items() for key in keys}
+        for future, number in list(self._open.items()):
+            key = str(future.key)
+            was = self._at.get(key)
+            its_worker_died = was is not None and was not in placed
+            nobody_has_it = key not in at and key in self._unplaced
+            died = its_worker_died or (nobody_has_it and was_claimed(self._tasks[number].target))
+            self._losses[number] += died
+            suspect = died and self._losses[number] >= SUSPECT
+            if future.status == "pending" and (suspect or nobody_has_it):
+                del self._open[future]
+                future.release()
+                self._send_again(number)
+        self._unplaced = {str(f.key) for f in self._open if str(f.key) not in at}
+        self._at = at
+
+    def _send_again(self, number: int) -> None:
+        """Put a file back that lost its workers; one that lost several is tried alone."""
+        if self._losses[number] >= HOPELESS:
+            self._fail(
+                number,
+                "the workers that made it died, in the end with no other file under way; it may "
+                "need more memory than a worker has",
+            )
+        elif self._losses[number] >= SUSPECT:
+            self._alone.append(number)
+        else:
+            self._waiting.appendleft(number)
+
+    def _put_back(self) -> None:
+        """Take files back that were under way: who makes them is asked to stop or has stopped."""
+        with contextlib.suppress(Exception):
+            for future in self._open:
+                future.release()
+        self._waiting.extendleft(sorted(self._open.values(), reverse=True))
+        self._open.clear()
+
+    def _watch(self) -> None:
+        """End the run if it has had neither scheduler nor workers for too long.
+
+        Raises:
+            CamkitError: If so.
+        """
+        if self._crew.slots and self._client.status == "running":
+            self._idle_since = None
+            return
+        now = time.monotonic()
+        if self._idle_since is None:
+            self._idle_since = now
+        elif now - self._idle_since > TELL_S and self._told_since != self._idle_since:
+            self._told_since = self._idle_since
+            lost = "no worker of" if self._client.status == "running" else "the scheduler at"
+            self._wishes.notice(f"{lost} {self._address} answers; waiting for it")
+        if now - self._idle_since > WAIT_S:
+            left = len(self._waiting) + len(self._later) + len(self._alone) + len(self._open)
+            raise CamkitError(
+                f"neither scheduler nor workers came back within {WAIT_S:.0f} s; {left} file(s) "
+                "are left: run again with --resume"
+            )
+
+    def _give_up(self) -> None:
+        """Give up what is under way; wait until the workers have let go of it."""
+        with contextlib.suppress(Exception):
+            self._client.cancel(list(self._open), force=True)
+            end = time.monotonic() + STOP_S
+            while time.monotonic() < end and self._crew.busy(self._client):
+                time.sleep(POLL_S)
+
+    # ---------------------------------------------------------------------------- progress
+
+    def _subscribe(self) -> None:
+        if self._topic is not None:
+            self._client.subscribe_topic(self._topic, self._tell)
+
+    def _tell(self, event: tuple[float, Any]) -> None:
+        number, done, total = event[1]
+        if self._wishes.progress is not None and self._results[number] is None:
+            self._wishes.progress(self._tasks[number].source, done, total)
