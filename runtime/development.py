@@ -32,6 +32,7 @@ class WriteOptions:
 
     Attributes:
         out_dir: Folder of pictures and sidecars, made if needed.
+        keep_folders: Below it, the folders of the captures from what they have in common on.
         format: exr, tiff, png, jpeg or dng.
         linear: TIFF and PNG without the sRGB curve.
         jpeg_quality: Of JPEG, 1..100; None for 92.
@@ -42,6 +43,7 @@ class WriteOptions:
     """
 
     out_dir: Path = Path()
+    keep_folders: bool = False
     format: FileFormat = "exr"
     linear: bool = False
     jpeg_quality: int | None = None

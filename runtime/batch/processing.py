@@ -78,31 +78,33 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     if bundle is not None and tasks:
         pipelines.get(str(bundle))
     write.out_dir.mkdir(parents=True, exist_ok=True)
-    if client is not None:
-        from camkit.runtime.batch.cluster.run import Wishes, process_on_cluster
-
-        wishes = Wishes(
-            options=options,
-            write=write,
-            mosaic=mosaic,
-            progress=progress,
-            cancel=cancel,
-            on_result=on_result,
-            notice=on_notice or logger.warning,
-        )
-        return process_on_cluster(client, tasks, wishes)
-
+    for folder in {task.target.parent for task in tasks}:
+        folder.mkdir(parents=True, exist_ok=True)
     common = Common(write=write, mosaic=mosaic, progress=progress, cancel=cancel)
+    if client is None:
+        return _process_here(tasks, pipelines, common, on_result)
+    from camkit.runtime.batch.cluster.run import Wishes, process_on_cluster
 
+    notice = on_notice or logger.warning
+    wishes = Wishes(options=options, common=common, on_result=on_result, notice=notice)
+    return process_on_cluster(client, tasks, wishes)
+
+
+def _process_here(
+    tasks: Sequence[Task],
+    pipelines: Pipelines,
+    common: Common,
+    on_result: Callable[[FileResult], None] | None,
+) -> list[FileResult]:
     def run(task: Task) -> FileResult:
         result = run_task(task, pipelines, common)
         if on_result is not None:
             on_result(result)
         return result
 
-    if write.jobs == 1:
+    if common.write.jobs == 1:
         return [run(task) for task in tasks]
-    with ThreadPoolExecutor(write.jobs, thread_name_prefix="camkit") as pool:
+    with ThreadPoolExecutor(common.write.jobs, thread_name_prefix="camkit") as pool:
         return list(pool.map(run, tasks))
 
 

@@ -1,5 +1,6 @@
 """What is decided for every input before any work: its bundle, its picture, why it cannot be."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +41,11 @@ def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptio
         ContractError: If two inputs would give one output, an output exists (and neither resume
             nor overwrite was asked for), or no input names a bundle.
     """
-    tasks = [_make_task(source, bundle, write) for source in sources]
+    folders = _folders(sources, write)
+    tasks = [
+        _make_task(source, bundle, folder / f"{source.stem}{write.suffix}")
+        for source, folder in zip(sources, folders, strict=True)
+    ]
     sound = [t for t in tasks if t.refusal is None]
     _refuse_clashes(sound)
     nameless = [t for t in tasks if t.refusal is not None and t.refusal.endswith(_NAMELESS)]
@@ -59,8 +64,16 @@ def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptio
     return tasks
 
 
-def _make_task(source: Path, bundle: str | None, write: WriteOptions) -> Task:
-    target = write.out_dir / f"{source.stem}{write.suffix}"
+def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
+    """Give the folder of every picture."""
+    if not write.keep_folders or not sources:
+        return [write.out_dir] * len(sources)
+    parents = [source.absolute().parent for source in sources]
+    common = os.path.commonpath(parents)
+    return [write.out_dir / parent.relative_to(common) for parent in parents]
+
+
+def _make_task(source: Path, bundle: str | None, target: Path) -> Task:
     refusal = refusal_of(source)
     chosen = bundle
     if chosen is None and refusal is None:
@@ -94,6 +107,6 @@ def _refuse_clashes(tasks: Sequence[Task]) -> None:
         if target in owners:
             raise ContractError(
                 f"{owners[target]} and {task.source} would both give {task.target}; "
-                "run them into different folders"
+                "keep their folders (--keep-folders), or run them into different ones"
             )
         owners[target] = task.source

@@ -27,6 +27,9 @@ def process(
     max_seconds: MaxSeconds = None,
     max_error_db: MaxErrorDb = None,
     out_dir: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path(),
+    keep_folders: Annotated[
+        bool, typer.Option("--keep-folders", help="Pictures in folders as the captures are.")
+    ] = False,
     format_: Annotated[str, typer.Option("--format", help="exr, tiff, png, jpeg or dng.")] = "exr",
     jpeg_quality: Annotated[
         int | None, typer.Option(help="With --format jpeg: 1..100. Default: 92.")
@@ -124,6 +127,7 @@ def process(
     )
     write = WriteOptions(
         out_dir=out_dir,
+        keep_folders=keep_folders,
         format=format_,  # type: ignore[arg-type]
         linear=linear,
         jpeg_quality=jpeg_quality,

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import CamkitError, ContractError, UnsupportedError
 from camkit.runtime.network.engine import available_threads
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ T = TypeVar("T")
 logger = logging.getLogger(__name__)
 
 
-class NoAnswer(Exception):  # noqa: N818 - says what it is
+class NoAnswer(CamkitError):  # noqa: N818 - says what it is
     """What was asked did not answer in time."""
 
 

@@ -44,6 +44,7 @@ class Crew:
         self.slots: dict[str, int] = {}
         self.unfit: dict[str, str] = {}
         self.has_losses = False
+        self._folders: dict[str, str] = {}
         self._needs = needs
         self._bundles = bundles
         self._notice = notice
@@ -80,13 +81,14 @@ class Crew:
         """
         if not now and time.monotonic() - self._looked_s < LOOK_S:
             return False
-        found = within(REPLY_S, lambda: client.scheduler_info(n_workers=-1))["workers"]
+        told = within(REPLY_S, lambda: client.scheduler_info(n_workers=-1))["workers"]
         self._looked_s = time.monotonic()
-        for gone in set(self.slots) - set(found):
-            del self.slots[gone]
-            self.has_losses = True
-        for gone in set(self.unfit) - set(found):
-            del self.unfit[gone]
+        # a worker that is started again may have its address again, its folder is another one
+        found = {address: str(worker.get("local_directory")) for address, worker in told.items()}
+        for gone in [a for a in {**self.slots, **self.unfit} if found.get(a) != self._folders[a]]:
+            self.has_losses |= self.slots.pop(gone, None) is not None
+            self.unfit.pop(gone, None)
+        self._folders = found
         if new := [address for address in found if address not in {**self.slots, **self.unfit}]:
             self._take_in(client, new)
         return True

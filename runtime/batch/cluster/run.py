@@ -13,16 +13,17 @@ from typing import TYPE_CHECKING, Any, Final
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.batch.cluster import remote
-from camkit.runtime.batch.cluster.connection import NoAnswer, close_client, open_client
+from camkit.runtime.batch.cluster.connection import NoAnswer
 from camkit.runtime.batch.cluster.crew import Crew
-from camkit.runtime.batch.making import ELSEWHERE, FileProgress
+from camkit.runtime.batch.cluster.link import Link
+from camkit.runtime.batch.cluster.losses import Losses
+from camkit.runtime.batch.making import ELSEWHERE, Common
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task
-from camkit.runtime.cancel import Cancel, Cancelled, check_cancelled
-from camkit.runtime.capture import MosaicOptions
-from camkit.runtime.development import FileResult, WriteOptions
+from camkit.runtime.cancel import Cancelled, check_cancelled
+from camkit.runtime.development import FileResult
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.options import Options
-from camkit.runtime.output.claim import claimed, was_claimed
+from camkit.runtime.output.claim import claimed
 from camkit.runtime.output.sidecar import read_sidecar
 
 if TYPE_CHECKING:
@@ -40,9 +41,6 @@ CLAIMED_S: Final = 30.0
 RETRY_S: Final = 1.0
 TRIES: Final = 3
 """Of a file whose task failed for no reason of its own."""
-SUSPECT: Final = 2
-HOPELESS: Final = 4
-"""Workers that a file lost: then it is tried with no other under way; then it has failed."""
 SAMPLE: Final = 3
 
 Notice = Callable[[str], None]
@@ -54,19 +52,13 @@ class Wishes:
 
     Attributes:
         options: What changes the pixels.
-        write: Where and how pictures are written.
-        mosaic: How to read headerless mosaics.
-        progress: Called with (file, work done, work in all).
-        cancel: The wish to stop.
+        common: How pictures are written; progress and the wish to stop.
         on_result: Called with each result as it is ready.
         notice: Called with what concerns no single file.
     """
 
     options: Options
-    write: WriteOptions
-    mosaic: MosaicOptions | None
-    progress: FileProgress | None
-    cancel: Cancel | None
+    common: Common
     on_result: Callable[[FileResult], None] | None
     notice: Notice
 
@@ -90,7 +82,7 @@ def process_on_cluster(client: "Client", tasks: Sequence[Task], wishes: Wishes) 
     if client.asynchronous:
         raise ContractError("an asynchronous client cannot be waited for; give one that is not")
     run = _Run(client, tasks, wishes)
-    with _token(wishes.write.out_dir, run.name) as token:
+    with _token(wishes.common.write.out_dir, run.name) as token:
         return run.results(token)
 
 
@@ -110,10 +102,8 @@ class _Run:
 
     def __init__(self, client: "Client", tasks: Sequence[Task], wishes: Wishes) -> None:
         self.name = uuid.uuid4().hex[:12]
-        self._client = client
-        self._address = str(getattr(client.scheduler, "address", ""))
-        self._security = client.security
-        self._ours = False
+        self._topic = None if wishes.common.progress is None else f"camkit-{self.name}"
+        self._link = Link(client, self._topic, self._tell)
         self._tasks, self._wishes = tasks, wishes
         self._results: list[FileResult | None] = [None] * len(tasks)
         self._waiting: deque[int] = deque()
@@ -121,11 +111,9 @@ class _Run:
         self._alone: deque[int] = deque()
         self._open: dict[Future[FileResult | None], int] = {}
         self._done: queue.SimpleQueue[Future[FileResult | None]] = queue.SimpleQueue()
+        self._losses = Losses(tasks)
         self._tries = [0] * len(tasks)
         self._claimed_s: dict[int, float] = {}
-        self._unplaced: set[str] = set()
-        self._at: dict[str, str] = {}
-        self._losses = [0] * len(tasks)
         self._idle_since: float | None = None
         self._told_since: float | None = None
         self._shas: dict[str, str] = {NO_BUNDLE: NO_BUNDLE}
@@ -141,8 +129,6 @@ class _Run:
                 self._settle(number, FileResult.failure(task.source, None, task.refusal))
             elif self._results[number] is None:
                 self._waiting.append(number)
-        if not self._waiting:
-            return self._all()
         needs = remote.Needs(
             run=self.name,
             bundles=tuple(bundles),
@@ -151,35 +137,33 @@ class _Run:
             sources=tuple(self._tasks[n].source.absolute() for n in list(self._waiting)[:SAMPLE]),
         )
         self._crew = Crew(needs, bundles, self._wishes.notice)
-        self._topic = None if self._wishes.progress is None else f"camkit-{self.name}"
         try:
-            self._begin()
+            if self._waiting:
+                self._begin()
             while self._waiting or self._later or self._alone or self._open:
-                check_cancelled(self._wishes.cancel)
+                check_cancelled(self._wishes.common.cancel)
                 self._step()
         except BaseException:
             self._give_up()
             raise
         finally:
             self._end()
-        return self._all()
+        return [result for result in self._results if result is not None]
 
     def _begin(self) -> None:
-        self._subscribe()
-        self._crew.look(self._client)
+        self._crew.look(self._link.client)
         if not self._crew.slots:
             raise ContractError(
-                f"no worker of {self._address} can make these files"
+                f"no worker of {self._link.address} can make these files"
                 if self._crew.unfit
-                else f"the scheduler at {self._address} has no workers"
+                else f"the scheduler at {self._link.address} has no workers"
             )
 
     def _step(self) -> None:
         try:
-            if self._client.status in ("closed", "closing"):
-                raise ConnectionError("the connection is closed")
-            if self._client.status == "running":
-                if self._crew.look(self._client):
+            self._link.check()
+            if self._link.is_up:
+                if self._crew.look(self._link.client):
                     self._follow()
                 self._submit()
         except (OSError, NoAnswer) as error:
@@ -189,15 +173,8 @@ class _Run:
 
     def _end(self) -> None:
         with contextlib.suppress(Exception):
-            if self._topic is not None:
-                self._client.unsubscribe_topic(self._topic)
-        with contextlib.suppress(Exception):
-            self._crew.dismiss(self._client)
-        if self._ours:
-            close_client(self._client)
-
-    def _all(self) -> list[FileResult]:
-        return [result for result in self._results if result is not None]
+            self._crew.dismiss(self._link.client)
+        self._link.end()
 
     # ----------------------------------------------------------------------------- bundles
 
@@ -211,7 +188,8 @@ class _Run:
         trouble: dict[str, str] = {}
         for number, task in enumerate(self._tasks):
             name = task.bundle
-            if task.refusal is None and name not in self._shas and name not in trouble:
+            known = name in self._shas or name in trouble or name.lower() == NO_BUNDLE
+            if task.refusal is None and not known:
                 try:
                     path = find_bundle(name)
                     sha256 = open_bundle(path).sha256
@@ -248,15 +226,15 @@ class _Run:
                 bundle=bundle,
             ),
             options=wishes.options,
-            write=wishes.write,
-            mosaic=wishes.mosaic,
+            write=wishes.common.write,
+            mosaic=wishes.common.mosaic,
             run=self.name,
             topic=self._topic,
             number=number,
             file_bytes=self._bytes,
         )
         try:
-            future = self._client.submit(
+            future = self._link.client.submit(
                 remote.make,
                 order,
                 key=f"camkit-{self.name}-{number}-{uuid.uuid4().hex[:6]}",
@@ -301,11 +279,11 @@ class _Run:
             return
         error = future.exception(timeout=STOP_S) if future.status == "error" else None
         if isinstance(error, KilledWorker):
-            self._losses[number] = HOPELESS if self._losses[number] > SUSPECT else SUSPECT
+            self._losses.add_all(number)
             self._send_again(number)
         elif error is None or isinstance(error, Cancelled):
             self._waiting.append(number)
-            self._crew.forget()
+            self._crew.has_losses = True
         else:
             self._after_error(number, error)
 
@@ -359,7 +337,7 @@ class _Run:
         Where workers were lost it was made by one of them, which could not tell: its sidecar does.
         """
         with contextlib.suppress(OSError, NoAnswer):
-            self._crew.look(self._client, now=True)
+            self._crew.look(self._link.client, now=True)
         record = None if result.output is None else read_sidecar(result.output)
         if record is None or not self._crew.has_losses:
             return result
@@ -378,70 +356,44 @@ class _Run:
 
     # ------------------------------------------------------------------------------ losses
 
-    def _find_again(self, error: BaseException) -> None:
-        """Connect anew to a scheduler that was lost, while there is time."""
-        if self._told_since is None or self._told_since != self._idle_since:
-            self._idle_since = self._told_since = time.monotonic()
-            self._wishes.notice(
-                f"the scheduler at {self._address} is lost ({error}); waiting for it"
-            )
-        self._put_back()
-        self._crew.forget()
-        if self._client.status == "running":
-            return
-        try:
-            client = open_client(self._address, self._security)
-        except ContractError:
-            return
-        if self._ours:
-            close_client(self._client)
-        self._client, self._ours = client, True
-        self._subscribe()
-        self._crew.forget()
-
     def _follow(self) -> None:
-        """See where files are: count the workers each has lost, take back what nobody has got.
-
-        The scheduler looks for a worker when a task comes and when a worker comes; what a worker
-        is given by `offer` later makes it look no more.
-        """
-        placed = self._crew.placed(self._client)
-        at = {key: address for address, keys in placed.items() for key in keys}
-        for future, number in list(self._open.items()):
-            key = str(future.key)
-            was = self._at.get(key)
-            its_worker_died = was is not None and was not in placed
-            nobody_has_it = key not in at and key in self._unplaced
-            died = its_worker_died or (nobody_has_it and was_claimed(self._tasks[number].target))
-            self._losses[number] += died
-            suspect = died and self._losses[number] >= SUSPECT
-            if future.status == "pending" and (suspect or nobody_has_it):
-                del self._open[future]
-                future.release()
-                self._send_again(number)
-        self._unplaced = {str(f.key) for f in self._open if str(f.key) not in at}
-        self._at = at
+        """Take back files that nobody has got, or that want to be tried alone."""
+        pending = {str(f.key): f for f in self._open if f.status == "pending"}
+        under_way = {key: self._open[future] for key, future in pending.items()}
+        for key in self._losses.follow(self._crew.placed(self._link.client), under_way):
+            number = self._open.pop(pending[key])
+            pending[key].release()
+            self._send_again(number)
 
     def _send_again(self, number: int) -> None:
-        """Put a file back that lost its workers; one that lost several is tried alone."""
-        if self._losses[number] >= HOPELESS:
+        """Put a file back that lost its worker; one that lost several is tried alone."""
+        fate = self._losses.fate(number)
+        if fate == "failed":
             self._fail(
                 number,
                 "the workers that made it died, in the end with no other file under way; it may "
                 "need more memory than a worker has",
             )
-        elif self._losses[number] >= SUSPECT:
+        elif fate == "alone":
             self._alone.append(number)
         else:
             self._waiting.appendleft(number)
 
-    def _put_back(self) -> None:
-        """Take files back that were under way: who makes them is asked to stop or has stopped."""
+    def _find_again(self, error: Exception) -> None:
+        """Connect anew to a scheduler that was lost, while there is time."""
+        if self._told_since is None or self._told_since != self._idle_since:
+            self._idle_since = self._told_since = time.monotonic()
+            self._wishes.notice(
+                f"the scheduler at {self._link.address} is lost ({error}); waiting for it"
+            )
         with contextlib.suppress(Exception):
             for future in self._open:
                 future.release()
         self._waiting.extendleft(sorted(self._open.values(), reverse=True))
         self._open.clear()
+        self._crew.forget()
+        if not self._link.is_up:
+            self._link.find_again()
 
     def _watch(self) -> None:
         """End the run if it has had neither scheduler nor workers for too long.
@@ -449,7 +401,7 @@ class _Run:
         Raises:
             CamkitError: If so.
         """
-        if self._crew.slots and self._client.status == "running":
+        if self._crew.slots and self._link.is_up:
             self._idle_since = None
             return
         now = time.monotonic()
@@ -457,8 +409,8 @@ class _Run:
             self._idle_since = now
         elif now - self._idle_since > TELL_S and self._told_since != self._idle_since:
             self._told_since = self._idle_since
-            lost = "no worker of" if self._client.status == "running" else "the scheduler at"
-            self._wishes.notice(f"{lost} {self._address} answers; waiting for it")
+            lost = "no worker of" if self._link.is_up else "the scheduler at"
+            self._wishes.notice(f"{lost} {self._link.address} answers; waiting for it")
         if now - self._idle_since > WAIT_S:
             left = len(self._waiting) + len(self._later) + len(self._alone) + len(self._open)
             raise CamkitError(
@@ -469,18 +421,15 @@ class _Run:
     def _give_up(self) -> None:
         """Give up what is under way; wait until the workers have let go of it."""
         with contextlib.suppress(Exception):
-            self._client.cancel(list(self._open), force=True)
+            self._link.client.cancel(list(self._open), force=True)
             end = time.monotonic() + STOP_S
-            while time.monotonic() < end and self._crew.busy(self._client):
+            while time.monotonic() < end and self._crew.busy(self._link.client):
                 time.sleep(POLL_S)
 
     # ---------------------------------------------------------------------------- progress
 
-    def _subscribe(self) -> None:
-        if self._topic is not None:
-            self._client.subscribe_topic(self._topic, self._tell)
-
     def _tell(self, event: tuple[float, Any]) -> None:
         number, done, total = event[1]
-        if self._wishes.progress is not None and self._results[number] is None:
-            self._wishes.progress(self._tasks[number].source, done, total)
+        progress = self._wishes.common.progress
+        if progress is not None and self._results[number] is None:
+            progress(self._tasks[number].source, done, total)

@@ -115,6 +115,22 @@ def test_two_inputs_of_one_output_name_are_refused_before_any_work(captures: Pat
     assert not (captures / "out").exists()
 
 
+def test_folders_of_an_archive_are_kept_on_request(captures: Path) -> None:
+    archive = captures / "archive"
+    for folder in ("2021/may", "2022"):
+        (archive / folder).mkdir(parents=True)
+        (archive / folder / "a.dng").write_bytes((captures / "a.dng").read_bytes())
+    out = captures / "out"
+    choices = {"bundle": "none", "out_dir": out, "keep_folders": True}
+    results = camkit.process(f"{archive}/**/*.dng", **choices)
+    assert [r.output for r in results] == [out / "2021/may/a.exr", out / "2022/a.exr"]
+    assert all(sidecar_path(r.output).is_file() for r in results if r.output)
+    again = camkit.process(f"{archive}/**/*.dng", resume=True, **choices)
+    assert [r.status for r in again] == ["skipped", "skipped"]
+    (single,) = camkit.process(archive / "2022" / "a.dng", **(choices | {"out_dir": out / "one"}))
+    assert single.output == out / "one" / "a.exr", "one folder has nothing to tell apart"
+
+
 def test_a_capture_is_never_overwritten_by_its_own_picture(captures: Path) -> None:
     with pytest.raises(ContractError, match="overwrite itself"):
         camkit.process(

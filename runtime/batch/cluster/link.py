@@ -1,0 +1,71 @@
+"""The way to a scheduler, found again when it is lost."""
+
+import contextlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from camkit.errors import ContractError
+from camkit.runtime.batch.cluster.connection import close_client, open_client
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+
+class Link:
+    """A client, or the one that took its place.
+
+    Attributes:
+        client: To be used now.
+        address: Of the scheduler.
+    """
+
+    def __init__(
+        self, client: "Client", topic: str | None, hear: Callable[[tuple[float, Any]], None]
+    ) -> None:
+        """Take a client, which stays its owner's, and hear what workers tell on a topic."""
+        self.client = client
+        self.address = str(getattr(client.scheduler, "address", ""))
+        self._security = client.security
+        self._topic, self._hear = topic, hear
+        self._is_ours = False
+        self._subscribe()
+
+    @property
+    def is_up(self) -> bool:
+        """Tell whether the scheduler is there, as far as is known."""
+        return bool(self.client.status == "running")
+
+    def check(self) -> None:
+        """Refuse a client that has given up; one that tries again by itself is let.
+
+        Raises:
+            ConnectionError: If so.
+        """
+        if self.client.status in {"closed", "closing"}:
+            raise ConnectionError("the connection is closed")
+
+    def find_again(self) -> bool:
+        """Connect anew; give whether that worked."""
+        try:
+            client = open_client(self.address, self._security)
+        except ContractError:
+            return False
+        self._close()
+        self.client, self._is_ours = client, True
+        self._subscribe()
+        return True
+
+    def end(self) -> None:
+        """Leave the caller's client as it was, close one of our own."""
+        if self._topic is not None:
+            with contextlib.suppress(Exception):
+                self.client.unsubscribe_topic(self._topic)
+        self._close()
+
+    def _close(self) -> None:
+        if self._is_ours:
+            close_client(self.client)
+
+    def _subscribe(self) -> None:
+        if self._topic is not None:
+            self.client.subscribe_topic(self._topic, self._hear)
