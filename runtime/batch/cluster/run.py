@@ -23,7 +23,7 @@ from camkit.runtime.cancel import Cancelled, check_cancelled
 from camkit.runtime.development import FileResult
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.options import Options
-from camkit.runtime.output.claim import claimed
+from camkit.runtime.output.claim import CLAIM_SUFFIX, claimed
 from camkit.runtime.output.sidecar import read_sidecar
 
 if TYPE_CHECKING:
@@ -42,6 +42,9 @@ RETRY_S: Final = 1.0
 TRIES: Final = 3
 """Of a file whose task failed for no reason of its own."""
 SAMPLE: Final = 3
+TOKEN: Final = ".camkit-run-"
+TOKEN_KEPT_S: Final = 86_400.0
+"""A file system without locks would give away those of callers at work."""
 
 Notice = Callable[[str], None]
 
@@ -88,13 +91,19 @@ def process_on_cluster(client: "Client", tasks: Sequence[Task], wishes: Wishes) 
 
 @contextlib.contextmanager
 def _token(folder: Path, run: str) -> Iterator[Path]:
-    """Lay a file beside the pictures by which workers know that they see the same folder."""
-    path = folder.absolute() / f".camkit-run-{run}"
-    path.touch()
-    try:
-        yield path
-    finally:
-        path.unlink(missing_ok=True)
+    """Lay a file beside the pictures by which workers know that they see the same folder.
+
+    It is a claim, so that those of callers that were killed are told from those of callers at work.
+    """
+    folder = folder.absolute()
+    for left in folder.glob(f"{TOKEN}*{CLAIM_SUFFIX}"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > TOKEN_KEPT_S:
+                with claimed(left.with_suffix("")):
+                    pass  # removes it if its caller is no more
+    path = folder / f"{TOKEN}{run}"
+    with claimed(path):
+        yield path.with_name(path.name + CLAIM_SUFFIX)
 
 
 class _Run:

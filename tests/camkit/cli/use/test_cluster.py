@@ -158,6 +158,25 @@ def test_an_interrupt_ends_it_in_seconds_and_leaves_nothing_half_done(
         assert names == sorted(f"{n}{suffix}" for n in whole for suffix in (".exr", ".camkit.json"))
 
 
+def test_workers_give_up_the_files_of_a_caller_that_is_killed(tmp_path: Path, farm: Farm) -> None:
+    write_tiny_captures(tmp_path, [f"shot{n:02}" for n in range(12)])
+    out = tmp_path / "out"
+    caller = subprocess.Popen(_process(tmp_path, "--scheduler", farm.address))
+    wait_until(lambda: list(out.glob("*.exr")))
+    caller.send_signal(signal.SIGKILL)
+    caller.wait()
+    made = len(list(out.glob("*.exr")))
+    wait_until(lambda: not list(out.glob("*.exr.claim")), seconds=20)
+    assert len(list(out.glob("*.exr"))) <= made + 4, "no more than those that were under way"
+    assert len(list(out.glob("*.camkit.json"))) == len(list(out.glob("*.exr")))
+
+    (token,) = out.glob(".camkit-run-*")
+    os.utime(token, (0, 0))
+    done = subprocess.run(_process(tmp_path, "--scheduler", farm.address, "--resume"), check=False)
+    names = [path.suffix for path in out.iterdir()]
+    assert (done.returncode, len(names), names.count(".exr")) == (0, 24, 12)
+
+
 def _process(folder: Path, *options: str) -> list[str]:
     return [
         *(sys.executable, "-m", "camkit", "process", f"{folder}/*.dng"),
