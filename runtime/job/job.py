@@ -51,8 +51,7 @@ class Job:
         work: What was planned; set before any stage runs.
         subject: What was planned for; None before, and without a bundle.
         windows: Role -> the windows of its network, once they are planned.
-        probe: Gives the rows of a plane by name, made for the asking stage alone and equal to those
-            that it will be given; to be called when the first row is asked for, set by the walker.
+        prober: What `probe` asks; set by the walker.
         known: Planes of this capture that were made before; what gives them does not run.
         reserved_bytes: Of the memory cap, what somebody else needs for what becomes of the bands.
         clipped_fraction: Share of clipped samples in the rows read so far.
@@ -81,7 +80,7 @@ class Job:
         self.work = Work()
         self.subject: Subject | None = None
         self.windows: dict[str, NetworkWindows] = {}
-        self.probe: Callable[[str], RowSource] | None = None
+        self.prober: Callable[[Job, str], RowSource] | None = None
         self.known = dict(known or {})
         self.reserved_bytes = reserved_bytes
         self.clipped_fraction = 0.0
@@ -106,6 +105,21 @@ class Job:
     def threads(self) -> int:
         """Give the threads to compute with."""
         return self.setup.threads
+
+    def probe(self, plane: str) -> RowSource:
+        """Give rows of a plane that are made for the asking stage alone, before its first row.
+
+        They equal those that it will be given. To be called when the first row is asked for.
+
+        Raises:
+            ContractError: If it is called earlier, or the plane does not lie before that stage.
+        """
+        if self.prober is None:
+            raise ContractError(
+                f"the plane {plane!r} is asked for too early: stages look at planes when their "
+                "first row is asked for, not while they are made ready"
+            )
+        return self.prober(self, plane)
 
     def unheard(self) -> "Job":
         """Give the same job for a walk whose counts and notes nobody hears."""

@@ -6,12 +6,15 @@ Nothing is computed before the first row is asked for.
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from camkit.bundle.chain import CAPTURE
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
+from camkit.bundle.stages import Stage
 from camkit.errors import ContractError
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
@@ -49,7 +52,6 @@ class Walk:
         self._before = len(self.stages) if before is None else before
         self._instead: dict[str, str] = {}
         self._planes = _planes_of(job)
-        job.probe = self._probe
         self._works: list[StageWork] = [
             stage_module(stage.type).prepare(stage, job) for stage in self.stages
         ]
@@ -64,6 +66,8 @@ class Walk:
         job = self._job
         self.ways = ways_of(self.stages, job.work)
         self._instead = stand_ins(self.stages, self.ways, self._planes)
+        # not a method: a job must not hold the walk that holds it, or it waits for the collector
+        job.prober = partial(_probed, before=self._before)
         job.record["stages"] = {
             key: {"way": way or "left out"} for key, way in zip(self.keys, self.ways, strict=True)
         }
@@ -105,7 +109,7 @@ class Walk:
         Raises:
             ContractError: If no stage gives it.
         """
-        self._giver_of(wanted)
+        _giver_of(wanted, self.stages)
         job, last = self._job, self._instead.get(wanted, wanted)
         needed = self._needed(last)
         takers = Counter([last, *(name for number in needed for name in self._taken(number))])
@@ -148,38 +152,34 @@ class Walk:
         """Name the planes that a stage takes; those that stand in for what is left out."""
         return tuple(self._instead.get(name, name) for name in self.stages[number].takes)
 
-    def _giver_of(self, plane: str) -> int:
-        """Give the number of the stage that gives a plane; -1 for the sensor.
 
-        Raises:
-            ContractError: If none does.
-        """
-        if plane == CAPTURE:
-            return -1
-        for number, stage in enumerate(self.stages):
-            if plane in stage.gives:
-                return number
-        there = ", ".join([CAPTURE, *(name for stage in self.stages for name in stage.gives)])
-        raise ContractError(f"no stage gives the plane {plane!r}; there are {there}")
+def _giver_of(plane: str, stages: Sequence[Stage]) -> int:
+    """Give the number of the stage that gives a plane; -1 for the sensor.
 
-    def _probe(self, plane: str) -> RowSource:
-        """Give rows of a plane that are made for one stage alone, before its first row.
+    Raises:
+        ContractError: If none does.
+    """
+    if plane == CAPTURE:
+        return -1
+    for number, stage in enumerate(stages):
+        if plane in stage.gives:
+            return number
+    there = ", ".join([CAPTURE, *(name for stage in stages for name in stage.gives)])
+    raise ContractError(f"no stage gives the plane {plane!r}; there are {there}")
 
-        Raises:
-            ContractError: If the ways are not settled yet, or the plane does not lie before the
-                stage that asks.
-        """
-        if not self.ways:
-            raise ContractError(
-                f"the plane {plane!r} is asked for too early: stages look at planes when their "
-                "first row is asked for, not while they are made ready"
-            )
-        number = self._giver_of(plane)
-        if number >= self._before:
-            raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
-        walk = Walk(self._job.unheard(), before=number)
-        walk.settle()
-        return walk.stream(plane).rows()
+
+def _probed(job: Job, plane: str, *, before: int) -> RowSource:
+    """Give what `Job.probe` gives.
+
+    Raises:
+        ContractError: If the plane is made by a stage that asks, or behind it.
+    """
+    number = _giver_of(plane, job.setup.stages)
+    if number >= before:
+        raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
+    walk = Walk(job.unheard(), before=number)
+    walk.settle()
+    return walk.stream(plane).rows()
 
 
 def _planes_of(job: Job) -> dict[str, Plane]:

@@ -135,10 +135,11 @@ class _NetworkStage:
 
         Its activations are the peak: what other stages have freed must not lie beside them.
         """
+        cancel = self._job.cancel  # not by the job, which holds the windows
 
         def run(window: FloatArray) -> FloatArray:
             trim_heap(int(TRIM_SHARE * cap_bytes))
-            return engine.run(window, cancel=self._job.cancel)
+            return engine.run(window, cancel=cancel)
 
         return run
 

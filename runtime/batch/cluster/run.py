@@ -42,8 +42,8 @@ RETRY_S: Final = 1.0
 TRIES: Final = 3
 """Of a file whose task failed for no reason of its own."""
 SAMPLE: Final = 3
-TOKEN: Final = ".camkit-run-"
-TOKEN_KEPT_S: Final = 86_400.0
+MARK: Final = ".camkit-run-"
+MARK_KEPT_S: Final = 86_400.0
 """A file system without locks would give away those of callers at work."""
 
 Notice = Callable[[str], None]
@@ -96,12 +96,12 @@ def _token(folder: Path, run: str) -> Iterator[Path]:
     It is a claim, so that those of callers that were killed are told from those of callers at work.
     """
     folder = folder.absolute()
-    for left in folder.glob(f"{TOKEN}*{CLAIM_SUFFIX}"):
+    for left in folder.glob(f"{MARK}*{CLAIM_SUFFIX}"):
         with contextlib.suppress(OSError):
-            if time.time() - left.stat().st_mtime > TOKEN_KEPT_S:
+            if time.time() - left.stat().st_mtime > MARK_KEPT_S:
                 with claimed(left.with_suffix("")):
                     pass  # removes it if its caller is no more
-    path = folder / f"{TOKEN}{run}"
+    path = folder / f"{MARK}{run}"
     with claimed(path):
         yield path.with_name(path.name + CLAIM_SUFFIX)
 

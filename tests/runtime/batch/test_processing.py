@@ -1,5 +1,6 @@
 """Many captures: refused before work, or each done, and nothing half-done is ever visible."""
 
+import gc
 import json
 import os
 import signal
@@ -16,8 +17,10 @@ import camkit
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.batch import expand
 from camkit.runtime.cancel import Cancelled
-from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.output.sidecar import sidecar_path
+from camkit.runtime.pipeline import Pipeline
 from tests.capture_factory import write_tiny_captures
 
 
@@ -69,6 +72,23 @@ def test_jobs_give_the_bits_of_one_at_a_time(captures: Path) -> None:
     for name in ("a.exr", "b.exr"):
         one, two = (captures / f"out{jobs}" / name for jobs in (1, 2))
         np.testing.assert_array_equal(_pixels(one), _pixels(two))
+
+
+def test_what_a_file_took_is_let_go_without_the_collector(captures: Path) -> None:
+    """Captures and sessions are large, and the collector, which counts objects, comes late."""
+
+    def held() -> set[int]:
+        kinds = Capture | Pipeline | NetworkEngine
+        return {id(one) for one in gc.get_objects() if isinstance(one, kinds)}
+
+    gc.collect()
+    before = held()
+    gc.disable()
+    try:
+        camkit.process(captures, bundle=captures / "tiny.camkit", out_dir=captures / "out")
+        assert held() <= before
+    finally:
+        gc.enable()
 
 
 def test_resume_skips_only_what_is_proved_done(captures: Path) -> None:

@@ -395,7 +395,6 @@ class _Probed:
                 first, *others = taken
 
                 def bands() -> Iterator[Rows]:
-                    assert job.probe is not None
                     for plane in planes:
                         self.seen[plane] = read_all(job.probe(plane), step)
                     for band in first.bands():
@@ -449,7 +448,6 @@ def test_a_probe_may_begin_anywhere_in_planes_that_are_sources(
 
     def change(_entry: Any, job: Job, run: Callable[..., Any]) -> Callable[..., Any]:
         def changed(taken: list[Stream]) -> tuple[Stream, ...]:
-            assert job.probe is not None
             window["rgb"] = job.probe("rgb").read(37, 50)
             made: tuple[Stream, ...] = run(taken)
             return made
@@ -524,7 +522,6 @@ def test_planes_are_not_to_be_seen_while_stages_are_made_ready(
     prepare = module.prepare
 
     def early(entry: Any, job: Job) -> StageWork:
-        assert job.probe is not None
         job.probe("rgb")
         work: StageWork = prepare(entry, job)
         return work
