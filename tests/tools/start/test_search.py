@@ -6,12 +6,13 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import read_prescription
+from camkit.models_def.optics.prescription import Lens, read_prescription
 from camkit.models_def.optics.psf import energy_diameter
 from camkit.models_def.optics.pupil import half_disc
+from camkit.models_def.optics.search.problem import residuals
 from camkit.models_def.optics.spot import rms_radius, slopes_for_heights, trace_spots
 from tools.start.recipe import LensRecipe, read_recipe
-from tools.start.search import design
+from tools.start.search import design, problem_of
 
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
 RECIPE = MODELS / "recipes" / "duet_lens.toml"
@@ -97,11 +98,31 @@ def test_duet_is_as_bad_as_it_was_meant_to_be() -> None:
 
 @pytest.mark.slow
 def test_duet_is_found_again_by_its_recipe(recipe: LensRecipe) -> None:
-    found, kept = design(recipe).lens, read_prescription(DUET)
-    for one, other in zip(found.surfaces, kept.surfaces, strict=True):
-        assert one.curvature_per_mm == pytest.approx(other.curvature_per_mm, abs=1e-5)
-        assert one.thickness_mm == pytest.approx(other.thickness_mm, abs=1e-2)
+    """It lies in a flat valley: other places in it are as good to a thousandth."""
+    found, kept = design(recipe), read_prescription(DUET)
+    for one, other in zip(found.lens.surfaces, kept.surfaces, strict=True):
+        assert one.curvature_per_mm == pytest.approx(other.curvature_per_mm, abs=1e-3)
+        assert one.thickness_mm == pytest.approx(other.thickness_mm, abs=0.1)
         assert one.conic == pytest.approx(other.conic, abs=1e-2)
+    assert found.merit == pytest.approx(_merit(recipe, kept), rel=2e-3)
+
+
+def _merit(recipe: LensRecipe, lens: Lens) -> float:
+    """Give the merit of a lens, at its best focus, as the search counts it."""
+    problem = problem_of(recipe)
+    numbers = {
+        "curvature": lambda s: s.curvature_per_mm,
+        "thickness": lambda s: s.thickness_mm,
+        "conic": lambda s: s.conic,
+        "defocus": lambda _: 0.0,
+    }
+    free = problem.free
+    values = [numbers[v.kind](lens.surfaces[v.surface]) for v in free.variables]
+    low, high = free.low, free.high
+    scaled = (torch.tensor(values, dtype=torch.float64) - low) / (high - low).clamp_min(1e-12)
+    focused = scaled.clamp(0, 1).repeat(401, 1)
+    focused[:, [v.kind for v in free.variables].index("defocus")] = torch.linspace(0, 1, 401)
+    return float((residuals(problem, focused) ** 2).sum(1).min())
 
 
 @pytest.mark.parametrize(
