@@ -63,9 +63,9 @@ class Outcome:
     Attributes:
         files_a_s: In the middle of the run.
         hours: Of the whole archive.
-        cores_busy: Share of the core seconds that computed.
-        storage_busy: Share of the time in which storage was at its limit.
-        queue_busy: The same of caller and scheduler.
+        cores_busy: Share of the cores' time that is computing, in the middle of the run.
+        storage_busy: Share of the storage's bytes a second that go through it then.
+        queue_busy: Share of the time of caller and scheduler then, the slower of the two.
         tail_s: From the moment when nothing waited any more to the end.
         again: Share of files that were made again.
     """
@@ -81,9 +81,12 @@ class Outcome:
     @property
     def limit(self) -> str:
         """Name what the rate is limited by."""
-        shares = {"storage": self.storage_busy, "scheduler": self.queue_busy}
-        name = max(shares, key=lambda key: shares[key])
-        return name if shares[name] > 0.95 else "cores"
+        shares = {
+            "cores": self.cores_busy,
+            "storage": self.storage_busy,
+            "scheduler": self.queue_busy,
+        }
+        return max(shares, key=lambda key: shares[key])
 
 
 class Simulation:
@@ -94,7 +97,7 @@ class Simulation:
         self._load = load
         self._rng = random.Random(seed)
         self._queue_free = self._storage_free = 0.0
-        self._queue_s = self._storage_s = self._computed_s = 0.0
+        self._computed_s = 0.0
         self._again = 0
 
     def run(self, files: int, archive: int) -> Outcome:
@@ -124,14 +127,12 @@ class Simulation:
 
     def _handed_out(self, now: float) -> float:
         self._queue_free = max(now, self._queue_free) + self._load.queue_s
-        self._queue_s += self._load.queue_s
         return self._queue_free
 
     def _moved(self, now: float, size: float) -> float:
         """Give when bytes have gone through the storage."""
         alone = size / self._load.storage
         self._storage_free = max(now, self._storage_free) + alone
-        self._storage_s += alone
         return max(self._storage_free, now + size / self._load.stream)
 
     def _computed(self, now: float) -> float:
@@ -149,13 +150,13 @@ class Simulation:
     def _outcome(self, done: list[float], nothing_waits: float, archive: int) -> Outcome:
         first, last = done[len(done) // 4], done[3 * len(done) // 4]
         rate = (3 * len(done) // 4 - len(done) // 4) / max(last - first, 1e-9)
-        wall_s = done[-1]
+        wall_s, load = done[-1], self._load
         return Outcome(
             files_a_s=rate,
             hours=(wall_s + max(archive - len(done), 0) / rate) / 3600,
-            cores_busy=self._computed_s / (wall_s * self._load.cores),
-            storage_busy=self._storage_s / wall_s,
-            queue_busy=self._queue_s / wall_s,
+            cores_busy=rate * self._computed_s / (len(done) * load.cores),
+            storage_busy=rate * (load.bytes_in + load.bytes_out) / load.storage,
+            queue_busy=rate * load.queue_s,
             tail_s=wall_s - nothing_waits,
             again=self._again / len(done),
         )

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LOOK_S: Final = 1.0
-"""So often new workers are looked for."""
+"""So often workers and the places of files are looked at, but for a small share of the time only."""
+LOOK_SHARE: Final = 0.05
 REPLY_S: Final = 8.0
 TRAVEL_S: Final = 120.0
 """A bundle has as long to reach every worker that lacks it."""
@@ -49,6 +50,7 @@ class Crew:
         self._bundles = bundles
         self._notice = notice
         self._looked_s = float("-inf")
+        self._took_s = 0.0
 
     @property
     def flag(self) -> str:
@@ -66,11 +68,11 @@ class Crew:
         return sum(self.slots.values()) + len(self.slots)
 
     def look(self, client: "Client", *, now: bool = False) -> bool:
-        """Take in workers that are new and drop those that are gone, at most once a second.
+        """Take in workers that are new and drop those that are gone, once in a while.
 
         Args:
             client: A connected one.
-            now: Also where that second is not over.
+            now: Also where it is early for that.
 
         Returns:
             Whether it looked.
@@ -79,10 +81,12 @@ class Crew:
             NoAnswer: If the scheduler does not answer.
             OSError: If it is lost.
         """
-        if not now and time.monotonic() - self._looked_s < LOOK_S:
+        began = time.monotonic()
+        if not now and began - self._looked_s < max(LOOK_S, self._took_s / LOOK_SHARE):
             return False
         told = within(REPLY_S, lambda: client.scheduler_info(n_workers=-1))["workers"]
         self._looked_s = time.monotonic()
+        self._took_s = self._looked_s - began
         # a worker that is started again may have its address again, its folder is another one
         found = {address: str(worker.get("local_directory")) for address, worker in told.items()}
         for gone in [a for a in {**self.slots, **self.unfit} if found.get(a) != self._folders[a]]:
@@ -100,7 +104,9 @@ class Crew:
             NoAnswer: If the scheduler does not answer.
             OSError: If it is lost.
         """
+        began = time.monotonic()
         found = within(REPLY_S, client.processing)
+        self._took_s += time.monotonic() - began
         return {address: frozenset(map(str, keys)) for address, keys in found.items()}
 
     def _take_in(self, client: "Client", new: Sequence[str]) -> None:

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -162,6 +163,30 @@ def test_a_worker_that_does_not_answer_is_left_out(tmp_path: Path) -> None:
     assert not workers.look(_Silent()), "not twice within a second"  # type: ignore[arg-type]
     assert notices == ["worker tcp://silent:1 is left out: does not answer within 8 s"]
     assert workers.room() == 0
+
+
+class _Slow(_Silent):
+    """The client of a scheduler with so many workers that to list them takes time."""
+
+    def scheduler_info(self, *, n_workers: int) -> dict[str, Any]:
+        time.sleep(0.1)
+        return {"workers": {}}
+
+    def processing(self) -> dict[str, Any]:
+        time.sleep(0.1)
+        return {}
+
+
+def test_looking_takes_a_small_share_of_the_time(tmp_path: Path) -> None:
+    needs = remote.Needs(
+        run="x", bundles=(), file_bytes=1, token=tmp_path / "token", sources=(tmp_path,)
+    )
+    workers, slow = crew.Crew(needs, {}, print), _Slow()
+    assert workers.look(slow)  # type: ignore[arg-type]
+    workers.placed(slow)  # type: ignore[arg-type]
+    time.sleep(1.1)
+    assert not workers.look(slow), "a second is not enough"  # type: ignore[arg-type]
+    assert workers.look(slow, now=True)  # type: ignore[arg-type]
 
 
 def test_who_takes_too_long_is_left_alone() -> None:
