@@ -1,12 +1,12 @@
 """What a cluster costs beside one process: seconds a file, overhead, bits, and killed workers.
 
-    python -m tools.cluster --captures 200 --width 600 --height 400 --size S
-    python -m tools.cluster --captures 6 --size M              24 megapixels
+    python -m tools.batch.cluster --captures 200 --width 600 --height 400 --size S
+    python -m tools.batch.cluster --captures 6 --size M              24 megapixels
 
 A dask scheduler and workers with one thread each are processes of this machine. `--jobs` of one
 process and the cluster take turns over the same captures, after one round that nobody counts; the
 table has every round and the medians. `--kill N` kills a worker after every N results of one more
-round; a supervisor starts it again. `-o FILE` keeps what `tools.archive` wants.
+round; a supervisor starts it again. `-o FILE` keeps what `tools.batch.archive` wants.
 """
 
 import argparse

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tools import archive
-from tools.archive import Load, Simulation
+from tools.batch import archive
+from tools.batch.archive import Load, Simulation
 
 QUIET = Load(
     cores=50,

@@ -1,13 +1,13 @@
 r"""What an archive costs on many cores, and what breaks first: the queue of a cluster simulated.
 
-    python -m tools.archive --file docs/results/cluster/24mp.json \
+    python -m tools.batch.archive --file docs/results/cluster/24mp.json \
         --queue docs/results/cluster/small.json --captures 10_000_000
 
 Event by event: a free core takes the next file once the caller and the scheduler have had their
 time for it (one after the other, for all files), reads it, computes, writes the picture. Storage is
 one queue of so many bytes a second, a stream no faster than --stream. Seconds vary from file to
 file (log-normal), some files are stragglers, workers die and their files are made again. Seconds,
-bytes and CPU times come from files of `tools.cluster`; a run simulates --simulated files
+bytes and CPU times come from files of `tools.batch.cluster`; a run simulates --simulated files
 and goes on at the rate of its middle.
 """
 
@@ -167,7 +167,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--file", type=Path, required=True, help="of tools.cluster: what one is")
+    parser.add_argument(
+        "--file", type=Path, required=True, help="of tools.batch.cluster: what one is"
+    )
     parser.add_argument("--queue", type=Path, required=True, help="one of many files: the queue")
     parser.add_argument("--captures", type=int, default=10_000_000)
     parser.add_argument("--cores", default="100,300,1000,3000,10000")
@@ -214,7 +216,7 @@ def table(load: Load, cores: list[int], wanted: argparse.Namespace) -> Iterator[
 
 
 def measured_load(file: Path, queue: Path) -> Load:
-    """Read what `tools.cluster` measured."""
+    """Read what `tools.batch.cluster` measured."""
     found = json.loads(file.read_text(encoding="utf-8"))
     many = json.loads(queue.read_text(encoding="utf-8"))
     queue_ms = max(many["caller_cpu_ms_a_file"], many["scheduler_cpu_ms_a_file"])

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.bundle_factory import write_tiny_bundle
-from tools import cluster
+from tools.batch import cluster
 
 
 def test_both_ways_are_measured_and_give_equal_bits(
