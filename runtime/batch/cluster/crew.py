@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LOOK_S: Final = 1.0
-"""So often workers and the places of files are looked at, but for a small share of the time only."""
+"""So often workers and places of files are looked at, but for a small share of the time."""
 LOOK_SHARE: Final = 0.05
 REPLY_S: Final = 8.0
 TRAVEL_S: Final = 120.0
