@@ -86,7 +86,9 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     from camkit.runtime.batch.cluster.run import Wishes, process_on_cluster
 
     notice = on_notice or logger.warning
-    wishes = Wishes(options=options, common=common, on_result=on_result, notice=notice)
+    wishes = Wishes(
+        options=options, common=common, pipelines=pipelines, on_result=on_result, notice=notice
+    )
     return process_on_cluster(client, tasks, wishes)
 
 

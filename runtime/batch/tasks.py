@@ -31,7 +31,7 @@ class Task:
     target: Path
     bundle: str
     refusal: str | None = None
-    before: tuple[int, int, int] | None = None
+    before: tuple[int, int] | None = None
 
 
 def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptions) -> list[Task]:
@@ -89,13 +89,16 @@ def _make_task(source: Path, bundle: str | None, target: Path) -> Task:
     )
 
 
-def state_of(path: Path) -> tuple[int, int, int] | None:
-    """Give what changes when a file is written anew; None without a file."""
+def state_of(path: Path) -> tuple[int, int] | None:
+    """Give what changes when a file is written anew; None without a file.
+
+    Its inode does too, but every machine may see another one.
+    """
     try:
         found = path.stat()
     except (OSError, ValueError):
         return None
-    return found.st_ino, found.st_mtime_ns, found.st_size
+    return found.st_mtime_ns, found.st_size
 
 
 def _refuse_clashes(tasks: Sequence[Task]) -> None:

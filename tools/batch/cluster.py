@@ -10,7 +10,9 @@ round; a supervisor starts it again. `-o FILE` keeps what `tools.batch.archive` 
 """
 
 import argparse
+import contextlib
 import json
+import os
 import random
 import signal
 import socket
@@ -145,7 +147,7 @@ class Processes:
         for name in self.workers:
             scratch = str(folder / name)
             self._commands[name] = [
-                *("worker", self.address, "--nthreads", "1", "--no-nanny", *host),
+                *("worker", self.address, "--nthreads", "1", *host),
                 *("--local-directory", scratch),
             ]
         self._running: dict[str, subprocess.Popen[bytes]] = {}
@@ -159,13 +161,14 @@ class Processes:
     def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
-        for process in self._running.values():
-            process.send_signal(signal.SIGKILL)
+        for name, process in self._running.items():
+            self.kill(name)
             process.wait()
 
     def kill(self, name: str) -> None:
-        """Kill a process as the system does for want of memory."""
-        self._running[name].send_signal(signal.SIGKILL)
+        """Kill a process and what it started, as a machine is lost."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._running[name].pid, signal.SIGKILL)
 
     def pid_of(self, name: str) -> int:
         """Give the process that has a name now."""
@@ -179,6 +182,7 @@ class Processes:
                         [sys.executable, "-W", "ignore", "-m", "dask", *command],
                         stdout=subprocess.DEVNULL,
                         stderr=subprocess.DEVNULL,
+                        start_new_session=True,
                     )
             if self._ended.wait(0.2):
                 return

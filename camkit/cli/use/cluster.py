@@ -12,11 +12,13 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def cluster_client(scheduler: str | None, workers: int | None) -> "Iterator[Client | None]":
+def cluster_client(
+    scheduler: str | None, workers: int | None, jobs: int
+) -> "Iterator[Client | None]":
     """Give a client of dask.distributed; None where this process makes the pictures.
 
     Raises:
-        ContractError: If both are given, or no scheduler answers.
+        ContractError: If both are given, or jobs beside one of them, or no scheduler answers.
         UnsupportedError: If dask.distributed is not installed.
     """
     if scheduler is None and workers is None:
@@ -24,6 +26,8 @@ def cluster_client(scheduler: str | None, workers: int | None) -> "Iterator[Clie
         return
     if scheduler is not None and workers is not None:
         raise ContractError("--scheduler has workers of its own; leave --workers out")
+    if jobs > 1:
+        raise ContractError("--jobs are those of one process; leave it out with workers")
     from camkit.runtime.batch.cluster.connection import connected, own_workers
 
     _quiet()

@@ -146,14 +146,14 @@ def process(
 
         done = print_plans(sources, bundle, options, write, headerless, as_json=json_)
     else:
-        with cluster_client(scheduler, workers) as client, TileProgress() as progress:
+        with cluster_client(scheduler, workers, jobs) as client, TileProgress() as progress:
             results = run(
                 sources,
                 bundle=bundle,
                 options=options,
                 write=write,
                 mosaic=headerless,
-                progress=progress.tile,
+                progress=progress.teller,
                 on_result=lambda result: progress.result(result, as_json=json_),
                 client=client,
                 on_notice=progress.notice,

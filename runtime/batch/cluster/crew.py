@@ -4,6 +4,7 @@ import importlib.metadata
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.runtime.batch.cluster import remote
@@ -18,6 +19,9 @@ LOOK_SHARE: Final = 0.05
 REPLY_S: Final = 8.0
 TRAVEL_S: Final = 120.0
 """A bundle has as long to reach every worker that lacks it."""
+SILENT_S: Final = 60.0
+"""After so long a worker that did not answer is asked again."""
+ASKED_AT_ONCE: Final = 32
 
 
 class Crew:
@@ -51,6 +55,8 @@ class Crew:
         self._notice = notice
         self._looked_s = float("-inf")
         self._took_s = 0.0
+        self._silent_s: dict[str, float] = {}
+        self._told: set[tuple[str, str]] = set()
 
     @property
     def flag(self) -> str:
@@ -84,14 +90,20 @@ class Crew:
         began = time.monotonic()
         if not now and began - self._looked_s < max(LOOK_S, self._took_s / LOOK_SHARE):
             return False
-        told = within(REPLY_S, lambda: client.scheduler_info(n_workers=-1))["workers"]
-        self._looked_s = time.monotonic()
-        self._took_s = self._looked_s - began
+        told = within(REPLY_S, lambda: _workers(client))
+        if not now:
+            self._looked_s = time.monotonic()
+            self._took_s = self._looked_s - began
         # a worker that is started again may have its address again, its folder is another one
         found = {address: str(worker.get("local_directory")) for address, worker in told.items()}
         for gone in [a for a in {**self.slots, **self.unfit} if found.get(a) != self._folders[a]]:
-            self.has_losses |= self.slots.pop(gone, None) is not None
+            if self.slots.pop(gone, None) is not None:
+                self.has_losses = True
+                self._notice(f"worker {gone} is lost; its files are made again")
             self.unfit.pop(gone, None)
+        for silent in [a for a, since in self._silent_s.items() if began - since > SILENT_S]:
+            del self._silent_s[silent]
+            self.unfit.pop(silent, None)
         self._folders = found
         if new := [address for address in found if address not in {**self.slots, **self.unfit}]:
             self._take_in(client, new)
@@ -147,20 +159,30 @@ class Crew:
         if not workers:
             return {}
         ready = [arg() if callable(arg) else arg for arg in args]
+
+        def ask(asked: list[str]) -> dict[str, Any]:
+            try:
+                return within(
+                    seconds, lambda: client.run(function, *ready, workers=asked, on_error="return")
+                )
+            except NoAnswer:
+                return {}
+
         asked = list(workers)
-        try:
-            answers = within(
-                seconds, lambda: client.run(function, *ready, workers=asked, on_error="return")
-            )
-        except NoAnswer:
-            answers = {}
+        answers = ask(asked)
+        if not answers and len(asked) > 1:  # one that is silent keeps the answers of all
+            with ThreadPoolExecutor(ASKED_AT_ONCE) as pool:
+                for answer in pool.map(lambda address: ask([address]), asked):
+                    answers |= answer
         kept = {}
         for address in asked:
-            answer = answers.get(address, NoAnswer(f"does not answer within {seconds:.0f} s"))
-            if isinstance(answer, BaseException):
-                self._leave_out(address, _trouble(answer))
+            if address not in answers:
+                self._silent_s[address] = time.monotonic()
+                self._leave_out(address, f"does not answer within {seconds:.0f} s")
+            elif isinstance(answers[address], BaseException):
+                self._leave_out(address, _trouble(answers[address]))
             else:
-                kept[address] = answer
+                kept[address] = answers[address]
         return kept
 
     def _keep(
@@ -173,7 +195,9 @@ class Crew:
 
     def _leave_out(self, address: str, reason: str) -> None:
         self.unfit[address] = reason
-        self._notice(f"worker {address} is left out: {reason}")
+        if (address, reason) not in self._told:
+            self._told.add((address, reason))
+            self._notice(f"worker {address} is left out: {reason}")
 
     def dismiss(self, client: "Client") -> None:
         """Let the workers forget the run."""
@@ -191,6 +215,17 @@ class Crew:
             lambda: client.run(remote.busy, self._needs.run, workers=workers, on_error="ignore"),
         )
         return sum(answers.values())
+
+
+def _workers(client: "Client") -> dict[str, dict[str, Any]]:
+    """Give what the scheduler knows of every worker, by its address.
+
+    Asked of it directly: `client.scheduler_info` answers for five workers if the client has looked
+    after itself meanwhile.
+    """
+    scheduler: Any = client.scheduler
+    told: dict[str, dict[str, Any]] = client.sync(scheduler.identity, n_workers=-1)["workers"]
+    return told
 
 
 def _trouble(error: BaseException) -> str:

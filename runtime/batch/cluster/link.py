@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from camkit.errors import ContractError
+from camkit.errors import CamkitError
 from camkit.runtime.batch.cluster.connection import close_client, open_client
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ class Link:
         self.client = client
         self.address = str(getattr(client.scheduler, "address", ""))
         self._security = client.security
-        self._topic, self._hear = topic, hear
+        self._topic = topic
+        self._ears = [hear]  # emptied at the end: a client keeps for life what it was given
         self._is_ours = False
         self._subscribe()
 
@@ -36,19 +37,21 @@ class Link:
         return bool(self.client.status == "running")
 
     def check(self) -> None:
-        """Refuse a client that has given up; one that tries again by itself is let.
+        """Refuse a client that has given up; one that tries again by itself is let, and listens.
 
         Raises:
             ConnectionError: If so.
         """
         if self.client.status in {"closed", "closing"}:
             raise ConnectionError("the connection is closed")
+        if self.is_up and self.client.scheduler_comm is not self._comm:
+            self._subscribe()
 
     def find_again(self) -> bool:
         """Connect anew; give whether that worked."""
         try:
             client = open_client(self.address, self._security)
-        except ContractError:
+        except (CamkitError, OSError):
             return False
         self._close()
         self.client, self._is_ours = client, True
@@ -57,6 +60,7 @@ class Link:
 
     def end(self) -> None:
         """Leave the caller's client as it was, close one of our own."""
+        self._ears.clear()
         if self._topic is not None:
             with contextlib.suppress(Exception):
                 self.client.unsubscribe_topic(self._topic)
@@ -67,5 +71,12 @@ class Link:
             close_client(self.client)
 
     def _subscribe(self) -> None:
+        """Ask the scheduler for what is told; one that was started again knows nothing of it."""
+        self._comm, ears = self.client.scheduler_comm, self._ears
+
+        def hear(event: tuple[float, Any]) -> None:
+            for ear in ears:
+                ear(event)
+
         if self._topic is not None:
-            self.client.subscribe_topic(self._topic, self._hear)
+            self.client.subscribe_topic(self._topic, hear)

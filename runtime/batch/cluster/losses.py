@@ -51,9 +51,9 @@ class Losses:
         self._at = at
         return back
 
-    def add_all(self, number: int) -> None:
+    def add_all(self, number: int, *, was_alone: bool) -> None:
         """Count what dask does not hand out any more: it has lost one worker after the other."""
-        self._counts[number] = HOPELESS if self._counts[number] > SUSPECT else SUSPECT
+        self._counts[number] = HOPELESS if was_alone else max(self._counts[number], SUSPECT)
 
     def fate(self, number: int) -> Fate:
         """Say what becomes of a file that lost its worker."""

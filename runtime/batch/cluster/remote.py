@@ -14,6 +14,7 @@ from camkit.runtime.batch.making import Common, Pipelines, try_task
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions
+from camkit.runtime.machine.memory import keep_freed_memory, trim_heap
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ MEMORY: Final = "camkit_bytes"
 OWN_BYTES: Final = 150_000_000
 """What a worker with camkit takes before the first file (measured: 142 MB)."""
 BUNDLES: Final = "camkit-bundles"
-_TICK_S: Final = 0.25
+_TICK_S: Final = 1.0
 _KEPT_RUNS: Final = 2
 
 _lock = threading.Lock()
@@ -52,12 +53,8 @@ class Needs:
 
     @property
     def flag(self) -> str:
-        """Name the resource that tells workers that fit from others.
-
-        Runs with the same needs share it: a worker keeps the names of its resources for life.
-        """
-        said = [*self.bundles, str(self.file_bytes), str(self.token.parent)]
-        return f"camkit_{hashlib.sha256('|'.join(said).encode()).hexdigest()[:16]}"
+        """Name the resource that tells workers that fit from others."""
+        return f"camkit_{self.run}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,13 +87,10 @@ def file_bytes(options: Options) -> int:
     return options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
 
 
-async def look(needs: Needs, dask_worker: "Worker") -> tuple[str | None, tuple[str, ...]]:
+def look(needs: Needs, dask_worker: "Worker") -> tuple[str | None, tuple[str, ...]]:
     """Say why this worker cannot serve a run (None if it can), and which bundles it lacks."""
-    reason = _unfit(needs, dask_worker)
-    if reason is not None and needs.flag in dask_worker.state.total_resources:
-        await dask_worker.set_resources(**{needs.flag: 0})
     lacks = tuple(sha for sha in needs.bundles if not _bundle_path(sha, dask_worker).is_file())
-    return reason, lacks
+    return _unfit(needs, dask_worker), lacks
 
 
 def _unfit(needs: Needs, dask_worker: "Worker") -> str | None:
@@ -133,6 +127,7 @@ def take_bundle(sha256: str, data: bytes, dask_worker: "Worker") -> None:
 
 async def offer(needs: Needs, dask_worker: "Worker") -> int:
     """Offer this worker to a run; give how many files it makes at once."""
+    keep_freed_memory()
     memory = _memory_bytes(dask_worker)
     wanted = {MEMORY: float(memory), needs.flag: 1e9}
     if any(dask_worker.state.total_resources.get(k) != v for k, v in wanted.items()):
@@ -176,6 +171,7 @@ def make(order: Order) -> FileResult | None:
         )
         return try_task(_local(order.task, worker), _pipelines_of(order, worker), common)
     finally:
+        trim_heap(OWN_BYTES + order.file_bytes // 2)
         with _lock:
             _busy[order.run] -= 1
             if not _busy[order.run]:
@@ -212,7 +208,7 @@ def _is_given_up(worker: "Worker", key: Any) -> bool:
 
 
 def _teller(worker: "Worker", topic: str, number: int) -> Callable[[Path, int, int], None]:
-    """Give a progress that tells the caller, a few times a second."""
+    """Give a progress that tells the caller, once a second."""
     last = 0.0
 
     def tell(_: Path, done: int, total: int) -> None:

@@ -17,11 +17,10 @@ from camkit.runtime.batch.cluster.connection import NoAnswer
 from camkit.runtime.batch.cluster.crew import Crew
 from camkit.runtime.batch.cluster.link import Link
 from camkit.runtime.batch.cluster.losses import Losses
-from camkit.runtime.batch.making import ELSEWHERE, Common
+from camkit.runtime.batch.making import ELSEWHERE, Common, Pipelines
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task
 from camkit.runtime.cancel import Cancelled, check_cancelled
 from camkit.runtime.development import FileResult
-from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.options import Options
 from camkit.runtime.output.claim import CLAIM_SUFFIX, claimed
 from camkit.runtime.output.sidecar import read_sidecar
@@ -38,6 +37,12 @@ STOP_S: Final = 5.0
 """Files in the making have so long to be given up."""
 CLAIMED_S: Final = 30.0
 """A file that somebody else has claimed for so long is left to him."""
+LEASE_S: Final = 120.0
+"""Where workers were lost he may be one of them: a file server keeps a lock while it waits for the
+machine to come back (NFS: 90 s).
+"""
+LOST_S: Final = 60.0
+"""A scheduler that is connected may take so long to answer."""
 RETRY_S: Final = 1.0
 TRIES: Final = 3
 """Of a file whose task failed for no reason of its own."""
@@ -56,12 +61,14 @@ class Wishes:
     Attributes:
         options: What changes the pixels.
         common: How pictures are written; progress and the wish to stop.
+        pipelines: Of this machine; nothing is computed with them.
         on_result: Called with each result as it is ready.
         notice: Called with what concerns no single file.
     """
 
     options: Options
     common: Common
+    pipelines: Pipelines
     on_result: Callable[[FileResult], None] | None
     notice: Notice
 
@@ -122,6 +129,8 @@ class _Run:
         self._done: queue.SimpleQueue[Future[FileResult | None]] = queue.SimpleQueue()
         self._losses = Losses(tasks)
         self._tries = [0] * len(tasks)
+        self._lone: int | None = None
+        self._unanswered_s: float | None = None
         self._claimed_s: dict[int, float] = {}
         self._idle_since: float | None = None
         self._told_since: float | None = None
@@ -175,7 +184,17 @@ class _Run:
                 if self._crew.look(self._link.client):
                     self._follow()
                 self._submit()
-        except (OSError, NoAnswer) as error:
+                self._unanswered_s = None
+        except NoAnswer as error:
+            now = time.monotonic()
+            if self._unanswered_s is None:
+                self._unanswered_s = now
+                self._wishes.notice(
+                    f"the scheduler at {self._link.address} does not answer; waiting for it"
+                )
+            if not self._link.is_up or now - self._unanswered_s > LOST_S:
+                self._find_again(error)
+        except OSError as error:
             self._find_again(error)
         self._collect()
         self._watch()
@@ -222,7 +241,8 @@ class _Run:
         while self._waiting and len(self._open) < room:
             self._send(self._waiting.popleft())
         if self._alone and not (self._open or self._waiting or self._later) and room:
-            self._send(self._alone.popleft())
+            self._lone = self._alone.popleft()
+            self._send(self._lone)
 
     def _send(self, number: int) -> None:
         task, wishes = self._tasks[number], self._wishes
@@ -278,7 +298,7 @@ class _Run:
             try:
                 result = future.result(timeout=STOP_S)
             except Exception:  # noqa: BLE001 - its worker went with the result: it is made or proved again
-                self._waiting.append(number)
+                self._again(number)
                 return
             self._idle_since = None
             if result is None:
@@ -288,33 +308,34 @@ class _Run:
             return
         error = future.exception(timeout=STOP_S) if future.status == "error" else None
         if isinstance(error, KilledWorker):
-            self._losses.add_all(number)
+            self._losses.add_all(number, was_alone=number == self._lone)
             self._send_again(number)
         elif error is None or isinstance(error, Cancelled):
-            self._waiting.append(number)
-            self._crew.has_losses = True
+            self._again(number)
         else:
             self._after_error(number, error)
+
+    def _again(self, number: int) -> None:
+        """Put a file back that was lost for no reason of its own."""
+        self._crew.has_losses = True
+        self._claimed_s.pop(number, None)
+        self._waiting.append(number)
 
     def _wait_for_claim(self, number: int) -> None:
         """Try a file again that somebody else is making: he may be a worker that was lost."""
         task, now = self._tasks[number], time.monotonic()
         since = self._claimed_s.setdefault(number, now)
-        if now - since < CLAIMED_S:
+        if now - since < (LEASE_S if self._crew.has_losses else CLAIMED_S):
             self._later.append((now + RETRY_S, number))
-            return
-        self._settle(
-            number,
-            FileResult(
-                input=task.source,
-                output=task.target,
-                status="skipped",
-                bundle=None if task.bundle == NO_BUNDLE else task.bundle,
-                seconds={},
-                peak_rss_mb=peak_rss_mb(),
-                warnings=(ELSEWHERE,),
-            ),
-        )
+        elif self._crew.has_losses:
+            self._fail(
+                number,
+                f"{task.target} is claimed by another process, or by a worker that was lost; run "
+                "again with --resume",
+            )
+        else:
+            pipeline = self._wishes.pipelines.get(task.bundle)
+            self._settle(number, FileResult.skip(task.source, task.target, pipeline, ELSEWHERE))
 
     def _after_error(self, number: int, error: BaseException) -> None:
         self._tries[number] += 1
@@ -376,6 +397,7 @@ class _Run:
 
     def _send_again(self, number: int) -> None:
         """Put a file back that lost its worker; one that lost several is tried alone."""
+        self._claimed_s.pop(number, None)
         fate = self._losses.fate(number)
         if fate == "failed":
             self._fail(
@@ -400,6 +422,8 @@ class _Run:
                 future.release()
         self._waiting.extendleft(sorted(self._open.values(), reverse=True))
         self._open.clear()
+        self._claimed_s.clear()
+        self._unanswered_s = None
         self._crew.forget()
         if not self._link.is_up:
             self._link.find_again()

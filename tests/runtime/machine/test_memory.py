@@ -1,5 +1,6 @@
 """The peak memory is that of this process, not of the one that started it."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -41,6 +42,37 @@ def test_freed_memory_is_given_back_near_the_limit_only() -> None:
     assert given_back < 0.5 * held
 
 
+@pytest.mark.skipif(memory._LIBC is None, reason="no glibc")
+def test_a_threshold_that_gives_every_array_back_is_undone() -> None:
+    """As dask's nanny sets it: then memory that is freed and taken again is not paged in anew."""
+    env = {**os.environ, "MALLOC_TRIM_THRESHOLD_": "65536"}
+    faults = [
+        int(
+            subprocess.run(
+                [sys.executable, "-c", PAGES, undo],
+                capture_output=True,
+                text=True,
+                check=True,
+                env=env,
+            ).stdout
+        )
+        for undo in ("", "undo")
+    ]
+    assert faults[0] > 50_000
+    assert faults[1] < 0.2 * faults[0]
+
+
+PAGES = """
+import resource, sys
+import numpy as np
+from camkit.runtime.machine.memory import keep_freed_memory
+if sys.argv[1]:
+    keep_freed_memory()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(100):
+    np.ones(1_000_000)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
 HOLES = """
 import ctypes
 from camkit.runtime.machine import memory

@@ -65,7 +65,7 @@ def test_workers_of_its_own(captures: Path, camkit_command: Command) -> None:
     [
         (("--workers", 0), "workers must be >= 1"),
         (("--workers", 1, "--scheduler", "tcp://127.0.0.1:1"), "leave --workers out"),
-        (("--workers", 1, "--jobs", 2), "jobs are those of one process"),
+        (("--workers", 1, "--jobs", 2), "--jobs are those of one process"),
         (("--scheduler", "nonsense"), "missing port number"),
         (("--scheduler", "foo://host:1"), "unknown address scheme"),
         (("--scheduler", "tls://127.0.0.1:1"), "distributed.comm.tls"),

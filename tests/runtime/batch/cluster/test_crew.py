@@ -2,10 +2,11 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +147,13 @@ def test_certificates_are_those_of_dasks_configuration(tmp_path: Path) -> None:
 class _Silent:
     """A client whose workers do not answer."""
 
-    def scheduler_info(self, *, n_workers: int) -> dict[str, Any]:
+    def __init__(self) -> None:
+        self.scheduler = self
+
+    def sync(self, ask: Callable[..., Any], **choices: Any) -> Any:
+        return ask(**choices)
+
+    def identity(self, *, n_workers: int) -> dict[str, Any]:
         return {"workers": {"tcp://silent:1": {}}}
 
     def run(self, *_: object, **__: object) -> dict[str, Any]:
@@ -168,7 +175,7 @@ def test_a_worker_that_does_not_answer_is_left_out(tmp_path: Path) -> None:
 class _Slow(_Silent):
     """The client of a scheduler with so many workers that to list them takes time."""
 
-    def scheduler_info(self, *, n_workers: int) -> dict[str, Any]:
+    def identity(self, *, n_workers: int) -> dict[str, Any]:
         time.sleep(0.1)
         return {"workers": {}}
 
@@ -199,6 +206,34 @@ def test_who_takes_too_long_is_left_alone() -> None:
     assert within(5, lambda: "here") == "here"
     with pytest.raises(ZeroDivisionError):
         within(5, lambda: 1 / 0)
+
+
+def test_one_silent_worker_does_not_keep_the_answers_of_others(
+    farm: Farm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(crew, "SILENT_S", 1.0)  # asked again, not told again
+    bundle = write_tiny_captures(tmp_path, [f"shot{n}" for n in range(3)])
+    farm.add_worker("frozen")
+    farm.add_worker("awake")
+    farm.wait(len(UNFIT) + 2)
+    notices: list[str] = []
+    with farm.client() as client:
+        workers = client.scheduler_info(n_workers=-1)["workers"]
+        (address,) = [a for a, worker in workers.items() if worker["name"] == "frozen"]
+        pid = client.run(os.getpid, workers=[address])[address]
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            results = camkit.process(
+                tmp_path,
+                bundle=bundle,
+                out_dir=tmp_path / "out",
+                client=client,
+                on_notice=notices.append,
+            )
+        finally:
+            os.kill(pid, signal.SIGCONT)
+    assert [r.status for r in results] == ["ok"] * 3
+    assert sum("does not answer" in notice for notice in notices) == 1
 
 
 def test_a_bundle_that_did_not_arrive_whole_is_not_kept(tmp_path: Path) -> None:
