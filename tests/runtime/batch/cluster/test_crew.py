@@ -236,6 +236,17 @@ def test_one_silent_worker_does_not_keep_the_answers_of_others(
     assert sum("does not answer" in notice for notice in notices) == 1
 
 
+def test_runs_do_not_share_the_flag_of_workers_that_fit(tmp_path: Path) -> None:
+    """One of them may not see its captures where the other does."""
+    flags = {
+        remote.Needs(
+            run=run, bundles=("x",), file_bytes=1, token=tmp_path / "token", sources=(tmp_path,)
+        ).flag
+        for run in ("one", "two")
+    }
+    assert len(flags) == 2
+
+
 def test_a_bundle_that_did_not_arrive_whole_is_not_kept(tmp_path: Path) -> None:
     class Worker:
         local_directory = str(tmp_path)

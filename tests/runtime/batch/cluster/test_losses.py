@@ -10,6 +10,7 @@ import pytest
 import camkit
 from camkit.errors import CamkitError
 from camkit.runtime.batch.cluster import run as run_module
+from camkit.runtime.batch.cluster.losses import Losses
 from tests.capture_factory import write_tiny_captures
 from tests.runtime.batch.cluster.farm import Farm
 
@@ -119,6 +120,7 @@ def test_a_scheduler_that_is_lost_is_waited_for(tmp_path: Path) -> None:
         farm.add_worker("one")
         farm.wait(1)
         lost: list[str] = []
+        heard: set[str] = set()
 
         def lose(result: camkit.FileResult) -> None:
             if not lost:
@@ -132,8 +134,10 @@ def test_a_scheduler_that_is_lost_is_waited_for(tmp_path: Path) -> None:
                 out_dir=out,
                 client=client,
                 on_result=lose,
+                progress=lambda path, done, total: heard.add(path.stem),
             )
     assert lost
+    assert len(heard) > 4, "progress is heard of the new scheduler too"
     _check_whole(results, out, expected)
 
 
@@ -169,6 +173,17 @@ def test_a_network_that_stays_lost_ends_the_run_with_what_to_do(
 
 
 @pytest.mark.parametrize("fault", [KILLS_ITS_WORKER])
+def test_a_file_that_died_with_its_worker_though_alone_has_failed() -> None:
+    losses = Losses([])
+    losses._counts = [0, 0]
+    losses.add_all(0, was_alone=False)
+    assert losses.fate(0) == "alone"
+    losses.add_all(0, was_alone=False)
+    assert losses.fate(0) == "alone", "others were under way: it may have been one of them"
+    losses.add_all(0, was_alone=True)
+    assert [losses.fate(n) for n in (0, 1)] == ["failed", "again"]
+
+
 def test_a_worker_that_dies_of_a_file_costs_that_file(tmp_path: Path, fault: str) -> None:
     _one_file_is_lost(tmp_path, fault)
 

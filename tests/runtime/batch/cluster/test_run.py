@@ -10,7 +10,9 @@ from distributed import Client
 
 import camkit
 from camkit.errors import BundleError, ContractError
+from camkit.runtime.batch.cluster import crew
 from camkit.runtime.batch.cluster import run as run_module
+from camkit.runtime.batch.cluster.connection import NoAnswer
 from camkit.runtime.output.claim import claimed
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.capture_factory import write_tiny_captures
@@ -156,7 +158,56 @@ def test_what_somebody_else_is_making_is_waited_for(
         "a": "skipped",
     }
     assert results[0].warnings == ("another process makes this picture",)
+    assert (results[0].bundle, results[0].size) == (results[1].bundle, results[1].size)
     assert set(seen[:2]) == {"c", "d"}
+
+
+def test_a_claim_that_a_lost_worker_may_hold_is_no_success(
+    captures: Path, client: Client, tmp_path: Path
+) -> None:
+    with claimed(tmp_path / "a.exr"), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "CLAIMED_S", 0.0)
+        patch.setattr(run_module, "LEASE_S", 3.0)
+        patch.setattr(crew.Crew, "has_losses", property(lambda _: True, lambda *_: None))
+        results = camkit.process(
+            captures, bundle=captures / "tiny.camkit", out_dir=tmp_path, client=client
+        )
+    assert [r.status for r in results] == ["failed", "ok", "ok", "ok"]
+    assert "claimed by another process, or by a worker that was lost" in (results[0].error or "")
+
+
+def test_a_scheduler_that_answers_late_keeps_what_is_under_way(
+    captures: Path, client: Client, tmp_path: Path
+) -> None:
+    notices: list[str] = []
+    sent: list[int] = []
+    looks: list[bool] = []
+    look, send = crew.Crew.look, run_module._Run._send
+
+    def late(self: crew.Crew, client: Client, *, now: bool = False) -> bool:
+        looks.append(now)
+        if 1 < len(looks) < 5:
+            raise NoAnswer
+        return look(self, client, now=now)
+
+    def counted(self: run_module._Run, number: int) -> None:
+        sent.append(number)
+        send(self, number)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(crew.Crew, "look", late)
+        patch.setattr(run_module._Run, "_send", counted)
+        results = camkit.process(
+            captures,
+            bundle=captures / "tiny.camkit",
+            out_dir=tmp_path,
+            client=client,
+            on_notice=notices.append,
+        )
+    assert [r.status for r in results] == ["ok"] * len(NAMES)
+    assert sorted(sent) == list(range(len(NAMES))), "nothing is handed out twice"
+    assert [notice.split(" at ")[0] for notice in notices] == ["the scheduler"]
+    assert "does not answer; waiting for it" in notices[0]
 
 
 def test_the_wish_to_stop_leaves_nothing_half_done(

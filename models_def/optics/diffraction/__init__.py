@@ -1,0 +1,6 @@
+"""Plates that diffract, before an ordinary lens.
+
+- `chirp_z`: a Fourier transform onto any grid
+- `geometry`: source, lens and sensor, and the paths between them
+- `wave`: a height map -> the PSF on the sensor's pixels
+"""
