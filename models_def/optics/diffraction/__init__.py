@@ -3,4 +3,6 @@
 - `chirp_z`: a Fourier transform onto any grid
 - `geometry`: source, lens and sensor, and the paths between them
 - `wave`: a height map -> the PSF on the sensor's pixels
+- `heights`: few numbers -> a height map
+- `fabrication`: a height map -> levels, masks, errors of depth
 """
