@@ -1,4 +1,4 @@
-"""The README's runnable blocks run as they stand, one after the other in one folder.
+"""The runnable blocks of README and docs run as they stand, one after the other in one folder.
 
 Where the built-in bundle is not there (a checkout in which it was not exported yet), a tiny bundle
 takes its place and the capture its size.
@@ -9,6 +9,8 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 from camkit.bundle.reader import built_in_bundles
 from tests.bundle_factory import write_tiny_bundle
@@ -24,9 +26,15 @@ STAND_IN = {
 SHELL = 'camkit() { "$PYTHON" -c "from camkit.cli import main; main()" "$@"; }\n'
 
 
-def _blocks() -> list[tuple[str, str]]:
-    blocks = BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
-    return [(kind, text) for kind, text in blocks]
+PAGES = [
+    path
+    for path in sorted((ROOT / "docs").glob("*.md"))
+    if BLOCK.search(path.read_text(encoding="utf-8"))
+]
+
+
+def _blocks(page: Path = ROOT / "README.md") -> list[tuple[str, str]]:
+    return [(kind, text) for kind, text in BLOCK.findall(page.read_text(encoding="utf-8"))]
 
 
 def _run(kind: str, text: str, folder: Path) -> str:
@@ -60,3 +68,9 @@ def test_the_python_block_has_eight_lines_and_no_main_guard() -> None:
     (text,) = [text for kind, text in _blocks() if kind == "python"]
     assert len(text.splitlines()) == 8
     assert "__main__" not in text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_every_runnable_block_of_a_page_runs(page: Path, tmp_path: Path) -> None:
+    for kind, text in _blocks(page):
+        _run(kind, text, tmp_path)

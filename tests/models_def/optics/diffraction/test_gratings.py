@@ -106,5 +106,5 @@ def test_what_no_weak_grating_writes_is_refused() -> None:
     ):
         with pytest.raises(ContractError):
             _streaks(**wrong)
-    with pytest.raises(ContractError, match="cells of 62.5 um are too wide"):
+    with pytest.raises(ContractError, match=r"cells of 62\.5 um are too wide"):
         chirped_gratings(_streaks(), _bench(), 64)

@@ -134,7 +134,7 @@ def test_a_scheduler_that_is_lost_is_waited_for(tmp_path: Path) -> None:
                 out_dir=out,
                 client=client,
                 on_result=lose,
-                progress=lambda path, done, total: heard.add(path.stem),
+                progress=lambda path, *_: heard.add(path.stem),
             )
     assert lost
     assert len(heard) > 4, "progress is heard of the new scheduler too"
