@@ -1,9 +1,10 @@
 """TOML tables turned into dataclasses; unknown, missing and wrong keys are errors naming them."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
+from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from camkit.errors import ContractError
@@ -57,6 +58,8 @@ def check_keys(where: str, table: Mapping[str, Any], known: set[str]) -> None:
 
 def typed(where: str, value: Any, kind: Any) -> Any:
     """Give a value as the type of its field; whole numbers pass as float, lists as tuples."""
+    if get_origin(kind) is UnionType:  # TOML has no None: a key that is there has a value
+        (kind,) = (one for one in get_args(kind) if one is not NoneType)
     if get_origin(kind) is tuple:
         if not isinstance(value, list):
             raise ContractError(f"{where} must be a list; got {value!r}")
@@ -73,6 +76,26 @@ def typed(where: str, value: Any, kind: Any) -> Any:
     if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
         raise ContractError(f"{where} must be of type {kind.__name__}; got {value!r}")
     return value
+
+
+def key_line(key: str, value: str | float | bool | Sequence[str | float]) -> str:
+    """Give a line of TOML; numbers to their last bit."""
+    return f"{key} = {_value_text(value)}"
+
+
+def _value_text(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        # every control character is escaped, as TOML wants it
+        escaped = "".join(
+            f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else c
+            for c in value.replace("\\", "\\\\").replace('"', '\\"')
+        )
+        return f'"{escaped}"'
+    if isinstance(value, Sequence):
+        return f"[{', '.join(map(_value_text, value))}]"
+    return repr(value)
 
 
 def _is_required(entry: Any) -> bool:

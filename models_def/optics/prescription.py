@@ -18,6 +18,7 @@ from camkit.models_def.optics.glass.agf import read_agf
 from camkit.models_def.optics.glass.catalogue import GlassCatalogue, find_glass, own_glass
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
+from camkit.models_def.toml_table import key_line
 from camkit.units import to_degrees, to_radians
 
 ApertureKind = Literal["f_number", "entrance_pupil_diameter_mm", "stop_semi_diameter_mm"]
@@ -287,8 +288,8 @@ def format_prescription(lens: Lens) -> str:
         raise ContractError("a prescription holds no index offsets; write the nominal lens")
     angles = ", ".join(degrees_text(angle) for angle in lens.field_angles_rad)
     lines = [
-        f"name = {_quote(lens.name)}",
-        f"note = {_quote(lens.note)}",
+        key_line("name", lens.name),
+        key_line("note", lens.note),
         f"{lens.aperture_kind} = {lens.aperture_value!r}",
         f"stop = {lens.stop}",
         f"object_distance_mm = {lens.object_distance_mm!r}",
@@ -297,7 +298,7 @@ def format_prescription(lens: Lens) -> str:
         f"reference_wavelength_um = {lens.reference_wavelength_um!r}",
     ]
     for glass in {s.material: None for s in lens.surfaces if s.material is not None}:
-        lines += ["", "[[glass]]", *(_key_line(k, v) for k, v in glass_table(glass).items())]
+        lines += ["", "[[glass]]", *(key_line(k, v) for k, v in glass_table(glass).items())]
     for surface in lens.surfaces:
         lines += ["", "[[surface]]", *_surface_lines(surface)]
     return "\n".join(lines) + "\n"
@@ -307,21 +308,16 @@ def _surface_lines(surface: Surface) -> list[str]:
     lines = [
         f"radius_mm = {_radius_text(surface.curvature_per_mm)}",
         f"thickness_mm = {surface.thickness_mm!r}",
-        f"glass = {_quote(surface.glass)}",
+        key_line("glass", surface.glass),
         f"semi_diameter_mm = {surface.semi_diameter_mm!r}",
     ]
     if surface.conic:
         lines.append(f"conic = {surface.conic!r}")
     if surface.even_asphere:
-        lines.append(_key_line("even_asphere", surface.even_asphere))
+        lines.append(key_line("even_asphere", surface.even_asphere))
     if surface.vary:
-        lines.append(f"vary = [{', '.join(map(_quote, surface.vary))}]")
+        lines.append(key_line("vary", surface.vary))
     return lines
-
-
-def _key_line(key: str, value: str | tuple[float, ...]) -> str:
-    text = _quote(value) if isinstance(value, str) else f"[{', '.join(map(repr, value))}]"
-    return f"{key} = {text}"
 
 
 def degrees_text(angle_rad: float) -> str:
@@ -349,11 +345,6 @@ def _radius_text(curvature_per_mm: float) -> str:
             if 1 / rounded == curvature_per_mm:
                 return repr(rounded)
     return repr(radius_mm)
-
-
-def _quote(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
 
 
 def _parse_surfaces(value: object, catalogues: Sequence[GlassCatalogue]) -> tuple[Surface, ...]:

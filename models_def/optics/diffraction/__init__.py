@@ -5,4 +5,6 @@
 - `wave`: a height map -> the PSF on the sensor's pixels
 - `heights`: few numbers -> a height map
 - `fabrication`: a height map -> levels, masks, errors of depth
+- `gratings`: streaks that are wanted -> heights, in closed form
+- `plate`: a plate as a file
 """

@@ -1,0 +1,111 @@
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from safetensors.torch import save
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.diffraction.fabrication import Etching
+from camkit.models_def.optics.diffraction.geometry import Bench
+from camkit.models_def.optics.diffraction.plate import Plate, read_plate, write_plate
+from camkit.models_def.optics.diffraction.wave import PixelGrid
+
+
+def _plate(**changes: Any) -> Plate:
+    generator = torch.Generator().manual_seed(1)
+    made: dict[str, Any] = {
+        "name": 'odd "name"\t\\ é',
+        "note": "two\nlines",
+        "glass": "SILICA",
+        "bench": Bench(diameter_mm=2.0, focal_length_mm=50.0),
+        "height_um": 0.3 * torch.rand(64, 64, generator=generator),
+        "etching": Etching(range_um=0.3, levels=8),
+    }
+    return Plate(**{**made, **changes})
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"etching": None},
+        {"bench": Bench(diameter_mm=1.0, aperture="square", sensor_mm=5.0)},
+        {"etching": Etching(range_um=1.2, wraps=True)},
+    ],
+)
+def test_what_is_written_is_read(tmp_path: Path, changes: dict[str, Any]) -> None:
+    plate = _plate(**changes)
+    write_plate(plate, tmp_path / "plate.toml")
+    again = read_plate(tmp_path / "plate.toml")
+    assert (again.name, again.note, again.glass) == (plate.name, plate.note, plate.glass)
+    assert (again.bench, again.etching) == (plate.bench, plate.etching)
+    assert torch.equal(again.height_um, plate.height_um)
+
+
+def test_its_psf_is_that_of_the_heights_as_made() -> None:
+    plate = _plate()
+    grid = PixelGrid(side_px=21, pitch_um=6.0)
+    as_designed = _plate(etching=None).psf(0.55, grid)
+    assert not torch.allclose(plate.psf(0.55, grid), as_designed, atol=1e-7)
+    assert torch.allclose(
+        _plate(height_um=plate.made_um, etching=None).psf(0.55, grid), plate.psf(0.55, grid)
+    )
+    bare = plate.psf(0.55, grid, bare=True)
+    assert float(bare[10, 10]) > float(plate.psf(0.55, grid)[10, 10])
+    assert plate.cell_um == pytest.approx(31.25)
+    assert plate.index(0.55) == pytest.approx(1.4599, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("[bench]", "[bank]"), "unknown key 'bank'"),
+        (("diameter_mm = 2.0", "diameter_mm = 'x'"), r"bench\.diameter_mm must be of type float"),
+        (('glass = "SILICA"', 'glass = "SAND"'), "SAND"),
+        (('heights = "plate.safetensors"', 'heights = "../plate.safetensors"'), "lie beside it"),
+        (
+            ('heights = "plate.safetensors"', 'heights = "none.safetensors"'),
+            "cannot read the heights",
+        ),
+        (("levels = 8", "levels = 9"), "levels are 2, 4, 8"),
+        (("levels = 8", "steps = 8"), "unknown key 'steps'"),
+        (("note", "name"), "not valid TOML"),
+    ],
+)
+def test_a_damaged_file_is_one_error(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    path = tmp_path / "plate.toml"
+    write_plate(_plate(), path)
+    text = path.read_text(encoding="utf-8")
+    assert change[0] in text
+    path.write_text(text.replace(change[0], change[1], 1), encoding="utf-8")
+    with pytest.raises(ContractError, match=message):
+        read_plate(path)
+
+
+def test_a_plate_without_a_bench_is_refused(tmp_path: Path) -> None:
+    write_plate(_plate(etching=None), tmp_path / "plate.toml")
+    text = (tmp_path / "plate.toml").read_text(encoding="utf-8")
+    (tmp_path / "plate.toml").write_text(text[: text.index("[bench]")], encoding="utf-8")
+    with pytest.raises(ContractError, match=r"lacks the table \[bench\]"):
+        read_plate(tmp_path / "plate.toml")
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "is no safetensors file"),
+        (b"\xff" * 64, "is no safetensors file"),
+        (save({"height": torch.zeros(4, 4)}), "wanted is height_um"),
+        (save({"height_um": torch.zeros(4, 5)}), "heights are a square"),
+        (save({"height_um": torch.zeros(1, 1)}), "heights are a square"),
+        (save({"height_um": torch.zeros(4, 4, dtype=torch.int32)}), "heights are torch.int32"),
+        (save({"height_um": torch.full((4, 4), math.nan)}), "not a finite number"),
+    ],
+)
+def test_heights_that_are_none_are_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    write_plate(_plate(), tmp_path / "plate.toml")
+    (tmp_path / "plate.safetensors").write_bytes(data)
+    with pytest.raises(ContractError, match=message):
+        read_plate(tmp_path / "plate.toml")
