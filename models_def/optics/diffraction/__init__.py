@@ -7,4 +7,5 @@
 - `fabrication`: a height map -> levels, masks, errors of depth
 - `gratings`: streaks that are wanted -> heights, in closed form
 - `plate`: a plate as a file
+- `shares`: where the light goes, and where the streaks lie
 """
