@@ -52,6 +52,8 @@ def main() -> None:
             captures = Captures(Path(folder), name, float(megapixels))
             runs = (arguments.sizes, arguments.formats, arguments.jobs)
             for size, format_, jobs in itertools.product(*(text.split(",") for text in runs)):
+                if size not in captures.sizes:
+                    continue
                 words = ["--size", size, "--format", format_, "--jobs", jobs, *arguments.options]
                 cap = DEFAULT_MAX_MEM_BYTES * int(jobs) / 1e6
                 if arguments.max_mem:
@@ -96,6 +98,11 @@ class Captures:
             large.manifest.sensor,
             large.manifest.name,
         )
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Give the sizes that the camera has."""
+        return open_bundle(find_bundle(str(self._bundle))).manifest.sizes
 
     def peak_mb(self, words: list[str], *, files: int) -> float:
         """Process some copies and give the peak of the tree.

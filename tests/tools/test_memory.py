@@ -14,7 +14,7 @@ def test_peaks_are_told_as_shares_of_the_cap(
 ) -> None:
     bundle = write_tiny_bundle(tmp_path)
     monkeypatch.setattr(memory, "CELL_PX", (32, 48))
-    words = ["--bundles", str(bundle), "--sizes", "M", "--megapixels", "0.006,0.024"]
+    words = ["--bundles", str(bundle), "--sizes", "M,XL", "--megapixels", "0.006,0.024"]
     monkeypatch.setattr(sys, "argv", ["memory", *words, "--max-mem", "1G", "--jobs", "1,2"])
     memory.main()
     *rows, last = capsys.readouterr().out.splitlines()
