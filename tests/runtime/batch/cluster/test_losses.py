@@ -172,7 +172,6 @@ def test_a_network_that_stays_lost_ends_the_run_with_what_to_do(
     assert notices[0][0] - gone[0] < 10, "told within ten seconds"
 
 
-@pytest.mark.parametrize("fault", [KILLS_ITS_WORKER])
 def test_a_file_that_died_with_its_worker_though_alone_has_failed() -> None:
     losses = Losses([])
     losses._counts = [0, 0]
@@ -184,8 +183,8 @@ def test_a_file_that_died_with_its_worker_though_alone_has_failed() -> None:
     assert [losses.fate(n) for n in (0, 1)] == ["failed", "again"]
 
 
-def test_a_worker_that_dies_of_a_file_costs_that_file(tmp_path: Path, fault: str) -> None:
-    _one_file_is_lost(tmp_path, fault)
+def test_a_worker_that_dies_of_a_file_costs_that_file(tmp_path: Path) -> None:
+    _one_file_is_lost(tmp_path, KILLS_ITS_WORKER)
 
 
 @pytest.mark.slow

@@ -168,7 +168,8 @@ def test_a_claim_that_a_lost_worker_may_hold_is_no_success(
     with claimed(tmp_path / "a.exr"), pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_module, "CLAIMED_S", 0.0)
         patch.setattr(run_module, "LEASE_S", 3.0)
-        patch.setattr(crew.Crew, "has_losses", property(lambda _: True, lambda *_: None))
+        has_losses = property(lambda _: True, lambda *_: None)
+        patch.setattr(crew.Crew, "has_losses", has_losses, raising=False)
         results = camkit.process(
             captures, bundle=captures / "tiny.camkit", out_dir=tmp_path, client=client
         )
