@@ -19,10 +19,17 @@ def test_each_capture_is_made_by_exactly_one(tmp_path: Path, option: str) -> Non
     bundle = write_tiny_captures(tmp_path, NAMES)
     out = tmp_path / "out"
     command = [
-        *(sys.executable, "-m", "camkit", "process", f"{tmp_path}/*.dng", "--json", option),
+        *("process", f"{tmp_path}/*.dng", "--json", option),
         *("--bundle", str(bundle), "--out-dir", str(out)),
     ]
-    runs = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    runs = [
+        subprocess.Popen(
+            [sys.executable, "-c", TOGETHER, str(tmp_path / f"listed{n}"), *command],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for n in range(2)
+    ]
     told = [json.loads(line) for run in runs for line in run.communicate()[0].splitlines()]
     assert [run.returncode for run in runs] == [0, 0]
     made = [Path(one["output"]).stem for one in told if one["status"] == "ok"]
@@ -45,3 +52,23 @@ def test_what_another_process_makes_is_skipped_and_says_so(
     assert (done.code, told["status"]) == (0, "skipped")
     assert told["warnings"] == ["another process makes this picture"]
     assert not (tmp_path / "a.exr").exists()
+
+
+TOGETHER = """
+import sys, time
+from pathlib import Path
+from camkit.cli import main
+from camkit.runtime.batch import processing
+
+list_tasks, mark = processing.list_tasks, Path(sys.argv.pop(1))
+
+def list_then_wait(*args, **kwargs):
+    tasks = list_tasks(*args, **kwargs)
+    mark.touch()
+    while len(list(mark.parent.glob("listed*"))) < 2:
+        time.sleep(0.01)
+    return tasks
+
+processing.list_tasks = list_then_wait
+main()
+"""

@@ -88,6 +88,7 @@ def _check_whole(results: list[camkit.FileResult], out: Path, expected: dict[str
     )
 
 
+@pytest.mark.slow
 def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
     captures, out = tmp_path / "in", tmp_path / "out"
     captures.mkdir()
