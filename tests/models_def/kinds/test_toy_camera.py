@@ -103,7 +103,9 @@ def test_in_a_minute_its_loss_falls_and_falls(role, recipe_path, tmp_path):
     result = train(recipe_path, options)
     losses = [entry["loss"] for entry in read_log(result.log) if "loss" in entry]
     fifth = len(losses) // 5
-    assert np.mean(losses[-fifth:]) < np.mean(losses[:fifth]) - 0.1
+    # a fast machine is through most of the fall within the first fifth of the minute
+    assert np.mean(losses[-fifth:]) < np.mean(losses[:5]) - 0.1
+    assert np.mean(losses[-fifth:]) < np.mean(losses[:fifth]) - 0.02
     assert result.valid_db > result.baselines["input"] + 1.0
 
 
