@@ -6,7 +6,6 @@ streak is evenly bright if every frequency gets the same area of the aperture.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -84,17 +83,15 @@ def chirped_gratings(streaks: Streaks, bench: Bench, cells: int) -> GratingMap:
             f"a streak of {streaks.far_um:.0f} um needs a grating of {finest_um:.1f} um: cells of "
             f"{cell_um:.1f} um are too wide, at most {finest_um / 2:.1f} um"
         )
-    return GratingMap(
-        cells, streaks.angles_rad, _profiles(streaks, bench, streaks.angles_rad, 8 * cells)
-    )
+    return GratingMap(cells, streaks.angles_rad, _profiles(streaks, bench, 8 * cells))
 
 
-def _profiles(streaks: Streaks, bench: Bench, angles_rad: Sequence[float], samples: int) -> Tensor:
+def _profiles(streaks: Streaks, bench: Bench, samples: int) -> Tensor:
     """Give a chirp (line, sample) over the diagonal for every line."""
     diagonal_mm = bench.diameter_mm * math.sqrt(2)
     place_mm = torch.linspace(-0.5, 0.5, samples, dtype=torch.float64) * diagonal_mm
     made = []
-    for angle in angles_rad:
+    for angle in streaks.angles_rad:
         share = torch.cumsum(_chord(place_mm / bench.diameter_mm, angle, bench), 0)
         share = share / share[-1]
         sensor_um = streaks.near_um + (streaks.far_um - streaks.near_um) * share

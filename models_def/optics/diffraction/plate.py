@@ -4,7 +4,7 @@ name = "four-lines"
 glass = "SILICA"
 heights = "four-lines.safetensors"     # height_um (cells, cells), float32, as designed
 
-[bench]                                # aperture, lens, sensor: camkit.…diffraction.geometry
+[bench]                                # aperture, lens, sensor: the fields of geometry.Bench
 diameter_mm = 9.162
 focal_length_mm = 50.0
 focus_mm = 5000.0
@@ -31,6 +31,7 @@ from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.toml_table import key_line, read_table, section
+from camkit.units import UM_PER_MM
 
 MAX_CELLS: Final = 16_384
 HEIGHTS: Final = "height_um"
@@ -86,7 +87,7 @@ class Plate:
     @property
     def cell_um(self) -> float:
         """Give the side of a cell."""
-        return 1e3 * self.bench.diameter_mm / self.height_um.shape[0]
+        return UM_PER_MM * self.bench.diameter_mm / self.height_um.shape[0]
 
     @property
     def made_um(self) -> Tensor:

@@ -60,12 +60,12 @@ def find_streaks(psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
         ContractError: If the two are no PSFs of one odd side.
     """
     added = _added(psf, bare)
-    distance, _ = _polar(added)
+    distance = _distance(added)
     centre = added.shape[0] // 2
     usable = (distance > 2 * CORE_PX) & (distance <= centre)
     angles = torch.arange(0, 180, _STEP_DEG, dtype=torch.float64)
-    bands = [usable & _near_line(added.shape[0], float(angle)) for angle in angles]
-    light = torch.stack([added[band].sum() for band in bands])
+    side = added.shape[0]
+    light = torch.stack([added[usable & _near_line(side, float(a))].sum() for a in angles])
     floor = light.median()
     found: list[Streak] = []
     for i in torch.argsort(light, descending=True).tolist():
@@ -80,7 +80,7 @@ def find_streaks(psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
 
 def shares(psf: Tensor, streaks: tuple[Streak, ...]) -> Shares:
     """Share the light of a PSF (side, side) out among core, streaks and haze."""
-    distance, _ = _polar(psf)
+    distance = _distance(psf)
     core = distance <= CORE_PX
     on_streak = torch.zeros_like(core)
     for streak in streaks:
@@ -100,11 +100,10 @@ def _added(psf: Tensor, bare: Tensor) -> Tensor:
     return (psf - bare * (psf[middle] / bare[middle].clamp_min(1e-30))).double()
 
 
-def _polar(psf: Tensor) -> tuple[Tensor, Tensor]:
-    """Give (distance, (y, x)) of every pixel from the middle."""
+def _distance(psf: Tensor) -> Tensor:
+    """Give the distance of every pixel from the middle."""
     place = torch.arange(psf.shape[0], dtype=torch.float64) - psf.shape[0] // 2
-    y, x = torch.meshgrid(place, place, indexing="ij")
-    return (x**2 + y**2).sqrt(), torch.stack([y, x])
+    return (place[:, None] ** 2 + place[None, :] ** 2).sqrt()
 
 
 def _near_line(side: int, angle_deg: float) -> Tensor:
@@ -130,7 +129,7 @@ def _apart(one_deg: float, other_deg: float) -> float:
 
 def _reach(added: Tensor, angle_deg: float) -> float:
     """Give the distance at which a streak has ended, of both arms together."""
-    distance, _ = _polar(added)
+    distance = _distance(added)
     band = _near_line(added.shape[0], angle_deg)
     reach = added.shape[0] // 2
     ring = distance.round().long().clamp(max=reach + 1)

@@ -9,6 +9,7 @@ light that the aperture lets through: a window that does not hold all of it sums
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import torch
 from torch import Tensor
@@ -54,6 +55,11 @@ def pupil(bench: Bench, cells: int) -> Tensor:
     """
     if bench.aperture == "square":
         return torch.ones(cells, cells, dtype=torch.float64)
+    return _circle(cells).clone()
+
+
+@lru_cache(maxsize=4)  # asked for at every wavelength and depth
+def _circle(cells: int) -> Tensor:
     fine = 8
     place = (torch.arange(cells * fine, dtype=torch.float64) + 0.5) / fine - cells / 2
     squares = place.reshape(cells, fine) ** 2
