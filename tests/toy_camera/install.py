@@ -20,9 +20,9 @@ def write_entry_point(folder: Path) -> None:
     (facts / "entry_points.txt").write_text(text, encoding="utf-8")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def toy_installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Install the toy camera, for this process and those that it starts."""
+    """Install the toy camera for a module, in this process and those that it starts."""
     folder = tmp_path_factory.mktemp("site")
     write_entry_point(folder)
     known = os.environ.get("PYTHONPATH", "")

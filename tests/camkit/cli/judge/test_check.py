@@ -1,8 +1,6 @@
 """`camkit check`: a sound bundle passes, a damaged one is refused with 3."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -42,22 +40,17 @@ def test_a_damaged_bundle_ends_with_3(captures, camkit_command, where: float) ->
     assert "fail" in outcome.out
 
 
-def test_a_kind_that_is_not_installed_ends_with_3_wherever_it_is_used(captures) -> None:
+def test_a_kind_that_is_not_installed_ends_with_3_wherever_it_is_used(
+    captures, camkit_command
+) -> None:
     for command in (
         ["check", EXAMPLE_2, "--level", "schema"],
         ["process", "shot.dng", "--bundle", EXAMPLE_2, "--out-dir", "out"],
         ["simulate", "procedural:1", "--bundle", EXAMPLE_2, "-o", "new.dng"],
     ):
-        # in a process of its own: other tests install that kind in theirs
-        done = subprocess.run(
-            [sys.executable, "-m", "camkit", *map(str, command)],
-            cwd=captures,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == ExitCode.BUNDLE_REFUSED, done
-        assert "no kind of camera 'toy'" in done.stdout + done.stderr
+        outcome = camkit_command(*command)
+        assert outcome.code == ExitCode.BUNDLE_REFUSED, outcome
+        assert "no kind of camera 'toy'" in outcome.out + outcome.err
 
 
 def test_an_unknown_level_is_a_usage_error(captures, camkit_command) -> None:
