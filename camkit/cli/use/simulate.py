@@ -73,13 +73,10 @@ def _depth_mm(bundle: "Bundle") -> float | None:
 
 
 def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def]  # numpy stays lazy
-    if scene.startswith("procedural:"):
-        from camkit.scenes import procedural_scene
+    from camkit.scenes import is_scene_name, named_scene
 
-        seed = scene.removeprefix("procedural:")
-        if not seed.isdigit():
-            raise ContractError(f"expected procedural:SEED with a number; got {scene!r}")
-        return procedural_scene(int(seed), size_px[1], size_px[0])
+    if is_scene_name(scene):
+        return named_scene(scene, size_px[1], size_px[0])
     from camkit.runtime.files.picture import read_scene
 
     return read_scene(Path(scene))

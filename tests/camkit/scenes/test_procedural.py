@@ -63,3 +63,17 @@ def test_any_size_works(size):
 def test_impossible_requests_are_refused(seed, height, width):
     with pytest.raises(ContractError, match="positive size and a seed"):
         procedural_scene(seed, height, width)
+
+
+@pytest.mark.parametrize(
+    ("seed", "size", "means", "most"),
+    [
+        (5, (64, 96), (0.1322308, 0.1280601, 0.1375466), 1.110827),
+        (7, (200, 300), (0.1946287, 0.1961309, 0.2044885), 50.81047),
+    ],
+)
+def test_seeds_keep_their_scenes_from_version_to_version(seed, size, means, most):
+    """Bundles, journals and reports name scenes by their seeds; bits may differ by processor."""
+    scene = procedural_scene(seed, *size)
+    np.testing.assert_allclose(scene.mean(axis=(1, 2)), means, rtol=1e-5)
+    assert scene.max() == pytest.approx(most, rel=1e-5)

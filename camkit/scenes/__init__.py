@@ -1,0 +1,13 @@
+"""Scenes that need no data: sharp linear pictures, drawn from a seed.
+
+texture       colours and textures with the spectrum of nature
+leaves        dead leaves: what the statistics of natural images are made of
+lettering     lines of made-up glyphs
+procedural    `procedural:SEED`, a bit of everything
+named         the register: a scene by its name
+"""
+
+from camkit.scenes.named import is_scene_name, named_scene
+from camkit.scenes.procedural import procedural_scene
+
+__all__ = ["is_scene_name", "named_scene", "procedural_scene"]
