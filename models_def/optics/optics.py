@@ -1,6 +1,7 @@
 """What freezing knows of any optics: kernels over field, depth and wavelength, and the geometry.
 
     Optics = LensOptics        a lens, traced where it is asked for    (lens_optics.py)
+           | PlateOptics       a plate, computed where it is asked for (diffraction/plate_optics.py)
            | MeasuredOptics    kernels known at places of their own    (measured.py)
 
 Positions are in millimetres on the sensor from the optical axis, +x to the right, +y down the rows.

@@ -1,8 +1,10 @@
-"""Optics by the suffix of a file: a lens, or a PSF that was measured."""
+"""Optics by their file: a lens, a plate, or a PSF that was measured."""
 
 from pathlib import Path
 from typing import Final
 
+from camkit.models_def.optics.diffraction.plate import is_plate, read_plate
+from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.measured import read_measured
@@ -12,12 +14,16 @@ MEASURED: Final = ".safetensors"
 
 
 def read_optics(path: Path) -> Optics:
-    """Read optics: .safetensors as a measured PSF, anything else as a lens (`read_lens`).
+    """Read optics: .safetensors as a measured PSF, TOML with a table [bench] as a plate.
+
+    Anything else is a lens (`read_lens`).
 
     Raises:
         BundleError: If a PSF is missing or damaged.
-        CamkitError: If a lens is wrong, see `read_lens`.
+        CamkitError: If a lens is wrong, see `read_lens`, or a plate, see `read_plate`.
     """
     if path.suffix.lower() == MEASURED:
         return read_measured(path)
+    if is_plate(path):
+        return PlateOptics(plate=read_plate(path))
     return LensOptics(lens=read_lens(path))

@@ -8,4 +8,6 @@
 - `gratings`: streaks that are wanted -> heights, in closed form
 - `plate`: a plate as a file
 - `shares`: where the light goes, and where the streaks lie
+- `plate_optics`: a plate as freezing sees it, and its kernels as arrays
+- `freezing`: its PSF, frozen whole
 """

@@ -119,6 +119,13 @@ class Plate:
         )
 
 
+def is_plate(path: Path) -> bool:
+    """Tell whether a file is that of a plate: TOML that speaks of a bench."""
+    if path.suffix.lower() != ".toml" or not path.is_file():
+        return False
+    return "bench" in read_table(path, "optics")
+
+
 def read_plate(path: Path) -> Plate:
     """Read a plate.
 

@@ -1,0 +1,132 @@
+"""A plate is frozen whole: its window and its colours lose no more light than is stated."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from typer.testing import CliRunner
+
+from camkit.bundle.psf_file import read_psf
+from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
+from camkit.cli.app import app
+from camkit.errors import ContractError
+from camkit.models_def.optics.diffraction import freezing
+from camkit.models_def.optics.diffraction.freezing import MISPLACED_LIMIT, WINDOW, freeze_plate
+from camkit.models_def.optics.diffraction.geometry import Bench
+from camkit.models_def.optics.diffraction.gratings import Streaks, chirped_gratings
+from camkit.models_def.optics.diffraction.plate import Plate, write_plate
+from camkit.models_def.optics.diffraction.plate_optics import PlateOptics, plate_kernels
+from camkit.models_def.sensors.psf import wavelength_weights
+
+BENCH = Bench(diameter_mm=2.0, focal_length_mm=20.0, focus_mm=2000.0)
+STREAKS = Streaks(
+    angles_rad=(0.0, math.pi / 2), near_um=30.0, far_um=120.0, share=0.1,
+    wavelength_um=0.55, index=1.46,
+)  # fmt: skip
+SMALL = replace(WINDOW, max_side_px=61)
+
+
+@pytest.fixture(scope="module")
+def optics() -> PlateOptics:
+    height_um = chirped_gratings(STREAKS, BENCH, cells=128)().detach().float()
+    return PlateOptics(plate=Plate(name="cross", glass="SILICA", bench=BENCH, height_um=height_um))
+
+
+@pytest.fixture(scope="module")
+def sensor() -> PlanesSensor:
+    return PlanesSensor(
+        extent=Extent(width_px=400, height_px=300, pixel_pitch_um=6.0),
+        channels=("R", "B"),
+        black_level=64,
+        white_level=4095,
+        full_well_e=9000,
+        noise=(IsoNoise(iso=100, gain_e_per_dn=2.2, read_noise_e=2.0),),
+        channel_response=ChannelResponse(
+            wavelengths_um=(0.45, 0.5, 0.55, 0.6, 0.65),
+            response=((0.0, 0.0, 0.3, 1.0, 0.5), (1.0, 0.5, 0.1, 0.0, 0.0)),
+            source="made up",
+        ),
+    )
+
+
+def test_the_kernels_of_colours_are_those_of_the_plate(
+    optics: PlateOptics, sensor: PlanesSensor, tmp_path: Path
+) -> None:
+    lines: list[str] = []
+    out = tmp_path / "psf.safetensors"
+    grid = replace(SMALL, depths_mm=(1000.0, 2000.0))
+    report = freeze_plate(optics, out, sensor=sensor, grid=grid, tell=lines.append)
+    psf = read_psf(out)
+    assert psf.symmetry == "uniform"
+    assert psf.depths_mm.tolist() == [1000.0, 2000.0]
+    assert report.misplaced <= MISPLACED_LIMIT
+    assert len(lines) >= 1
+    assert report.wavelengths == psf.wavelengths_um.size
+    assert report.side_px == 61
+    response_um, response = sensor.response_arrays()
+    many_um = np.linspace(0.45, 0.65, 81)
+    side_px = psf.kernels.shape[-1]
+    light = plate_kernels(
+        optics.plate, depths_m=(2.0,), wavelengths_um=tuple(many_um), side_px=side_px, pitch_um=6.0
+    )[0]
+    weights = wavelength_weights(many_um, response_um, response)
+    true = np.einsum("cw,wyx->cyx", weights, light)
+    few = wavelength_weights(psf.wavelengths_um, response_um, response)
+    found = np.einsum("cw,wyx->cyx", few, psf.kernels[0, 1])
+    off = np.abs(found - true / true.sum((-2, -1), keepdims=True)).sum((-2, -1)) / 2
+    assert off.max() <= 1.2 * MISPLACED_LIMIT
+    assert report.energy_kept == pytest.approx(true.sum((-2, -1)).min(), abs=2e-3)
+    told = report.to_json()
+    assert told["depths_mm"] == "1000, 2000"
+    assert told["efl_mm"] == 20.0
+
+
+def test_a_window_that_holds_too_little_is_refused_before_anything_is_written(
+    optics: PlateOptics, sensor: PlanesSensor, tmp_path: Path
+) -> None:
+    out = tmp_path / "psf.safetensors"
+    with pytest.raises(ContractError, match=r"hold 0\.9"):
+        freeze_plate(
+            optics, out, sensor=sensor, grid=replace(SMALL, max_side_px=21, least_energy=None)
+        )
+    assert not out.exists()
+
+
+def test_colours_that_no_number_of_wavelengths_places_are_refused(
+    optics: PlateOptics,
+    sensor: PlanesSensor,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(freezing, "WAVELENGTH_COUNTS", (1,))
+    out = tmp_path / "psf.safetensors"
+    with pytest.raises(ContractError, match="1 wavelengths misplace 0"):
+        freeze_plate(optics, out, sensor=sensor, grid=SMALL)
+    assert not out.exists()
+
+
+def test_the_command_freezes_a_plate(optics: PlateOptics, tmp_path: Path) -> None:
+    tiny = replace(
+        optics.plate,
+        bench=replace(BENCH, diameter_mm=1.0),
+        height_um=torch.zeros(32, 32),
+    )
+    write_plate(tiny, tmp_path / "flat.toml")
+    out = tmp_path / "psf.safetensors"
+    arguments = ["freeze", str(tmp_path / "flat.toml"), "-o", str(out), "--max-side-px", "31"]
+    done = CliRunner().invoke(app, [*arguments, "--json"])
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout.strip().splitlines()[-1])
+    assert told["side_px"] == 31
+    assert 0.9 < told["energy_kept"] < 1
+    assert read_psf(out).symmetry == "uniform"
+    again = CliRunner().invoke(app, arguments)
+    assert "--overwrite" in str(again.exception)
+    missing = [*arguments[:3], str(tmp_path / "x.safetensors"), "--energy", "0.9999"]
+    short = CliRunner().invoke(app, [*missing, "--max-side-px", "31"])
+    assert "wanted 0.9999" in str(short.exception)
+    assert not (tmp_path / "x.safetensors").exists()
