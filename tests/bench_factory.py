@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from camkit.report.bench.accuracy import INPUT, Scores
-from camkit.report.bench.metric import registered_metrics
+from camkit.report.bench.metrics.picture import METRIC
 from camkit.report.bench.row import Facts
 from camkit.report.bench.timed.process_run import Run
 from camkit.report.bench.trial import Trial
@@ -53,7 +53,7 @@ def make_facts(**changes: Any) -> Facts:
             INPUT: make_scores({"a": 20.0, "b": 22.0}),
             make_trial().accuracy_key: make_scores({"a": 25.0, "b": 29.0}),
         },
-        "metrics": registered_metrics(),
+        "metrics": (METRIC,),
         "base": [make_run(4.0), make_run(6.0)],
         "base_label": "M",
         "base_key": make_trial().accuracy_key,

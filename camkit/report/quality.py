@@ -9,9 +9,9 @@ the border of `BORDER_PX` cut off.
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,10 +78,16 @@ class Exposed:
         simulation: Samples and place.
         truths: Product -> what a perfect camera would give, in sensor geometry; for `image`
             (3, h, w) float32 sRGB values.
+        extras: What some metrics need or take beside, by name: `linear` (3, h, w) float32, the
+            truth of `image` as linear Rec.709, which may exceed white; `clipped` (3, h, w) bool,
+            samples that are clipped in the capture; `input` (3, h, w) float32 linear Rec.709, a
+            picture that stands as the input in place of the developed capture, such as that of
+            an ordinary lens.
     """
 
     simulation: Simulation
     truths: Mapping[str, FloatArray]
+    extras: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     @property
     def sharp(self) -> FloatArray:

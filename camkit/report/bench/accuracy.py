@@ -4,7 +4,7 @@ import math
 import statistics
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle, open_bundle
@@ -21,6 +21,10 @@ from camkit.runtime.plan.decision import DEVELOP
 Key = tuple[object, ...]
 INPUT: Key = ("input",)
 """Key of the capture that was only developed."""
+BROUGHT: Key = ("brought",)
+"""Key of the picture that a capture brings as its input, such as that of an ordinary lens."""
+BROUGHT_NAME: Final = "input"
+"""Its name among the extras of a capture."""
 OnResult = Callable[[Key, KnownCapture, FloatArray], None]
 
 
@@ -99,6 +103,7 @@ def measure_accuracy(
     restorers: Restorers,
     metrics: Sequence[Metric],
     on_result: OnResult | None = None,
+    constants: Mapping[str, Any] | None = None,
 ) -> dict[Key, Scores]:
     """Restore every capture by every method that differs in its pixels.
 
@@ -108,24 +113,29 @@ def measure_accuracy(
         restorers: Of that camera.
         metrics: What to measure.
         on_result: Called with every picture, that of `INPUT` first, if the camera has one.
+        constants: What metrics may take that is the same for all captures.
 
     Returns:
-        Scores by `score_key`.
+        Scores by `score_key`; under `BROUGHT` those of what captures bring as their input.
     """
     methods: dict[Key, Trial | None] = {INPUT: None}
     methods |= {score_key(t): t for t in trials if score_key(t) != INPUT}
     found = {key: Scores() for key in methods}
     products = dict.fromkeys(metric.product for metric in metrics)
     for known in captures:
+        beside = {**(constants or {}), **known.extras}
+        if BROUGHT_NAME in beside:
+            brought = {IMAGE: beside[BROUGHT_NAME]}
+            _add(found.setdefault(BROUGHT, Scores()), known, brought, metrics, beside)
         for key, trial in methods.items():
             if found[key].error is not None:
                 continue
             try:
                 restored = restorers.restore(trial, known, products)
+                _add(found[key], known, restored, metrics, beside)
             except CamkitError as error:
                 found[key] = Scores(error=str(error))
                 continue
-            _add(found[key], known, restored, metrics)
             if on_result is not None and IMAGE in restored:
                 on_result(key, known, restored[IMAGE])
     return found
@@ -136,12 +146,17 @@ def _add(
     known: KnownCapture,
     restored: Mapping[str, FloatArray],
     metrics: Sequence[Metric],
+    beside: Mapping[str, Any],
 ) -> None:
     scores.psf.add(known.psf)
     values = scores.by_picture.setdefault(known.picture, {})
-    for metric in (m for m in metrics if m.product in known.truths):
-        truth = known.truths[metric.product]
-        for name, value in metric.measure(restored[metric.product], truth).items():
+    for metric in metrics:
+        there = metric.product in known.truths and metric.product in restored
+        if not there or not all(name in beside for name in metric.needs):
+            continue
+        named = {n: beside[n] for n in (*metric.needs, *metric.takes) if n in beside}
+        found = metric.measure(restored[metric.product], known.truths[metric.product], **named)
+        for name, value in found.items():
             values.setdefault(name, []).append(value)
 
 

@@ -1,12 +1,13 @@
 """Captures with a known truth: the golden cases as stored, or pictures of a folder photographed.
 
 golden     capture and sharp reference of the bundle; through the bundle's own PSF
-pictures   five field positions, two sensitivities, fabricated lenses traced afresh where the
-           bundle holds its prescription and torch is there (`camkit.report.quality`)
+pictures   the field positions and sensitivities of the kind of camera, fabricated lenses traced
+           afresh where the bundle holds its prescription and torch is there
+           (`camkit.report.quality`)
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import util
 from pathlib import Path
@@ -34,7 +35,6 @@ from camkit.report.quality import (
 from camkit.runtime.twin.light import stated_balance
 from camkit.runtime.twin.truth import picture_scale
 
-ISOS: Final = (100.0, 1600.0)
 MOST_PX: Final = 1024
 """Of a larger picture the middle is taken."""
 LEAST_PX: Final = 96
@@ -56,6 +56,7 @@ class KnownCapture:
         undistort: Whether the truth is in ideal geometry; else in that of the sensor.
         truths: Product -> what a perfect camera would give; for `image` (3, h, w) float32 sRGB
             values.
+        extras: What metrics may need beside, by name, see `camkit.report.quality.Exposed`.
     """
 
     picture: str
@@ -67,6 +68,7 @@ class KnownCapture:
     origin_px: tuple[int, int]
     undistort: bool
     truths: Mapping[str, FloatArray]
+    extras: Mapping[str, Any] = field(default_factory=dict)
 
 
 def golden_captures(bundle: Bundle) -> list[KnownCapture]:
@@ -84,6 +86,7 @@ def golden_captures(bundle: Bundle) -> list[KnownCapture]:
             origin_px=case.origin_px,
             undistort=True,
             truths={IMAGE: encode_srgb(arrays[case.name].reference)},
+            extras={"linear": arrays[case.name].reference},
         )
         for case in cases
         if min(arrays[case.name].reference.shape[1:]) >= LEAST_PX
@@ -107,7 +110,7 @@ def picture_captures(
     sensor, scale = bundle.manifest.sensor, picture_scale(bundle.manifest)
     most_px = min(MOST_PX, scale * sensor.width_px, scale * sensor.height_px)
     psf = psf_source(bundle)
-    photograph = find_part(bundle.manifest.kind, "bench", BenchPart).photograph
+    part = find_part(bundle.manifest.kind, "bench", BenchPart)
 
     @lru_cache(maxsize=4)
     def lens(seed: int) -> FrozenPsf:
@@ -120,8 +123,8 @@ def picture_captures(
                 f"{path} has {scene.shape[2]}x{scene.shape[1]} pixels; a picture to measure on "
                 f"needs {LEAST_PX} a side"
             )
-        for position, share in enumerate(FIELD_SHARES):
-            for iso in ISOS:
+        for position in part.positions:
+            for iso in part.isos:
                 shot = Shot(
                     set_name=folder.name,
                     picture=path,
@@ -131,7 +134,7 @@ def picture_captures(
                     psf=psf,
                 )
                 kernels = lens(shot.fabrication_seed) if psf == "fresh" else bundle.psf
-                yield _known(shot, photograph(shot, scene, bundle, kernels), share)
+                yield _known(shot, part.photograph(shot, scene, bundle, kernels))
 
 
 def psf_source(bundle: Bundle) -> PsfSource:
@@ -146,8 +149,8 @@ def _whole_pixels(scene: FloatArray, scale: int) -> FloatArray:
     return np.ascontiguousarray(scene[:, :height, :width])
 
 
-def _known(shot: Shot, exposed: Exposed, share: float) -> KnownCapture:
-    simulation = exposed.simulation
+def _known(shot: Shot, exposed: Exposed) -> KnownCapture:
+    simulation, share = exposed.simulation, FIELD_SHARES[shot.position]
     x, y = (int(v) for v in simulation.window.origin_px)
     return KnownCapture(
         picture=shot.picture.name,
@@ -159,4 +162,5 @@ def _known(shot: Shot, exposed: Exposed, share: float) -> KnownCapture:
         origin_px=(x, y),
         undistort=False,
         truths=exposed.truths,
+        extras=exposed.extras,
     )

@@ -47,6 +47,6 @@ def write_csv(path: Path, rows: list[Row]) -> None:
 
 
 def flatten(row: Row) -> dict[str, Any]:
-    """Give a row without nesting: `stages` becomes columns `stage_NAME_s`."""
-    flat = {name: value for name, value in row.items() if name != "stages"}
+    """Give a row without nesting: `stages` becomes columns `stage_NAME_s`, `pictures` goes."""
+    flat = {name: value for name, value in row.items() if name not in ("stages", "pictures")}
     return flat | {f"stage_{name}_s": value for name, value in row["stages"].items()}

@@ -7,7 +7,7 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.row_maker import RowMaker
-from camkit.report.quality import Exposed, Shot
+from camkit.report.quality import FIELD_SHARES, Exposed, Shot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,10 +16,14 @@ class BenchPart:
 
     Attributes:
         photograph: (place and noise, sharp picture (3, h, w), bundle, lens) -> capture and truth.
+        positions: Places of a picture on the sensor, as indices into `FIELD_SHARES`.
+        isos: Sensitivities.
         rows: Row makers of its own; one called as a common maker stands in its place.
         metrics: Of its own, beside the common ones; the kind names those that count.
     """
 
     photograph: Callable[[Shot, FloatArray, Bundle, FrozenPsf], Exposed]
+    positions: tuple[int, ...] = tuple(range(len(FIELD_SHARES)))
+    isos: tuple[float, ...] = (100.0, 1600.0)
     rows: tuple[RowMaker, ...] = ()
     metrics: tuple[Metric, ...] = ()

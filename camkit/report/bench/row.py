@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from camkit.report.bench.accuracy import (
+    BROUGHT,
     INPUT,
     Key,
     Scores,
@@ -133,7 +134,8 @@ def _network_share(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
 
 
 def _accuracy(trial: Trial, facts: Facts) -> Row:
-    scores, of_input = facts.scores.get(score_key(trial)), facts.scores.get(INPUT)
+    scores = facts.scores.get(score_key(trial))
+    of_input = facts.scores.get(BROUGHT, facts.scores.get(INPUT))
     of_base = facts.scores.get(facts.base_key)
     lenses = set() if scores is None else scores.psf
     row: Row = {
@@ -145,13 +147,34 @@ def _accuracy(trial: Trial, facts: Facts) -> Row:
         for column in metric.columns:
             name = column.name
             mean, spread = _means(scores, name)
-            base, _ = _means(of_input, name)
-            row |= {name: mean, column.spread: spread, column.of_input: base}
-            row[f"gain_se_{name}"] = _gain(scores, of_input, name)[1]
-            row[f"over_base_{name}"], row[f"over_base_se_{name}"] = _gain(scores, of_base, name)
+            row[name] = mean
+            if column.spread is not None:
+                row[column.spread] = spread
+            if column.of_input is not None:
+                row[column.of_input] = _means(of_input, name)[0]
+            if column.spread is not None:
+                row[f"gain_se_{name}"] = _gain(scores, of_input, name)[1]
+                row[f"over_base_{name}"], row[f"over_base_se_{name}"] = _gain(scores, of_base, name)
             if scores is not None:
-                row["captures"] = sum(len(v.get(name, ())) for v in scores.by_picture.values())
-    return row
+                count = sum(len(v.get(name, ())) for v in scores.by_picture.values())
+                row["captures"] = max(row["captures"], count)
+        row |= {} if metric.notes is None else metric.notes()
+    return row | _each_picture(facts.metrics, scores, of_input)
+
+
+def _each_picture(metrics: Sequence[Metric], scores: Scores | None, of_input: Scores | None) -> Row:
+    """Give the numbers of every picture, of the metrics that want it; nothing where none does."""
+    columns = [column for m in metrics if m.each_picture for column in m.columns]
+    if not columns:
+        return {}
+    found: dict[str, Row] = {} if scores is None else {name: {} for name in scores.by_picture}
+    for column in columns:
+        wanted = ((column.name, scores), (column.of_input, of_input))
+        for name, source in wanted:
+            if name is not None and source is not None:
+                for picture, value in source.picture_means(column.name).items():
+                    found.setdefault(picture, {})[name] = value
+    return {"pictures": found}
 
 
 def _gain(

@@ -12,18 +12,19 @@ from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy, score_key
 from camkit.report.bench.crops import MOST_CAPTURES, CropCollector, Patch
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
-from camkit.report.bench.known_captures import ISOS, KnownCapture, golden_captures, picture_captures
+from camkit.report.bench.known_captures import KnownCapture, golden_captures, picture_captures
 from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric
+from camkit.report.bench.part import BenchPart
 from camkit.report.bench.row import Facts, Row, make_row
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
 from camkit.report.bench.timed.capture import SCENE_TEXT, timed_capture
 from camkit.report.bench.timed.process_run import Job, Run, run_job
 from camkit.report.bench.timed.timing import interleaved
 from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
-from camkit.report.kind_finder import camera_of
-from camkit.report.quality import FIELD_SHARES, list_set
+from camkit.report.kind_finder import camera_of, find_part
+from camkit.report.quality import list_set
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads, usable_providers
 
@@ -213,7 +214,9 @@ def _judge(
 
     restorers = Restorers(bundle, available_threads(None))
     try:
-        scores = measure_accuracy(own, told(captures), restorers, metrics, collector.take)
+        scores = measure_accuracy(
+            own, told(captures), restorers, metrics, collector.take, settings.constants
+        )
     except CamkitError as error:
         text = f"not measured: {error}"
         return _Judged(scores={}, patches=[], metrics=metrics, text=text, error=str(error))
@@ -229,11 +232,12 @@ def _known_captures(
         return golden, len(golden), f"{len(golden)} golden cases of the bundle"
     pictures = len(list_set(settings.data, settings.images))
     captures = picture_captures(bundle, settings.data, settings.images, folder / "psf")
+    part = find_part(bundle.manifest.kind, "bench", BenchPart)
     text = (
-        f"{pictures} pictures of {settings.data.name}, {len(FIELD_SHARES)} field positions, "
-        f"ISO {' and '.join(f'{iso:g}' for iso in ISOS)}"
+        f"{pictures} pictures of {settings.data.name}, {len(part.positions)} field positions, "
+        f"ISO {' and '.join(f'{iso:g}' for iso in part.isos)}"
     )
-    return captures, pictures * len(FIELD_SHARES) * len(ISOS), text
+    return captures, pictures * len(part.positions) * len(part.isos), text
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -32,6 +33,7 @@ class Settings:
         work_dir: Where captures and traced PSFs are kept between runs; None for a folder of this
             user among the temporary files.
         gemm_s: Seconds spent on the speed of the matrix product, per number of threads.
+        constants: What metrics may take that is the same for all captures, by name.
     """
 
     bundles: tuple[str, ...]
@@ -47,6 +49,7 @@ class Settings:
     images: int | None = None
     work_dir: Path | None = None
     gemm_s: float = 1.0
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.bundles:

@@ -1,6 +1,7 @@
 """Accuracy: captures of both sorts, scores by the protocol, the input by the same pipeline."""
 
 import math
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -13,8 +14,10 @@ from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.colorimetry import decode_srgb
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.bench.accuracy import (
+    BROUGHT,
     INPUT,
     Restorers,
     Scores,
@@ -23,7 +26,8 @@ from camkit.report.bench.accuracy import (
     standard_error_of_gain,
 )
 from camkit.report.bench.known_captures import golden_captures, picture_captures, psf_source
-from camkit.report.bench.metric import registered_metrics
+from camkit.report.bench.metric import Column, Metric
+from camkit.report.bench.metrics.picture import METRIC
 from camkit.report.bench.trial import Trial
 from camkit.report.quality import Shot, judge
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_sensor
@@ -65,7 +69,7 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
         trials,
         picture_captures(bundle, pictures, 1, tmp_path),
         Restorers(bundle, threads=1),
-        registered_metrics(),
+        (METRIC,),
     )
     shot = Shot(
         set_name=pictures.name,
@@ -103,10 +107,47 @@ def test_a_method_that_fails_says_why_and_the_others_go_on(
         trials,
         islice(picture_captures(bundle, pictures, 1, tmp_path), 2),
         Restorers(bundle, threads=1),
-        registered_metrics(),
+        (METRIC,),
     )
     assert "holds size" in str(scores[trials[0].accuracy_key].error)
     assert scores[trials[1].accuracy_key].error is None
+
+
+def test_a_metric_gets_what_the_capture_brings_and_the_settings_say(
+    bundle: Bundle, pictures: Path, tmp_path: Path
+) -> None:
+    def measure(result: FloatArray, _truth: FloatArray, **beside: FloatArray) -> dict[str, float]:
+        assert set(beside) == {"linear", "nits"}
+        return {"level": float(result.mean()), "nits": float(beside["nits"])}
+
+    wanting = Metric(
+        name="m",
+        columns=(Column(name="level"), Column(name="nits")),
+        measure=measure,
+        needs=("linear",),
+        takes=("nits", "absent"),
+    )
+    plain, *_ = picture_captures(bundle, pictures, 1, tmp_path)
+    grey = np.full_like(plain.truths[IMAGE], 0.25)
+    known = replace(plain, extras={"linear": grey, "input": grey})
+    scores = measure_accuracy(
+        [], [plain, known], Restorers(bundle, threads=1), (wanting,), constants={"nits": 3.0}
+    )
+    assert scores[BROUGHT].by_picture == {"a.png": {"level": [0.25], "nits": [3.0]}}
+    (level,) = scores[INPUT].by_picture["a.png"]["level"]  # of one capture: the other lacks a need
+    assert level != 0.25
+
+
+def test_a_result_that_a_metric_refuses_fails_its_method_alone(
+    bundle: Bundle, pictures: Path, tmp_path: Path
+) -> None:
+    def measure(_result: FloatArray, _truth: FloatArray) -> dict[str, float]:
+        raise ContractError("a result must be finite")
+
+    metric = Metric(name="m", columns=(Column(name="m"),), measure=measure)
+    captures = islice(picture_captures(bundle, pictures, 1, tmp_path), 2)
+    scores = measure_accuracy([], captures, Restorers(bundle, threads=1), (metric,))
+    assert scores == {INPUT: Scores(error="a result must be finite")}
 
 
 def test_golden_cases_are_judged_against_their_stored_truth(tmp_path: Path) -> None:
@@ -134,6 +175,7 @@ def test_golden_cases_are_judged_against_their_stored_truth(tmp_path: Path) -> N
     assert (known.picture, known.origin_px, known.undistort) == ("large", (8, 6), True)
     stored = arrays.reference.astype(np.float16).astype(np.float32)  # as bundles store it
     np.testing.assert_allclose(decode_srgb(known.truths[IMAGE]), stored, atol=1e-5)
+    np.testing.assert_array_equal(known.extras["linear"], stored)
     restored = Restorers(bundle, threads=1).restore(None, known)
     assert restored[IMAGE].shape == (3, 96, 128)
 

@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from camkit.report.bench.accuracy import BROUGHT, INPUT, Scores
+from camkit.report.bench.metric import Column, Metric
+from camkit.report.bench.output import flatten
 from camkit.report.bench.row import make_row
 from camkit.report.bench.timed.process_run import Run
-from tests.bench_factory import make_facts, make_run, make_trial
+from tests.bench_factory import make_facts, make_run, make_scores, make_trial
 
 PROMISED = {
     *("bundle", "method", "size", "mode", "dtype", "provider", "threads", "width", "height"),
@@ -74,3 +77,40 @@ def test_speed_on_another_provider_is_not_held_against_the_cpu() -> None:
 def test_trials_carry_no_paths_into_rows() -> None:
     row = make_row(make_trial(path=Path("/secret/duet.camkit")), [make_run(1.0)], make_facts())
     assert "secret" not in json.dumps(row)
+
+
+def test_the_input_is_what_captures_bring_if_they_bring_it() -> None:
+    scores = make_facts().scores | {BROUGHT: make_scores({"a": 24.0, "b": 27.0})}
+    row = make_row(make_trial(), [make_run(1.0)], make_facts(scores=scores))
+    assert (row["psnr_db"], row["input_psnr_db"]) == (27, 25.5)
+    assert row["gain_se_psnr_db"] == pytest.approx(0.5)  # gains of 1 and 2
+    trial = make_trial(path=None, maker="develop", method="develop", size=None, provider=None)
+    developed = make_row(trial, [make_run(1.0)], make_facts(scores=scores))
+    assert (developed["psnr_db"], developed["input_psnr_db"]) == (21, 25.5)
+
+
+def test_a_metric_may_add_plain_columns_notes_and_the_numbers_of_every_picture() -> None:
+    def measure(*_: object) -> dict[str, float]:
+        raise AssertionError
+
+    metric = Metric(
+        name="hdr",
+        columns=(Column(name="stops", of_input="input_stops"), Column(name="guess")),
+        measure=measure,
+        notes=lambda: {"display": "24 inch"},
+        each_picture=True,
+    )
+    scores = {
+        make_trial().accuracy_key: Scores(
+            by_picture={"a": {"stops": [1.0, 3.0], "guess": [5.0, 5.0]}, "b": {"guess": [6.0]}}
+        ),
+        INPUT: Scores(by_picture={"a": {"stops": [4.0]}}),
+    }
+    row = make_row(make_trial(), [make_run(1.0)], make_facts(metrics=(metric,), scores=scores))
+    assert {"gain_se_stops", "over_base_stops", "psnr_db"}.isdisjoint(row)
+    assert (row["stops"], row["input_stops"], row["guess"]) == (2, 4, 5.5)
+    assert (row["display"], row["captures"]) == ("24 inch", 3)
+    assert row["pictures"] == {"a": {"stops": 2, "input_stops": 4, "guess": 5}, "b": {"guess": 6}}
+    assert "pictures" not in flatten(row)
+    nothing = make_row(make_trial(), [], make_facts(metrics=(metric,), scores={}))
+    assert (nothing["stops"], nothing["input_stops"], nothing["pictures"]) == (None, None, {})
