@@ -25,7 +25,12 @@ FOUND_BY_PLACE = (
     "camkit.runtime.plan.rules",
     "camkit.runtime.stages",
 )
-DATA = {"camkit.bundles", "camkit.models_def.prescriptions", "camkit.models_def.recipes"}
+DATA = {
+    "camkit.bundles",
+    "camkit.models_def.plates",
+    "camkit.models_def.prescriptions",
+    "camkit.models_def.recipes",
+}
 
 
 def _modules(top: str) -> Iterator[tuple[str, Path]]:

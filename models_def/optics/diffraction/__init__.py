@@ -6,7 +6,10 @@
 - `heights`: few numbers -> a height map
 - `fabrication`: a height map -> levels, masks, errors of depth
 - `gratings`: streaks that are wanted -> heights, in closed form
+- `patterns`: height maps that a few numbers describe
+- `map_numbers`: the numbers of a map as tensors, and the heights that follow
 - `plate`: a plate as a file
+- `references`: the plates to compare with, which come with camkit
 - `shares`: where the light goes, and where the streaks lie
 - `plate_optics`: a plate as freezing sees it, and its kernels as arrays
 - `freezing`: its PSF, frozen whole

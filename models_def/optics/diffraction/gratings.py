@@ -86,18 +86,28 @@ def chirped_gratings(streaks: Streaks, bench: Bench, cells: int) -> GratingMap:
     return GratingMap(cells, streaks.angles_rad, _profiles(streaks, bench, 8 * cells))
 
 
+def chirp_along(streaks: Streaks, bench: Bench, angle_rad: float, place_mm: Tensor) -> Tensor:
+    """Give the sine (place,) of the chirp that writes a line, of amplitude 1.
+
+    Args:
+        streaks: What is wanted.
+        bench: Aperture and distance of the sensor.
+        angle_rad: Of the line.
+        place_mm: (place,) along it, evenly, over the whole aperture.
+    """
+    share = torch.cumsum(_chord(place_mm / bench.diameter_mm, angle_rad, bench), 0)
+    share = share / share[-1]
+    sensor_um = streaks.near_um + (streaks.far_um - streaks.near_um) * share
+    cycles_per_mm = sensor_um / (streaks.wavelength_um * bench.distance_mm)
+    cycles = torch.cumsum(cycles_per_mm, 0) * (place_mm[1] - place_mm[0])
+    return torch.sin(2 * math.pi * (cycles - cycles[place_mm.numel() // 2]))
+
+
 def _profiles(streaks: Streaks, bench: Bench, samples: int) -> Tensor:
     """Give a chirp (line, sample) over the diagonal for every line."""
     diagonal_mm = bench.diameter_mm * math.sqrt(2)
     place_mm = torch.linspace(-0.5, 0.5, samples, dtype=torch.float64) * diagonal_mm
-    made = []
-    for angle in streaks.angles_rad:
-        share = torch.cumsum(_chord(place_mm / bench.diameter_mm, angle, bench), 0)
-        share = share / share[-1]
-        sensor_um = streaks.near_um + (streaks.far_um - streaks.near_um) * share
-        cycles_per_mm = sensor_um / (streaks.wavelength_um * bench.distance_mm)
-        cycles = torch.cumsum(cycles_per_mm, 0) * (diagonal_mm / (samples - 1))
-        made.append(torch.sin(2 * math.pi * (cycles - cycles[samples // 2])))
+    made = [chirp_along(streaks, bench, angle, place_mm) for angle in streaks.angles_rad]
     most_um = streaks.phase_rad * streaks.wavelength_um / (2 * math.pi * (streaks.index - 1))
     return most_um * torch.stack(made)
 

@@ -68,8 +68,8 @@ class RankMap(nn.Module):
         generator = torch.Generator().manual_seed(seed)
         both = start * torch.randn(2, cells, rank, generator=generator)
         both[..., 0] += offset
-        self.v, self.q = nn.Parameter(both[0]), nn.Parameter(both[1])
-        self.most_um = most_um
+        self.v, self.q = nn.Parameter(both[0].clone()), nn.Parameter(both[1].clone())
+        self.most_um, self.cells = most_um, cells
 
     def forward(self) -> Tensor:
         """Give the heights."""
@@ -122,6 +122,7 @@ class ZernikeMap(nn.Module):
         if coefficients_um.ndim != 1 or coefficients_um.numel() < 1:
             raise ContractError("coefficients are a list")
         self.coefficients_um = nn.Parameter(coefficients_um.clone())
+        self.cells = cells
         self.register_buffer("basis", zernike_basis(cells, coefficients_um.numel()))
 
     def forward(self) -> Tensor:
@@ -139,6 +140,7 @@ class RadialMap(nn.Module):
         if profile_um.ndim != 1 or profile_um.numel() < 2:
             raise ContractError("a profile has two samples at least")
         self.profile_um = nn.Parameter(profile_um.clone())
+        self.cells = cells
         place = (torch.arange(cells, dtype=torch.float64) + 0.5) / cells - 0.5
         radius = (place[:, None] ** 2 + place[None, :] ** 2).sqrt() * math.sqrt(2)
         at = (radius * (profile_um.numel() - 1)).clamp(0, profile_um.numel() - 1)

@@ -2,7 +2,7 @@
 
 name = "four-lines"
 glass = "SILICA"
-heights = "four-lines.safetensors"     # height_um (cells, cells), float32, as designed
+heights = "four-lines.safetensors"     # what its heights follow from, see map_numbers
 
 [bench]                                # aperture, lens, sensor: the fields of geometry.Bench
 diameter_mm = 9.162
@@ -12,12 +12,24 @@ focus_mm = 5000.0
 [etching]                              # how the heights are made; without it as designed
 range_um = 0.3
 levels = 16
+
+In place of `heights`, a pattern (`patterns`) and how many cells it is drawn with:
+
+cells = 1527
+
+[pattern]
+kind = "star"
+angles_deg = [0, 45, 90, 135]
+near_um = 47.76
+far_um = 716.4
+share = 0.06
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import torch
 from safetensors import SafetensorError
@@ -27,14 +39,15 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.fabrication import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
+from camkit.models_def.optics.diffraction.map_numbers import HEIGHTS, MAX_CELLS, map_of
+from camkit.models_def.optics.diffraction.patterns import PATTERNS, Pattern
 from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.toml_table import key_line, read_table, section
 from camkit.units import UM_PER_MM
 
-MAX_CELLS: Final = 16_384
-HEIGHTS: Final = "height_um"
+PLATES: Final = Path(__file__).resolve().parents[2] / "plates"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +56,8 @@ class _Head:
 
     name: str
     glass: str
-    heights: str
+    heights: str = ""
+    cells: int = 0
     note: str = ""
 
 
@@ -58,6 +72,8 @@ class Plate:
         bench: Aperture, lens and sensor.
         height_um: (cells, cells) as designed, rows downwards; its side is the bench's diameter.
         etching: How it is made; None for as designed.
+        pattern: What its heights follow from, if they are those of a pattern.
+        numbers: The same, if they are those of a map of few numbers (`map_numbers`).
     """
 
     name: str
@@ -66,6 +82,8 @@ class Plate:
     height_um: Tensor
     etching: Etching | None = None
     note: str = ""
+    pattern: Pattern | None = None
+    numbers: Mapping[str, Tensor] | None = None
 
     def __post_init__(self) -> None:
         """Refuse heights that are none.
@@ -119,8 +137,52 @@ class Plate:
         )
 
 
+def pattern_plate(
+    name: str,
+    pattern: Pattern,
+    *,
+    cells: int,
+    bench: Bench,
+    glass: str = "SILICA",
+    etching: Etching | None = None,
+    note: str = "",
+) -> Plate:
+    """Make the plate of a pattern.
+
+    Raises:
+        ContractError: If the pattern cannot be drawn with such cells, or the glass is not known.
+    """
+    if not 1 < cells <= MAX_CELLS:
+        raise ContractError(f"a plate has 2 to {MAX_CELLS} cells along a side; got {cells}")
+    found = find_glass(glass)
+
+    def index_at(wavelength_um: float) -> float:
+        return float(refractive_index(found, torch.tensor([wavelength_um], dtype=torch.float64)))
+
+    return Plate(
+        name=name,
+        note=note,
+        glass=glass,
+        bench=bench,
+        etching=etching,
+        height_um=pattern.height_um(bench, index_at, cells),
+        pattern=pattern,
+    )
+
+
+def built_in_plates() -> tuple[str, ...]:
+    """Give the names of the plates that come with camkit."""
+    return tuple(sorted(path.stem for path in PLATES.glob("*.toml")))
+
+
+def _built_in(path: Path) -> Path:
+    named = not path.is_file() and str(path) in built_in_plates()
+    return PLATES / f"{path}.toml" if named else path
+
+
 def is_plate(path: Path) -> bool:
-    """Tell whether a file is that of a plate: TOML that speaks of a bench."""
+    """Tell whether a file is that of a plate, TOML that speaks of a bench, or a plate's name."""
+    path = _built_in(path)
     if path.suffix.lower() != ".toml" or not path.is_file():
         return False
     return "bench" in read_table(path, "optics")
@@ -129,57 +191,113 @@ def is_plate(path: Path) -> bool:
 def read_plate(path: Path) -> Plate:
     """Read a plate.
 
+    Args:
+        path: Its file, or the name of a built-in one.
+
     Raises:
         ContractError: If the file, or that of its heights, is missing, damaged or no plate.
     """
+    path = _built_in(path)
+    if not path.suffix and not path.exists():
+        raise ContractError(
+            f"no plate {path}: name a file, or one of {', '.join(built_in_plates())}"
+        )
     table = read_table(path, "plate")
-    parts = {key: table.pop(key, None) for key in ("bench", "etching")}
+    parts = {key: table.pop(key, None) for key in ("bench", "etching", "pattern")}
     head = section(f"plate {path}", _Head, table)
     if parts["bench"] is None:
         raise ContractError(f"plate {path} lacks the table [bench]")
-    etching = parts["etching"]
+    bench = section("bench", Bench, parts["bench"])
+    etching = None if parts["etching"] is None else section("etching", Etching, parts["etching"])
+    if bool(head.heights) == (parts["pattern"] is not None):
+        raise ContractError(f"plate {path} needs heights or a table [pattern], one of them")
+    if head.heights and head.cells:
+        raise ContractError(f"plate {path}: its heights know their cells; leave out cells")
+    if parts["pattern"] is not None:
+        return pattern_plate(
+            head.name,
+            _read_pattern(parts["pattern"]),
+            cells=head.cells,
+            bench=bench,
+            glass=head.glass,
+            etching=etching,
+            note=head.note,
+        )
+    numbers = _read_numbers(path, head.heights)
+    with torch.no_grad():
+        height_um = map_of(numbers)().detach()
     return Plate(
         name=head.name,
         note=head.note,
         glass=head.glass,
-        bench=section("bench", Bench, parts["bench"]),
-        etching=None if etching is None else section("etching", Etching, etching),
-        height_um=_read_heights(path, head.heights),
+        bench=bench,
+        etching=etching,
+        height_um=height_um,
+        numbers=None if HEIGHTS in numbers else numbers,
     )
 
 
-def _read_heights(plate: Path, name: str) -> Tensor:
-    """Read the heights beside a plate.
+def _read_pattern(table: Any) -> Pattern:
+    """Read the table of a pattern.
 
     Raises:
-        ContractError: If they cannot be.
+        ContractError: If it is none.
+    """
+    kind = table.get("kind") if isinstance(table, dict) else None
+    if not isinstance(kind, str) or kind not in PATTERNS:
+        raise ContractError(f"pattern.kind must be one of {', '.join(PATTERNS)}; got {kind!r}")
+    return section("pattern", PATTERNS[kind], {k: v for k, v in table.items() if k != "kind"})
+
+
+def _read_numbers(plate: Path, name: str) -> dict[str, Tensor]:
+    """Read what lies beside a plate.
+
+    Raises:
+        ContractError: If it cannot be.
     """
     if Path(name).name != name:
         raise ContractError(f"plate {plate}: heights lie beside it, not at {name!r}")
     path = plate.with_name(name)
     try:
-        tensors = load(path.read_bytes())
+        return load(path.read_bytes())
     except OSError as error:
         raise ContractError(f"cannot read the heights {path}: {error.strerror}") from error
     except (SafetensorError, ValueError) as error:
         raise ContractError(f"{path} is no safetensors file: {error}") from error
-    if set(tensors) != {HEIGHTS}:
-        raise ContractError(f"{path} holds {', '.join(sorted(tensors))}; wanted is {HEIGHTS}")
-    return tensors[HEIGHTS]
 
 
 def write_plate(plate: Plate, path: Path) -> None:
-    """Write a plate and, beside it under the same name, its heights.
+    """Write a plate and, unless it is one of a pattern, its heights beside it.
+
+    The heights take the plate's name and appear before it; each file is whole or not there.
 
     Raises:
         OSError: If it cannot be written.
     """
     heights = path.with_suffix(".safetensors")
-    head = {"name": plate.name, "note": plate.note, "glass": plate.glass, "heights": heights.name}
+    head: dict[str, str | int] = {"name": plate.name, "note": plate.note, "glass": plate.glass}
+    if plate.pattern is None:
+        head["heights"] = heights.name
+    else:
+        head["cells"] = plate.height_um.shape[0]
     lines = [key_line(k, v) for k, v in head.items()]
-    bench = {k: v for k, v in asdict(plate.bench).items() if v is not None}
-    lines += ["", "[bench]", *(key_line(k, v) for k, v in bench.items())]
+    lines += ["", "[bench]", *_entries(plate.bench)]
     if plate.etching is not None:
-        lines += ["", "[etching]", *(key_line(k, v) for k, v in asdict(plate.etching).items())]
-    heights.write_bytes(save({HEIGHTS: plate.height_um.detach().contiguous()}))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        lines += ["", "[etching]", *_entries(plate.etching)]
+    if plate.pattern is not None:
+        kind = next(k for k, made in PATTERNS.items() if isinstance(plate.pattern, made))
+        lines += ["", "[pattern]", key_line("kind", kind), *_entries(plate.pattern)]
+    else:
+        numbers = plate.numbers or {HEIGHTS: plate.height_um}
+        _replace(heights, save({k: v.detach().contiguous() for k, v in numbers.items()}))
+    _replace(path, ("\n".join(lines) + "\n").encode())
+
+
+def _entries(table: Any) -> list[str]:
+    return [key_line(k, v) for k, v in asdict(table).items() if v is not None]
+
+
+def _replace(path: Path, data: bytes) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(data)
+    part.replace(path)

@@ -100,7 +100,7 @@ def test_a_plate_without_a_bench_is_refused(tmp_path: Path) -> None:
         (save({"height": torch.zeros(4, 4)}), "wanted is height_um"),
         (save({"height_um": torch.zeros(4, 5)}), "heights are a square"),
         (save({"height_um": torch.zeros(1, 1)}), "heights are a square"),
-        (save({"height_um": torch.zeros(4, 4, dtype=torch.int32)}), "heights are torch.int32"),
+        (save({"height_um": torch.zeros(4, 4, dtype=torch.int32)}), "of type float; got"),
         (save({"height_um": torch.full((4, 4), math.nan)}), "not a finite number"),
     ],
 )
@@ -109,3 +109,38 @@ def test_heights_that_are_none_are_refused(tmp_path: Path, data: bytes, message:
     (tmp_path / "plate.safetensors").write_bytes(data)
     with pytest.raises(ContractError, match=message):
         read_plate(tmp_path / "plate.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "needs heights or a table"),
+        ('heights = "a.safetensors"\n[pattern]\nkind = "flat"', "needs heights or a table"),
+        ('heights = "a.safetensors"\ncells = 64', "leave out cells"),
+        ('[pattern]\nkind = "flat"', "2 to 16384 cells along a side; got 0"),
+        ('cells = 20000\n[pattern]\nkind = "flat"', "2 to 16384 cells along a side; got 20000"),
+        ('cells = 64\n[pattern]\nkind = "spiral"', "must be one of star, cross, peak, flat"),
+        ('cells = 64\n[pattern]\nkind = ["flat"]', "must be one of star, cross, peak, flat"),
+        ("cells = 64\npattern = 3", "must be one of star, cross, peak, flat"),
+        ('cells = 64\n[pattern]\nkind = "star"', "pattern lacks angles_deg, far_um"),
+        ('cells = 64\n[pattern]\nkind = "flat"\nshare = 1', "unknown key 'share'"),
+        (
+            'cells = 64\n[pattern]\nkind = "cross"\nnear_um = 1\nfar_um = 2\nshare = 0.5',
+            "share lies between 0 and 1/3",
+        ),
+    ],
+)
+def test_a_wrong_pattern_is_one_error(tmp_path: Path, text: str, message: str) -> None:
+    head, *tables = text.partition("[pattern]")
+    bench = "\n[bench]\ndiameter_mm = 2.0\nfocal_length_mm = 50.0\n"
+    text = f'name = "x"\nglass = "SILICA"\n{head}{bench}{"".join(tables)}\n'
+    (tmp_path / "plate.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ContractError, match=message):
+        read_plate(tmp_path / "plate.toml")
+
+
+def test_a_name_of_no_plate_is_told_those_that_there_are(tmp_path: Path) -> None:
+    with pytest.raises(ContractError, match="no plate streak-9: name a file, or one of bare-lens"):
+        read_plate(Path("streak-9"))
+    with pytest.raises(ContractError, match="cannot read plate"):
+        read_plate(tmp_path / "none.toml")

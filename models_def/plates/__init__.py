@@ -1,0 +1,1 @@
+"""Plates as TOML; read by `camkit.models_def.optics.diffraction.plate`."""
