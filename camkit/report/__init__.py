@@ -2,6 +2,8 @@
 
     fabricated_psf   lenses with fabrication errors, traced afresh and densely
     quality          where a picture is placed, how it is captured and scored
+    hdr_score        how well a picture of high dynamic range was recovered
+    pu21, jod        what the eye sees of it, on a stated display
     discovery        modules of a folder that register themselves
     kind, kind_finder   what reports ask of a kind of camera, and where they find it
     kinds/           the kinds that come with camkit

@@ -11,6 +11,7 @@ from camkit.bundle.reader import Bundle
 from camkit.errors import ContractError, UnsupportedError
 from camkit.report.bench.line_up import make_trials
 from camkit.report.bench.metric import registered_metrics
+from camkit.report.bench.metrics import picture
 from camkit.report.bench.row_maker import row_makers
 from camkit.report.bench.trial import Axes, Entrant, Ground
 from camkit.report.discovery import discover
@@ -31,7 +32,8 @@ def labels(bundle: Bundle, axes: Axes, ground: Ground = GROUND) -> tuple[list[st
 
 def test_the_row_makers_that_come_with_camkit_are_found() -> None:
     assert [maker.name for maker in row_makers()] == ["classical", "develop", "network"]
-    assert [c.name for m in registered_metrics() for c in m.columns] == ["psnr_db", "ssim"]
+    assert [metric.name for metric in registered_metrics()] == ["hdr", "picture"]
+    assert [column.name for column in picture.METRIC.columns] == ["psnr_db", "ssim"]
 
 
 def test_a_new_module_registers_without_any_edit(
