@@ -4,6 +4,7 @@ texture       colours and textures with the spectrum of nature
 leaves        dead leaves: what the statistics of natural images are made of
 lettering     lines of made-up glyphs
 procedural    `procedural:SEED`, a bit of everything
+night         `night:SEED`, dark surfaces and lights up to 256 times white
 named         the register: a scene by its name
 """
 

@@ -4,6 +4,7 @@ References: Lee, Mumford and Huang 2001, "Occlusion models for natural images" (
 size density r^-3).
 """
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -17,16 +18,23 @@ LEAF_MIN_PX: Final = 4.0
 LEAF_MAX_PX: Final = 160.0
 
 
-def add_leaves(rng: Generator, scene: FloatArray, textures: list[FloatArray]) -> None:
+def add_leaves(
+    rng: Generator,
+    scene: FloatArray,
+    textures: Sequence[FloatArray],
+    *,
+    least_px: float = LEAF_MIN_PX,
+) -> None:
     """Cover a scene with leaves, in place.
 
     Args:
         rng: Draws sizes, places and colours.
         scene: (3, h, w) float32, linear.
         textures: One for each shape of leaf, see `make_texture`.
+        least_px: Radius of the smallest.
     """
     _, height, width = scene.shape
-    radii = _leaf_radii(rng, height, width)
+    radii = _leaf_radii(rng, height, width, least_px)
     centres = rng.random((radii.size, 2)) * (height, width)
     kinds = rng.integers(0, 3, radii.size)
     angles = rng.uniform(0, np.pi, radii.size)
@@ -48,13 +56,13 @@ def add_leaves(rng: Generator, scene: FloatArray, textures: list[FloatArray]) ->
         region += alpha * (paint - region)
 
 
-def _leaf_radii(rng: Generator, height: int, width: int) -> NDArray[np.float64]:
+def _leaf_radii(rng: Generator, height: int, width: int, least_px: float) -> NDArray[np.float64]:
     """Draw radii with density r^-3, enough to cover the picture LEAF_LAYERS times."""
-    largest = max(LEAF_MIN_PX * 2, min(LEAF_MAX_PX, 0.35 * min(height, width)))
-    log_span = np.log(largest / LEAF_MIN_PX)
-    mean_area = 2 * np.pi * LEAF_MIN_PX**2 * log_span
+    largest = max(least_px * 2, min(LEAF_MAX_PX, 0.35 * min(height, width)))
+    log_span = np.log(largest / least_px)
+    mean_area = 2 * np.pi * least_px**2 * log_span
     number = draw_count(rng, LEAF_LAYERS * height * width / mean_area)
-    low, high = LEAF_MIN_PX**-2, largest**-2
+    low, high = least_px**-2, largest**-2
     return np.asarray((low - rng.random(number) * (low - high)) ** -0.5)
 
 

@@ -5,10 +5,12 @@ from typing import Final
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.scenes.night import night_scene
 from camkit.scenes.procedural import procedural_scene
 
 SOURCES: Final[Mapping[str, Callable[[int, int, int], FloatArray]]] = {
     "procedural": procedural_scene,
+    "night": night_scene,
 }
 """Name -> what draws the scene of (seed, height, width)."""
 MOST_DIGITS: Final = 18

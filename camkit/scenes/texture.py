@@ -57,3 +57,30 @@ def cut_texture(rng: Generator, texture: FloatArray, height: int, width: int) ->
     rows = np.arange(y, y + height) % TEXTURE_SIDE_PX
     columns = np.arange(x, x + width) % TEXTURE_SIDE_PX
     return np.asarray(texture[rows[:, None], columns])
+
+
+def sample_texture(
+    texture: FloatArray, y: NDArray[np.float64], x: NDArray[np.float64]
+) -> FloatArray:
+    """Give a periodic texture between its samples, without a kink at them.
+
+    Args:
+        texture: (side, side) float32.
+        y: (h,) rows to look at.
+        x: (w,) columns to look at.
+
+    Returns:
+        (h, w) float32.
+    """
+    tall = _along(texture, y, 0)
+    return _along(tall, x, 1)
+
+
+def _along(texture: FloatArray, at: NDArray[np.float64], axis: int) -> FloatArray:
+    first = np.floor(at).astype(np.intp)
+    share = (at - first).astype(np.float32)
+    share = share * share * (3 - 2 * share)
+    share = share[:, None] if axis == 0 else share
+    side = texture.shape[axis]
+    low, high = (np.take(texture, (first + step) % side, axis=axis) for step in (0, 1))
+    return np.asarray(low + share * (high - low), dtype=np.float32)

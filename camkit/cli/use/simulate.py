@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 def simulate(
     scene: Annotated[
-        str, typer.Argument(help="A picture (8/16-bit sRGB, or linear EXR) or procedural:SEED.")
+        str,
+        typer.Argument(
+            help="A picture (8/16-bit sRGB, linear EXR), procedural:SEED or night:SEED."
+        ),
     ],
     bundle: Annotated[str, typer.Option(help="Bundle NAME or PATH of the camera.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The capture to write, such as a DNG.")],
@@ -28,7 +31,7 @@ def simulate(
     exposure: Annotated[float, typer.Option(help="Factor on the scene's radiance.")] = 1.0,
     depth_m: DepthM = None,
     size_px: Annotated[
-        str | None, typer.Option(help="W,H of a procedural scene; default: the sensor.")
+        str | None, typer.Option(help="W,H of a scene of a seed; default: the sensor.")
     ] = None,
     overwrite: Overwrite = False,
     _debug: Debug = False,
