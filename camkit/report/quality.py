@@ -22,7 +22,7 @@ from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
-from camkit.runtime.files.picture import read_scene
+from camkit.runtime.files.picture import read_light
 from camkit.runtime.geometry.sensor_window import centred_origin
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
@@ -32,7 +32,9 @@ FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 QUADRANTS: Final = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 FABRICATION_SEEDS: Final = (2001, 2002, 2003)
 BORDER_PX: Final = 32
-PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+LIGHT_SUFFIXES: Final = (".exr", ".hdr")
+"""Pictures that hold linear light, which may exceed white and may be what no camera sees."""
+PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", *LIGHT_SUFFIXES)
 
 FloatGrid = NDArray[np.float64]
 PsfSource = Literal["fresh", "bundle"]
@@ -171,8 +173,12 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Ex
 
 
 def read_picture(path: Path, most_px: int | None = None) -> FloatArray:
-    """Read a picture as linear Rec.709, greys replicated; its middle if a side exceeds a limit."""
-    scene = read_scene(path)
+    """Read a picture as linear Rec.709, greys replicated; its middle if a side exceeds a limit.
+
+    Raises:
+        DecodeError: If it is damaged, not a picture or not finite; names the file.
+    """
+    scene = read_light(path)
     if most_px is not None:
         _, height, width = scene.shape
         top, left = (max(side - most_px, 0) // 2 for side in (height, width))

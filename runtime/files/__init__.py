@@ -11,5 +11,6 @@ doubts        what of a decode is not likely, as notes
 white_level   white where the data contradict the file
 dng_checks    a DNG against itself and against LibRaw
 mapped_tiff   large plain TIFF files read in place
-picture       EXR, TIFF and PNG as captures or scenes
+radiance      the header of a Radiance HDR file
+picture       EXR, HDR, TIFF and PNG as captures or scenes
 """

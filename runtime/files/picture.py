@@ -3,6 +3,7 @@
     read_picture   a capture that is already RGB (linear_rgb_v1)
     read_mosaic    a single-channel PNG or TIFF that is a Bayer mosaic
     read_scene     a sharp scene for the simulation, as linear Rec.709
+    read_light     the same as light, which is never negative
 
 PNG, TIFF, JPEG and Radiance HDR are decoded by OpenCV, EXR by the OpenEXR package. Samples stay as
 they are stored; an EXIF orientation is told beside them.
@@ -31,7 +32,7 @@ from camkit.colorimetry import (
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.files import raw_checks
+from camkit.runtime.files import radiance, raw_checks
 from camkit.runtime.files.exif_tags import exif_of_picture, metadata_of, orientation_of
 from camkit.runtime.files.exr_attributes import metadata_of_exr
 from camkit.runtime.files.mapped_tiff import map_plain_tiff
@@ -46,6 +47,8 @@ MOSAIC_ADVICE: Final = (
     "if it is a Bayer mosaic, say --mosaic RGGB --black-level N --white-level N "
     "(RGGB, BGGR, GRBG or GBRG at the top-left pixel)"
 )
+FAINT: Final = 0.01
+"""Negative samples up to this share of the brightest are noise."""
 _JPEG_MAGIC: Final = b"\xff\xd8"
 _CHROMATICITY_TOLERANCE: Final = 2e-3
 
@@ -145,12 +148,14 @@ def read_scene(path: Path) -> FloatArray:
         (3, h, w) float32 linear Rec.709.
 
     Raises:
-        DecodeError: If the file is missing, damaged, or holds NaN or infinite samples.
+        DecodeError: If the file is missing, damaged, or holds NaN or infinite samples; names it.
     """
     try:
         picture = _decode(Path(path))
     except OSError as error:
         raise DecodeError(f"cannot read {path}: {error.strerror or error}") from error
+    except DecodeError as error:
+        raise DecodeError(f"{path}: {error}") from error
     samples = picture.samples
     if np.issubdtype(samples.dtype, np.integer):
         samples = _srgb_table(int(np.iinfo(samples.dtype).max))[samples]
@@ -160,6 +165,24 @@ def read_scene(path: Path) -> FloatArray:
         raise DecodeError(f"{path}: {bad} samples are NaN or infinite; a scene must be finite")
     planes = np.stack([linear] * 3) if linear.ndim == 2 else np.ascontiguousarray(linear)
     return planes if picture.to_rec709 is None else apply_matrix(picture.to_rec709, planes)
+
+
+def read_light(path: Path) -> FloatArray:
+    """Read a sharp scene whose faint negative samples are taken as dark.
+
+    Noise and colours outside Rec.709 leave samples a little below 0 in linear files. What lies
+    deeper than `FAINT` of the brightest sample is no such thing and stays, for others to refuse.
+
+    Returns:
+        (3, h, w) float32 linear Rec.709.
+
+    Raises:
+        DecodeError: As `read_scene`.
+    """
+    scene = read_scene(path)
+    if scene.min() >= -FAINT * scene.max():
+        np.maximum(scene, 0, out=scene)
+    return scene
 
 
 def _srgb_table(top: int) -> FloatArray:
@@ -182,6 +205,8 @@ def _decode(path: Path) -> _Picture:
         planes = mapped if mapped.ndim == 2 else np.moveaxis(mapped, -1, 0)
         return _with_exif(_Picture(samples=planes, to_rec709=None, notes=()), tags)
     data = path.read_bytes()
+    if data.startswith(radiance.MAGIC):
+        radiance.check_header(data)
     picture = _decode_by_opencv(data)
     if not tags.directories:
         return _with_exif(picture, exif_of_picture(data))
@@ -198,12 +223,15 @@ def _decode_by_opencv(data: bytes) -> _Picture:
     # libjpeg fills what is missing with grey and only warns
     if data.startswith(_JPEG_MAGIC) and b"\xff\xd9" not in data[-65536:]:
         raise DecodeError("the JPEG has no end marker: it is cut off, copy it again")
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         decoded = (
             cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
         )
     except cv2.error as error:
         raise DecodeError(f"the picture cannot be decoded: {error.err or error}") from error
+    finally:
+        cv2.utils.logging.setLogLevel(level)
     if decoded is None:
         raise DecodeError(
             "the picture is damaged or of an unknown kind; expected EXR, PNG, TIFF, JPEG or HDR"

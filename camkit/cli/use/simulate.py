@@ -18,7 +18,7 @@ def simulate(
     scene: Annotated[
         str,
         typer.Argument(
-            help="A picture (8/16-bit sRGB, linear EXR), procedural:SEED or night:SEED."
+            help="A picture (8/16-bit sRGB, linear EXR or HDR), procedural:SEED or night:SEED."
         ),
     ],
     bundle: Annotated[str, typer.Option(help="Bundle NAME or PATH of the camera.")],
@@ -80,6 +80,6 @@ def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def
 
     if is_scene_name(scene):
         return named_scene(scene, size_px[1], size_px[0])
-    from camkit.runtime.files.picture import read_scene
+    from camkit.runtime.files.picture import read_light
 
-    return read_scene(Path(scene))
+    return read_light(Path(scene))

@@ -24,7 +24,7 @@ from camkit.report.bench.timed.process_run import Job, Run, run_job
 from camkit.report.bench.timed.timing import interleaved
 from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
 from camkit.report.kind_finder import camera_of, find_part
-from camkit.report.quality import list_set
+from camkit.report.quality import LIGHT_SUFFIXES, list_set, read_picture
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads, usable_providers
 
@@ -74,11 +74,13 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     Raises:
         ContractError: If bundles, methods or pictures do not fit each other.
         BundleError: If a bundle is refused.
-        DecodeError: If the given capture cannot be read.
+        DecodeError: If the given capture or a file of linear light cannot be read.
     """
     folder = settings.folder()
     if settings.data is not None:
-        list_set(settings.data, settings.images)  # an error now, not after the timing
+        for path in list_set(settings.data, settings.images):
+            if path.suffix.lower() in LIGHT_SUFFIXES:
+                read_picture(path)  # an error now, not after the timing
     entrants = open_entrants(settings.bundles, settings.references)
     ground = Ground(
         threads=available_threads(None),

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,6 +13,7 @@ from camkit.report.quality import (
     BORDER_PX,
     FABRICATION_SEEDS,
     FIELD_SHARES,
+    LIGHT_SUFFIXES,
     QUADRANTS,
     Shot,
     crop_origin,
@@ -103,6 +105,22 @@ def test_pictures_are_read_linear_and_greys_replicated(tmp_path: Path) -> None:
     assert scene.shape == (3, 20, 30)
     np.testing.assert_allclose(scene, 0.5029, atol=1e-3)
     assert read_picture(path, 16).shape == (3, 16, 16)
+
+
+@pytest.mark.parametrize("suffix", LIGHT_SUFFIXES)
+def test_linear_light_is_taken_as_it_is_and_may_exceed_white(tmp_path: Path, suffix: str) -> None:
+    light = np.full((20, 30, 3), 0.5, np.float32)
+    light[4] = 40
+    written = tmp_path / f"x{suffix.upper()}"
+    if suffix == ".hdr":
+        written.write_bytes(cv2.imencode(suffix, light)[1].tobytes())
+    else:
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"RGB": light}).write(str(written))
+    (path,) = list_set(tmp_path)
+    scene = read_picture(path)
+    assert set(np.unique(scene)) == {0.5, 40}
+    assert scene[:, 4].min() == 40
 
 
 def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:

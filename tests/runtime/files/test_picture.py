@@ -12,7 +12,7 @@ from camkit.colorimetry import ACES_WHITE, ACESCG_PRIMARIES, decode_srgb
 from camkit.errors import DecodeError
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files.mapped_tiff import map_plain_tiff
-from camkit.runtime.files.picture import read_mosaic, read_picture, read_scene
+from camkit.runtime.files.picture import read_light, read_mosaic, read_picture, read_scene
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.raw import read_capture
 from tests.data_folder import data_path
@@ -176,6 +176,41 @@ def test_a_missing_scene_is_a_decode_error(tmp_path):
         read_scene(tmp_path / "none.png")
 
 
+def test_what_is_wrong_with_a_scene_is_told_with_its_name(tmp_path):
+    write_exr(tmp_path / "luma.exr", [np.ones((4, 4), np.float32)] * 3, ["Y", "RY", "BY"])
+    with pytest.raises(DecodeError, match=r"luma\.exr: expected EXR channels R, G, B or Y"):
+        read_scene(tmp_path / "luma.exr")
+    (tmp_path / "no.png").write_bytes(b"no picture")
+    with pytest.raises(DecodeError, match=r"no\.png: the picture is damaged"):
+        read_scene(tmp_path / "no.png")
+
+
+def test_faint_negatives_of_a_scene_are_dark_and_deep_ones_stay(tmp_path):
+    planes = np.abs(planes_of(np.float32))
+    planes[0, 0, 0], planes[1, 0, 0] = planes.max() * -0.009, planes.max()
+    write_exr(tmp_path / "x.exr", planes)
+    np.testing.assert_array_equal(read_light(tmp_path / "x.exr"), np.maximum(planes, 0))
+    planes[0, 0, 0] = planes.max() * -0.02
+    write_exr(tmp_path / "x.exr", planes)
+    np.testing.assert_array_equal(read_light(tmp_path / "x.exr"), planes)
+    write_exr(tmp_path / "x.exr", -np.abs(planes) - 1)
+    assert read_light(tmp_path / "x.exr").max() < 0
+
+
+def test_a_damaged_hdr_leaves_no_word_and_no_file(tmp_path, capfd, monkeypatch):
+    monkeypatch.setenv("OPENCV_TEMP_PATH", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    path = tmp_path / "x.hdr"
+    bgr = np.abs(planes_of(np.float32, height=64, width=64)).transpose(1, 2, 0)
+    data = cv2.imencode(".hdr", bgr)[1].tobytes()
+    for changed in (data[:-40], data.replace(b"+X 64", b"+X 60000").replace(b"-Y 64", b"-Y 60000")):
+        path.write_bytes(changed)
+        with pytest.raises(DecodeError):
+            read_scene(path)
+    assert capfd.readouterr() == ("", "")
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
 def test_damaged_exr_and_hdr_files_are_refused_and_stdout_stays_clean(capsys):
     stdout = sys.stdout
     for path in sorted(data_path("hdr/damaged").iterdir()):
@@ -190,6 +225,9 @@ def test_real_hdr_pictures_are_read():
     assert bright.notes == ("18 samples are NaN or infinite",)
     assert read_scene(data_path("hdr/StageEnvLatLong.exr")).max() == 4096
     assert read_scene(data_path("hdr/esplanade.hdr")).max() == 49664
+    for name in ("CandleGlass", "Desk"):
+        assert read_scene(data_path(f"hdr/{name}.exr")).min() < 0
+        assert read_light(data_path(f"hdr/{name}.exr")).min() == 0
 
 
 ORIENTED = np.arange(6 * 8 * 3, dtype=np.uint16).reshape(6, 8, 3) * 300

@@ -10,7 +10,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Sensor
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.files.picture import read_scene
+from camkit.runtime.files.picture import read_light
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.twin.simulate import SimulationOptions
@@ -63,7 +63,7 @@ def timed_capture(
         if photo is None:
             scene = np.minimum(procedural_scene(SCENE_SEED, height, width), np.float32(1))
         else:
-            scene = _middle(read_scene(photo), photo.name, height, width)
+            scene = _middle(read_light(photo), photo.name, height, width)
         options = SimulationOptions(
             exposure=EXPOSURE if photo is None else 1.0,
             depth_mm=depth_mm,

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 
-from camkit.errors import BundleError, ContractError
+from camkit.errors import BundleError, ContractError, DecodeError
 from camkit.report.bench.output import write_bench
 from camkit.report.bench.run import open_entrants, run_bench
 from camkit.report.bench.settings import Settings
@@ -86,6 +87,21 @@ def test_a_folder_without_pictures_is_an_error_before_the_timing(tmp_path: Path)
         bundles=(str(write_tiny_bundle(tmp_path)),), data=tmp_path / "none", work_dir=tmp_path
     )
     with pytest.raises(ContractError, match="no folder"):
+        run_bench(settings, told.append)
+    assert told == []
+
+
+def test_a_scene_that_is_not_finite_is_an_error_before_the_timing(tmp_path: Path) -> None:
+    told: list[str] = []
+    light = np.full((120, 120, 3), 0.5, np.float32)
+    light[3, 4] = np.inf
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    (tmp_path / "data").mkdir()
+    OpenEXR.File(header, {"RGB": light}).write(str(tmp_path / "data" / "bad.exr"))
+    settings = Settings(
+        bundles=(str(write_tiny_bundle(tmp_path)),), data=tmp_path / "data", work_dir=tmp_path
+    )
+    with pytest.raises(DecodeError, match=r"bad\.exr: 3 samples are NaN or infinite"):
         run_bench(settings, told.append)
     assert told == []
 
