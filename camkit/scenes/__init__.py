@@ -5,10 +5,12 @@ leaves        dead leaves: what the statistics of natural images are made of
 lettering     lines of made-up glyphs
 procedural    `procedural:SEED`, a bit of everything
 night         `night:SEED`, dark surfaces and lights up to 256 times white
+saturation    the exposure at which a share of a scene saturates
 named         the register: a scene by its name
 """
 
 from camkit.scenes.named import is_scene_name, named_scene
+from camkit.scenes.night import night_scene
 from camkit.scenes.procedural import procedural_scene
 
-__all__ = ["is_scene_name", "named_scene", "procedural_scene"]
+__all__ = ["is_scene_name", "named_scene", "night_scene", "procedural_scene"]

@@ -1,5 +1,6 @@
 """The digital twin: what the camera would record of a sharp scene.
 
+saturation   scene -> the exposure at which a share of it clips
 light        scene -> distortion -> blur that varies over the field -> Light on the sensor
 exposure     Light -> illumination, mosaic, photons, amplifier, converter -> DN
 """
