@@ -2,5 +2,6 @@
 
 classical   the classical methods on the bundle's blocks
 develop     no reconstruction at all
+physics     the optics alone, where a stage of the bundle knows that
 network     the networks of a bundle: sizes, modes, precisions, providers, threads, tiles
 """

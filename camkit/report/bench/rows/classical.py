@@ -3,12 +3,15 @@
 from typing import Final
 
 from camkit.report.bench.row_maker import RowMaker
+from camkit.report.bench.rows import physics
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.ways import offered_methods, planned
 from camkit.runtime.stage_finder import all_methods, stage_module
 
-METHODS: Final = tuple(m for m in all_methods() if m not in stage_module("network").METHODS)
+METHODS: Final = tuple(
+    m for m in all_methods() if m not in (*stage_module("network").METHODS, physics.METHOD)
+)
 
 
 def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Trial], list[Skip]]:
@@ -19,7 +22,8 @@ def make_trials(entrant: Entrant, axes: Axes, ground: Ground) -> tuple[list[Tria
     offered = [
         method
         for method in offered_methods(manifest.stages, manifest.all_planes)
-        if method != DEVELOP and not planned(manifest.stages, Work(method=method)).networks
+        if method not in (DEVELOP, physics.METHOD)
+        and not planned(manifest.stages, Work(method=method)).networks
     ]
     threads = ground.base_threads(axes)
     trials = [

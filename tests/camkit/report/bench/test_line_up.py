@@ -11,6 +11,7 @@ from camkit.report.bench import line_up
 from camkit.report.bench.line_up import make_trials, makers_of, metrics_of
 from camkit.report.bench.trial import Axes, Entrant, Ground
 from camkit.report.kinds import bayer
+from camkit.runtime.stages import wiener
 from tests.plain_bundle import SIZES, write_bankless_bundle, write_networkless_bundle
 from tests.wide_bundle import write_wide_bundle
 
@@ -26,7 +27,7 @@ def labels(bundle: Bundle, axes: Axes) -> tuple[list[str], list[str]]:
 def test_a_row_of_the_kind_stands_in_place_of_the_common_one(tmp_path: Path) -> None:
     manifest = write_wide_bundle(tmp_path).manifest
     makers = {maker.name: maker for maker in makers_of(manifest)}
-    assert list(makers) == ["classical", "develop", "network"]
+    assert list(makers) == ["classical", "develop", "network", "physics"]
     assert makers["develop"] is bayer.PART.bench.rows[0]
 
 
@@ -48,6 +49,21 @@ def test_without_a_bank_there_are_the_networks_in_its_own_sizes(tmp_path: Path) 
     assert not skips
     _, skips = labels(bundle, Axes(methods=("wiener",)))
     assert skips == ["bankless wiener: no stage of the bundle has this method"]
+
+
+def test_a_stage_that_knows_physics_gets_a_row_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle = write_wide_bundle(tmp_path)
+    asked = Axes(methods=("physics",))
+    assert labels(bundle, asked) == ([], ["tiny physics: no stage of the bundle has this method"])
+    monkeypatch.setattr(wiener, "METHODS", (*wiener.METHODS, "physics"))
+    assert labels(bundle, asked) == (["physics"], [])
+    entrants = [Entrant(label="tiny", bundle=bundle, camera="tiny")]
+    rival = Entrant(label="rival", bundle=bundle, camera="tiny")
+    trials, _ = make_trials([*entrants, rival], Axes(vary=False), GROUND)
+    kinds = [trial.maker for trial in trials if trial.method == "physics"]
+    assert kinds == ["physics"]
 
 
 def test_without_networks_there_is_the_bank(tmp_path: Path) -> None:

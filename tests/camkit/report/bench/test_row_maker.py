@@ -31,7 +31,7 @@ def labels(bundle: Bundle, axes: Axes, ground: Ground = GROUND) -> tuple[list[st
 
 
 def test_the_row_makers_that_come_with_camkit_are_found() -> None:
-    assert [maker.name for maker in row_makers()] == ["classical", "develop", "network"]
+    assert [maker.name for maker in row_makers()] == ["classical", "develop", "network", "physics"]
     assert [metric.name for metric in registered_metrics()] == ["hdr", "picture"]
     assert [column.name for column in picture.METRIC.columns] == ["psnr_db", "ssim"]
 
@@ -101,5 +101,5 @@ def test_a_reference_gives_its_networks_only(bundle: Bundle) -> None:
 
 
 def test_an_unknown_method_is_refused_with_the_known_ones(bundle: Bundle) -> None:
-    with pytest.raises(ContractError, match="wiener, rl, admm-tv, develop, net; got magic"):
+    with pytest.raises(ContractError, match="wiener, rl, admm-tv, develop, net, physics; got"):
         labels(bundle, Axes(methods=("magic",)))
