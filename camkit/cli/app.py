@@ -13,6 +13,7 @@ from camkit.cli.design.design import design
 from camkit.cli.design.export import export
 from camkit.cli.design.freeze import freeze
 from camkit.cli.design.lens.app import lens_app
+from camkit.cli.design.plate.app import plate_app
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.judge.bench import bench
@@ -51,6 +52,7 @@ for command in (
 ):
     app.command()(command)
 app.add_typer(lens_app)
+app.add_typer(plate_app)
 
 
 @app.callback(invoke_without_command=True)

@@ -11,6 +11,7 @@
     bench/           speed against accuracy
     stress/          where methods fail
     lens/            one lens on one page
+    plate/           one plate on one page
 
 Test pictures are only ever measured on.
 """

@@ -1,6 +1,7 @@
 """Commands of design time; they need torch.
 
     lens      one lens file: look at it, improve it, convert it
+    plate     one plate: look at it, design it, etch it
     design    a lens and its network designed together
     freeze    a lens to a frozen PSF
     train     a recipe to a checkpoint

@@ -1,7 +1,7 @@
 """Where the light of a plate goes: core, streaks, haze; and where the streaks lie."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import torch
@@ -16,6 +16,10 @@ HALF_WIDTH_PX: Final = 3.0
 _STEP_DEG: Final = 0.5
 _LEAST: Final = 0.25
 """Of the brightest streak; what is fainter is none."""
+_FAINTEST: Final = 1e-4
+"""Of the light; what is fainter is none even where nothing is brighter."""
+_MOST: Final = 16
+_TURNS: Final = 4
 _END: Final = 0.3
 """Of a streak's usual brightness; where it stays below, the streak has ended."""
 _SMOOTH_PX: Final = 9
@@ -63,19 +67,44 @@ def find_streaks(psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
     distance = _distance(added)
     centre = added.shape[0] // 2
     usable = (distance > 2 * CORE_PX) & (distance <= centre)
-    angles = torch.arange(0, 180, _STEP_DEG, dtype=torch.float64)
-    side = added.shape[0]
-    light = torch.stack([added[usable & _near_line(side, float(a))].sum() for a in angles])
-    floor = light.median()
+    left = torch.where(usable, added, torch.zeros_like(added))
+    angles = torch.arange(0, 180, _STEP_DEG, dtype=torch.float64).tolist()
+    bands = [_near_line(added.shape[0], angle) for angle in angles]
     found: list[Streak] = []
-    for i in torch.argsort(light, descending=True).tolist():
-        above = float(light[i] - floor)
-        if above <= _LEAST * float(light.max() - floor) or above <= 1e-4:
+    brightest = 0.0
+    for _ in range(_MOST):
+        light = torch.stack([left[band].sum() for band in bands])
+        above = light - light.median()
+        brightest = max(brightest, float(above.max()))
+        if float(above.max()) <= max(_LEAST * brightest, _FAINTEST):
             break
-        angle = _refined(light, i)
-        if all(_apart(angle, other.angle_deg) > 5 for other in found):
-            found.append(Streak(angle_deg=angle, reach_px=_reach(added, angle)))
+        angle = _refined(left, angles[int(light.argmax())])
+        found.append(Streak(angle_deg=angle, reach_px=_reach(added, angle)))
+        # beside it a line still meets its inner part
+        left = torch.where(_near_line(added.shape[0], angle, 3.0), torch.zeros_like(left), left)
     return tuple(found)
+
+
+def with_reach(streaks: tuple[Streak, ...], psf: Tensor, bare: Tensor) -> tuple[Streak, ...]:
+    """Give streaks as far as they reach in another colour; see `find_streaks`."""
+    added = _added(psf, bare)
+    return tuple(replace(one, reach_px=_reach(added, one.angle_deg)) for one in streaks)
+
+
+def side_for(psf: Tensor, share: float) -> int:
+    """Give the least odd side around the middle that holds a share of the light; all at most.
+
+    Args:
+        psf: (..., side, side), each a PSF; all must be held.
+        share: Of the light of the aperture.
+    """
+    side = psf.shape[-1]
+    for wanted in range(1, side, 2):
+        cut = (side - wanted) // 2
+        inner = psf[..., cut : cut + wanted, cut : cut + wanted]
+        if float(inner.sum((-2, -1)).min()) >= share:
+            return wanted
+    return side
 
 
 def shares(psf: Tensor, streaks: tuple[Streak, ...]) -> Shares:
@@ -106,25 +135,28 @@ def _distance(psf: Tensor) -> Tensor:
     return (place[:, None] ** 2 + place[None, :] ** 2).sqrt()
 
 
-def _near_line(side: int, angle_deg: float) -> Tensor:
+def _near_line(side: int, angle_deg: float, widths: float = 1.0) -> Tensor:
     place = torch.arange(side, dtype=torch.float64) - side // 2
     angle = math.radians(angle_deg)
     across = -math.sin(angle) * place[None, :] + math.cos(angle) * place[:, None]
-    return across.abs() <= HALF_WIDTH_PX
+    return across.abs() <= widths * HALF_WIDTH_PX
 
 
-def _refined(light: Tensor, i: int) -> float:
-    """Give the angle of a maximum: of the middle of what is nearly as bright around it."""
-    count = light.numel()
-    offsets = range(-int(3 / _STEP_DEG), int(3 / _STEP_DEG) + 1)
-    near = torch.stack([light[(i + k) % count] for k in offsets])
-    weight = (near - 0.8 * near.max()).clamp_min(0)
-    shift = float((weight * torch.tensor(list(offsets), dtype=weight.dtype)).sum() / weight.sum())
-    return ((i + shift) * _STEP_DEG) % 180
-
-
-def _apart(one_deg: float, other_deg: float) -> float:
-    return abs((one_deg - other_deg + 90) % 180 - 90)
+def _refined(added: Tensor, angle_deg: float) -> float:
+    """Give the angle of the axis about which light near a line has the least moment."""
+    light = torch.where(_distance(added) > 4 * CORE_PX, added, torch.zeros_like(added))
+    place = torch.arange(added.shape[0], dtype=torch.float64) - added.shape[0] // 2
+    for _ in range(_TURNS):
+        near = torch.where(
+            _near_line(added.shape[0], angle_deg, 2.0), light.clamp_min(0), torch.zeros_like(light)
+        )
+        xx = float((near.sum(0) * place**2).sum())
+        yy = float((near.sum(1) * place**2).sum())
+        xy = float((near * place[:, None] * place[None, :]).sum())
+        if xx + yy == 0:
+            break
+        angle_deg = math.degrees(math.atan2(2 * xy, xx - yy) / 2)
+    return round(angle_deg, 3) % 180
 
 
 def _reach(added: Tensor, angle_deg: float) -> float:

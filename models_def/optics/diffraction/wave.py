@@ -106,13 +106,8 @@ def plate_psf(
     wave_mm = wavelength_um / UM_PER_MM
     _check_sampling(bench, grid, cell_mm, wave_mm, depth_mm)
     samples = grid.samples or _needed_samples(bench, grid, wave_mm)
-    places = (torch.arange(cells, dtype=torch.float64) - (cells - 1) / 2) * cell_mm
-    r2_mm = places[:, None] ** 2 + places[None, :] ** 2
-    light = pupil(bench, cells) if amplitude is None else amplitude
-    rest = torch.remainder(bench.path_mm(r2_mm, depth_mm) / wave_mm, 1.0)
-    cycles = rest.to(height_um.dtype) + (index - 1) / wavelength_um * height_um
-    light = light.to(height_um.dtype)
-    field = torch.polar(light.expand_as(cycles).contiguous(), 2 * math.pi * cycles)
+    light = (pupil(bench, cells) if amplitude is None else amplitude).to(height_um.dtype)
+    field = _field(height_um, index, wavelength_um, bench, depth_mm, light)
     step_mm = grid.pitch_um / UM_PER_MM / samples
     step = cell_mm * step_mm / (wave_mm * bench.distance_mm)
     fine = grid.side_px * samples
@@ -122,6 +117,44 @@ def plate_psf(
     own = (own**2).to(found.dtype)
     found = found * own[:, None] * own[None, :] * (step**2 / (light**2).sum())
     return found.reshape(grid.side_px, samples, grid.side_px, samples).sum((1, 3))
+
+
+def strehl(
+    height_um: Tensor, index: float, wavelength_um: float, *, bench: Bench, depth_mm: float
+) -> float:
+    """Give the light in the middle of the PSF over that of an aperture of even phase.
+
+    Args:
+        height_um: (cells, cells).
+        index: Of refraction of the plate at the wavelength, in air.
+        wavelength_um: Of the light.
+        bench: Lens, sensor, aperture.
+        depth_mm: Distance of the point light, on the axis.
+    """
+    light = pupil(bench, _side(height_um)).to(height_um.dtype)
+    with torch.no_grad():
+        field = _field(height_um, index, wavelength_um, bench, depth_mm, light)
+    return float(field.to(torch.complex128).sum().abs() ** 2 / light.double().sum() ** 2)
+
+
+def _field(
+    height_um: Tensor,
+    index: float,
+    wavelength_um: float,
+    bench: Bench,
+    depth_mm: float,
+    light: Tensor,
+) -> Tensor:
+    """Give the field (cells, cells) behind the plate, less the phase of the sphere to the axis."""
+    cells = height_um.shape[0]
+    places = (torch.arange(cells, dtype=torch.float64) - (cells - 1) / 2) * (
+        bench.diameter_mm / cells
+    )
+    r2_mm = places[:, None] ** 2 + places[None, :] ** 2
+    path = bench.path_mm(r2_mm, depth_mm) * UM_PER_MM / wavelength_um
+    rest = torch.remainder(path, 1.0)
+    cycles = rest.to(height_um.dtype) + (index - 1) / wavelength_um * height_um
+    return torch.polar(light.expand_as(cycles).contiguous(), 2 * math.pi * cycles)
 
 
 def _side(height_um: Tensor) -> int:

@@ -1,0 +1,6 @@
+"""`camkit plate`: commands for one plate, a file or a built-in one by its name.
+
+- `app`: the commands joined
+- `show`: a plate on one page
+- `sensor`: the sensor of a recipe, which they look through
+"""

@@ -1,0 +1,15 @@
+"""The commands of `camkit plate` joined."""
+
+import typer
+
+from camkit.cli.design.plate.show import show
+
+plate_app = typer.Typer(
+    name="plate", help="One plate: look at it, design it, etch it.", no_args_is_help=True
+)
+plate_app.command()(show)
+
+
+@plate_app.callback()
+def plate() -> None:
+    """One plate: look at it, design it, etch it."""
