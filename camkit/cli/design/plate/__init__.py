@@ -2,5 +2,6 @@
 
 - `app`: the commands joined
 - `show`: a plate on one page
+- `masks`: what it is etched through
 - `sensor`: the sensor of a recipe, which they look through
 """

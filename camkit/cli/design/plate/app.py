@@ -2,12 +2,14 @@
 
 import typer
 
+from camkit.cli.design.plate.masks import masks
 from camkit.cli.design.plate.show import show
 
 plate_app = typer.Typer(
     name="plate", help="One plate: look at it, design it, etch it.", no_args_is_help=True
 )
 plate_app.command()(show)
+plate_app.command()(masks)
 
 
 @plate_app.callback()

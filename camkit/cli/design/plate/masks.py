@@ -1,0 +1,40 @@
+"""`camkit plate masks`: what a plate is etched through."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
+from camkit.errors import ContractError
+
+
+def masks(
+    plate: Annotated[Path, typer.Argument(help="The plate (.toml), or a name.", metavar="PLATE")],
+    out_dir: Annotated[Path, typer.Option("-o", "--out-dir", help="Folder for the images.")],
+    format_: Annotated[str, typer.Option("--format", help="png (one bit) or tiff.")] = "png",
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Write the masks of a plate as images, one for each etch step (needs torch)."""
+    from camkit.cli.design.design_time import refuse_existing, require_torch
+
+    require_torch("camkit plate masks")
+    from camkit.models_def.optics.diffraction.plate import read_plate
+    from camkit.report.plate.masks import mask_paths, write_masks
+
+    if format_ not in ("png", "tiff"):
+        raise ContractError(f"--format is png or tiff; got {format_!r}")
+    found = read_plate(plate)
+    paths = mask_paths(found, out_dir, plate.stem, format_)  # type: ignore[arg-type]
+    refuse_existing(paths, overwrite=overwrite)
+    told = write_masks(found, out_dir, plate.stem, format_)  # type: ignore[arg-type]
+    if json_:
+        say(json.dumps(told))
+        return
+    for mask, path in zip(told["masks"], paths[:-1], strict=True):
+        say(f"{path}: etch {mask['depth_um']:.4f} um, {mask['etched_share']:.1%} of the cells")
+    say(str(paths[-1]))
