@@ -47,7 +47,12 @@ def fill_of(scene: FloatArray, matrix: NDArray[np.float64], gains: tuple[float, 
 
     Returns:
         (h, w) float32.
+
+    Raises:
+        ContractError: If the scene is not (3, h, w) with a pixel.
     """
+    if scene.ndim != 3 or scene.shape[0] != 3 or 0 in scene.shape:
+        raise ContractError(f"a scene must be (3, h, w) and hold a pixel; got {scene.shape}")
     raw = (matrix / np.array(gains)[:, None]).astype(np.float32)
     fill = np.empty(scene.shape[1:], dtype=np.float32)
     for top in range(0, scene.shape[1], BAND_ROWS):

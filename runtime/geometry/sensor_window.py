@@ -60,6 +60,11 @@ class SensorWindow:
         x_mm, y_mm = self.to_mm(np.array([0, width - 1.0]), np.array([0, height - 1.0]))
         return float(np.hypot(np.abs(x_mm).max(), np.abs(y_mm).max()))
 
+    def widened(self, px: int) -> "SensorWindow":
+        """Give a window with more pixels on every side, even beyond the sensor."""
+        (x, y), (width, height) = self.origin_px, self.size_px
+        return replace(self, size_px=(width + 2 * px, height + 2 * px), origin_px=(x - px, y - px))
+
     def resampled(self, ratio: float, size_px: tuple[int, int]) -> "SensorWindow":
         """Give the same window in samples of another distance.
 

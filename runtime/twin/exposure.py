@@ -16,6 +16,7 @@ from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.twin.light import Gains, Light
 
 NOISE_ROWS: Final = 256
+MOST_BITS: Final = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +42,8 @@ class Setting:
     def __post_init__(self) -> None:
         if not (self.iso > 0 and np.isfinite(self.iso)):
             raise ContractError(f"iso must be > 0; got {self.iso}")
+        if self.bits is not None and not 1 <= self.bits <= MOST_BITS:
+            raise ContractError(f"a converter has 1 to {MOST_BITS} bits; got {self.bits}")
         if self.seed < 0:
             raise ContractError(f"seed must be >= 0; got {self.seed}")
         if not (self.exposure > 0 and np.isfinite(self.exposure)):

@@ -70,6 +70,8 @@ class LightOptions:
         exposure: Factor on the scene.
         scale: Samples of the scene along a side of a pixel, which sees their mean; for cameras
             whose pictures are finer than their sensor.
+        surround_px: Pixels of the scene beyond every side of the picture. Its ring only throws
+            light into it; beyond the scene, or without a ring, the scene is mirrored.
         distort: Apply the radial distortion.
         vignette: Apply the relative illumination.
         workers: Threads of the FFT; the result does not depend on them.
@@ -77,6 +79,7 @@ class LightOptions:
 
     exposure: float = 1.0
     scale: int = 1
+    surround_px: int = 0
     distort: bool = True
     vignette: bool = True
     workers: int = 1
@@ -139,7 +142,7 @@ def light_of(
 
     Args:
         scene: (3, s h, s w) float32 linear Rec.709 in ideal geometry, >= 0; h and w those of the
-            window, s the `scale` of the options.
+            window with its surround, s the `scale` of the options.
         sensor: Colour of its channels.
         lens: What the light goes through.
         window: Place on the sensor, see `scene_window`.
@@ -153,12 +156,13 @@ def light_of(
     planes = scatter(extended, lens.kernels_at, window, margin_px=margin, workers=chosen.workers)
     # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
     np.maximum(planes, 0, out=planes)
-    _, height, width = seen.shape
+    width, height = window.size_px
     if chosen.scale == 1:
         clean = extended[:, margin : margin + height, margin : margin + width].copy()
     else:
-        fine = window.resampled(1 / chosen.scale, (scene.shape[2], scene.shape[1]))
-        clean = _on_sensor(scene, matrix, lens.psf, fine, chosen, 0)
+        fine = window.resampled(1 / chosen.scale, (chosen.scale * width, chosen.scale * height))
+        ring = chosen.scale * chosen.surround_px
+        clean = _on_sensor(scene, matrix, lens.psf, fine, replace(chosen, surround_px=ring), 0)
     return Light(
         planes=planes,
         clean=clean,
@@ -198,19 +202,25 @@ def stated_balance(gains: Gains) -> tuple[float, float, float] | None:
 
 
 def scene_window(
-    scene: FloatArray, sensor: ColorSensor, origin_px: tuple[int, int] | None, *, scale: int = 1
+    scene: FloatArray,
+    sensor: ColorSensor,
+    origin_px: tuple[int, int] | None,
+    *,
+    scale: int = 1,
+    surround_px: int = 0,
 ) -> SensorWindow:
-    """Give where a scene lies on the sensor; centred without an origin.
+    """Give where the picture of a scene lies on the sensor; centred without an origin.
 
     Args:
         scene: (3, h, w) linear Rec.709.
         sensor: Its size, pitch and mosaic.
         origin_px: (x, y) of the first pixel.
         scale: Samples of the scene along a side of a pixel.
+        surround_px: Pixels of the scene on every side that are not in the picture.
 
     Raises:
-        ContractError: If the scene is not finite (3, h, w), is not of whole pixels, or leaves the
-            sensor or the CFA cell.
+        ContractError: If the scene is not finite (3, h, w), is not of whole pixels, has nothing
+            within its surround, or leaves the sensor or the CFA cell.
     """
     if scene.ndim != 3 or scene.shape[0] != 3 or min(scene.shape) < 1:
         raise ContractError(f"a scene must be (3, h, w); got {scene.shape}")
@@ -224,7 +234,12 @@ def scene_window(
         )
     extent = sensor.known_extent
     step = 2 if sensor.captured == MOSAIC else 1
-    size = (scene.shape[2] // scale, scene.shape[1] // scale)
+    size = (scene.shape[2] // scale - 2 * surround_px, scene.shape[1] // scale - 2 * surround_px)
+    if surround_px < 0 or min(size) < 1:
+        raise ContractError(
+            f"a surround must be >= 0 px and leave a picture within it; got {surround_px} px of a "
+            f"scene of {scene.shape[2] // scale}x{scene.shape[1] // scale}"
+        )
     whole = (extent.width_px, extent.height_px)
     origin = centred_origin(size, whole, multiple=step) if origin_px is None else origin_px
     spans = zip(origin, size, whole, strict=True)
@@ -251,13 +266,21 @@ def _on_sensor(
     options: LightOptions,
     margin_px: int,
 ) -> FloatArray:
-    """Give the sharp scene in the sensor's channels and geometry, with a mirrored margin."""
+    """Give the sharp scene in the sensor's channels and geometry, with a margin around the window.
+
+    The margin is the surround of the scene as far as that reaches, and mirrored beyond it.
+    """
+    ring = options.surround_px
+    beyond = max(margin_px - ring, 0)
     planes = _apply(matrix, scene)
     if options.distort:
-        planes = distort_array(planes, psf.distortion, window, margin_px=margin_px)
+        planes = distort_array(planes, psf.distortion, window.widened(ring), margin_px=beyond)
     else:
-        pad = ((0, 0), (margin_px, margin_px), (margin_px, margin_px))
+        pad = ((0, 0), (beyond, beyond), (beyond, beyond))
         planes = np.pad(planes, pad, mode="reflect" if min(planes.shape[1:]) > 1 else "edge")
+    if ring > margin_px:
+        inner = slice(ring - margin_px, margin_px - ring)
+        planes = np.ascontiguousarray(planes[:, inner, inner])
     # Interpolation rings and saturated colours leave the gamut; light is never negative.
     return np.maximum(planes, 0.0, out=planes)
 

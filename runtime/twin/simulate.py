@@ -18,7 +18,7 @@ from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
 from camkit.runtime.output.part_file import atomic_output
-from camkit.runtime.twin.exposure import Setting, expose
+from camkit.runtime.twin.exposure import Setting, expose, levels_of
 from camkit.runtime.twin.light import LightOptions, lens_of, light_of, scene_window
 
 LEAST_DNG_SIDE_PX: Final = 22
@@ -35,10 +35,12 @@ class SimulationOptions:
         origin_px: (x, y) of the picture on the sensor, both even on a mosaic; None centres it.
         exposure: Factor on the scene.
         scale: Samples of the scene along a side of a pixel, see `LightOptions`.
+        surround_px: Pixels of the scene beyond every side of the picture, likewise.
         depth_mm: Object distance; may only be left out where the PSF has one depth.
         distort: Apply the radial distortion.
         vignette: Apply the relative illumination.
         noise: Apply shot and read noise.
+        bits: Of the converter; None for the levels of the sensor.
         workers: Threads of the FFT; the result does not depend on them.
     """
 
@@ -47,14 +49,16 @@ class SimulationOptions:
     origin_px: tuple[int, int] | None = None
     exposure: float = 1.0
     scale: int = 1
+    surround_px: int = 0
     depth_mm: float | None = None
     distort: bool = True
     vignette: bool = True
     noise: bool = True
+    bits: int | None = None
     workers: int = 1
 
     def __post_init__(self) -> None:
-        Setting(iso=self.iso, exposure=self.exposure, seed=self.seed)  # checks them
+        _setting(self)  # checks them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +73,7 @@ class Simulation:
         window: Where the picture lies on the sensor.
         iso: Sensitivity.
         depth_mm: Object distance, where the PSF has several; else None.
+        levels: Black and white level in DN, where they are not those of the sensor.
     """
 
     samples: NDArray[Any]
@@ -77,6 +82,7 @@ class Simulation:
     window: SensorWindow
     iso: float
     depth_mm: float | None = None
+    levels: tuple[float, float] | None = None
 
 
 def simulate(
@@ -86,8 +92,8 @@ def simulate(
 
     Args:
         scene: (3, s h, s w) float32 linear Rec.709 in ideal geometry, >= 0, 1.0 = white; may
-            exceed 1; s is the `scale` of the options. At most as large as the sensor; a smaller one
-            is a crop of it.
+            exceed 1; s is the `scale` of the options. At most as large as the sensor, but for its
+            surround; a smaller one is a crop of it.
         sensor: Of the bundle: a mosaic, or planes.
         psf: Frozen PSF of the optics.
         options: Sensitivity, seed, placement and which effects to apply.
@@ -99,7 +105,9 @@ def simulate(
     """
     if isinstance(sensor, SpadSensor):
         raise UnsupportedError("this twin has no sensor that counts photons")
-    window = scene_window(scene, sensor, options.origin_px, scale=options.scale)
+    window = scene_window(
+        scene, sensor, options.origin_px, scale=options.scale, surround_px=options.surround_px
+    )
     light = light_of(
         scene,
         sensor,
@@ -108,12 +116,13 @@ def simulate(
         LightOptions(
             exposure=options.exposure,
             scale=options.scale,
+            surround_px=options.surround_px,
             distort=options.distort,
             vignette=options.vignette,
             workers=options.workers,
         ),
     )
-    setting = Setting(iso=options.iso, seed=options.seed, noise=options.noise)
+    setting = _setting(options)
     return Simulation(
         samples=expose(light, sensor, setting),
         clean=light.clean,
@@ -121,7 +130,15 @@ def simulate(
         window=window,
         iso=options.iso,
         depth_mm=options.depth_mm if psf.depths_mm.size > 1 else None,
+        levels=None if options.bits is None else levels_of(sensor, setting),
     )
+
+
+def _setting(options: SimulationOptions) -> Setting:
+    # the exposure is the light's here, whose clean planes have it too
+    if not (options.exposure > 0 and np.isfinite(options.exposure)):
+        raise ContractError(f"exposure must be > 0; got {options.exposure}")
+    return Setting(iso=options.iso, seed=options.seed, noise=options.noise, bits=options.bits)
 
 
 def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) -> Simulation:
@@ -148,10 +165,11 @@ def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_nam
     window = simulation.window
     x0, y0 = (int(v) for v in window.origin_px)
     red, green, blue = (1 / gain for gain in simulation.white_balance)
+    black, white = simulation.levels or (sensor.black_level, sensor.white_level)
     tags = DngTags(
         cfa=sensor.cfa,
-        black=round(sensor.black_level),
-        white=int(sensor.white_level),
+        black=round(black),
+        white=int(white),
         color_matrix=np.array(sensor.color_matrix, dtype=np.float64),
         as_shot_neutral=(red, green, blue),
         camera_model=f"camkit {bundle_name}",

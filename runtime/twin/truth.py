@@ -1,7 +1,9 @@
 """What a perfect camera would have shown: the truth beside a capture, as a bundle's picture is.
 
-clean planes of the twin -> ideal geometry, if the picture has it -> linear Rec.709
+clean planes of the twin -> ideal geometry, if the picture has it -> linear Rec.709 -> EXR
 """
+
+from pathlib import Path
 
 import numpy as np
 
@@ -12,7 +14,11 @@ from camkit.bundle.sensor import RGB, ColorSensor, SpadSensor
 from camkit.colorimetry import apply_matrix, rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
+from camkit.runtime.color import color_stage
 from camkit.runtime.geometry.warp import undistort_bands
+from camkit.runtime.output.part_file import atomic_output
+from camkit.runtime.output.picture_writer import PictureFormat
+from camkit.runtime.output.writer import open_writer
 from camkit.runtime.rows import ArrayRows
 from camkit.runtime.twin.simulate import Simulation
 
@@ -88,3 +94,19 @@ def ideal_picture(simulation: Simulation, bundle: Bundle) -> FloatArray:
         bands = undistort_bands(ArrayRows(clean), bundle.psf.distortion, window)
         clean = np.concatenate(list(bands), axis=1)
     return true_picture(clean, light_sensor(manifest))
+
+
+def write_truth(path: Path, picture: FloatArray) -> None:
+    """Write an `ideal_picture` as EXR: what `process` should give for the capture.
+
+    Args:
+        path: The file.
+        picture: (3, h, w) float32 linear Rec.709; what interpolation left below zero is cut.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    _, height, width = picture.shape
+    layout = PictureFormat(width=width, height=height, color=color_stage(None))
+    with atomic_output(path) as part, open_writer(part, "exr", layout) as writer:
+        writer.write(np.maximum(picture, 0))

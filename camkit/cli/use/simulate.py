@@ -1,17 +1,23 @@
 """`camkit simulate`: the digital twin, a sharp scene to a capture such as a Bayer DNG."""
 
+import json
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from camkit.cli.choices import Debug, DepthM, Overwrite, whole_pair
+from camkit.cli.choices import Debug, DepthM, Json, Overwrite, whole_pair
 from camkit.cli.say import say
 from camkit.errors import ContractError
 from camkit.units import MM_PER_M
 
 if TYPE_CHECKING:
     from camkit.bundle.reader import Bundle
+    from camkit.bundle.sensor import Sensor
+    from camkit.contracts import FloatArray
+    from camkit.runtime.twin.simulate import Simulation, SimulationOptions
+    from camkit.scenes.saturation import Saturation
 
 
 def simulate(
@@ -28,23 +34,42 @@ def simulate(
     origin_px: Annotated[
         str | None, typer.Option(help="X,Y of a crop on the sensor; default: centred.")
     ] = None,
-    exposure: Annotated[float, typer.Option(help="Factor on the scene's radiance.")] = 1.0,
+    exposure: Annotated[
+        float | None, typer.Option(help="Factor on the scene's radiance; default: 1.")
+    ] = None,
+    saturate: Annotated[
+        float | None,
+        typer.Option(help="Share of the scene that exceeds white in any colour, such as 0.015."),
+    ] = None,
+    surround_px: Annotated[
+        int, typer.Option(min=0, help="Ring of the scene outside the frame that lights it.")
+    ] = 0,
+    bits: Annotated[
+        int | None, typer.Option(help="Of the converter, 8 to 16; default: the sensor's levels.")
+    ] = None,
     depth_m: DepthM = None,
     size_px: Annotated[
         str | None, typer.Option(help="W,H of a scene of a seed; default: the sensor.")
     ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(help="EXR to write beside it: what nothing lost would give.")
+    ] = None,
     overwrite: Overwrite = False,
+    json_: Json = False,
     _debug: Debug = False,
 ) -> None:
     """Photograph a scene with the bundle's camera: blur, vignetting, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
-    from camkit.contracts import depth_name
     from camkit.runtime.kind import part_of
     from camkit.runtime.network.engine import available_threads
     from camkit.runtime.twin.simulate import SimulationOptions
+    from camkit.runtime.twin.truth import ideal_picture, write_truth
 
-    if out.exists() and not overwrite:
-        raise ContractError(f"{out} exists; say --overwrite or another name")
+    if exposure is not None and saturate is not None:
+        raise ContractError("--saturate finds the exposure: leave --exposure out")
+    for path in filter(None, (out, truth)):
+        if path.exists() and not overwrite:
+            raise ContractError(f"{path} exists; say --overwrite or another name")
     opened = open_bundle(find_bundle(bundle))
     part, sensor = part_of(opened.manifest), opened.manifest.sensor
     if out.suffix.lower() != part.suffix:
@@ -52,22 +77,118 @@ def simulate(
             f"a simulated capture of this camera is a {part.suffix[1:].upper()}; expected a name "
             f"in {part.suffix}, got {out}"
         )
+    _check_bits(bits, sensor)
+    _check_truth(truth, out, opened)
     whole = (sensor.width_px, sensor.height_px)
     size = whole if size_px is None else whole_pair(size_px, "--size-px")
     options = SimulationOptions(
         iso=iso,
         seed=seed,
         origin_px=None if origin_px is None else whole_pair(origin_px, "--origin-px"),
-        exposure=exposure,
+        exposure=1.0 if exposure is None else exposure,
+        surround_px=surround_px,
+        bits=bits,
         depth_mm=_depth_mm(opened) if depth_m is None else depth_m * MM_PER_M,
         workers=available_threads(None),
     )
-    simulation = part.simulate(_scene(scene, size), opened, options)
+    drawn = _scene(scene, (size[0] + 2 * surround_px, size[1] + 2 * surround_px))
+    drawn, saturation = _exposed(drawn, sensor, options, saturate)
+    simulation = part.simulate(drawn, opened, options)
+    shown = None if truth is None else ideal_picture(simulation, opened)
     out.parent.mkdir(parents=True, exist_ok=True)
     part.write(out, simulation, opened)
+    if truth is not None and shown is not None:
+        truth.parent.mkdir(parents=True, exist_ok=True)
+        write_truth(truth, shown)
+    if json_:
+        say(json.dumps(_facts(out, truth, simulation, saturation), allow_nan=False))
+    else:
+        say(_line(out, simulation, None if saturate is None else saturation))
+
+
+def _check_bits(bits: int | None, sensor: "Sensor") -> None:
+    if bits is None:
+        return
+    if not 8 <= bits <= 16:
+        raise ContractError(f"--bits takes 8 to 16; got {bits}")
+    if sensor.type != "bayer":
+        raise ContractError("--bits is for cameras with a mosaic, whose DNG states its levels")
+
+
+def _check_truth(truth: Path | None, out: Path, bundle: "Bundle") -> None:
+    """Refuse a truth that could not be written, before anything is."""
+    if truth is None:
+        return
+    from camkit.runtime.twin.truth import picture_scale
+
+    if truth.suffix.lower() != ".exr":
+        raise ContractError(f"the truth is an EXR; expected a name in .exr, got {truth}")
+    if truth.resolve() == out.resolve():
+        raise ContractError(f"capture and truth need different names; got {truth} twice")
+    scale = picture_scale(bundle.manifest)
+    if scale != 1:
+        raise ContractError(
+            f"--truth needs a camera whose pictures are as fine as its sensor; {bundle.path.name} "
+            f"makes them {scale} times finer"
+        )
+
+
+def _exposed(
+    scene: "FloatArray", sensor: "Sensor", options: "SimulationOptions", share: float | None
+) -> "tuple[FloatArray, Saturation | None]":
+    """Give the scene to photograph with the options, and what of its picture saturates."""
+    from camkit.runtime.twin.saturation import exposure_for_share, saturation_of
+    from camkit.scenes.saturation import with_exposure
+
+    if sensor.type == "spad":
+        if share is not None:
+            raise ContractError("--saturate is for sensors that clip; this one counts photons")
+        return scene, None
+    inner = slice(options.surround_px, -options.surround_px or None)
+    seen = scene[:, inner, inner]
+    if share is None:
+        return scene, saturation_of(seen, sensor, options.exposure)
+    found = exposure_for_share(seen, sensor, share)
+    return with_exposure(scene, found.exposure), found
+
+
+def _facts(
+    out: Path, truth: Path | None, simulation: "Simulation", saturation: "Saturation | None"
+) -> dict[str, Any]:
+    """Give what `--json` prints."""
     height, width = simulation.samples.shape[-2:]
-    depth = "" if simulation.depth_mm is None else f", {depth_name(simulation.depth_mm)} away"
-    say(f"{out}: {width}x{height}, ISO {iso:g}{depth}")
+    facts = {
+        "path": str(out),
+        "truth": None if truth is None else str(truth),
+        "size": [width, height],
+        "iso": simulation.iso,
+        "object_distance_m": _metres(simulation.depth_mm),
+    }
+    names = ("exposure", "saturated_fraction", "peak")
+    return facts | {name: saturation and getattr(saturation, name) for name in names}
+
+
+def _metres(depth_mm: float | None) -> float | str | None:
+    """Give a distance as JSON can hold it, which has no infinity."""
+    if depth_mm is None or math.isfinite(depth_mm):
+        return depth_mm and depth_mm / MM_PER_M
+    return "inf"
+
+
+def _line(out: Path, simulation: "Simulation", saturation: "Saturation | None") -> str:
+    """Give what is printed for people; a saturation only where it was asked for."""
+    from camkit.contracts import depth_name
+
+    height, width = simulation.samples.shape[-2:]
+    line = f"{out}: {width}x{height}, ISO {simulation.iso:g}"
+    if simulation.depth_mm is not None:
+        line += f", {depth_name(simulation.depth_mm)} away"
+    if saturation is None:
+        return line
+    return (
+        f"{line}, exposure {saturation.exposure:.4g}, "
+        f"{saturation.saturated_fraction:.2%} saturated, peak {saturation.peak:.4g}"
+    )
 
 
 def _depth_mm(bundle: "Bundle") -> float | None:

@@ -40,6 +40,19 @@ def test_it_simulates_files_of_its_own_format(capture: Path, toy: Path, camkit_c
     assert "expected a name in .tif" in wrong.err
 
 
+def test_its_light_is_exposed_by_what_saturates_it(
+    toy: Path, tmp_path: Path, camkit_command
+) -> None:
+    call = ("simulate", "night:2", "--bundle", toy, "-o", tmp_path / "n.tif", "--json")
+    told = json.loads(camkit_command(*call, "--saturate", 0.05).out)
+    assert told["saturated_fraction"] == pytest.approx(0.05, abs=1e-3)
+    refused = {("--bits", "10"): "cameras with a mosaic", ("--truth", "t.exr"): "2 times finer"}
+    for option, said in refused.items():
+        outcome = camkit_command(*call, "--overwrite", *option)
+        assert outcome.code == ExitCode.USAGE
+        assert said in outcome.err
+
+
 @pytest.mark.parametrize(("format_", "suffix"), [("exr", "exr"), ("tiff", "tif"), ("png", "png")])
 def test_it_makes_pictures_twice_the_size(
     capture: Path, toy: Path, tmp_path: Path, camkit_command, format_: str, suffix: str

@@ -105,6 +105,8 @@ def test_the_lights_just_brighter_saturate_where_those_alike_are_too_many() -> N
         (np.full((3, 30, 30), 0.4, np.float32), 0.015, 256.0, "no exposure saturates 1.500%"),
         (np.zeros((3, 30, 30), np.float32), 0.015, 256.0, "no exposure saturates 1.500%"),
         (np.ones((3, 5, 5), np.float32), 0.01, 256.0, "less than one"),
+        (np.ones((3, 0, 5), np.float32), 0.01, 256.0, "hold a pixel"),
+        (np.ones((5, 5), np.float32), 0.01, 256.0, "must be"),
         (shares(), 0.0, 256.0, "between 0 and 1; got 0"),
         (shares(), 1.0, 256.0, "between 0 and 1; got 1"),
         (shares(), float("nan"), 256.0, "between 0 and 1; got nan"),

@@ -160,7 +160,10 @@ def test_without_noise_the_pixel_counts_no_electron_twice() -> None:
     np.testing.assert_allclose(found, np.minimum(signal, 20_000 * noise.shot[1]), rtol=1e-12)
 
 
-@pytest.mark.parametrize("wrong", [{"iso": 0.0}, {"seed": -1}, {"exposure": float("nan")}])
+@pytest.mark.parametrize(
+    "wrong",
+    [{"iso": 0.0}, {"seed": -1}, {"exposure": float("nan")}, {"bits": 0}, {"bits": 17}],
+)
 def test_an_impossible_setting_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(ContractError, match="must be"):
+    with pytest.raises(ContractError, match=r"must be|1 to 16 bits"):
         Setting(**wrong)  # type: ignore[arg-type]

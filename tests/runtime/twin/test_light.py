@@ -172,6 +172,104 @@ def test_without_an_optical_centre_light_has_the_bits_of_one_in_the_middle() -> 
     np.testing.assert_array_equal(plain.clean, stated.clean)
 
 
+def _wide_kernel(half: int = 200) -> FloatArray:
+    """Give a kernel of a plate's size: a core, four lines at odd angles, one of them one-sided."""
+    at = np.arange(-half, half + 1)
+    y, x = np.meshgrid(at, at, indexing="ij")
+    kernel = 0.9 * np.exp(-(x**2 + y**2) / 2.0) + 1e-6
+    for turn_deg, both in ((12.0, True), (57.0, True), (103.0, True), (150.0, False)):
+        turn = np.deg2rad(turn_deg)
+        along = x * np.cos(turn) + y * np.sin(turn)
+        line = np.exp(-((y * np.cos(turn) - x * np.sin(turn)) ** 2)) * (np.abs(along) > 8)
+        kernel += 2e-3 * line * np.exp(-np.abs(along) / 120) * (both | (along > 0))
+    return (kernel / kernel.sum()).astype(np.float32)
+
+
+def _slow_light(around: FloatArray, kernel: FloatArray, size: tuple[int, int]) -> np.ndarray:
+    """Add the kernel of every lamp, one by one, to a picture in the middle of what is around it."""
+    half = kernel.shape[0] // 2
+    height, width = size
+    top, left = (around.shape[0] - height) // 2, (around.shape[1] - width) // 2
+    found = np.zeros(size)
+    for row, column in zip(*np.nonzero(around), strict=True):
+        rows = np.arange(height) + top - row + half
+        columns = np.arange(width) + left - column + half
+        seen = np.ix_((rows >= 0) & (rows <= 2 * half), (columns >= 0) & (columns <= 2 * half))
+        inside = kernel[np.ix_(rows[seen[0][:, 0]], columns[seen[1][0]])]
+        found[seen] += float(around[row, column]) * inside
+    return found
+
+
+def _lamps(height: int, width: int, seed: int = 0) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    lamps = np.zeros((height, width), np.float32)
+    places = rng.integers(0, height, 9), rng.integers(0, width, 9)
+    lamps[places] = np.exp2(rng.uniform(0, 8, 9))
+    return lamps
+
+
+@pytest.mark.parametrize("surround_px", [0, 60, 200, 230])
+@pytest.mark.parametrize("distort", [False, True])
+def test_a_kernel_wider_than_the_picture_is_the_sum_over_all_lamps(
+    surround_px: int, *, distort: bool
+) -> None:
+    """Lamps of the surround throw light into the frame; beyond it the scene is mirrored."""
+    size, kernel = (40, 56), _wide_kernel()
+    height, width = (side + 2 * surround_px for side in size)
+    lamps = _lamps(height, width)
+    beyond = max(200 - surround_px, 0)
+    around = np.pad(lamps, beyond, mode="reflect")
+    sensor = _planes_camera(64)
+    scene = np.stack([lamps] * 3)
+    window = scene_window(scene, sensor, None, surround_px=surround_px)
+    options = LightOptions(distort=distort, vignette=False, surround_px=surround_px)
+    psf = uniform_psf(kernel)
+    light = light_of(scene, sensor, lens_of(psf, sensor), window, options)
+    assert light.planes.shape == (1, *size)
+    expected = _slow_light(around, kernel, size)
+    np.testing.assert_allclose(light.planes[0], expected, atol=4 * FFT_ERROR * around.max())
+    inner = lamps[surround_px : height - surround_px, surround_px : width - surround_px]
+    np.testing.assert_allclose(light.clean[0], inner, atol=1e-4)
+
+
+def test_a_lamp_outside_the_frame_lights_it_and_is_not_seen() -> None:
+    sensor = _planes_camera(64)
+    psf = uniform_psf(_wide_kernel())
+    scene = np.zeros((3, 164, 164), np.float32)
+    scene[:, 82, 20] = 100
+    window = scene_window(scene, sensor, None, surround_px=50)
+    options = LightOptions(distort=False, vignette=False, surround_px=50)
+    light = light_of(scene, sensor, lens_of(psf, sensor), window, options)
+    assert light.clean.max() == 0
+    assert light.planes[0, :, 0].max() > 0.01
+    alone = light_of(scene[:, 50:-50, 50:-50], sensor, lens_of(psf, sensor), window, BARE)
+    assert alone.planes.max() < 1e-6
+
+
+def test_the_surround_of_a_finer_scene_is_as_fine_as_it() -> None:
+    """In pixels it is as wide, and the truth ends at the frame."""
+    sensor, psf = _planes_camera(64), uniform_psf(streak_kernel(30.0))
+    coarse = np.random.default_rng(1).random((3, 80, 84), dtype=np.float32)
+    fine = coarse.repeat(2, axis=1).repeat(2, axis=2)
+    lights = []
+    for scene, scale in ((coarse, 1), (fine, 2)):
+        window = scene_window(scene, sensor, None, scale=scale, surround_px=12)
+        options = LightOptions(scale=scale, surround_px=12, vignette=False)
+        lights.append(light_of(scene, sensor, lens_of(psf, sensor), window, options))
+    np.testing.assert_allclose(lights[1].planes, lights[0].planes, atol=FFT_ERROR)
+    assert lights[1].clean.shape == (1, 112, 120)
+    np.testing.assert_allclose(
+        lights[1].clean, lights[0].clean.repeat(2, axis=1).repeat(2, axis=2), atol=1e-3
+    )
+
+
+@pytest.mark.parametrize("surround_px", [-1, 32, 500])
+def test_a_surround_that_leaves_no_picture_is_refused(surround_px: int) -> None:
+    scene = np.zeros((3, 64, 64), np.float32)
+    with pytest.raises(ContractError, match="surround must be >= 0 px and leave a picture"):
+        scene_window(scene, _planes_camera(64), None, surround_px=surround_px)
+
+
 # --------------------------------------------------------------------------- lens and colour
 
 

@@ -225,3 +225,22 @@ def test_a_capture_states_its_depth_where_there_are_several(
         record = json.loads(file.pages[0].description)["camkit"]
     assert record.get("object_distance_mm") == stated
     assert read_capture(tmp_path / "a.dng").bundle_name == "deep"
+
+
+@pytest.mark.parametrize("bits", [8, 14])
+def test_a_capture_of_other_bits_states_its_own_levels(bits: int, tmp_path: Path) -> None:
+    sensor, white = make_sensor(), 2**bits - 1
+    taken = {}
+    for name, options in (("usual", {}), ("other", {"bits": bits})):
+        found = simulated_with(delta_psf(sensor), scene(), noise=False, **options)
+        write_capture(tmp_path / f"{name}.dng", found, sensor, "duet")
+        capture = read_capture(tmp_path / f"{name}.dng", isolate=False)
+        taken[name] = capture
+    assert taken["other"].white_level == white
+    assert taken["other"].samples.max() <= white
+    signals = [
+        (c.samples - c.black_level[0, 0]) / (c.white_level - c.black_level[0, 0])
+        for c in taken.values()
+    ]
+    # a black level of whole DN moves the signal by half a step at most
+    np.testing.assert_allclose(signals[0], signals[1], atol=1.1 / min(white, 4095))

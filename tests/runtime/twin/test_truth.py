@@ -12,6 +12,7 @@ from camkit.bundle.sensor import Extent, SpadSensor
 from camkit.bundle.stages import Color, Linearise, Network, Undistort
 from camkit.bundle.writer import write_bundle
 from camkit.errors import UnsupportedError
+from camkit.runtime.files.picture import read_scene
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import SimulationOptions, simulate
@@ -20,6 +21,7 @@ from camkit.runtime.twin.truth import (
     light_sensor,
     picture_scale,
     true_picture,
+    write_truth,
 )
 from tests.bundle_factory import PITCH_UM, tiny_manifest, tiny_members, tiny_sensor
 from tests.camera_factory import delta_psf, make_psf
@@ -117,3 +119,16 @@ def test_a_camera_without_a_picture_or_light_has_no_such_truth(tmp_path: Path) -
     counting = tiny_manifest().model_copy(update={"sensor": diodes})
     with pytest.raises(UnsupportedError, match="counts photons"):
         light_sensor(counting)
+
+
+def test_the_truth_is_written_as_linear_rec709_and_never_below_zero(
+    bundle: Bundle, tmp_path: Path
+) -> None:
+    scene = np.clip(_smooth() - 0.3, 0, None) * 900
+    options = SimulationOptions(noise=False)
+    shown = ideal_picture(simulate(scene, bundle.manifest.sensor, bundle.psf, options), bundle)
+    write_truth(tmp_path / "truth.exr", shown)
+    read = read_scene(tmp_path / "truth.exr")
+    assert shown.min() < 0 <= read.min()
+    np.testing.assert_allclose(read, np.maximum(shown, 0), rtol=2**-11, atol=1e-6)
+    assert [path.name for path in tmp_path.iterdir()] == ["truth.exr"]

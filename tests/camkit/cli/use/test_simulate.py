@@ -1,13 +1,22 @@
 """`camkit simulate`: scenes become real DNG files that `process` takes."""
 
 import json
+import math
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from camkit.bundle.reader import open_bundle
+from camkit.bundle.sensor import Extent, SpadSensor
 from camkit.cli.exit_code import ExitCode
+from camkit.cli.use.simulate import _check_truth, _exposed, _metres
+from camkit.errors import ContractError
+from camkit.runtime.files.picture import read_scene
 from camkit.runtime.raw import read_capture
+from camkit.runtime.twin.simulate import SimulationOptions
+from camkit.scenes import night_scene
 from tests.deep_bundle import write_deep_bundle
 
 
@@ -62,6 +71,16 @@ def test_an_existing_dng_is_kept_unless_overwrite_is_said(captures, camkit_comma
     ("arguments", "code"),
     [
         (["procedural:x"], ExitCode.USAGE),
+        (["night:x"], ExitCode.USAGE),
+        (["night:1", "--saturate", "0.02", "--exposure", "2"], ExitCode.USAGE),
+        (["night:1", "--saturate", "1.5"], ExitCode.USAGE),
+        (["flat.png", "--saturate", "0.02"], ExitCode.USAGE),
+        (["black.png", "--saturate", "0.02"], ExitCode.USAGE),
+        (["night:1", "--exposure", "0"], ExitCode.USAGE),
+        (["night:1", "--bits", "7"], ExitCode.USAGE),
+        (["flat.png", "--surround-px", "12"], ExitCode.USAGE),
+        (["night:1", "--truth", "truth.tif"], ExitCode.USAGE),
+        (["night:1", "--truth", "a.exr"], ExitCode.USAGE),
         (["absent.png"], ExitCode.INPUT_FAILED),
         (["procedural:3", "--origin-px", "4"], ExitCode.USAGE),
         (["procedural:3", "--size-px", "200,200"], ExitCode.USAGE),
@@ -72,10 +91,15 @@ def test_an_existing_dng_is_kept_unless_overwrite_is_said(captures, camkit_comma
 def test_what_cannot_be_photographed_is_refused_and_nothing_is_written(
     captures, camkit_command, arguments: list[str], code: int
 ) -> None:
+    for name, level in (("flat", 90), ("black", 0)):
+        cv2.imwrite(f"{name}.png", np.full((24, 24, 3), level, dtype=np.uint8))
+    (captures / "a.exr").write_bytes(b"older")
+    before = sorted(captures.iterdir())
     outcome = _simulate(camkit_command, *arguments)
     assert outcome.code == code, outcome
     assert outcome.err.count("\n") == 1
-    assert not (captures / "s.dng").exists()
+    assert sorted(captures.iterdir()) == before
+    assert (captures / "a.exr").read_bytes() == b"older"
 
 
 def test_a_negative_seed_is_a_usage_error(captures, camkit_command) -> None:
@@ -110,3 +134,101 @@ def test_a_depth_beyond_the_bundles_is_refused_and_nothing_is_written(
     assert outcome.code == ExitCode.USAGE
     assert "the one depth infinity; got 5 m" in outcome.err
     assert not (captures / "s.dng").exists()
+
+
+def test_a_share_of_the_scene_saturates_and_what_came_of_it_is_told(
+    captures, camkit_command
+) -> None:
+    outcome = _simulate(camkit_command, "night:3", "--saturate", 0.03, "--json")
+    assert outcome.code == 0, outcome.err
+    told = json.loads(outcome.out)
+    assert (told["path"], told["truth"], told["size"], told["iso"]) == (
+        "s.dng",
+        None,
+        [96, 64],
+        100,
+    )
+    assert told["saturated_fraction"] == round(0.03 * 96 * 64) / (96 * 64)
+    assert 1 < told["peak"] <= 256
+    taken = read_capture("s.dng")
+    assert (taken.samples >= taken.white_level).any()
+    # the same exposure by hand gives the same capture, where nothing reaches the ceiling
+    assert told["peak"] < 256
+    by_hand = _simulate(camkit_command, "night:3", "--exposure", told["exposure"], out="h.dng")
+    assert by_hand.code == 0
+    difference = taken.samples.astype(int) - read_capture("h.dng").samples
+    assert np.abs(difference).max() <= 2
+
+
+def test_people_are_told_the_exposure_that_was_found(captures, camkit_command) -> None:
+    outcome = _simulate(camkit_command, "night:3", "--saturate", 0.03)
+    assert outcome.code == 0
+    assert "% saturated, peak" in outcome.out
+
+
+def test_json_tells_what_an_exposure_saturates(captures, camkit_command) -> None:
+    told = [
+        json.loads(
+            _simulate(
+                camkit_command, "night:3", "--exposure", factor, "--json", out=f"{factor}.dng"
+            ).out
+        )
+        for factor in (0.5, 4)
+    ]
+    assert told[0]["saturated_fraction"] < told[1]["saturated_fraction"]
+    assert told[1]["peak"] == pytest.approx(8 * told[0]["peak"])
+
+
+def test_the_truth_lies_beside_the_capture_at_its_exposure(captures, camkit_command) -> None:
+    outcome = _simulate(
+        *(camkit_command, "night:3", "--saturate", 0.03, "--truth", "t/truth.exr", "--json")
+    )
+    assert outcome.code == 0, outcome.err
+    told = json.loads(outcome.out)
+    assert told["truth"] == "t/truth.exr"
+    truth = read_scene(captures / "t" / "truth.exr")
+    scene = np.minimum(night_scene(3, 64, 96) * told["exposure"], 256)
+    assert truth.shape == scene.shape
+    np.testing.assert_allclose(truth.mean(), scene.mean(), rtol=0.05)
+    again = _simulate(camkit_command, "night:3", "--truth", "t/truth.exr", out="new.dng")
+    assert again.code == ExitCode.USAGE
+    assert not (captures / "new.dng").exists()
+
+
+def test_a_surround_is_drawn_and_not_photographed(captures, camkit_command) -> None:
+    for name, ring in (("ring", 20), ("none", 0)):
+        arguments = ("night:5", "--size-px", "60,40", "--surround-px", ring)
+        assert _simulate(camkit_command, *arguments, out=f"{name}.dng").code == 0
+        taken = read_capture(f"{name}.dng")
+        assert (taken.width, taken.height) == (60, 40)
+
+
+def test_other_bits_are_photographed(captures, camkit_command) -> None:
+    assert _simulate(camkit_command, "night:5", "--bits", 10).code == 0
+    assert read_capture("s.dng").white_level == 1023
+
+
+def test_a_distance_is_told_in_json_which_has_no_infinity(
+    tmp_path, monkeypatch, camkit_command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_deep_bundle(tmp_path)
+    call = ("simulate", "procedural:3", "--size-px", "64,48", "--bundle", "deep.camkit", "--json")
+    told = json.loads(camkit_command(*call, "--depth-m", 0.7, "-o", "near.dng").out)
+    assert told["object_distance_m"] == pytest.approx(0.7)
+    assert _metres(math.inf) == "inf"
+    assert _metres(None) is None
+
+
+def test_a_sensor_that_counts_photons_has_no_white_to_exceed() -> None:
+    diodes = SpadSensor(extent=Extent(width_px=8, height_px=8, pixel_pitch_um=6.0))
+    scene = np.ones((3, 8, 8), np.float32)
+    options = SimulationOptions()
+    assert _exposed(scene, diodes, options, None) == (scene, None)
+    with pytest.raises(ContractError, match="this one counts photons"):
+        _exposed(scene, diodes, options, 0.015)
+
+
+def test_capture_and_truth_cannot_be_one_file(captures) -> None:
+    with pytest.raises(ContractError, match="different names"):
+        _check_truth(Path("a.exr"), captures / "a.exr", open_bundle(captures / "tiny.camkit"))
