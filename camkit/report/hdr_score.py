@@ -3,8 +3,8 @@
     result, truth -> as they are ------------> PSNR to 2^8, stops, unclipped, mu-law, PU21, EVs
              `----> one log scale (`aligned`) -> the same numbers, names in `_aligned`
 
-Signals are linear, 1.0 = white, at most `CEILING`. No PSNR exceeds `BEST_DB`: equal pictures would
-be infinitely good, which no mean survives. What cannot be measured on a picture (stops where
+Signals are linear, 1.0 = white, at most `CEILING` = 2^8. No PSNR exceeds `BEST_DB`: equal pictures
+would be infinitely good, which no mean survives. What cannot be measured on a picture (stops where
 nothing exceeds white, say) is left out.
 """
 
@@ -19,8 +19,8 @@ from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.pu21 import MOST_NITS, pu21_mean_square, pu21_ssim
+from camkit.scenes.saturation import CEILING
 
-CEILING: Final = 2.0**8
 BEST_DB: Final = 120.0
 MU: Final = 5000.0
 EXPOSURES_EV: Final = (0, 4, 8)

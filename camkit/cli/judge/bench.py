@@ -24,7 +24,15 @@ def bench(
     ] = None,
     all_: Annotated[bool, typer.Option("--all", help="All built-in bundles.")] = False,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of sharp pictures; default: the golden cases.")
+        Path | None,
+        typer.Option(help="Folder of sharp pictures, EXR and HDR too; default: golden cases."),
+    ] = None,
+    saturate: Annotated[
+        float | None, typer.Option(help="Expose them so that this share saturates, such as 0.015.")
+    ] = None,
+    nits_per_unit: Annotated[
+        float | None,
+        typer.Option(help="cd/m^2 of white, for what the eye sees; default 39.0625."),
     ] = None,
     images: Annotated[int | None, typer.Option(help="Only the first N of them.")] = None,
     out_dir: Annotated[Path, typer.Option(help="Folder of table, chart and page.")] = Path("bench"),
@@ -99,6 +107,8 @@ def bench(
         photo=photo,
         data=data,
         images=images,
+        saturate=saturate,
+        constants={} if nits_per_unit is None else {"nits_per_unit": nits_per_unit},
         work_dir=work_dir,
         gemm_s=0.2 if quick else 1.0,
     )
@@ -131,14 +141,19 @@ def _teller() -> "Callable[[str], None]":
 
 
 def _lines(rows: "list[Row]") -> list[str]:
-    heads = ("bundle", "method", "PSNR dB", "SSIM", "s", "p90", "steady s", "peak MB", "noisy")
-    keys = ("psnr_db", "ssim", "seconds_median", "seconds_p90", "steady_seconds_median")
-    forms = (".2f", ".3f", ".2f", ".2f", ".2f")
+    shown = [
+        *(("PSNR dB", "psnr_db", ".2f"), ("SSIM", "ssim", ".3f")),
+        *(("HDR dB", "hdr_psnr_db", ".2f"), ("stops", "stops_rmse", ".2f")),
+        *(("s", "seconds_median", ".2f"), ("p90", "seconds_p90", ".2f")),
+        ("steady s", "steady_seconds_median", ".2f"),
+    ]
+    if not any("hdr_psnr_db" in row for row in rows):
+        del shown[2:4]
+    heads = ("bundle", "method", *(head for head, _, _ in shown), "peak MB", "noisy")
     table: list[tuple[str, ...]] = [heads]
     for row in rows:
         numbers = [
-            "-" if row.get(key) is None else format(row[key], form)
-            for key, form in zip(keys, forms, strict=True)
+            "-" if row.get(key) is None else format(row[key], form) for _, key, form in shown
         ]
         peak = "-" if row["peak_rss_mb"] is None else f"{row['peak_rss_mb']:.0f}"
         noisy = {True: "yes", False: "no", None: "-"}[row["noisy"]]

@@ -33,7 +33,9 @@ from camkit.report.quality import (
     read_picture,
 )
 from camkit.runtime.twin.light import stated_balance
-from camkit.runtime.twin.truth import picture_scale
+from camkit.runtime.twin.saturation import exposure_for_share
+from camkit.runtime.twin.truth import light_sensor, picture_scale
+from camkit.scenes.saturation import with_exposure
 
 MOST_PX: Final = 1024
 """Of a larger picture the middle is taken."""
@@ -94,7 +96,11 @@ def golden_captures(bundle: Bundle) -> list[KnownCapture]:
 
 
 def picture_captures(
-    bundle: Bundle, folder: Path, count: int | None, cache_folder: Path
+    bundle: Bundle,
+    folder: Path,
+    count: int | None,
+    cache_folder: Path,
+    saturate: float | None = None,
 ) -> Iterator[KnownCapture]:
     """Photograph the first pictures of a folder at every place and sensitivity.
 
@@ -103,12 +109,11 @@ def picture_captures(
         folder: Sharp pictures.
         count: How many of them; None for all.
         cache_folder: Where traced PSFs are kept.
+        saturate: As of `bench_scene`.
 
     Raises:
-        ContractError: If the folder holds no pictures, or one is too small.
+        ContractError: If the folder holds no pictures, or one is too small, or as `bench_scene`.
     """
-    sensor, scale = bundle.manifest.sensor, picture_scale(bundle.manifest)
-    most_px = min(MOST_PX, scale * sensor.width_px, scale * sensor.height_px)
     psf = psf_source(bundle)
     part = find_part(bundle.manifest.kind, "bench", BenchPart)
 
@@ -117,7 +122,7 @@ def picture_captures(
         return fabricated_psf(bundle, seed, cache_folder=cache_folder)
 
     for number, path in enumerate(list_set(folder, count)):
-        scene = _whole_pixels(read_picture(path, most_px), scale)
+        scene = bench_scene(path, bundle, saturate)
         if min(scene.shape[1:]) < LEAST_PX:
             raise ContractError(
                 f"{path} has {scene.shape[2]}x{scene.shape[1]} pixels; a picture to measure on "
@@ -135,6 +140,33 @@ def picture_captures(
                 )
                 kernels = lens(shot.fabrication_seed) if psf == "fresh" else bundle.psf
                 yield _known(shot, part.photograph(shot, scene, bundle, kernels))
+
+
+def bench_scene(path: Path, bundle: Bundle, saturate: float | None = None) -> FloatArray:
+    """Give a picture as large and as bright as a camera photographs it.
+
+    Args:
+        path: A picture; of a large one the middle is taken.
+        bundle: The camera.
+        saturate: Share of the pixels that exceed what the sensor holds, in any colour; the picture
+            is exposed for it and ends at `camkit.scenes.saturation.CEILING`. None leaves it alone.
+
+    Returns:
+        (3, h, w) float32 linear Rec.709, of whole pixels of the sensor.
+
+    Raises:
+        DecodeError: If it is damaged.
+        ContractError: If no exposure saturates that share; names the file.
+    """
+    sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
+    most_px = min(MOST_PX, scale * sensor.width_px, scale * sensor.height_px)
+    scene = _whole_pixels(read_picture(path, most_px), scale)
+    if saturate is None:
+        return scene
+    try:
+        return with_exposure(scene, exposure_for_share(scene, sensor, saturate).exposure)
+    except ContractError as error:
+        raise ContractError(f"{path}: {error}") from error
 
 
 def psf_source(bundle: Bundle) -> PsfSource:

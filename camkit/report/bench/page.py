@@ -45,6 +45,13 @@ COLUMNS: Final = (
     Shown("noisy", "noisy", "", "the seconds are not to be trusted to a few per cent"),
 )
 
+HDR_COLUMNS: Final = (
+    Shown("HDR dB", "hdr_psnr_db", ".2f", "mean over pictures, linear, with its peak at 2^8"),
+    Shown("stops", "stops_rmse", ".2f", "RMS of log2 above white, mean over pictures"),
+    Shown("unclipped dB", "unclipped_psnr_db", ".2f", "where the capture is not clipped"),
+)
+"""Where a camera is judged by high dynamic range."""
+
 TIE_DB: Final = 0.05
 """Differences below are not worth time."""
 
@@ -162,7 +169,9 @@ def _table(report: dict[str, Any], camera: str) -> list[str]:
     timed = [r for r in rows if r["seconds_median"] is not None and r.get("psnr_db") is not None]
     points = [(r["seconds_median"], r["psnr_db"]) for r in timed]
     front = {id(timed[index]) for index in pareto_front(points)}
-    heads = "".join(f'<th title="{escape(c.meaning)}">{escape(c.head)}</th>' for c in COLUMNS)
+    is_hdr = any(HDR_COLUMNS[0].key in row for row in rows)
+    columns = (COLUMNS[0], *HDR_COLUMNS, *COLUMNS[1:]) if is_hdr else COLUMNS
+    heads = "".join(f'<th title="{escape(c.meaning)}">{escape(c.head)}</th>' for c in columns)
     lines = [f"<h2>{escape(camera)}: every row</h2>"]
     lines.append(
         '<p class="small">Click a head to sort. Bold: nothing is both faster and better.</p>'
@@ -170,7 +179,7 @@ def _table(report: dict[str, Any], camera: str) -> list[str]:
     lines.append(f'<div class="scroll"><table><thead><tr>{heads}</tr></thead><tbody>')
     for row in rows:
         mark = ' class="front"' if id(row) in front else ""
-        cells = "".join(_cell(row, column) for column in COLUMNS)
+        cells = "".join(_cell(row, column) for column in columns)
         lines.append(f"<tr{mark}>{cells}</tr>")
     lines.append("</tbody></table></div>")
     failed = [row for row in rows if row["error"]]

@@ -12,7 +12,12 @@ from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy, score_key
 from camkit.report.bench.crops import MOST_CAPTURES, CropCollector, Patch
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
-from camkit.report.bench.known_captures import KnownCapture, golden_captures, picture_captures
+from camkit.report.bench.known_captures import (
+    KnownCapture,
+    bench_scene,
+    golden_captures,
+    picture_captures,
+)
 from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric
@@ -72,16 +77,13 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
         tell: Called with a line whenever something begins.
 
     Raises:
-        ContractError: If bundles, methods or pictures do not fit each other.
+        ContractError: If bundles, methods, pictures or settings do not fit each other.
         BundleError: If a bundle is refused.
         DecodeError: If the given capture or a file of linear light cannot be read.
     """
     folder = settings.folder()
-    if settings.data is not None:
-        for path in list_set(settings.data, settings.images):
-            if path.suffix.lower() in LIGHT_SUFFIXES:
-                read_picture(path)  # an error now, not after the timing
     entrants = open_entrants(settings.bundles, settings.references)
+    _check(settings, [e.bundle for e in entrants if not e.is_reference])
     ground = Ground(
         threads=available_threads(None),
         providers=usable_providers(),
@@ -108,6 +110,21 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
         if found.error is not None
     ]
     return _join(trials, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
+
+
+def _check(settings: Settings, bundles: Sequence[Bundle]) -> None:
+    """Refuse settings and pictures that do not fit the cameras, before anything is timed."""
+    known = {name for b in bundles for m in metrics_of(b.manifest) for name in m.takes}
+    if unknown := [name for name in settings.constants if name not in known]:
+        raise ContractError(
+            f"none of these cameras is judged by a metric that takes {', '.join(unknown)}"
+        )
+    for path in () if settings.data is None else list_set(settings.data, settings.images):
+        if settings.saturate is not None:
+            for bundle in bundles:
+                bench_scene(path, bundle, settings.saturate)
+        elif path.suffix.lower() in LIGHT_SUFFIXES:
+            read_picture(path)
 
 
 def open_entrants(bundles: Sequence[str], references: Sequence[str]) -> list[Entrant]:
@@ -233,12 +250,16 @@ def _known_captures(
         golden = golden_captures(bundle)
         return golden, len(golden), f"{len(golden)} golden cases of the bundle"
     pictures = len(list_set(settings.data, settings.images))
-    captures = picture_captures(bundle, settings.data, settings.images, folder / "psf")
+    captures = picture_captures(
+        bundle, settings.data, settings.images, folder / "psf", settings.saturate
+    )
     part = find_part(bundle.manifest.kind, "bench", BenchPart)
     text = (
         f"{pictures} pictures of {settings.data.name}, {len(part.positions)} field positions, "
         f"ISO {' and '.join(f'{iso:g}' for iso in part.isos)}"
     )
+    if settings.saturate is not None:
+        text += f", {settings.saturate:.3%} of the scene saturated"
     return captures, pictures * len(part.positions) * len(part.isos), text
 
 

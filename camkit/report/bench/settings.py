@@ -1,5 +1,6 @@
 """What a caller may ask of a bench, checked once."""
 
+import math
 import os
 import tempfile
 from collections.abc import Mapping
@@ -30,6 +31,8 @@ class Settings:
         photo: A sharp picture that every camera photographs for it, likewise.
         data: Folder of sharp pictures to measure accuracy on; None for the golden cases.
         images: Only the first N of them.
+        saturate: Share of their pixels that are exposed to saturate the sensor; None leaves them
+            as bright as they are.
         work_dir: Where captures and traced PSFs are kept between runs; None for a folder of this
             user among the temporary files.
         gemm_s: Seconds spent on the speed of the matrix product, per number of threads.
@@ -47,6 +50,7 @@ class Settings:
     photo: Path | None = None
     data: Path | None = None
     images: int | None = None
+    saturate: float | None = None
     work_dir: Path | None = None
     gemm_s: float = 1.0
     constants: Mapping[str, float] = field(default_factory=dict)
@@ -67,6 +71,17 @@ class Settings:
             raise ContractError("give a capture or a photo to take one of, not both")
         if self.capture is not None and (self.width_px or self.height_px):
             raise ContractError("a capture has its own size; leave out width and height")
+
+        self._check_accuracy()
+
+    def _check_accuracy(self) -> None:
+        if self.saturate is not None and self.data is None:
+            raise ContractError("a share to saturate is one of pictures; give their folder as data")
+        if self.saturate is not None and not 0 < self.saturate < 1:
+            raise ContractError(f"saturate must lie between 0 and 1; got {self.saturate:g}")
+        for name, number in self.constants.items():
+            if not 0 < number < math.inf:
+                raise ContractError(f"{name} must be > 0; got {number:g}")
 
     def folder(self) -> Path:
         """Give the folder for captures and PSFs, which only this user can read, and make it."""

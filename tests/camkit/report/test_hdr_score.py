@@ -10,7 +10,6 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.hdr_score import (
     BEST_DB,
-    CEILING,
     DARKEST,
     NITS_PER_UNIT,
     Reference,
@@ -23,6 +22,7 @@ from camkit.report.hdr_score import (
     psnr_db,
     stops_rmse,
 )
+from camkit.scenes.saturation import CEILING
 from tests.hdr_pictures import hdr_pair
 
 RESULT, TRUTH = hdr_pair(48)

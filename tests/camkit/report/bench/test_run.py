@@ -1,19 +1,34 @@
 """The whole bench on a tiny camera, and what it refuses before any work."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import OpenEXR
 import pytest
 
+from camkit.bundle.reader import Bundle
+from camkit.cli.judge.bench import _lines
+from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import BundleError, ContractError, DecodeError
+from camkit.kinds import find_kind
+from camkit.report.bench import known_captures, line_up, run
+from camkit.report.bench.known_captures import bench_scene, picture_captures
+from camkit.report.bench.metrics import hdr
 from camkit.report.bench.output import write_bench
 from camkit.report.bench.run import open_entrants, run_bench
 from camkit.report.bench.settings import Settings
 from camkit.report.bench.timed.capture import timed_capture
 from camkit.report.bench.trial import Axes
+from camkit.report.kinds import bayer
+from camkit.report.quality import Exposed, Shot, expose
+from camkit.runtime.twin.saturation import saturation_of
+from camkit.runtime.twin.truth import light_sensor, true_picture
 from tests.bundle_factory import write_tiny_bundle
+from tests.hdr_pictures import hdr_pair
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
 
@@ -95,15 +110,125 @@ def test_a_scene_that_is_not_finite_is_an_error_before_the_timing(tmp_path: Path
     told: list[str] = []
     light = np.full((120, 120, 3), 0.5, np.float32)
     light[3, 4] = np.inf
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    (tmp_path / "data").mkdir()
-    OpenEXR.File(header, {"RGB": light}).write(str(tmp_path / "data" / "bad.exr"))
+    _write_light(tmp_path / "data" / "bad.exr", light)
     settings = Settings(
         bundles=(str(write_tiny_bundle(tmp_path)),), data=tmp_path / "data", work_dir=tmp_path
     )
     with pytest.raises(DecodeError, match=r"bad\.exr: 3 samples are NaN or infinite"):
         run_bench(settings, told.append)
     assert told == []
+
+
+def _write_light(path: Path, light: FloatArray) -> None:
+    path.parent.mkdir(exist_ok=True)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGB": np.ascontiguousarray(light)}).write(str(path))
+
+
+def test_scenes_are_exposed_for_a_share_and_captures_clip_there(tmp_path: Path) -> None:
+    bundle = write_wide_bundle(tmp_path)
+    rng = np.random.default_rng(5)
+    lights = np.kron(rng.random((10, 10)) ** 8, np.ones((12, 13)))  # wider than the blur
+    lights += 1e-6 * rng.random(lights.shape)
+    light = (lights[..., None] * np.full(3, 1e-3)).astype(np.float32)
+    _write_light(tmp_path / "data" / "night.exr", light)
+    path = tmp_path / "data" / "night.exr"
+    plain, saturated = (bench_scene(path, bundle, share) for share in (None, 0.1))
+    np.testing.assert_array_equal(plain, light.transpose(2, 0, 1))
+    sensor = light_sensor(bundle.manifest)
+    found = saturation_of(saturated, sensor, 1.0)
+    assert found.saturated_fraction == pytest.approx(0.1, abs=1 / (120 * 130))
+    known, *_ = picture_captures(bundle, path.parent, 1, tmp_path, 0.1)
+    assert known.capture.max() == sensor.white_level
+    dim, *_ = picture_captures(bundle, path.parent, 1, tmp_path)
+    assert dim.capture.max() < 0.2 * sensor.white_level
+
+
+def _expose_hdr(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Exposed:
+    """Photograph a scene as a kind does that is judged by high dynamic range."""
+    exposed = expose(shot, scene, bundle, lens)
+    sensor = light_sensor(bundle.manifest)
+    linear = true_picture(exposed.simulation.clean, sensor)
+    clipped = np.broadcast_to(exposed.simulation.samples >= sensor.white_level, linear.shape)
+    bare = np.where(clipped, np.minimum(linear, 1), linear)
+    extras = {"linear": linear, "clipped": clipped, "input": bare}
+    return replace(exposed, extras=extras)
+
+
+def test_a_camera_judged_by_high_dynamic_range_gets_its_numbers_in_every_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle = write_wide_bundle(tmp_path)
+    kind = replace(find_kind("bayer"), metrics=("picture", "hdr"))
+    part = replace(bayer.PART.bench, photograph=_expose_hdr, positions=(0,), isos=(100.0,))
+    monkeypatch.setattr(line_up, "find_kind", lambda _name: kind)
+    for module in (line_up, known_captures, run):
+        monkeypatch.setattr(module, "find_part", lambda *_: part)
+    monkeypatch.setattr(hdr, "obstacle", lambda: "not here")
+    _write_light(tmp_path / "data" / "night.exr", hdr_pair(128)[1].transpose(1, 2, 0))
+    settings = Settings(
+        bundles=(str(bundle.path),),
+        axes=Axes(methods=("net", "develop"), modes=("exact",), threads=(1,)),
+        repeat=1,
+        data=tmp_path / "data",
+        saturate=0.2,
+        constants={"nits_per_unit": 100.0},
+        work_dir=tmp_path / "work",
+        gemm_s=0.01,
+    )
+    result = run_bench(settings)
+    (camera,) = result.report["cameras"].values()
+    assert camera["accuracy"].endswith("1 field positions, ISO 100, 20.000% of the scene saturated")
+    developed, restored = result.report["rows"]
+    assert (restored["nits_per_unit"], restored["captures"]) == (100, 1)
+    for row in (developed, restored):
+        assert row["input_unclipped_psnr_db"] > row["unclipped_psnr_db"]  # the input has no blur
+        assert row["stops_rmse_guess"] > 0
+        assert row["pictures"]["night.exr"]["hdr_psnr_db"] == row["hdr_psnr_db"]
+    assert developed["hdr_psnr_db"] != restored["hdr_psnr_db"] != restored["input_hdr_psnr_db"]
+    files = {path.suffix: path for path in write_bench(result, tmp_path / "out")}
+    assert json.loads(files[".json"].read_text(encoding="utf-8"))["rows"] == [developed, restored]
+    head = files[".csv"].read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert {"pu21_ssim_aligned", "jod_display"} <= set(head)
+    assert "pictures" not in head
+    assert ">HDR dB</th>" in files[".html"].read_text(encoding="utf-8")
+    assert _lines(result.report["rows"])[0].split()[5:8] == ["HDR", "dB", "stops"]
+
+
+def test_a_scene_that_cannot_saturate_is_an_error_before_the_timing(tmp_path: Path) -> None:
+    told: list[str] = []
+    _write_light(tmp_path / "data" / "flat.exr", np.full((120, 120, 3), 0.5, np.float32))
+    settings = Settings(
+        bundles=(str(write_wide_bundle(tmp_path).path),),
+        data=tmp_path / "data",
+        saturate=0.015,
+        work_dir=tmp_path,
+    )
+    with pytest.raises(ContractError, match=r"flat\.exr: no exposure saturates 1\.500%"):
+        run_bench(settings, told.append)
+    assert told == []
+
+
+def test_a_setting_that_no_metric_takes_is_refused(tmp_path: Path) -> None:
+    bundle = write_wide_bundle(tmp_path)
+    settings = Settings(bundles=(str(bundle.path),), constants={"nits_per_unit": 100.0})
+    with pytest.raises(ContractError, match="metric that takes nits_per_unit"):
+        run_bench(settings)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"saturate": 0.015}, "folder as data"),
+        ({"saturate": 1.0, "data": Path()}, "between 0 and 1; got 1"),
+        ({"saturate": float("nan"), "data": Path()}, "between 0 and 1; got nan"),
+        ({"constants": {"nits_per_unit": 0.0}}, "nits_per_unit must be > 0; got 0"),
+        ({"constants": {"nits_per_unit": float("inf")}}, "nits_per_unit must be > 0; got inf"),
+    ],
+)
+def test_settings_of_the_accuracy_are_checked(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(ContractError, match=words):
+        Settings(bundles=("duet",), **fields)
 
 
 def _copy(source: Path, target: Path) -> Path:
