@@ -6,6 +6,7 @@ block of the scene is spread with the PSF of its own centre).
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,15 @@ from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import FloatArray, FrozenPsf, depth_name
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.geometry.scatter import KernelLookup, scatter
+from camkit.runtime.geometry.scatter import KernelLookup, scatter, scatter_uniform
 from camkit.runtime.geometry.sensor_window import SensorWindow, centred_origin
 from camkit.runtime.geometry.warp import distort_array
 
 Gains = tuple[float, ...]
 KernelChange = Callable[[FloatArray], FloatArray]
+WIDE_MARGIN_PX: Final = 65
+"""From here on kernels that are the same everywhere are spread at once; smaller ones keep the bits
+that captures of older bundles have."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Of linear Rec.709 (ITU-R BT.709-6): what a channel sees that has no colour of its own."""
 
@@ -34,12 +38,14 @@ class Lens:
         kernels_at: Gives the (c, k, k) kernels at a sensor position in millimetres.
         margin_px: Half of the largest kernel.
         gains: White balance of the light; None for that of the sensor's illuminant.
+        uniform: Whether all places have the same kernels.
     """
 
     psf: FrozenPsf
     kernels_at: KernelLookup
     margin_px: int
     gains: Gains | None = None
+    uniform: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +106,12 @@ def lens_of(psf: FrozenPsf, sensor: ColorSensor, *, depth_mm: float | None = Non
         known = ", ".join(map(depth_name, psf.depths_mm))
         raise ContractError(f"light comes from one depth: give one of those the PSF knows, {known}")
     kernels = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm)
-    return Lens(psf=psf, kernels_at=kernels.at, margin_px=max(psf.kernels.shape[-2:]) // 2)
+    return Lens(
+        psf=psf,
+        kernels_at=kernels.at,
+        margin_px=max(psf.kernels.shape[-2:]) // 2,
+        uniform=psf.symmetry == "uniform",
+    )
 
 
 def with_kernels(lens: Lens, change: KernelChange) -> Lens:
@@ -153,7 +164,7 @@ def light_of(
     matrix, margin = matrix * chosen.exposure, lens.margin_px
     seen = cell_means(scene, chosen.scale)
     extended = _on_sensor(seen, matrix, lens.psf, window, chosen, margin)
-    planes = scatter(extended, lens.kernels_at, window, margin_px=margin, workers=chosen.workers)
+    planes = _spread(extended, lens, window, chosen.workers)
     # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
     np.maximum(planes, 0, out=planes)
     width, height = window.size_px
@@ -170,6 +181,13 @@ def light_of(
         gains=lens.gains or gains,
         vignetting=lens.psf if chosen.vignette else None,
     )
+
+
+def _spread(planes: FloatArray, lens: Lens, window: SensorWindow, workers: int) -> FloatArray:
+    if lens.uniform and lens.margin_px >= WIDE_MARGIN_PX:
+        kernels = lens.kernels_at(0.0, 0.0)
+        return scatter_uniform(planes, kernels, margin_px=lens.margin_px, workers=workers)
+    return scatter(planes, lens.kernels_at, window, margin_px=lens.margin_px, workers=workers)
 
 
 def cell_means(planes: FloatArray, scale: int) -> FloatArray:

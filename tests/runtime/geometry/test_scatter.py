@@ -4,7 +4,8 @@ import scipy.signal
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.geometry.scatter import convolve_full, scatter
+from camkit.runtime.geometry import scatter as scatter_module
+from camkit.runtime.geometry.scatter import convolve_full, scatter, scatter_uniform
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
 FFT_ERROR = 2e-6
@@ -163,3 +164,45 @@ def test_planes_without_the_margin_are_refused() -> None:
         scatter(
             np.zeros((3, 8, 8), np.float32), lambda *_: kernel(), window(8, 8), margin_px=MARGIN
         )
+
+
+@pytest.mark.parametrize("sides", [(1, 1), (9, 5), (5, 9), (41, 41)])
+@pytest.mark.parametrize("tile_px", [16, 64, 2048])
+def test_one_kernel_for_all_places_is_the_sum_written_down(
+    sides: tuple[int, int], tile_px: int, monkeypatch
+) -> None:
+    monkeypatch.setattr(scatter_module, "TILE_PX", tile_px)
+    rng, margin, size = np.random.default_rng(0), 22, (70, 33)
+    kernels = rng.random((2, *sides), dtype=np.float32)
+    kernels /= kernels.sum(axis=(1, 2), keepdims=True)
+    around = rng.random((2, size[0] + 2 * margin, size[1] + 2 * margin), dtype=np.float32)
+    expected = np.zeros((2, *size))
+    down, across = (margin + side // 2 for side in sides)
+    for row in range(sides[0]):
+        for column in range(sides[1]):
+            top, left = down - row, across - column
+            moved = around[:, top : top + size[0], left : left + size[1]]
+            expected += kernels[:, row, column, None, None] * moved
+    found = scatter_uniform(around, kernels, margin_px=margin)
+    assert (found.shape, found.dtype) == ((2, *size), np.float32)
+    np.testing.assert_allclose(found, expected, atol=3e-6)
+
+
+def test_one_kernel_gives_what_blocks_give_and_no_bit_hangs_on_threads() -> None:
+    k = kernel()
+    picture = planes(100, 130)
+    in_blocks = scatter(picture, lambda *_: k, window(130, 100), margin_px=MARGIN, step_px=32)
+    at_once = scatter_uniform(picture, k, margin_px=MARGIN)
+    np.testing.assert_allclose(at_once, in_blocks, atol=3e-6)
+    np.testing.assert_array_equal(at_once, scatter_uniform(picture, k, margin_px=MARGIN, workers=2))
+
+
+@pytest.mark.parametrize("shape", [(3, 2 * MARGIN, 60), (3, 60, 2 * MARGIN)])
+def test_planes_that_are_all_margin_are_refused(shape: tuple[int, int, int]) -> None:
+    with pytest.raises(ContractError, match="do not fit a margin"):
+        scatter_uniform(np.zeros(shape, np.float32), kernel(), margin_px=MARGIN)
+
+
+def test_a_kernel_wider_than_its_margin_is_refused() -> None:
+    with pytest.raises(ContractError, match="do not fit a margin"):
+        scatter_uniform(planes(20, 20), kernel(side=2 * MARGIN + 3), margin_px=MARGIN)
