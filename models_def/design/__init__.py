@@ -16,4 +16,5 @@
 - `assembly`: a recipe turned into the parts of a loop
 - `tolerance`: what fabrication costs after recovery
 - `run`: a loop with its files: checkpoint, log, the lens
+- `plate/`: the relief of a plate, without a network
 """

@@ -19,7 +19,7 @@ from torch import Tensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.gratings import Streaks, chirp_along, chirped_gratings
-from camkit.models_def.optics.diffraction.heights import RankMap
+from camkit.models_def.optics.diffraction.heights import GratingMap, RankMap
 from camkit.units import UM_PER_MM
 
 IndexAt = Callable[[float], float]
@@ -53,8 +53,8 @@ class StarPattern:
     share: float
     wavelength_um: float = 0.55
 
-    def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
-        """Give the heights; see `chirped_gratings` for what is refused."""
+    def grating_map(self, bench: Bench, index_at: IndexAt, cells: int) -> GratingMap:
+        """Give the map with its profiles; see `chirped_gratings` for what is refused."""
         streaks = Streaks(
             angles_rad=tuple(math.radians(angle) for angle in self.angles_deg),
             near_um=self.near_um,
@@ -63,7 +63,11 @@ class StarPattern:
             wavelength_um=self.wavelength_um,
             index=index_at(self.wavelength_um),
         )
-        made: Tensor = chirped_gratings(streaks, bench, cells)()
+        return chirped_gratings(streaks, bench, cells)
+
+    def height_um(self, bench: Bench, index_at: IndexAt, cells: int) -> Tensor:
+        """Give the heights."""
+        made: Tensor = self.grating_map(bench, index_at, cells)()
         return made.detach().float()
 
 

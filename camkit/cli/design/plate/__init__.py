@@ -2,6 +2,7 @@
 
 - `app`: the commands joined
 - `show`: a plate on one page
+- `design`: a relief by gradients, from a recipe
 - `masks`: what it is etched through
 - `sensor`: the sensor of a recipe, which they look through
 """

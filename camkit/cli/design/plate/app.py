@@ -2,6 +2,7 @@
 
 import typer
 
+from camkit.cli.design.plate.design import design
 from camkit.cli.design.plate.masks import masks
 from camkit.cli.design.plate.show import show
 
@@ -9,6 +10,7 @@ plate_app = typer.Typer(
     name="plate", help="One plate: look at it, design it, etch it.", no_args_is_help=True
 )
 plate_app.command()(show)
+plate_app.command()(design)
 plate_app.command()(masks)
 
 

@@ -1,0 +1,82 @@
+"""`camkit plate design`: a relief found by gradients."""
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.models_def.design.plate.loop import Moment
+
+
+def design(
+    recipe: Annotated[Path, typer.Argument(help="Recipe of a plate (.toml).", metavar="RECIPE")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="The plate (.toml); checkpoint and log beside it.")
+    ],
+    steps: Annotated[int | None, typer.Option(min=1, help="Steps instead of the recipe's.")] = None,
+    minutes: Annotated[
+        float | None, typer.Option(help="Stop after so long; --resume goes on.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the start and of etch errors.")] = None,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of torch.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where a run stopped.")] = False,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Design the relief of a plate by gradients, for masks on the sensor (needs torch)."""
+    from camkit.cli.design.design_time import require_torch
+
+    require_torch("camkit plate design")
+    from camkit.models_def.design.plate.recipe import read_plate_recipe, with_plate_choices
+    from camkit.models_def.design.plate.run import PlateRun, PlateRunOptions
+
+    if resume and overwrite:
+        raise ContractError("--resume goes on, --overwrite starts anew: give one of them")
+    if minutes is not None and not minutes > 0:
+        raise ContractError(f"--minutes must be > 0; got {minutes:g}")
+    run = PlateRun(
+        with_plate_choices(read_plate_recipe(recipe), steps=steps, seed=seed),
+        PlateRunOptions(
+            out=out,
+            recipe_folder=recipe.parent,
+            seconds=math.inf if minutes is None else 60 * minutes,
+            threads=threads,
+            resume=resume,
+            overwrite=overwrite,
+        ),
+    )
+    for moment in run.go():
+        say(_line(moment), err=True)
+    report = run.finish()
+    say(json.dumps(report) if json_ else _text(report))
+
+
+def _line(moment: "Moment") -> str:
+    core, streak, far = (
+        "/".join(f"{100 * share:.1f}" for share in shares)
+        for shares in (
+            moment.reached.core_share,
+            moment.reached.streak_share,
+            moment.reached.far_share,
+        )
+    )
+    return (
+        f"step {moment.step}: loss {moment.loss:.5f} (best {moment.best_loss:.5f}), core {core} % "
+        f"of the bare lens's, written {streak} %, of it far out {far} %, {moment.seconds:.0f} s"
+    )
+
+
+def _text(report: dict[str, Any]) -> str:
+    return (
+        f"{report['name']}: loss {report['begin_loss']:.5f} -> {report['best_loss']:.5f} after "
+        f"{report['steps']} of {report['of_steps']} steps\nplate: {report['plate']}\n"
+        f"log: {report['log']}"
+    )

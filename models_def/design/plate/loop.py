@@ -1,0 +1,176 @@
+"""The steps of a design: Adam on the numbers of a map, colour by colour.
+
+Every step computes the PSF of each colour and carries its loss back to the heights before the next
+one begins, so that memory is that of one colour. Nothing is drawn but etch errors, which follow
+from seed and step: a resumed run ends in the same bits.
+"""
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from camkit.models_def.design.plate.goal import Reached, goal_loss, masks_of, reached
+from camkit.models_def.design.plate.recipe import PlateRecipe
+from camkit.models_def.optics.diffraction.map_numbers import HeightMap
+from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
+from camkit.models_def.optics.glass.catalogue import find_glass
+from camkit.models_def.optics.glass.dispersion import refractive_index
+
+State = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """One logged moment.
+
+    Attributes:
+        step: Steps done.
+        seconds: Since the loop was made or resumed.
+        loss: Mean over colours, of the plate as it is made.
+        best_loss: The least so far.
+        reached: What the colours have of the goal.
+    """
+
+    step: int
+    seconds: float
+    loss: float
+    best_loss: float
+    reached: Reached
+
+
+class PlateLoop:
+    """Runs a design."""
+
+    def __init__(self, recipe: PlateRecipe, made: HeightMap) -> None:
+        """Make ready.
+
+        Args:
+            recipe: What is wanted.
+            made: The map to begin at; its numbers move.
+
+        Raises:
+            ContractError: If the window does not hold the streaks, or the cells are too wide.
+        """
+        self.recipe, self.made = recipe, made.float()
+        self.step, self.best_loss = 0, math.inf
+        self.best: State = {}
+        pixels = recipe.pixels
+        self._grid = PixelGrid(
+            side_px=pixels.side_px, pitch_um=pixels.pitch_um, samples=pixels.samples or None
+        )
+        waves = torch.tensor(pixels.wavelengths_um, dtype=torch.float64)
+        self._index = refractive_index(find_glass(recipe.glass), waves).tolist()
+        self._masks = masks_of(recipe.goal, pixels.side_px)
+        with torch.no_grad():
+            flat = torch.zeros(recipe.cells, recipe.cells)
+            colours = range(len(pixels.wavelengths_um))
+            self._bare = torch.stack([self._light(flat, colour) for colour in colours])
+        self._optimizer = torch.optim.Adam(self.made.parameters(), lr=recipe.schedule.rate)
+
+    def run(self, until: int | None = None, seconds: float = math.inf) -> Iterator[Moment]:
+        """Go on to a step (the last by default) or for a time, giving every logged moment.
+
+        The step that is under way when the time ends is finished, and logged.
+        """
+        schedule, begin = self.recipe.schedule, time.monotonic()
+        end = schedule.steps if until is None else min(until, schedule.steps)
+        while self.step < end:
+            self._one_step()
+            spent = time.monotonic() - begin
+            if self.step % schedule.log_steps == 0 or self.step == end or spent >= seconds:
+                yield self.judge(spent)
+            if spent >= seconds:
+                return
+
+    def _one_step(self) -> None:
+        schedule = self.recipe.schedule
+        for group in self._optimizer.param_groups:
+            group["lr"] = schedule.rate * (1 - self.step / schedule.steps)
+        self._optimizer.zero_grad(set_to_none=True)
+        heights = self.made()
+        leaf = heights.detach().requires_grad_()
+        made = self._etched(leaf, self._errors())
+        count = len(self._bare)
+        pushed = torch.zeros_like(leaf)
+        for colour in range(count):
+            loss = goal_loss(
+                self._light(made, colour), self._bare[colour], self._masks, self.recipe.goal
+            )
+            (found,) = torch.autograd.grad(loss / count, leaf, retain_graph=schedule.etched)
+            pushed += found
+        heights.backward(pushed)
+        self._optimizer.step()
+        self.step += 1
+
+    def judge(self, seconds: float = 0.0) -> Moment:
+        """Look at the present map, made without errors; the best are kept."""
+        with torch.no_grad():
+            made = self._etched(self.made(), ())
+            light = torch.stack([self._light(made, c) for c in range(len(self._bare))])
+            losses = [
+                float(goal_loss(one, bare, self._masks, self.recipe.goal))
+                for one, bare in zip(light, self._bare, strict=True)
+            ]
+        loss = sum(losses) / len(losses)
+        if loss < self.best_loss:
+            self.best_loss = loss
+            self.best = {name: value.clone() for name, value in self.made.state_dict().items()}
+        return Moment(
+            step=self.step,
+            seconds=seconds,
+            loss=loss,
+            best_loss=self.best_loss,
+            reached=reached(light, self._bare, self._masks),
+        )
+
+    def _light(self, height_um: Tensor, colour: int) -> Tensor:
+        bench = self.recipe.bench
+        return plate_psf(
+            height_um,
+            self._index[colour],
+            self.recipe.pixels.wavelengths_um[colour],
+            bench=bench,
+            grid=self._grid,
+            depth_mm=bench.focus_mm,
+        )
+
+    def _etched(self, height_um: Tensor, errors: tuple[float, ...]) -> Tensor:
+        etching = self.recipe.etching
+        if etching is None or not self.recipe.schedule.etched:
+            return height_um
+        return etching.etched(height_um, errors)
+
+    def _errors(self) -> tuple[float, ...]:
+        """Give the errors of the masks in this step."""
+        schedule, etching = self.recipe.schedule, self.recipe.etching
+        if not schedule.depth_error or etching is None:
+            return ()
+        generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + self.step)
+        drawn = torch.randn(etching.masks, generator=generator, dtype=torch.float64)
+        return tuple((schedule.depth_error * drawn).tolist())
+
+    def take_best(self) -> None:
+        """Put the best map in place."""
+        self.made.load_state_dict(self.best)
+
+    def state(self) -> State:
+        """Give all that a resumed run needs."""
+        return {
+            "step": self.step,
+            "best_loss": self.best_loss,
+            "best": self.best,
+            "map": self.made.state_dict(),
+            "optimizer": self._optimizer.state_dict(),
+        }
+
+    def load(self, state: State) -> None:
+        """Go on from a state."""
+        self.step, self.best_loss = state["step"], state["best_loss"]
+        self.best = state["best"]
+        self.made.load_state_dict(state["map"])
+        self._optimizer.load_state_dict(state["optimizer"])
