@@ -71,7 +71,18 @@ BAYER: Final = Kind(
     metrics=("picture",),
 )
 
-KINDS: Final = {kind.name: kind for kind in (BAYER,)}
+HDR: Final = Kind(
+    name="hdr",
+    title="a photograph whose clipped lights are read from the streaks of a plate",
+    sensor="bayer",
+    stages=(
+        *("linearise", "repair", "white_balance", "demosaic", "highlights", "network"),
+        *("illumination", "undistort", "color"),
+    ),
+    metrics=("picture", "hdr"),
+)
+
+KINDS: Final = {kind.name: kind for kind in (BAYER, HDR)}
 """The kinds that come with camkit: one line each."""
 
 

@@ -20,9 +20,9 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
 from camkit.bundle.manifest import Manifest, Threshold, planes_of
-from camkit.bundle.optics import PSF, FrozenPsfOptics
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, STRESS_PSF, Bundle
 from camkit.bundle.stages import Parts as KnownParts
@@ -163,7 +163,7 @@ class _Camera:
     recipe: Recipe
     design: Design
     checkpoints: Found
-    psf: FrozenPsf
+    optics: FrozenOptics
     freeze: Mapping[str, Any]
     plan: dict[str, Threshold] | None
 
@@ -186,7 +186,7 @@ def _camera(parts: Parts) -> _Camera:
         recipe=recipe,
         design=kind.design(recipe),
         checkpoints=_by_role(kind.roles, parts.checkpoints, checkpoints),
-        psf=read_psf(parts.psf),
+        optics=read_optics_file(parts.psf, channels=len(recipe.sensor.channels)),
         freeze=_freeze_facts(parts),
         plan=_plan_entries(parts),
     )
@@ -272,24 +272,19 @@ def _check_lens(lens: Lens, psf: FrozenPsf, path: Path) -> None:
 
 
 def _members(parts: Parts, camera: _Camera, lens: Lens | None) -> dict[str, bytes]:
-    members = {PSF: psf_to_bytes(camera.psf)}
+    members = dict([camera.optics.member])
     if parts.stress_psf is not None:
         members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
     if lens is not None:
-        _check_lens(lens, camera.psf, parts.psf)
+        _check_lens(lens, camera.optics.psf, parts.psf)
         # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
         members[PRESCRIPTION] = format_prescription(lens).encode()
     return members
 
 
 def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
-    recipe, design, psf = camera.recipe, camera.design, camera.psf
-    distance = design.object_distance_mm
-    optics = FrozenPsfOptics(
-        pixel_pitch_um=psf.pixel_pitch_um,
-        symmetry=psf.symmetry,
-        object_distance_mm=None if np.isinf(distance) else distance,
-    )
+    recipe, design = camera.recipe, camera.design
+    optics = camera.optics.entry(design.object_distance_mm)
     facts: dict[str, dict[str, NetworkFacts]] = {
         role: {size: network.facts for size, network in sizes.items()}
         for role, sizes in networks.items()

@@ -22,11 +22,13 @@ from camkit.bundle.container import (
     read_container,
 )
 from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.frozen_optics import FrozenOptics, optics_from_bytes
 from camkit.bundle.manifest import Manifest, read_manifest
-from camkit.bundle.optics import PSF
+from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, StreakEntry
 from camkit.bundle.psf_file import psf_from_bytes
 from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
+from camkit.streaks.optics import StreakOptics
 
 SUFFIX: Final = ".camkit"
 MANIFEST: Final = "manifest.json"
@@ -52,7 +54,7 @@ class Bundle:
     path: Path
     manifest: Manifest
     _container: Container = field(repr=False)
-    _psf: FrozenPsf | None = field(repr=False)
+    _optics: FrozenOptics | None = field(repr=False)
 
     @property
     def sha256(self) -> str:
@@ -66,9 +68,20 @@ class Bundle:
         Raises:
             BundleError: If this bundle has none (its stages need none).
         """
-        if self._psf is None:
+        if self._optics is None:
             raise BundleError(f"{self.path.name} has no {PSF}")
-        return self._psf
+        return self._optics.psf
+
+    @property
+    def streaks(self) -> StreakOptics:
+        """What its optics write beside a light.
+
+        Raises:
+            BundleError: If they write no streaks.
+        """
+        if self._optics is None or self._optics.streaks is None:
+            raise BundleError(f"{self.path.name} has no {STREAKS}")
+        return self._optics.streaks
 
     @property
     def reference_depth_mm(self) -> float:
@@ -153,11 +166,27 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
     for name, member in manifest.members.items():
         _check_member(container, name, member.size, member.sha256)
-    psf = None
-    if PSF in manifest.members:
-        psf = psf_from_bytes(container.read(PSF))
-        _check_psf(psf, manifest)
-    return Bundle(path=path, manifest=manifest, _container=container, _psf=psf)
+    return Bundle(
+        path=path, manifest=manifest, _container=container, _optics=_optics_of(container, manifest)
+    )
+
+
+def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
+    """Read the optics; those of a bundle without any are refused."""
+    stated = manifest.optics
+    for name in (PSF, STREAKS):
+        if name in manifest.members and (stated is None or stated.member != name):
+            such = "no" if stated is None else "no such"
+            raise BundleError(f"the bundle holds {name}, and its manifest states {such} optics")
+    if stated is None:
+        return None
+    channels = len(manifest.sensor.channels)
+    data = container.read(stated.member)
+    optics = optics_from_bytes(data, what=stated.member, channels=channels)
+    if optics.member[0] != stated.member:
+        raise BundleError(f"{stated.member} holds optics of another type than the manifest states")
+    _check_psf(optics.psf, stated, channels)
+    return optics
 
 
 def read_container_manifest(container: Container) -> Manifest:
@@ -218,24 +247,21 @@ def _check_member(container: Container, name: str, size: int, sha256: str) -> No
         )
 
 
-def _check_psf(psf: FrozenPsf, manifest: Manifest) -> None:
+def _check_psf(psf: FrozenPsf, stated: FrozenPsfOptics | StreakEntry, channels: int) -> None:
     """Hold the PSF against what the manifest says of it."""
-    optics = manifest.optics
-    if optics is None:
-        raise BundleError(f"the bundle holds {PSF}, and its manifest states no optics")
-    if abs(psf.pixel_pitch_um - optics.pixel_pitch_um) > _PITCH_RTOL * optics.pixel_pitch_um:
+    if abs(psf.pixel_pitch_um - stated.pixel_pitch_um) > _PITCH_RTOL * stated.pixel_pitch_um:
         raise BundleError(
-            f"{PSF} is sampled at {psf.pixel_pitch_um} um, the manifest says "
-            f"{optics.pixel_pitch_um} um; freeze the PSF at the pitch of the sensor"
+            f"{stated.member} is sampled at {psf.pixel_pitch_um} um, the manifest says "
+            f"{stated.pixel_pitch_um} um; freeze the PSF at the pitch of the sensor"
         )
-    if psf.symmetry != optics.symmetry:
+    if psf.symmetry != stated.symmetry:
         raise BundleError(
-            f"{PSF} is {psf.symmetry}, the manifest says {optics.symmetry}; export again"
+            f"{stated.member} is {psf.symmetry}, the manifest says {stated.symmetry}; export again"
         )
-    rows, channels = psf.distortion.coefficients.shape[0], manifest.sensor.channels
-    if rows != len(channels):
+    rows = psf.distortion.coefficients.shape[0]
+    if rows != channels:
         raise BundleError(
-            f"{PSF} has the distortion of {rows} channel(s), the sensor {len(channels)}"
+            f"{stated.member} has the distortion of {rows} channel(s), the sensor {channels}"
         )
 
 

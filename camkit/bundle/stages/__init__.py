@@ -4,7 +4,7 @@ A stage names the planes that it takes and gives, and says by `join` what it mak
 does stands in the module of the same name in `camkit.runtime.stages`.
 
 linearise, repair, white_balance, demosaic    the front
-wiener, network                               the restoration
+wiener, highlights, network                   the restoration
 raise_clipped, illumination, undistort, color what every picture needs behind it
 """
 
@@ -15,6 +15,7 @@ from pydantic import Field
 from camkit.bundle.stages.color import Color
 from camkit.bundle.stages.demosaic import Demosaic
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry
+from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
 from camkit.bundle.stages.linearise import Linearise
 from camkit.bundle.stages.network import Network
@@ -27,6 +28,7 @@ from camkit.bundle.stages.wiener import Wiener
 __all__ = [
     "Color",
     "Demosaic",
+    "Highlights",
     "Illumination",
     "JoinError",
     "Linearise",
@@ -46,6 +48,7 @@ Stage = Annotated[
     | Repair
     | WhiteBalance
     | Demosaic
+    | Highlights
     | Wiener
     | Network
     | RaiseClipped

@@ -24,6 +24,7 @@ from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.sensors.demosaic import demosaic
 from camkit.models_def.sensors.demosaic import mosaic as sample_cfa
+from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.models_def.training.sample import Sample, SampleLayout
@@ -194,7 +195,7 @@ def make_shot(
         bank.blur_kernels(exposure.copy, exposure.x_mm, exposure.y_mm), *exposure.drift
     )
     blurred = _blur(sharp, kernels, bank.radius_px) * illumination
-    capture, saturated = _expose(blurred, gains, recipe, exposure.iso, rng)
+    capture, saturated = expose(blurred, gains, recipe.sensor, exposure.iso, rng)
     noise = sensor.noise_at(exposure.iso).with_gains(gains)
     planes, unknown = _develop(capture, saturated, gains, recipe, exposure.borders)
     return finish_shot(
@@ -276,25 +277,6 @@ def _blur(sharp: Tensor, kernels: Tensor, radius_px: int) -> Tensor:
     r = radius_px
     inner: Tensor = spread[..., r : size[0] - r, r : size[1] - r]
     return inner.clamp(min=0)
-
-
-def _expose(
-    light: Tensor,
-    gains: tuple[float, float, float],
-    recipe: BayerRecipe,
-    iso: float,
-    rng: Generator,
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Record (1, 3, h, w) white-balanced light as a mosaic (h, w) and where it clipped."""
-    sensor = recipe.sensor
-    noise = sensor.noise_at(iso)
-    raw = light / torch.tensor(gains).reshape(1, 3, 1, 1)
-    signal = sample_cfa(raw, sensor.cfa)[0].numpy().astype(np.float64)
-    recorded = rng.poisson(signal / noise.shot[0]) * noise.shot[0]
-    recorded += rng.standard_normal(signal.shape, dtype=np.float32) * noise.read_variance[0] ** 0.5
-    levels = sensor.white_level - sensor.black_level
-    dn = np.clip(np.rint(recorded * levels), -sensor.black_level, levels)
-    return (dn / levels).astype(np.float32), dn >= levels
 
 
 def _develop(

@@ -15,8 +15,12 @@ import torch
 
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.sensor import ColorSensor
+from camkit.bundle.streak_file import write_streaks
+from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
+from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks
+from camkit.models_def.optics.diffraction.streak_fit import NoStreaksError
 from camkit.models_def.optics.frozen import FINE_WAVELENGTHS, FreezeGrid, Frozen, freeze
 from camkit.models_def.sensors.psf import wavelength_weights
 
@@ -92,7 +96,7 @@ def freeze_plate(
             f"{count} wavelengths misplace {misplaced:.4f} of the light of a colour, more than "
             f"{MISPLACED_LIMIT}; freeze for a sensor with smoother responses"
         )
-    write_psf(out_path, frozen.psf)
+    _write(optics, out_path, frozen.psf, sensor)
     return PlateReport(
         wavelengths=count,
         side_px=frozen.psf.kernels.shape[-1],
@@ -101,6 +105,22 @@ def freeze_plate(
         depths_mm=tuple(frozen.psf.depths_mm.tolist()),
         of_optics=optics.facts,
     )
+
+
+def _write(optics: PlateOptics, path: Path, psf: FrozenPsf, sensor: ColorSensor) -> None:
+    """Write what was frozen: by its arms where it has any, else by its kernels."""
+    try:
+        streaks = plate_streaks(
+            optics.plate,
+            sensor,
+            depths_mm=tuple(psf.depths_mm.tolist()),
+            wavelengths_um=psf.wavelengths_um,
+            side_px=psf.kernels.shape[-1],
+        )
+    except NoStreaksError:
+        write_psf(path, psf)
+    else:
+        write_streaks(path, streaks)
 
 
 def misplaced_light(optics: PlateOptics, sensor: ColorSensor, frozen: Frozen) -> float:

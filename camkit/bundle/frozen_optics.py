@@ -1,0 +1,99 @@
+"""Optics as their file holds them, kernels or streaks, and the kernels that both give.
+
+psf.safetensors | streaks.safetensors -> FrozenOptics -> entry of the manifest, member, kernels
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, StreakEntry
+from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_tensors
+from camkit.bundle.streak_file import streaks_from_bytes, streaks_to_bytes
+from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.errors import BundleError
+from camkit.streaks.optics import StreakOptics
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrozenOptics:
+    """Optics that were frozen.
+
+    Attributes:
+        psf: Their kernels, each of sum 1.
+        streaks: Core, arms and haze; None for optics that are known by kernels alone.
+    """
+
+    psf: FrozenPsf
+    streaks: StreakOptics | None = None
+
+    @property
+    def member(self) -> tuple[str, bytes]:
+        """Give the name and the bytes of their member."""
+        if self.streaks is not None:
+            return STREAKS, streaks_to_bytes(self.streaks)
+        return PSF, psf_to_bytes(self.psf)
+
+    def entry(self, object_distance_mm: float) -> FrozenPsfOptics | StreakEntry:
+        """Give what the manifest says of them; the distance may be inf."""
+        pitch_um = self.psf.pixel_pitch_um
+        focus_mm = None if np.isinf(object_distance_mm) else object_distance_mm
+        if self.streaks is not None:
+            return StreakEntry(pixel_pitch_um=pitch_um, object_distance_mm=focus_mm)
+        return FrozenPsfOptics(
+            pixel_pitch_um=pitch_um, symmetry=self.psf.symmetry, object_distance_mm=focus_mm
+        )
+
+
+def optics_from_bytes(data: bytes, *, what: str, channels: int) -> FrozenOptics:
+    """Decode frozen optics, whichever of the two the file holds.
+
+    Args:
+        data: A whole safetensors file.
+        what: Its name in the error message.
+        channels: Of the sensor.
+
+    Raises:
+        BundleError: If it is damaged, or neither.
+    """
+    if "profiles" in read_tensors(data, what=what):
+        streaks = streaks_from_bytes(data, what=what)
+        return FrozenOptics(psf=psf_of_streaks(streaks, channels), streaks=streaks)
+    return FrozenOptics(psf=psf_from_bytes(data, what=what))
+
+
+def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:
+    """Read frozen optics from a file; see `optics_from_bytes`.
+
+    Raises:
+        BundleError: If it is missing, damaged, or neither.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise BundleError(f"cannot read the PSF {path}: {error.strerror}") from error
+    return optics_from_bytes(data, what=str(path), channels=channels)
+
+
+def psf_of_streaks(streaks: StreakOptics, channels: int, *, bare: bool = False) -> FrozenPsf:
+    """Give the dense kernels of streak optics, each of sum 1.
+
+    Args:
+        streaks: Core, arms and haze.
+        channels: Of the sensor; none is distorted.
+        bare: Of the lens without its plate.
+    """
+    kernels = streaks.dense(bare=bare)
+    kernels /= kernels.sum(axis=(-2, -1), keepdims=True, dtype=np.float64)
+    straight = np.tile(np.array([[1.0, 0.0, 0.0, 0.0]]), (channels, 1))
+    return FrozenPsf(
+        kernels=kernels[None],
+        field_heights_mm=np.zeros(1),
+        depths_mm=streaks.depths_mm,
+        wavelengths_um=streaks.wavelengths_um,
+        pixel_pitch_um=streaks.pixel_pitch_um,
+        distortion=RadialDistortion(coefficients=straight, radius_mm=1.0),
+        relative_illumination=np.ones(1),
+        symmetry="uniform",
+    )

@@ -1,0 +1,12 @@
+"""Streaks: what optics write beside a light, and the lights read back from it.
+
+    optics       core, arms and haze of every wavelength, instead of a kernel of 401 x 401
+    cells        a capture, or a kernel, in cells of 2 x 2 samples, and of 4 x 4
+    convolution  light spread by a kernel, and back
+    regions      clipped cells that throw light on the same samples, in one window
+    descent      the light of clipped cells that explains what lies around them
+    recovery     all of it: cells -> lights, their streaks, the veil of everything else
+    shapes       lights of cells as lights of pixels
+
+Numpy and scipy alone: the training side makes its samples with the code that runs at use time.
+"""

@@ -1,0 +1,176 @@
+"""The light of clipped cells that explains what lies around them, one colour, one window.
+
+Streaks are told from the scene by their gradients: wherever nothing clipped, the gradient of what
+is seen less the streaks of the lights is that of the scene, which is small nearly everywhere and
+large at edges. A penalty that grows less and less (Geman and McClure 1987) says so; its scale is
+narrowed step by step (graduated non-convexity, Blake and Zisserman 1987), each step a few
+conjugate gradients on the weights of the last one. Wide scales come first because edges of the
+scene would otherwise hold every light where it started.
+
+    min over x >= 0:  sum rho(grad(seen - K x)) + excess^2 where K x > seen + bias * x
+
+- Cells beside clipped ones are not looked at: part of their light is a lamp's blur within a cell.
+- Lights are sought on a scale of their own fourth root: a scale of their own would hold the faint
+  ones, none would let them rise to what only the bright ones can explain.
+- A small price per light keeps broad dim areas, whose streaks no one could tell from the scene,
+  from being made bright.
+
+References: Sun 2021, section 5.4, solves for the lights by a network; this takes its place.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.streaks.convolution import Convolution
+
+COARSE: Final = ((1.0, 8), (0.3, 8), (0.1, 8), (0.03, 8), (0.012, 8), (0.006, 8))
+"""(scale of the penalty, conjugate gradients), from the first step to the last."""
+FINE: Final = ((0.012, 6), (0.006, 6))
+FAINTEST: Final = 1e-2
+DIMMEST: Final = 0.05
+"""Fainter lights cost no more."""
+BRIGHTEST: Final = 600.0
+EXCESS: Final = 0.3
+"""What a light pays where its streaks outshine what is seen, beside the gradients."""
+_TINY: Final = 1e-30
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Steps:
+    """How lights are sought at one pitch of cells.
+
+    Attributes:
+        scales: (scale of the penalty, conjugate gradients) of every step.
+        root: Lights are sought on a scale of their own to this power.
+        price: Per light, of those that it would cost by itself.
+    """
+
+    scales: tuple[tuple[float, int], ...]
+    root: float
+    price: float
+
+
+COARSE_STEPS: Final = Steps(scales=COARSE, root=0.25, price=0.005)
+FINE_STEPS: Final = Steps(scales=FINE, root=0.5, price=0.00125)
+
+
+def seek_lights(
+    seen: FloatArray, clipped: Mask, spread: Convolution, first: FloatArray, steps: Steps
+) -> FloatArray:
+    """Give the light of clipped cells.
+
+    Args:
+        seen: (h, w) float32: light of the cells, less what known light has thrown there; of no
+            meaning in clipped ones.
+        clipped: (h, w): cells in which a sample clipped.
+        spread: What a cell's light becomes.
+        first: (h, w) float32: light to start from.
+        steps: Scales and prices.
+
+    Returns:
+        (h, w) float32, 0 outside the clipped cells.
+    """
+    usable = ~_grown(clipped)
+    down, across = usable[1:] & usable[:-1], usable[:, 1:] & usable[:, :-1]
+    slope_y, slope_x = _gradient(seen)
+    light = np.where(clipped, np.maximum(first, FAINTEST), 0).astype(np.float32)
+    for scale, rounds in steps.scales:
+        thrown = spread.spread(light)
+        rest_y, rest_x = _gradient(seen - thrown)
+        weights = _Weights(
+            y=np.where(down, _weight(rest_y, scale), 0).astype(np.float32),
+            x=np.where(across, _weight(rest_x, scale), 0).astype(np.float32),
+            excess=np.where(usable & (thrown > seen), EXCESS / scale**2, 0).astype(np.float32),
+        )
+        unit = np.where(clipped, light**steps.root, 0).astype(np.float32)
+        price = (steps.price * unit**2 / np.maximum(light, DIMMEST)).astype(np.float32)
+        system = _System(spread=spread, weights=weights, unit=unit, price=price)
+        wanted = unit * system.gathered(slope_y, slope_x, seen)
+        start = np.divide(light, unit, out=np.zeros_like(light), where=unit > 0)
+        found = unit * _conjugate_gradients(system, wanted, start, rounds)
+        light = np.where(clipped, np.clip(found, FAINTEST, BRIGHTEST), 0).astype(np.float32)
+    return light
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Weights:
+    """Of the gradients down and across, and of what outshines the picture."""
+
+    y: FloatArray
+    x: FloatArray
+    excess: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _System:
+    """The normal equations of one step, in units of the lights."""
+
+    spread: Convolution
+    weights: _Weights
+    unit: FloatArray
+    price: FloatArray
+
+    def gathered(self, slope_y: FloatArray, slope_x: FloatArray, level: FloatArray) -> FloatArray:
+        """Give what a picture of these gradients and level says to every light."""
+        weighed = _divergence(self.weights.y * slope_y, self.weights.x * slope_x)
+        weighed += self.weights.excess * level
+        return self.spread.gathered(weighed)
+
+    def applied(self, light: FloatArray) -> FloatArray:
+        """Give the matrix times lights in their units."""
+        thrown = self.spread.spread(self.unit * light)
+        return self.unit * self.gathered(*_gradient(thrown), thrown) + self.price * light
+
+
+def _conjugate_gradients(
+    system: _System, wanted: FloatArray, start: FloatArray, rounds: int
+) -> FloatArray:
+    found = start
+    rest = wanted - system.applied(found)
+    way = rest.copy()
+    size = float(np.vdot(rest, rest))
+    for _ in range(rounds):
+        if size < _TINY:
+            break
+        image = system.applied(way)
+        step = np.float32(size / max(float(np.vdot(way, image)), _TINY))
+        found = found + step * way
+        rest = rest - step * image
+        last, size = size, float(np.vdot(rest, rest))
+        way = rest + np.float32(size / last) * way
+    return found
+
+
+def _weight(rest: FloatArray, scale: float) -> FloatArray:
+    """Give the weights of Geman and McClure."""
+    return np.asarray(scale**-2 / (1 + (rest / scale) ** 2) ** 2, np.float32)
+
+
+def _gradient(image: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return np.diff(image, axis=0), np.diff(image, axis=1)
+
+
+def _divergence(y: FloatArray, x: FloatArray) -> FloatArray:
+    """Give the transpose of the gradient."""
+    out = np.zeros((x.shape[0], y.shape[1]), np.float32)
+    out[1:] += y
+    out[:-1] -= y
+    out[:, 1:] += x
+    out[:, :-1] -= x
+    return out
+
+
+def _grown(mask: Mask) -> Mask:
+    """Give a mask and the eight cells beside each of its own."""
+    rows = mask.copy()
+    rows[1:] |= mask[:-1]
+    rows[:-1] |= mask[1:]
+    grown = rows.copy()
+    grown[:, 1:] |= rows[:, :-1]
+    grown[:, :-1] |= rows[:, 1:]
+    return grown

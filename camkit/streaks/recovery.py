@@ -1,0 +1,206 @@
+"""The lights of a capture, found from their streaks; and what every light throws beside itself.
+
+    cells -> veil of what did not clip, taken away everywhere
+          -> windows -> lights in cells of 4 px -> (small windows) in cells of 2 px -> streaks
+
+"Model no more than a scene needs": nothing clipped, and only the veil is computed; the finer
+pitch is for windows in which it costs little.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.streaks.cells import COLOURS, Cells, coarser
+from camkit.streaks.convolution import Convolution
+from camkit.streaks.descent import COARSE_STEPS, FINE_STEPS, seek_lights
+from camkit.streaks.kernels import StreakKernels
+from camkit.streaks.regions import Window, windows_of
+from camkit.streaks.shapes import dome, pooled, rim_distance_px, upsampled, with_means
+
+FINE_CELLS: Final = 2**20
+"""Windows of more cells of 2 px are sought in cells of 4 px alone."""
+MOST_CLIPPED: Final = 0.3
+"""Share of a picture; where more clipped, streaks of different lights cannot be told apart."""
+GUESS: Final = 0.6
+"""Light of a clipped place that nothing was measured of, per squared pixel from its rim."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Region:
+    """The lights of one window.
+
+    Attributes:
+        window: Its place, in cells of 2 px.
+        light: (3, h, w) float32: light of clipped cells, 0 elsewhere; 1.0 = where samples clip.
+        streaks: (3, h, w) float32: what they throw beside themselves.
+        thrown: (on clipped cells, beyond what is seen elsewhere, in all): light of the streaks.
+    """
+
+    window: Window
+    light: FloatArray
+    streaks: FloatArray
+    thrown: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recovery:
+    """What was found of a capture.
+
+    Attributes:
+        fine: Its cells of 2 px.
+        coarse: Its cells of 4 px.
+        veil: (3, h, w) float32, in cells of 4 px: what unclipped light throws beside itself.
+        core: (3,): share of the light that stays where it is.
+        regions: From top to bottom; none where so much clipped that nothing can be told.
+        notes: What the user should know.
+    """
+
+    fine: Cells
+    coarse: Cells
+    veil: FloatArray
+    core: tuple[float, ...]
+    regions: tuple[Region, ...]
+    notes: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, int | float]:
+        """Give what a sidecar says of it.
+
+        `clipped_streak_fraction` is the share of the streaks that fell on clipped samples, where
+        nobody sees them; `unexplained` the share that outshines what is seen, which no true light
+        does.
+        """
+        cells = self.fine.clipped[0].size
+        inside = sum(region.light[0].size for region in self.regions)
+        hidden, beyond, thrown = np.sum([r.thrown for r in self.regions] or [(0, 0, 0)], axis=0)
+        return {
+            "regions": len(self.regions),
+            "saturated_fraction": round(float(self.fine.clipped.mean(dtype=np.float64)), 6),
+            "clipped_streak_fraction": round(float(hidden / thrown), 4) if thrown else 0.0,
+            "unexplained": round(float(beyond / thrown), 4) if thrown else 0.0,
+            "peak": round(max((float(r.light.max()) for r in self.regions), default=1.0), 2),
+            "window_fraction": round(inside / cells, 4),
+        }
+
+
+def recover(
+    cells: Cells, kernels: StreakKernels, pause: Callable[[], None] | None = None
+) -> Recovery:
+    """Find the lights of a capture.
+
+    Args:
+        cells: Of 2 px.
+        kernels: For these cells.
+        pause: Called before every window; may raise to stop.
+    """
+    coarse = coarser(cells)
+    veil = veil_of(coarse.known, kernels.coarse.veil)
+    reach = -(-kernels.reach_px // coarse.pitch_px)
+    clipped = np.asarray((coarse.clipped > 0).any(axis=0))
+    share = float(clipped.mean())
+    blind = share > MOST_CLIPPED
+    regions, notes = [], []
+    if blind:
+        notes.append(
+            f"{share:.0%} of the picture clipped: its lights were left as the sensor saw them, "
+            f"since streaks tell nothing where more than {MOST_CLIPPED:.0%} did"
+        )
+    for window in () if blind else windows_of(clipped, reach):
+        if pause is not None:
+            pause()
+        regions.append(_region(window, (cells, coarse), veil, kernels))
+    if not blind and _at_border(clipped):
+        notes.append("lights reach the border of the picture: those outside it were not sought")
+    return Recovery(
+        fine=cells,
+        coarse=coarse,
+        veil=veil,
+        core=kernels.coarse.core,
+        regions=tuple(regions),
+        notes=tuple(notes),
+    )
+
+
+def _at_border(mask: NDArray[np.bool_]) -> bool:
+    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
+
+
+def veil_of(known: FloatArray, kernels: tuple[FloatArray, ...]) -> FloatArray:
+    """Give what light throws beside itself; beyond the frame it goes on as at its border.
+
+    Args:
+        known: (3, h, w) light.
+        kernels: For every colour, in the same cells.
+    """
+    veil = np.empty_like(known)
+    for colour, kernel in enumerate(kernels):
+        half = kernel.shape[0] // 2
+        wide = np.pad(known[colour], half, mode="edge")
+        thrown = Convolution(kernel, wide.shape).spread(wide)
+        veil[colour] = thrown[half:-half, half:-half]
+    return veil
+
+
+def _region(
+    window: Window, cells: tuple[Cells, Cells], veil: FloatArray, kernels: StreakKernels
+) -> Region:
+    """Find the lights of a window."""
+    fine = cells[0]
+    place = window.finer(fine.light.shape[-2:])
+    light = np.zeros((COLOURS, *place.shape), np.float32)
+    streaks = np.zeros_like(light)
+    for colour in range(COLOURS):
+        clipped = fine.clipped[(colour, *place.at)] > 0
+        if not clipped.any():
+            continue
+        light[colour] = _sought(colour, window, clipped, cells, veil, kernels)
+        streaks[colour] = Convolution(kernels.fine.veil[colour], place.shape).spread(light[colour])
+    hidden = fine.clipped[(slice(None), *place.at)] > 0
+    beyond = np.maximum(streaks - fine.light[(slice(None), *place.at)], 0)
+    return Region(
+        window=place,
+        light=light,
+        streaks=streaks,
+        thrown=(_sum(streaks[hidden]), _sum(beyond[~hidden]), _sum(streaks)),
+    )
+
+
+def _sum(light: FloatArray) -> float:
+    return float(light.sum(dtype=np.float64))
+
+
+def _sought(
+    colour: int,
+    window: Window,
+    clipped: NDArray[np.bool_],
+    cells: tuple[Cells, Cells],
+    veil: FloatArray,
+    kernels: StreakKernels,
+) -> FloatArray:
+    """Find the lights of one colour in a window, in cells of 2 px."""
+    fine, coarse = cells
+    at, shape = (colour, *window.at), clipped.shape
+    distance_px = rim_distance_px(clipped, fine.pitch_px)
+    guess = np.where(clipped, 1 + GUESS * distance_px**2, 0).astype(np.float32)
+    means = seek_lights(
+        coarse.light[at] - veil[at],
+        coarse.clipped[at] > 0,
+        Convolution(kernels.coarse.whole[colour], window.shape),
+        pooled(guess),
+        COARSE_STEPS,
+    )
+    light = with_means(dome(distance_px), means)
+    if clipped.size > FINE_CELLS:
+        return light
+    place = window.finer(fine.light.shape[-2:])
+    return seek_lights(
+        fine.light[(colour, *place.at)] - upsampled(veil[at], shape),
+        clipped,
+        Convolution(kernels.fine.whole[colour], shape),
+        light,
+        FINE_STEPS,
+    )

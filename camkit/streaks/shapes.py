@@ -1,0 +1,73 @@
+"""Lights of coarse cells as lights of finer ones: high in the middle of a clipped place.
+
+Between cells of one pitch and of half of it: a coarse cell covers 2 x 2 fine ones; a last fine row
+or column that no coarse one covers goes with its neighbour.
+"""
+
+from typing import Final
+
+import numpy as np
+import scipy.ndimage
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+
+DOME_PX: Final = 5.0
+"""Farther from its rim a light rises no more."""
+_ROUNDS: Final = 4
+_TINY: Final = 1e-6
+
+
+def rim_distance_px(mask: NDArray[np.bool_], pitch_px: float) -> FloatArray:
+    """Give the distance of every cell of a mask (h, w) from its rim, 0 outside."""
+    if not mask.any():
+        return np.zeros(mask.shape, np.float32)
+    return (scipy.ndimage.distance_transform_edt(mask) * pitch_px).astype(np.float32)
+
+
+def dome(distance_px: FloatArray) -> FloatArray:
+    """Give what most lights look like, from the distance to their rim."""
+    return np.asarray(np.minimum(distance_px, DOME_PX) ** 2, np.float32)
+
+
+def pooled(fine: FloatArray) -> FloatArray:
+    """Give the means of 2 x 2 cells of (..., h, w); a last odd row or column is left out."""
+    height, width = fine.shape[-2] // 2, fine.shape[-1] // 2
+    cut = fine[..., : 2 * height, : 2 * width]
+    upper = cut[..., 0::2, 0::2] + cut[..., 0::2, 1::2]
+    lower = cut[..., 1::2, 0::2] + cut[..., 1::2, 1::2]
+    return np.asarray(0.25 * (upper + lower), np.float32)
+
+
+def upsampled(coarse: FloatArray, shape: tuple[int, int]) -> FloatArray:
+    """Give fine cells (h, w) of `shape`, linear between the middles of coarse ones."""
+    return _doubled(_doubled(coarse, shape[0]).T, shape[1]).T
+
+
+def with_means(base: FloatArray, means: FloatArray) -> FloatArray:
+    """Give lights shaped like a base whose coarse cells have these means.
+
+    Args:
+        base: (h, w) >= 0, fine; 0 where there is no light.
+        means: Of coarse cells.
+    """
+    light = base.copy()
+    for _ in range(_ROUNDS):
+        there = pooled(light)
+        weight = (there > 0).astype(np.float32)
+        ratio = np.divide(means, there, out=np.zeros_like(means), where=there > _TINY)
+        smooth = upsampled(ratio * weight, base.shape)
+        light *= smooth / np.maximum(upsampled(weight, base.shape), 0.1)
+    return light
+
+
+def _doubled(coarse: FloatArray, rows: int) -> FloatArray:
+    """Give twice the rows, or a few more, linear between the middles of the given ones."""
+    above = np.concatenate([coarse[:1], coarse[:-1]])
+    below = np.concatenate([coarse[1:], coarse[-1:]])
+    out = np.empty((2 * coarse.shape[0], coarse.shape[1]), np.float32)
+    out[0::2] = 0.75 * coarse + 0.25 * above
+    out[1::2] = 0.75 * coarse + 0.25 * below
+    if rows > out.shape[0]:
+        out = np.concatenate([out, np.repeat(out[-1:], rows - out.shape[0], axis=0)])
+    return out[:rows]

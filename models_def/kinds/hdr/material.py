@@ -1,0 +1,64 @@
+"""What the samples of a snapshot HDR camera are made with: the streaks of its plate."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.frozen_optics import psf_of_streaks
+from camkit.bundle.streak_file import read_streaks, streaks_to_bytes, write_streaks
+from camkit.contracts import FloatArray
+from camkit.models_def.kinds.hdr.recipe import HdrRecipe
+from camkit.models_def.optics.diffraction.plate import read_plate
+from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks
+from camkit.models_def.sensors.psf import wavelength_weights
+from camkit.streaks.optics import StreakOptics
+
+FILE: Final = "streaks.safetensors"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HdrMaterial:
+    """Streak optics; there is no prescription.
+
+    Attributes:
+        streaks: Of the plate.
+        lens_toml: Empty.
+    """
+
+    streaks: StreakOptics
+    lens_toml: str = ""
+
+    def digest(self) -> str:
+        """Give the sha256 of the optics."""
+        return hashlib.sha256(streaks_to_bytes(self.streaks)).hexdigest()
+
+    def write(self, folder: Path) -> None:
+        """Write the optics for another process."""
+        write_streaks(folder / FILE, self.streaks)
+
+    def color_kernels(self, recipe: HdrRecipe, *, bare: bool = False) -> FloatArray:
+        """Give the dense kernels (3, n, n) of the sensor's colours, each of sum 1."""
+        psf = psf_of_streaks(self.streaks, 3, bare=bare)
+        weights = wavelength_weights(psf.wavelengths_um, *recipe.sensor.response_arrays())
+        kernels = np.einsum("cw,wyx->cyx", weights, psf.kernels[0, -1])
+        return np.asarray(kernels, np.float32)
+
+
+def read_material(folder: Path) -> HdrMaterial:
+    """Read what `HdrMaterial.write` wrote."""
+    return HdrMaterial(streaks=read_streaks(folder / FILE))
+
+
+def compute_material(recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path) -> HdrMaterial:
+    """Compute what the plate of a recipe writes (seconds), or read what was computed before.
+
+    Raises:
+        ContractError: If there is no such plate, or it writes no streaks.
+    """
+    del cache_folder
+    beside = recipe_folder / recipe.plate.file
+    plate = read_plate(beside if beside.is_file() else Path(recipe.plate.file))
+    return HdrMaterial(streaks=plate_streaks(plate, recipe.sensor, side_px=recipe.plate.side_px))

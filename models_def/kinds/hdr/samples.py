@@ -1,0 +1,146 @@
+"""One training sample: a scene photographed, its lights found from their streaks, and the truth.
+
+scene -> exposure, camera space -> blur of the plate -> CFA, noise, clip
+      -> cells -> lights (camkit.streaks: what runs at use time) -> painted planes -> Sample
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.bundle.facts import Port
+from camkit.colorimetry import camera_from_rec709
+from camkit.contracts import FloatArray, NoiseModel
+from camkit.models_def.kinds.hdr.material import HdrMaterial
+from camkit.models_def.kinds.hdr.recipe import HdrRecipe
+from camkit.models_def.sensors.demosaic import demosaic, mosaic
+from camkit.models_def.sensors.exposure import expose
+from camkit.models_def.sensors.stabilise import stabilise
+from camkit.models_def.sensors.wiener import to_otf
+from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.streaks.cells import cells_of, sample_sites
+from camkit.streaks.kernels import StreakKernels, streak_kernels
+from camkit.streaks.painting import Painter
+from camkit.streaks.recovery import recover
+
+LAYOUT: Final = SampleLayout(
+    inputs=(Port(name="rgb", channels=3), Port(name="lit", channels=3)),
+    outputs=(Port(name="clean", channels=3),),
+)
+"""What the networks take and give. What streaks leave behind points every way alike, so samples
+may turn."""
+LIGHT_CANDIDATES: Final = 4
+
+Generator = np.random.Generator
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """A capture with its lights found.
+
+    Attributes:
+        rgb: (3, h, w) white-balanced planes as captured.
+        lit: (3, h, w) with lights, without streaks.
+        sharp: (3, h, w) the truth.
+        clipped: (h, w) where a sample clipped.
+        noise: After white balance.
+    """
+
+    rgb: FloatArray
+    lit: FloatArray
+    sharp: FloatArray
+    clipped: NDArray[np.bool_]
+    noise: NoiseModel
+
+
+class HdrCamera:
+    """The camera of a recipe, its kernels ready."""
+
+    def __init__(self, recipe: HdrRecipe, material: HdrMaterial) -> None:
+        self.recipe = recipe
+        sensor = recipe.sensor
+        self.matrix, self.gains = camera_from_rec709(np.array(sensor.color_matrix))
+        self._dense = material.color_kernels(recipe)
+        self._kernels: StreakKernels = streak_kernels(
+            self._dense, sample_sites(sensor.cfa), material.streaks.reach_px
+        )
+
+    def photograph(self, scene: FloatArray, iso: float, rng: Generator, surround_px: int) -> Shot:
+        """Photograph an exposed scene and find its lights.
+
+        Args:
+            scene: (3, h, w) linear Rec.709.
+            iso: Sensitivity.
+            rng: Source of the noise.
+            surround_px: Of the scene on every side, whose light falls into the capture.
+        """
+        height, width = scene.shape[1:]
+        flat = torch.from_numpy(self.matrix).float() @ torch.from_numpy(scene).reshape(3, -1)
+        sharp = flat.reshape(1, 3, height, width).clamp_(min=0)
+        inside = np.s_[..., surround_px : height - surround_px, surround_px : width - surround_px]
+        blurred = self._blurred(sharp)[inside]
+        sensor = self.recipe.sensor
+        raw, clipped = expose(blurred, self.gains, sensor, iso, rng)
+        rgb = self._developed(raw)
+        lit = rgb.copy()
+        cells = cells_of(raw[None], clipped[None], self._kernels.sites)
+        Painter(recover(cells, self._kernels)).paint(lit, 0, self.gains)
+        return Shot(
+            rgb=rgb,
+            lit=lit,
+            sharp=np.ascontiguousarray(sharp[inside][0].numpy()),
+            clipped=clipped,
+            noise=sensor.noise_at(iso).with_gains(self.gains),
+        )
+
+    def _blurred(self, sharp: Tensor) -> Tensor:
+        """Spread light over a scene that goes on beyond its border."""
+        half = self._dense.shape[-1] // 2
+        wide = torch.nn.functional.pad(sharp, (half,) * 4, mode="replicate")
+        size = wide.shape[-2], wide.shape[-1]
+        otf = to_otf(torch.from_numpy(self._dense)[None], size)
+        spread = torch.fft.irfft2(torch.fft.rfft2(wide) * otf, s=size)
+        inner: Tensor = spread[..., half : size[0] - half, half : size[1] - half]
+        return inner.clamp(min=0)
+
+    def _developed(self, raw: FloatArray) -> FloatArray:
+        """White-balance and demosaic a mosaic."""
+        cfa = self.recipe.sensor.cfa
+        samples = torch.from_numpy(raw)[None]
+        gains = torch.tensor(self.gains).reshape(1, 3, 1, 1).expand(1, 3, *samples.shape[1:])
+        return np.ascontiguousarray(demosaic(samples * mosaic(gains, cfa), cfa)[0].numpy())
+
+
+def sample_of(
+    shot: Shot, corner: tuple[int, int], recipe: HdrRecipe, *, side_px: int | None = None
+) -> Sample:
+    """Cut and stabilise a sample, of the side of the recipe unless another is given."""
+    side, (top, left) = side_px or recipe.data.sample_px, corner
+    part = np.s_[:, top : top + side, left : left + side]
+    shots, reads = torch.tensor(shot.noise.shot), torch.tensor(shot.noise.read_variance)
+    rgb, lit, sharp = (
+        stabilise(
+            torch.from_numpy(np.ascontiguousarray(x[part]))[None], shots, reads, scale=recipe.scale
+        )[0]
+        for x in (shot.rgb, shot.lit, shot.sharp)
+    )
+    return Sample(inputs={"rgb": rgb, "lit": lit}, target=sharp, weight=recipe.scale * shots.sqrt())
+
+
+def draw_corner(rng: Generator, shot: Shot, recipe: HdrRecipe) -> tuple[int, int]:
+    """Draw where a sample is cut: about a light, mostly."""
+    side, data = shot.clipped.shape[0], recipe.data
+    free = side - data.sample_px + 1
+    places = np.argwhere(shot.clipped)
+    if not len(places) or rng.random() >= data.light_share:
+        return int(rng.integers(free)), int(rng.integers(free))
+    # the brightest of a few, as most clipped pixels are of the faintest lights
+    found = places[rng.integers(len(places), size=LIGHT_CANDIDATES)]
+    at = found[np.argmax(shot.sharp[:, found[:, 0], found[:, 1]].max(axis=0))]
+    jitter = rng.integers(-data.sample_px // 3, data.sample_px // 3 + 1, size=2)
+    top, left = np.clip(at - data.sample_px // 2 + jitter, 0, free - 1)
+    return int(top), int(left)

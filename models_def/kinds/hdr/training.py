@@ -1,0 +1,151 @@
+"""A snapshot HDR camera as training sees it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from torch import nn
+
+from camkit.bundle.stages import (
+    Color,
+    Demosaic,
+    Highlights,
+    Illumination,
+    Linearise,
+    Network,
+    Repair,
+    Undistort,
+    WhiteBalance,
+)
+from camkit.models_def.kinds.hdr.material import HdrMaterial, compute_material, read_material
+from camkit.models_def.kinds.hdr.recipe import (
+    CAMERA_PARTS,
+    ROLES,
+    HdrRecipe,
+    samples_digest,
+    to_hdr_recipe,
+)
+from camkit.models_def.kinds.hdr.samples import LAYOUT, HdrCamera, draw_corner, sample_of
+from camkit.models_def.kinds.hdr.scenes import LightSource, exposed, open_lights
+from camkit.models_def.kinds.hdr.validation import HdrJudge, make_shots
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.training.kind import Design
+from camkit.models_def.training.sample import Sample, SampleLayout
+
+FAILS_ON: Final = (
+    "pictures of which a third or more clipped",
+    "broad lights barely above white, whose streaks look like the scene",
+    "and lights outside the picture",
+)
+
+
+class HdrMaker:
+    """Makes sample i of a recipe."""
+
+    def __init__(
+        self, recipe: HdrRecipe, camera: HdrCamera, source: LightSource, seed: int
+    ) -> None:
+        self._recipe, self._camera, self._source, self._seed = recipe, camera, source, seed
+
+    def make(self, index: int) -> Sample:
+        """Photograph a scene with lights."""
+        rng = np.random.default_rng((self._seed, index))
+        data = self._recipe.data
+        scene = self._source.draw(rng, data.capture_px + 2 * data.surround_px)
+        low, high = np.log([data.saturated_min, data.saturated_max])
+        share = float(np.exp(rng.uniform(low, high)))
+        as_it_is = rng.random() < data.as_it_is_share
+        camera = self._camera
+        scene = exposed(scene, camera.matrix, camera.gains, None if as_it_is else share)
+        iso = float(np.exp(rng.uniform(*np.log([data.iso_min, data.iso_max]))))
+        shot = camera.photograph(scene, iso, rng, data.surround_px)
+        return sample_of(shot, draw_corner(rng, shot, self._recipe), self._recipe)
+
+
+class HdrTraining:
+    """Fulfils `camkit.models_def.training.kind.TrainingKind`."""
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """One network, behind the lights found by physics."""
+        return ROLES
+
+    @property
+    def camera_parts(self) -> tuple[str, ...]:
+        """What says which camera a recipe describes."""
+        return CAMERA_PARTS
+
+    def to_recipe(self, table: Mapping[str, Any]) -> HdrRecipe:
+        """Check the tables of a recipe."""
+        return to_hdr_recipe(table)
+
+    def design(self, recipe: HdrRecipe) -> Design:
+        """Give the stages of every camera of this kind."""
+        return Design(
+            stages=(
+                Linearise(),
+                Repair(),
+                WhiteBalance(),
+                Demosaic(method="fast"),
+                Highlights(),
+                Network(role=ROLES[0], takes=("rgb", "lit"), scale=recipe.scale),
+                Illumination(takes=("clean",)),
+                Undistort(),
+                Color(),
+            ),
+            object_distance_mm=recipe.object_distance_mm,
+            fails_on=FAILS_ON,
+        )
+
+    def build_network(self, name: str, **config: Any) -> nn.Module:
+        """Build a network of the catalogue."""
+        return build_network(name, **config)
+
+    def layout(self, recipe: HdrRecipe, role: str) -> SampleLayout:
+        """Captured and lit planes in, clean planes out."""
+        del recipe, role
+        return LAYOUT
+
+    def prepare(self, recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path) -> HdrMaterial:
+        """Compute what the plate writes."""
+        return compute_material(recipe, recipe_folder, cache_folder)
+
+    def read_material(self, folder: Path) -> HdrMaterial:
+        """Read the optics that a trainer wrote."""
+        return read_material(folder)
+
+    def samples_digest(self, recipe: HdrRecipe, role: str, seed: int) -> str:
+        """Hash what decides the samples."""
+        del role
+        return samples_digest(recipe, seed)
+
+    def maker(
+        self,
+        recipe: HdrRecipe,
+        role: str,
+        material: HdrMaterial,
+        pictures: Path | None,
+        seed: int,
+    ) -> HdrMaker:
+        """Open the scenes."""
+        del role
+        data = recipe.data
+        source = open_lights(
+            pictures,
+            picture_share=data.picture_share,
+            scenes=data.procedural_scenes,
+            scene_px=data.scene_px,
+        )
+        return HdrMaker(recipe, HdrCamera(recipe, material), source, seed)
+
+    def judge(
+        self, recipe: HdrRecipe, role: str, material: HdrMaterial, pictures: Path | None
+    ) -> HdrJudge:
+        """Photograph scenes that are never trained on."""
+        del role
+        shots = make_shots(recipe, HdrCamera(recipe, material), pictures)
+        return HdrJudge(shots=shots, recipe=recipe)
+
+
+PART: Final = HdrTraining()

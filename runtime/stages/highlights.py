@@ -1,0 +1,105 @@
+"""Clipped lights found from their streaks before the first row; rows painted as they pass."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.stages import Highlights, Stage
+from camkit.errors import ContractError
+from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.plan.decision import Subject, Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import Rows
+from camkit.streaks.cells import Cells, cells_of, sample_sites
+from camkit.streaks.kernels import StreakKernels, streak_kernels
+from camkit.streaks.painting import Painter
+from camkit.streaks.recovery import Recovery, recover
+
+METHODS: Final = ("physics",)
+OPTIONS: Final = ("depth_m",)
+BYTES_PER_PX: Final = 26
+"""Cells, veil, lights and streaks of a picture that is one window (measured)."""
+BAND_ROWS: Final = 256
+REST_SHARE: Final = 0.4
+FRONT: Final = ("linearise", "repair")
+
+
+def prepare(_entry: Highlights, job: Job) -> StageWork:
+    """Say which planes are looked at."""
+    light, mask = _looked_at(job.setup.stages)
+    found: list[Recovery] = []
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        (picture,) = taken
+        return (picture.with_bands(_painted(picture, job, (light, mask), found)),)
+
+    held = BYTES_PER_PX * job.capture.height * job.capture.width
+    return StageWork(run=run, held_bytes=held, warnings=lambda: _warnings(found))
+
+
+def seconds(_entry: Highlights, subject: Subject, _work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
+
+
+def _looked_at(stages: Sequence[Stage]) -> tuple[str, str]:
+    """Name the planes of light and of what clipped, as they are before any gain.
+
+    Raises:
+        ContractError: If there are none.
+    """
+    given = [stage.gives for stage in stages if stage.type in FRONT and len(stage.gives) > 1]
+    if not given:
+        raise ContractError("highlights needs a stage that gives light and a mask of what clipped")
+    return given[-1][0], given[-1][1]
+
+
+def _painted(
+    picture: Stream, job: Job, looked_at: tuple[str, str], found: list[Recovery]
+) -> Iterator[Rows]:
+    """Yield the bands of a picture with its lights; finds them when the first is asked for."""
+    cells, kernels = _cells(job, *looked_at), _kernels(job)
+    recovery = recover(cells, kernels, lambda: check_cancelled(job.cancel))
+    found[:] = [recovery]
+    painter, top = Painter(recovery), 0
+    for band in picture.bands():
+        painter.paint(band, top, picture.gains)
+        top += band.shape[1]
+        yield band
+    job.record["hdr"] = recovery.to_json()
+
+
+def _kernels(job: Job) -> StreakKernels:
+    bundle = job.known_bundle
+    sensor = bundle.manifest.sensor
+    assert sensor.type != "spad"  # its counts never join
+    kernels = color_kernels(bundle.psf, *sensor.response_arrays(), depth_mm=job.options.depth_mm)
+    scaled = kernels.scaled(job.placement.kernel_scale)
+    reach_px = round(bundle.streaks.reach_px * job.placement.kernel_scale)
+    return streak_kernels(scaled.at(0.0, 0.0), sample_sites(job.capture.cfa), reach_px)
+
+
+def _cells(job: Job, light: str, mask: str) -> Cells:
+    """Read the whole capture in cells."""
+    samples, clipped = job.probe(light), job.probe(mask)
+    sites = sample_sites(job.capture.cfa)
+    height = samples.shape[1] // 2 * 2
+    parts = []
+    for top in range(0, height, BAND_ROWS):
+        bottom = min(top + BAND_ROWS, height)
+        parts.append(cells_of(samples.read(top, bottom), clipped.read(top, bottom), sites))
+    return Cells(
+        light=np.concatenate([part.light for part in parts], axis=1),
+        clipped=np.concatenate([part.clipped for part in parts], axis=1),
+        pitch_px=parts[0].pitch_px,
+        offset_px=parts[0].offset_px,
+    )
+
+
+def _warnings(found: Sequence[Recovery]) -> tuple[str, ...]:
+    return tuple(note for recovery in found for note in recovery.notes)
