@@ -64,6 +64,7 @@ def read_capture(
     timeout_s: float = DEFAULT_TIMEOUT_S,
     max_memory_mb: int = DEFAULT_MAX_MEMORY_MB,
     mosaic: MosaicOptions | None = None,
+    keep_codes: bool = False,
 ) -> Capture:
     """Read a RAW, DNG, EXR, TIFF or PNG file as a capture in sensor orientation.
 
@@ -75,6 +76,7 @@ def read_capture(
         max_memory_mb: Address-space limit of the child (where the system has one).
         mosaic: What a headerless single-channel picture does not say of itself, or the levels of a
             RAW file where its own are wrong.
+        keep_codes: Leave 8-bit pictures coded as they are, white at 255.
 
     Raises:
         DecodeError: If the file is missing, damaged, or not believable.
@@ -85,21 +87,24 @@ def read_capture(
     if not (math.isfinite(timeout_s) and timeout_s > 0 and max_memory_mb > 0):
         raise ContractError(f"limits must be > 0; got {timeout_s} s, {max_memory_mb} MB")
     with stored(path) as file:
-        return _read(file, isolate=isolate, limits=limits, mosaic=mosaic)
+        return _read(file, limits if isolate else None, mosaic, keep_codes=keep_codes)
 
 
-def _read(file: Path, *, isolate: bool, limits: _Limits, mosaic: MosaicOptions | None) -> Capture:
+def _read(
+    file: Path, limits: _Limits | None, mosaic: MosaicOptions | None, *, keep_codes: bool
+) -> Capture:
+    """Read a file, RAW in a child within its limits; None decodes it here."""
     try:
         check_regular(file)
         if is_picture(file):
-            capture = _read_picture(file, mosaic)
+            capture = _read_picture(file, mosaic, keep_codes=keep_codes)
             return replace(capture, sha256=file_sha256(file))
         if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
                 f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit --mosaic"
             )
         said = mosaic or MosaicOptions()
-        if isolate:
+        if limits is not None:
             return _read_isolated(file, limits, said)
         from camkit.runtime.raw_worker import decode_raw
 
@@ -146,11 +151,11 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _read_picture(path: Path, mosaic: MosaicOptions | None) -> Capture:
+def _read_picture(path: Path, mosaic: MosaicOptions | None, *, keep_codes: bool) -> Capture:
     from camkit.runtime.files.picture import read_mosaic, read_picture
 
     if mosaic is None:
-        return read_picture(path)
+        return read_picture(path, keep_codes=keep_codes)
     if mosaic.cfa is None:
         raise ContractError(
             f"{path.name} is a picture, levels are for RAW files; say --mosaic too if it is a "

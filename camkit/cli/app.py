@@ -22,6 +22,7 @@ from camkit.cli.judge.doctor import doctor
 from camkit.cli.judge.stress import stress
 from camkit.cli.say import say
 from camkit.cli.use.info import info
+from camkit.cli.use.merge import merge
 from camkit.cli.use.plan import plan
 from camkit.cli.use.process import process
 from camkit.cli.use.simulate import simulate
@@ -42,6 +43,7 @@ for command in (
     info,
     check,
     simulate,
+    merge,
     stress,
     doctor,
     bench,

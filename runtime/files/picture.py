@@ -67,11 +67,11 @@ class _Picture:
     metadata: Metadata = field(default_factory=Metadata)
 
 
-def read_picture(path: Path) -> Capture:
+def read_picture(path: Path, *, keep_codes: bool = False) -> Capture:
     """Read an RGB picture as a linear capture.
 
-    Float and 16-bit samples are taken as linear, 8-bit ones are decoded from sRGB. NaN and
-    infinite samples are kept and counted in the notes.
+    Float and 16-bit samples are taken as linear, 8-bit ones are decoded from sRGB unless their
+    codes are kept. NaN and infinite samples are kept and counted in the notes.
 
     Raises:
         DecodeError: If the file is damaged or not an RGB picture.
@@ -85,12 +85,12 @@ def read_picture(path: Path) -> Capture:
         samples = np.broadcast_to(samples, (3, *samples.shape))
     if picture.to_rec709 is not None:
         notes.append("chromaticities of the file are not Rec.709; samples are taken as they are")
-    if samples.dtype == np.uint8:
+    if samples.dtype == np.uint8 and not keep_codes:
         notes.append("8-bit picture: decoded from sRGB; 16-bit linear files are more exact")
         samples = np.round(_srgb_table(255) * 65535).astype(np.uint16)[samples]
     white = 1.0
-    if samples.dtype == np.uint16:
-        white = 65535.0
+    if np.issubdtype(samples.dtype, np.integer):
+        white = float(np.iinfo(samples.dtype).max)
     else:
         bad = int(samples.size - np.count_nonzero(np.isfinite(samples)))
         notes.extend([f"{bad} samples are NaN or infinite"] if bad else [])

@@ -28,7 +28,7 @@ class ExrWriter(PictureWriter):
 
     def __init__(self, path: Path, picture: PictureFormat) -> None:
         super().__init__(path, picture)
-        self.is_half = True
+        self.is_half = not picture.full_float
         self._stored = 0
         self._file = self._open()
 

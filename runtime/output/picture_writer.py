@@ -38,6 +38,7 @@ class PictureFormat:
         orientation: EXIF orientation 1..8; the pixels are turned so that the file needs none.
         tone: Curve of TIFF, PNG and JPEG.
         jpeg_quality: Of JPEG, 1..100.
+        full_float: EXR in 32 bits, whatever its values.
         origin: Where the picture comes from.
     """
 
@@ -47,6 +48,7 @@ class PictureFormat:
     orientation: int = UPRIGHT
     tone: Tone = "srgb"
     jpeg_quality: int = DEFAULT_JPEG_QUALITY
+    full_float: bool = False
     origin: Origin = field(default_factory=Origin)
 
     def __post_init__(self) -> None:

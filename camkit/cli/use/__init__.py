@@ -3,7 +3,8 @@
     process   captures in, pictures out (`progress`: bars and results)
     plan      what `process` would do, why, and what it would take (`plan_text`)
     simulate  the digital twin: a scene to a DNG
+    merge     a bracket of exposures to one linear EXR
     info      what a bundle or a capture is
 
-`mosaic` holds the options of headerless mosaics, for `process` and `info`.
+`mosaic` holds the options of headerless mosaics, for `process`, `info` and `merge`.
 """

@@ -22,6 +22,8 @@ OPTIONS = {
     "info": "--schema --json --debug",
     "check": "--level --json --debug",
     "simulate": "--bundle --iso --seed --origin-px -o --debug",
+    "merge": "-o --times --response --reference --mosaic --black-level --white-level --overwrite "
+    "--json --debug",
     "freeze": "-o --stress-out --report --debug",
     "bench": "--all --data --images --out-dir --sizes --methods --modes --dtypes --providers "
     "--threads --tile --reference --capture --width --height --repeat --quick --work-dir --json "

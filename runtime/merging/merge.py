@@ -1,0 +1,225 @@
+"""Frames merged into one picture: each sample of each frame by its own certainty.
+
+Linear samples x of a frame of time t tell the light x / t with the variance (shot x + read) / t^2.
+The signal in it is that which longer frames predict, since a weight by the sample's own noise
+prefers those that noise made dark. Coded samples are averaged as logarithms, see `response`.
+
+References: Robertson et al. 2003; Hasinoff, Durand, Freeman 2010, eq. (3) (noise-optimal weights).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray, NoiseModel, cfa_channels
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.capture import SATURATION_SHARE, Capture
+from camkit.runtime.merging.average import Average, BoolArray, Exposed
+from camkit.runtime.merging.estimate import disagreement, estimate_response
+from camkit.runtime.merging.response import Response, ResponseName, srgb_response
+from camkit.runtime.merging.survey import Frame, Survey, read_frame
+from camkit.runtime.signal.noise import fallback_noise, measure_noise
+
+BAND_ROWS: Final = 256
+_QUANTISATION: Final = 1 / 12
+_LEAST_VARIANCE: Final = 1e-14
+
+DarkRows = Callable[[Frame, int, int], tuple[FloatArray, BoolArray]]
+"""Gives the dark light of rows of a frame, and where it hides what came from the scene."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Merged:
+    """The light of a bracket.
+
+    Attributes:
+        light: (channel, h, w) float32, a mosaic as one channel; 1.0 = white of the longest frame.
+        precision: (channel, h, w) float32, one over the variance of `light` for linear frames, of
+            its logarithm for coded ones; 0 where no frame was usable.
+        response: What the codes were taken for.
+        clipped_fraction: Share of samples that are clipped in every frame.
+        notes: What the user should know.
+    """
+
+    light: FloatArray
+    precision: FloatArray
+    response: ResponseName
+    clipped_fraction: float
+    notes: tuple[str, ...] = ()
+
+
+def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Response | None, str]:
+    """Give what codes stand for, None for linear samples, and a note where it was a choice.
+
+    Without a wish, pictures of 8 bits are estimated and all others are linear, as captures are
+    elsewhere; the estimate gives way to sRGB where sRGB explains the frames better, or where too
+    little is unclipped in two of them.
+
+    Raises:
+        ContractError: If the frames cannot have that response.
+        DecodeError: If too little is there to estimate from.
+    """
+    codes, coded = survey.codes, np.issubdtype(survey.like.samples.dtype, np.integer)
+    if wanted in ("srgb", "estimate") and (survey.is_raw or not coded):
+        raise ContractError(f"RAW and float frames are linear; leave --response {wanted} out")
+    if wanted == "estimate" and codes is None:
+        raise ContractError("a response is estimated from 8-bit pictures; say --response srgb")
+    if wanted == "linear" or (wanted is None and codes is None):
+        return None, ""
+    plain = srgb_response(int(np.iinfo(survey.like.samples.dtype).max) + 1)
+    if wanted == "srgb" or codes is None:
+        return plain, ""
+    try:
+        found = estimate_response(codes, survey.times_s)
+    except DecodeError:
+        if wanted == "estimate":
+            raise
+        return plain, "too little is unclipped in two frames to estimate a response: sRGB is taken"
+    misses = [disagreement(codes, survey.times_s, r) for r in (found, plain)]
+    if wanted is None and misses[0] >= misses[1]:
+        return plain, "sRGB explains the frames as well as an estimate: sRGB is taken"
+    return found, ""
+
+
+def merge(survey: Survey, response: Response | None, dark: DarkRows | None = None) -> Merged:
+    """Merge the frames of a bracket.
+
+    Args:
+        survey: The bracket.
+        response: What codes stand for; None for linear samples.
+        dark: Taken off linear samples.
+
+    Raises:
+        DecodeError: If a frame cannot be read any more, or changed in between.
+    """
+    average = Average.empty(survey.like.plane_shape)
+    clipped_samples, noise = 0, None
+    for frame in survey.frames:
+        capture = read_frame(frame.path, survey.mosaic)
+        if capture.sha256 != frame.sha256:
+            raise DecodeError(f"{frame.path.name} changed while it was read; merge again")
+        if response is not None:
+            expose: _Coded | _Linear = _Coded(response)
+        else:
+            # what files do not state is measured where there is most light
+            noise = noise or frame.noise or measure_noise(capture)
+            expose = _Linear(survey.like, frame, frame.noise or noise, dark)
+        share = frame.time_s / survey.frames[0].time_s
+        clipped_samples = 0
+        for top in range(0, capture.height, BAND_ROWS):
+            bottom = min(top + BAND_ROWS, capture.height)
+            before = average.value[:, top:bottom], average.precision[:, top:bottom]
+            seen = expose.rows(capture, top, bottom, share, before)
+            average.add(top, bottom, seen)
+            clipped_samples += int(np.count_nonzero(seen.clipped & (before[1] == 0)))
+    light = average.value
+    if response is not None:
+        np.exp(light, out=light)
+    return Merged(
+        light=np.nan_to_num(light, copy=False, nan=0.0),
+        precision=average.precision,
+        response="linear" if response is None else response.name,
+        clipped_fraction=clipped_samples / light.size,
+    )
+
+
+class _Coded:
+    """Codes of pictures as logarithms of light."""
+
+    def __init__(self, response: Response) -> None:
+        self._response = response
+
+    def rows(
+        self,
+        capture: Capture,
+        top: int,
+        bottom: int,
+        share: float,
+        _before: tuple[FloatArray, FloatArray],
+    ) -> Exposed:
+        """Give what rows say, exposed by a share of the longest time."""
+        codes, tables = capture.samples[:, top:bottom], self._response
+        clipped = codes >= tables.clipped_from
+        value = np.stack([t[c] for t, c in zip(tables.log_light, codes, strict=True)])
+        return Exposed(
+            value=value - np.float32(np.log(share)),
+            precision=np.stack([t[c] for t, c in zip(tables.precision, codes, strict=True)]),
+            usable=~clipped & (codes > 0),
+            clipped=clipped,
+        )
+
+
+class _Linear:
+    """Linear samples as light."""
+
+    def __init__(
+        self, like: Capture, frame: Frame, noise: NoiseModel, dark: DarkRows | None
+    ) -> None:
+        if like.cfa is None and len(noise.shot) != like.channels:
+            noise = fallback_noise(like.channels)
+        self._frame, self._dark = frame, dark
+        self._shot = _spread_over(like, noise.shot)
+        self._read = _spread_over(like, _read_variance(like, noise))
+
+    def rows(
+        self,
+        capture: Capture,
+        top: int,
+        bottom: int,
+        share: float,
+        before: tuple[FloatArray, FloatArray],
+    ) -> Exposed:
+        """Give what rows say, exposed by a share of the longest time."""
+        shape = (-1, bottom - top, capture.width)
+        light = capture.linear_rows(top, bottom).reshape(shape)
+        clipped = self._clipped(capture, top, bottom).reshape(shape)
+        usable = ~clipped & np.isfinite(light)
+        shot, read = (_rows_of(part, bottom - top) for part in (self._shot, self._read))
+        hidden: FloatArray | np.float32 = np.float32(0)
+        if self._dark is not None:
+            taken, broken = self._dark(self._frame, top, bottom)
+            light, hidden = light - taken, taken
+            usable &= ~broken
+            clipped &= ~broken
+        value, precision = before
+        expected = np.where(precision > 0, value * np.float32(share), light) + hidden
+        variance = shot * np.maximum(expected, 0) + read
+        return Exposed(
+            value=light / np.float32(share),
+            precision=np.float32(share) ** 2 / np.maximum(variance, np.float32(_LEAST_VARIANCE)),
+            usable=usable,
+            clipped=clipped,
+        )
+
+    def _clipped(self, capture: Capture, top: int, bottom: int) -> BoolArray:
+        if np.issubdtype(capture.samples.dtype, np.floating):
+            limit = SATURATION_SHARE * capture.white_level
+            return np.asarray(capture.samples[..., top:bottom, :] >= limit)
+        return capture.saturated_rows(top, bottom)
+
+
+def _read_variance(like: Capture, noise: NoiseModel) -> tuple[float, ...]:
+    """Add the rounding of integer samples to the read noise."""
+    step = 0.0
+    if np.issubdtype(like.samples.dtype, np.integer):
+        step = 1 / (like.white_level - float(like.black_level.max()))
+    return tuple(read + _QUANTISATION * step**2 for read in noise.read_variance)
+
+
+def _spread_over(like: Capture, per_channel: tuple[float, ...]) -> FloatArray:
+    """Give numbers per colour as (1, 2, w) of a mosaic, or (channel, 1, 1)."""
+    values = np.array(per_channel, dtype=np.float32)
+    if like.cfa is None:
+        return values[:, None, None]
+    cell = values[np.array(cfa_channels(like.cfa))]
+    return np.tile(cell, (1, (like.width + 1) // 2))[None, :, : like.width]
+
+
+def _rows_of(pattern: NDArray[Any], rows: int) -> NDArray[Any]:
+    """Repeat the rows of a cell; bands begin with an even row."""
+    if pattern.shape[1] == 1:
+        return pattern
+    return np.tile(pattern, (1, (rows + 1) // 2, 1))[:, :rows]

@@ -1,0 +1,203 @@
+"""Every frame of a bracket looked at once, before any of them is merged.
+
+Only what a frame says of itself is kept: its pixels are read again when its turn comes, so that a
+bracket takes the memory of one frame.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import NoiseModel
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.raw import is_picture, read_capture
+
+SAMPLED_PIXELS: Final = 20_000
+SAME_TIME: Final = 1e-3
+_MOST_FRAMES: Final = 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """One frame of a bracket, its pixels left in the file.
+
+    Attributes:
+        path: The file.
+        time_s: Exposure time.
+        sha256: Hash of the file.
+        noise: As the file states it.
+    """
+
+    path: Path
+    time_s: float
+    sha256: str | None
+    noise: NoiseModel | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """What is known of a bracket.
+
+    Attributes:
+        frames: From the longest to the shortest.
+        like: The longest frame without its pixels: kind, size, levels, colour.
+        is_raw: Linear samples of a sensor, and not a picture.
+        codes: (frame, 3, pixel) uint8 on a lattice; None where pictures are not of 8 bits.
+        mosaic: What the caller said of a headerless mosaic or of levels.
+        notes: What decoders found worth a word.
+    """
+
+    frames: tuple[Frame, ...]
+    like: Capture
+    is_raw: bool
+    codes: NDArray[np.uint8] | None
+    mosaic: MosaicOptions | None
+    notes: tuple[str, ...]
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Give the exposure times, longest first."""
+        return np.array([frame.time_s for frame in self.frames])
+
+
+def survey(
+    files: Sequence[Path],
+    times_s: Sequence[float] | None,
+    *,
+    mosaic: MosaicOptions | None = None,
+) -> Survey:
+    """Look at every frame once.
+
+    Args:
+        files: Two or more, in any order.
+        times_s: One for each file; None for what the files say.
+        mosaic: How to read headerless mosaics, or levels in place of a RAW file's.
+
+    Raises:
+        ContractError: If there are not two different times, a file is given twice, or times are
+            neither stated nor in the files.
+        DecodeError: If a frame cannot be read, is not finite, or differs from the others in kind
+            or size.
+    """
+    _check_files(files)
+    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]] = []
+    for number, path in enumerate(files):
+        capture = read_frame(path, mosaic)
+        told = capture.metadata.exposure_time_s or capture.exposure_time_s
+        time_s = told if times_s is None else times_s[number]
+        if time_s is None:
+            raise ContractError(
+                f"{path.name} states no exposure time; say --times with one for each file"
+            )
+        frame = Frame(path=path, time_s=time_s, sha256=capture.sha256, noise=capture.noise)
+        if found:
+            check_alike(found[0][1], found[0][0].path, capture, path)
+        found.append((frame, _without_pixels(capture), _lattice(capture)))
+    if times_s is None:
+        _check_settings([(frame.path, capture) for frame, capture, _ in found])
+    found.sort(key=lambda one: (-one[0].time_s, str(one[0].path)))
+    return _joined(found, mosaic)
+
+
+def read_frame(path: Path, mosaic: MosaicOptions | None) -> Capture:
+    """Read a frame; pictures of 8 bits keep their codes.
+
+    Raises:
+        DecodeError: If it cannot be read, or holds what is no number.
+    """
+    capture = read_capture(path, mosaic=mosaic, keep_codes=True)
+    if np.issubdtype(capture.samples.dtype, np.floating):
+        bad = int(capture.samples.size - np.count_nonzero(np.isfinite(capture.samples)))
+        if bad:
+            raise DecodeError(
+                f"{path.name}: {bad} samples are NaN or infinite; a frame must be finite"
+            )
+    return capture
+
+
+def check_alike(one: Capture, named: Path, other: Capture, path: Path) -> None:
+    """Refuse a frame that differs from another in kind, size or levels.
+
+    Raises:
+        DecodeError: If it does.
+    """
+    for what, mine, its in (
+        ("size", (one.width, one.height), (other.width, other.height)),
+        ("mosaic", one.cfa, other.cfa),
+        ("type of samples", one.samples.dtype.name, other.samples.dtype.name),
+        ("white level", one.white_level, other.white_level),
+        ("black level", one.black_level.tolist(), other.black_level.tolist()),
+        ("orientation", one.orientation, other.orientation),
+    ):
+        if mine != its:
+            raise DecodeError(
+                f"frames differ in {what}: {named.name} has {mine}, {path.name} {its}; "
+                "give frames of one camera and one scene"
+            )
+
+
+def _check_files(files: Sequence[Path]) -> None:
+    if not 2 <= len(files) <= _MOST_FRAMES:
+        raise ContractError(f"a bracket has 2 to {_MOST_FRAMES} frames; got {len(files)}")
+    seen: set[Path] = set()
+    for path in files:
+        if path.resolve() in seen:
+            raise ContractError(f"{path} is given twice; give every frame once")
+        seen.add(path.resolve())
+
+
+def _check_settings(frames: Sequence[tuple[Path, Capture]]) -> None:
+    """Refuse times alone where aperture or sensitivity changed too."""
+    for name, what in (("f_number", "f-number"), ("iso", "ISO")):
+        stated = [(path, getattr(c.metadata, name)) for path, c in frames]
+        values = {value for _, value in stated if value is not None}
+        if len(values) > 1:
+            raise ContractError(
+                f"frames differ in {what} ({', '.join(f'{v:g}' for v in sorted(values))}), so "
+                "their times do not tell their exposures; say --times with relative exposures"
+            )
+
+
+def _joined(
+    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]], mosaic: MosaicOptions | None
+) -> Survey:
+    frames = tuple(frame for frame, _, _ in found)
+    longest, shortest = frames[0], frames[-1]
+    if math.isclose(longest.time_s, shortest.time_s, rel_tol=SAME_TIME):
+        raise ContractError(
+            f"a bracket needs two different exposures; all {len(frames)} frames have "
+            f"{longest.time_s:g} s"
+        )
+    like, is_raw = found[0][1], not is_picture(longest.path) or found[0][1].cfa is not None
+    lattices = [codes for _, _, codes in found if codes is not None]
+    notes = [f"{frame.path.name}: {note}" for frame, capture, _ in found for note in capture.notes]
+    return Survey(
+        frames=frames,
+        like=like,
+        is_raw=is_raw,
+        codes=np.stack(lattices) if lattices else None,
+        mosaic=mosaic,
+        notes=tuple(notes),
+    )
+
+
+def _without_pixels(capture: Capture) -> Capture:
+    """Keep what a capture says of itself: its samples become views of one number."""
+    one: NDArray[Any] = np.zeros((), dtype=capture.samples.dtype)
+    return replace(capture, samples=np.broadcast_to(one, capture.samples.shape))
+
+
+def _lattice(capture: Capture) -> NDArray[np.uint8] | None:
+    """Give (3, pixel) codes of a regular lattice; None for other samples than 8-bit pictures."""
+    samples = capture.samples
+    if samples.dtype != np.uint8 or capture.cfa is not None:
+        return None
+    step = max(1, math.isqrt(capture.width * capture.height // SAMPLED_PIXELS))
+    picked = samples[:, step // 2 :: step, step // 2 :: step]
+    return np.ascontiguousarray(picked.reshape(samples.shape[0], -1))

@@ -1,0 +1,83 @@
+"""Exposure times as people state them: seconds on the command line, or a list in a file."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from camkit.errors import ContractError, DecodeError
+
+COMMENT: Final = "#"
+MOST_LIST_BYTES: Final = 1 << 20
+
+
+def stated_times(text: str, files: Sequence[Path]) -> tuple[float, ...]:
+    """Give the exposure time of every file.
+
+    Args:
+        text: Seconds separated by commas, in the order of the files; or the path of a list with
+            lines `NAME SECONDS`, of which further words, comments (`#`) and names that are not
+            among the files are skipped. Seconds may be fractions, 1/60.
+        files: The frames.
+
+    Returns:
+        One time in seconds for each file.
+
+    Raises:
+        ContractError: If a time is missing, is stated twice, or is no time.
+        DecodeError: If the list cannot be read.
+    """
+    seconds = [_seconds(part) for part in text.split(",")]
+    if all(s is not None for s in seconds):
+        if len(seconds) != len(files):
+            raise ContractError(
+                f"--times states {len(seconds)} times for {len(files)} files; state one for each"
+            )
+        return tuple(_checked(s, "--times") for s in seconds if s is not None)
+    listed = _read_list(Path(text))
+    missing = [path.name for path in files if path.name not in listed]
+    if missing:
+        raise ContractError(
+            f"{text} states no time for {', '.join(missing[:3])}; expected lines NAME SECONDS"
+        )
+    return tuple(listed[path.name] for path in files)
+
+
+def _read_list(path: Path) -> dict[str, float]:
+    if not path.is_file():
+        raise ContractError(
+            "--times takes seconds separated by commas, or a file with lines NAME SECONDS; "
+            f"got {str(path)!r}"
+        )
+    try:
+        with path.open("rb") as file:
+            text = file.read(MOST_LIST_BYTES).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise DecodeError(f"{path} cannot be read as a list of times: {error}") from error
+    listed: dict[str, float] = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.partition(COMMENT)[0].split()
+        if not words:
+            continue
+        seconds = _seconds(words[1]) if len(words) > 1 else None
+        if seconds is None:
+            raise ContractError(f"{path}, line {number}: expected NAME SECONDS; got {line[:60]!r}")
+        if words[0] in listed:
+            raise ContractError(f"{path}, line {number}: {words[0]} is stated twice")
+        listed[words[0]] = _checked(seconds, f"{path}, line {number}")
+    return listed
+
+
+def _seconds(word: str) -> float | None:
+    """Read a number or a fraction; None for anything else."""
+    above, slash, below = word.partition("/")
+    try:
+        return float(above) / float(below) if slash else float(above)
+    except (ValueError, ZeroDivisionError):
+        return None
+
+
+def _checked(seconds: float, where: str) -> float:
+    if not (math.isfinite(seconds) and seconds > 0):
+        raise ContractError(f"{where}: an exposure time must be > 0 s; got {seconds:g}")
+    return seconds
