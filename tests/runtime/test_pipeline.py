@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
@@ -268,7 +269,7 @@ def test_without_a_depth_the_bank_has_the_mean_kernel(deep: Bundle, near: Simula
     mean = np.stack([deep.psf.kernels.mean(axis=1)], axis=1)
     shallow = replace(deep.psf, kernels=mean, depths_mm=np.array([1000.0]))
     images = []
-    for bundle in (deep, replace(deep, _psf=shallow)):
+    for bundle in (deep, replace(deep, _optics=FrozenOptics(psf=shallow))):
         pipeline = Pipeline(bundle, Options(method="wiener"))
         images.append(pipeline.process_array(near.samples, iso=100.0, origin_px=(80, 40)))
     np.testing.assert_allclose(images[0], images[1], atol=2e-5)

@@ -38,7 +38,7 @@ def test_scenarios_ask_what_a_bundle_states_and_never_its_kind(tmp_path: Path) -
     bundle = write_networkless_bundle(tmp_path)
     manifest = bundle.manifest.model_copy(update={"kind": "of somebody else"})
     stranger = bundle.__class__(
-        path=bundle.path, manifest=manifest, _container=bundle._container, _psf=bundle._psf
+        path=bundle.path, manifest=manifest, _container=bundle._container, _optics=bundle._optics
     )
     for scenario in all_scenarios():
         assert scenario.applies(bundle) == scenario.applies(stranger), scenario.name
