@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.frozen_optics import psf_of_streaks
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
 from camkit.contracts import FloatArray, FrozenPsf
@@ -41,6 +42,7 @@ class SimulationOptions:
         vignette: Apply the relative illumination.
         noise: Apply shot and read noise.
         bits: Of the converter; None for the levels of the sensor.
+        plate: Whether the plate stands before the lens, in `photograph`; False for the bare lens.
         workers: Threads of the FFT; the result does not depend on them.
     """
 
@@ -55,6 +57,7 @@ class SimulationOptions:
     vignette: bool = True
     noise: bool = True
     bits: int | None = None
+    plate: bool = True
     workers: int = 1
 
     def __post_init__(self) -> None:
@@ -142,8 +145,24 @@ def _setting(options: SimulationOptions) -> Setting:
 
 
 def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) -> Simulation:
-    """Photograph a scene with sensor and optics of a bundle; see `simulate`."""
-    return simulate(scene, bundle.manifest.sensor, bundle.psf, options)
+    """Photograph a scene with sensor and optics of a bundle; see `simulate` and `bare_psf`."""
+    psf = bundle.psf if options.plate else bare_psf(bundle)
+    return simulate(scene, bundle.manifest.sensor, psf, options)
+
+
+def bare_psf(bundle: Bundle) -> FrozenPsf:
+    """Give the kernels of the lens alone, where a plate before it writes streaks.
+
+    Raises:
+        ContractError: If the optics of the bundle write none.
+    """
+    optics = bundle.manifest.optics
+    if optics is None or optics.type != "streaks":
+        raise ContractError(
+            f"bundle {bundle.manifest.name} has no plate to take away: its optics write no "
+            "streaks; photograph with them as they are"
+        )
+    return psf_of_streaks(bundle.streaks, len(bundle.manifest.sensor.channels), bare=True)
 
 
 def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_name: str) -> None:

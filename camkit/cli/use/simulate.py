@@ -47,6 +47,9 @@ def simulate(
     bits: Annotated[
         int | None, typer.Option(help="Of the converter, 8 to 16; default: the sensor's levels.")
     ] = None,
+    no_plate: Annotated[
+        bool, typer.Option("--no-plate", help="Take the bare lens of a camera that has a plate.")
+    ] = False,
     depth_m: DepthM = None,
     size_px: Annotated[
         str | None, typer.Option(help="W,H of a scene of a seed; default: the sensor.")
@@ -62,7 +65,7 @@ def simulate(
     from camkit.bundle.reader import find_bundle, open_bundle
     from camkit.runtime.kind import part_of
     from camkit.runtime.network.engine import available_threads
-    from camkit.runtime.twin.simulate import SimulationOptions
+    from camkit.runtime.twin.simulate import SimulationOptions, bare_psf
     from camkit.runtime.twin.truth import ideal_picture, write_truth
 
     if exposure is not None and saturate is not None:
@@ -79,6 +82,8 @@ def simulate(
         )
     _check_bits(bits, sensor)
     _check_truth(truth, out, opened)
+    if no_plate:
+        bare_psf(opened)  # refuses cameras without one before a scene is drawn
     whole = (sensor.width_px, sensor.height_px)
     size = whole if size_px is None else whole_pair(size_px, "--size-px")
     options = SimulationOptions(
@@ -88,6 +93,7 @@ def simulate(
         exposure=1.0 if exposure is None else exposure,
         surround_px=surround_px,
         bits=bits,
+        plate=not no_plate,
         depth_mm=_depth_mm(opened) if depth_m is None else depth_m * MM_PER_M,
         workers=available_threads(None),
     )

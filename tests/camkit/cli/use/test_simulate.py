@@ -18,6 +18,7 @@ from camkit.runtime.raw import read_capture
 from camkit.runtime.twin.simulate import SimulationOptions
 from camkit.scenes import night_scene
 from tests.deep_bundle import write_deep_bundle
+from tests.hdr_bundle import STREAK_SHARE, write_hdr_bundle
 
 
 def _simulate(camkit_command, *arguments: object, out: str = "s.dng"):
@@ -78,6 +79,7 @@ def test_an_existing_dng_is_kept_unless_overwrite_is_said(captures, camkit_comma
         (["black.png", "--saturate", "0.02"], ExitCode.USAGE),
         (["night:1", "--exposure", "0"], ExitCode.USAGE),
         (["night:1", "--bits", "7"], ExitCode.USAGE),
+        (["night:1", "--no-plate"], ExitCode.USAGE),
         (["flat.png", "--surround-px", "12"], ExitCode.USAGE),
         (["night:1", "--truth", "truth.tif"], ExitCode.USAGE),
         (["night:1", "--truth", "a.exr"], ExitCode.USAGE),
@@ -108,6 +110,29 @@ def test_a_negative_seed_is_a_usage_error(captures, camkit_command) -> None:
 
 def test_only_a_dng_is_written(captures, camkit_command) -> None:
     assert _simulate(camkit_command, "procedural:3", out="s.png").code == ExitCode.USAGE
+
+
+def test_without_its_plate_a_camera_writes_no_streaks(
+    tmp_path, monkeypatch, camkit_command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_hdr_bundle(tmp_path)
+    lamp = np.zeros((96, 96, 3), np.float32)
+    lamp[46:50, 46:50] = 200
+    cv2.imwrite("lamp.hdr", lamp)
+    found = {}
+    for name, plate in (("with", ()), ("without", ("--no-plate",))):
+        call = ("simulate", "lamp.hdr", "--bundle", "streaks.camkit", *plate)
+        outcome = camkit_command(*call, "-o", f"{name}.dng")
+        assert outcome.code == 0, outcome.err
+        samples = read_capture(f"{name}.dng").samples.astype(float) - 256
+        # everything more than a dozen pixels from the lamp
+        samples[34:62, 34:62] = 0
+        found[name] = samples.sum() / (4095 - 256)
+    # 16 pixels throw so much into their arms; a fifth fell into the square, gains took some more
+    thrown = STREAK_SHARE * 200 * 16
+    assert 0.4 * thrown < found["with"] < thrown
+    assert found["without"] < 0.02 * found["with"]
 
 
 def test_a_depth_is_photographed_and_named_and_the_focus_without_one(
