@@ -5,15 +5,19 @@ psf.safetensors | streaks.safetensors -> FrozenOptics -> entry of the manifest, 
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, StreakEntry
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_tensors
-from camkit.bundle.streak_file import streaks_from_bytes, streaks_to_bytes
+from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import BundleError
 from camkit.streaks.optics import StreakOptics
+
+PROFILES: Final = "profiles"
+"""The tensor that only streaks have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,11 +33,16 @@ class FrozenOptics:
     streaks: StreakOptics | None = None
 
     @property
+    def member_name(self) -> str:
+        """Give the name of their member."""
+        return PSF if self.streaks is None else STREAKS
+
+    @property
     def member(self) -> tuple[str, bytes]:
         """Give the name and the bytes of their member."""
         if self.streaks is not None:
-            return STREAKS, streaks_to_bytes(self.streaks)
-        return PSF, psf_to_bytes(self.psf)
+            return self.member_name, streaks_to_bytes(self.streaks)
+        return self.member_name, psf_to_bytes(self.psf)
 
     def entry(self, object_distance_mm: float) -> FrozenPsfOptics | StreakEntry:
         """Give what the manifest says of them; the distance may be inf."""
@@ -57,8 +66,9 @@ def optics_from_bytes(data: bytes, *, what: str, channels: int) -> FrozenOptics:
     Raises:
         BundleError: If it is damaged, or neither.
     """
-    if "profiles" in read_tensors(data, what=what):
-        streaks = streaks_from_bytes(data, what=what)
+    tensors = read_tensors(data, what=what)
+    if PROFILES in tensors:
+        streaks = streaks_from_tensors(tensors, what=what)
         return FrozenOptics(psf=psf_of_streaks(streaks, channels), streaks=streaks)
     return FrozenOptics(psf=psf_from_bytes(data, what=what))
 

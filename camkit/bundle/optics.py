@@ -1,7 +1,7 @@
 """What the light goes through, as a bundle states it: a tagged union.
 
 Optics = FrozenPsfOptics    kernels, psf.safetensors        (psf_file.py)
-       | StreakOptics       core, arms and haze, streaks.safetensors    (streak_file.py)
+       | StreakEntry        core, arms and haze, streaks.safetensors    (streak_file.py)
 """
 
 from collections.abc import Mapping

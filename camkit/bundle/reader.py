@@ -183,7 +183,7 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
     channels = len(manifest.sensor.channels)
     data = container.read(stated.member)
     optics = optics_from_bytes(data, what=stated.member, channels=channels)
-    if optics.member[0] != stated.member:
+    if optics.member_name != stated.member:
         raise BundleError(f"{stated.member} holds optics of another type than the manifest states")
     _check_psf(optics.psf, stated, channels)
     return optics

@@ -2,11 +2,13 @@
 
     optics       core, arms and haze of every wavelength, instead of a kernel of 401 x 401
     cells        a capture, or a kernel, in cells of 2 x 2 samples, and of 4 x 4
+    kernels      dense kernels as cells see them: what is core, what is veil
     convolution  light spread by a kernel, and back
     regions      clipped cells that throw light on the same samples, in one window
+    shapes       lights of coarse cells as lights of finer ones
     descent      the light of clipped cells that explains what lies around them
     recovery     all of it: cells -> lights, their streaks, the veil of everything else
-    shapes       lights of cells as lights of pixels
+    painting     lights put into the rows of a picture, veil and streaks taken out
 
 Numpy and scipy alone: the training side makes its samples with the code that runs at use time.
 """

@@ -93,7 +93,13 @@ def cells_of(samples: FloatArray, clipped: NDArray[np.bool_], sites: Sequence[Si
 
 
 def coarser(cells: Cells) -> Cells:
-    """Give cells of twice the pitch; a last odd row or column is left out."""
+    """Give cells of twice the pitch; a last odd row or column is left out.
+
+    Raises:
+        ContractError: If a side is shorter than such a cell.
+    """
+    if min(cells.light.shape[1:]) < 2:
+        raise ContractError(f"cells need two on each side; got {cells.light.shape[1:]}")
     share = pooled(cells.clipped)
     half = cells.pitch_px / 2
     return Cells(

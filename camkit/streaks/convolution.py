@@ -1,15 +1,11 @@
 """Light spread by a kernel over a window, and the transpose of that."""
 
-from typing import Final
-
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-
-_REAL: Final = True
 
 
 class Convolution:
@@ -32,7 +28,7 @@ class Convolution:
         half = min(kernel.shape[0] // 2, max(shape) - 1)
         middle = kernel.shape[0] // 2
         inside = slice(middle - half, middle + half + 1)
-        self._size = tuple(scipy.fft.next_fast_len(side + half, _REAL) for side in shape)
+        self._size = tuple(scipy.fft.next_fast_len(side + half, real=True) for side in shape)
         place = np.arange(-half, half + 1)
         wrapped = np.zeros(self._size, np.float32)
         # where a window is shorter than the kernel, both ends meet in the padding

@@ -19,6 +19,8 @@ MAX_ARMS: Final = 32
 SECTION_STEP_PX: Final = 0.25
 HAZE_STEP_PX: Final = 8
 _MOST_LIGHT: Final = 1 + 1e-4
+_MOST: Final = {"profiles": 1.0, "sections": 1 / SECTION_STEP_PX, "haze": 1.0}
+"""Of a sample: all the light in one pixel, or in one step of a section."""
 FloatGrid = NDArray[np.float64]
 
 
@@ -65,6 +67,11 @@ class StreakOptics:
             light = getattr(self, name)
             if not np.isfinite(light).all() or (light < 0).any():
                 raise ContractError(f"streaks: {name} must be finite and >= 0")
+            most = _MOST_LIGHT * _MOST.get(name, np.inf)
+            if (light > most).any():
+                raise ContractError(
+                    f"streaks: {name} holds more than all the light: {light.max()} in one sample"
+                )
         for name in ("core", "bare_core"):
             share = getattr(self, name).sum(axis=(-2, -1), dtype=np.float64)
             if (share <= 0).any() or (share > _MOST_LIGHT).any():
@@ -79,7 +86,7 @@ class StreakOptics:
                 axis.ndim != 1
                 or not axis.size
                 or not (axis > 0).all()
-                or (np.diff(axis) <= 0).any()
+                or (axis[1:] <= axis[:-1]).any()
             ):
                 raise ContractError(f"streaks: {name} must be > 0 and increasing; got {axis}")
         if not np.isfinite(self.wavelengths_um).all():

@@ -3,6 +3,7 @@
     veil and streaks of cells -> rows of pixels, linear between the middles of cells
     lights of cells           -> spots: domes over the pixels of every clipped place
 
+A cell at the rim of a light holds pixels that did not clip: those keep what the sensor saw.
 Every pixel follows from the cells and its own place alone: bands of any height have the same bits.
 """
 
@@ -19,7 +20,10 @@ from camkit.streaks.cells import COLOURS, Cells
 from camkit.streaks.recovery import Recovery, Region
 from camkit.streaks.shapes import dome, rim_distance_px, with_means
 
+SEEN: Final = 0.98
+"""Of where samples clip: a pixel of a rim that is darker did not, it was seen."""
 _EIGHT: Final = np.ones((3, 3), np.int8)
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,14 +35,16 @@ class Spot:
         top: First row of pixels.
         left: First column.
         light: (h, w) float32; 1.0 = where samples clip.
-        mask: (h, w): where it counts.
+        mask: (h, w): pixels of cells in which a sample clipped.
+        certain: (h, w): those away from its rim, which clipped whatever a demosaic made of them.
     """
 
     colour: int
     top: int
     left: int
     light: FloatArray
-    mask: NDArray[np.bool_]
+    mask: Mask
+    certain: Mask
 
 
 def spots_of(recovery: Recovery) -> tuple[Spot, ...]:
@@ -53,38 +59,35 @@ def spots_of(recovery: Recovery) -> tuple[Spot, ...]:
 
 
 def _region_spots(region: Region, colour: int, cells: Cells) -> Iterator[Spot]:
-    clipped = cells.clipped[(colour, *region.window.at)] > 0
-    labels, _ = scipy.ndimage.label(clipped, structure=_EIGHT)
+    share = cells.clipped[(colour, *region.window.at)]
+    labels, _ = scipy.ndimage.label(share > 0, structure=_EIGHT)
     offset = cells.offset_px[colour]
     # a cell stands for two rows of pixels: its own and the next, or, about a sample, the last
     shift_y, shift_x = (-1 if side < 0.5 else 0 for side in offset)
-    for rows, columns in scipy.ndimage.find_objects(labels):
+    for number, (rows, columns) in enumerate(scipy.ndimage.find_objects(labels), start=1):
         top, left = max(rows.start - 1, 0), max(columns.start - 1, 0)
         part = (slice(top, rows.stop + 1), slice(left, columns.stop + 1))
-        mine = clipped[part]
-        whole = (
-            colour,
-            slice(region.window.top + top, region.window.top + rows.stop + 1),
-            slice(region.window.left + left, region.window.left + columns.stop + 1),
-        )
+        mine = labels[part] == number
+        full = mine & (share[part] == 1)
         yield Spot(
             colour=colour,
             top=2 * (region.window.top + top) + shift_y,
             left=2 * (region.window.left + left) + shift_x,
-            light=_domed(mine, region.light[(colour, *part)], cells.clipped[whole] == 1),
+            light=_domed(mine, region.light[(colour, *part)], full),
             mask=_doubled(mine),
+            certain=_doubled(scipy.ndimage.binary_erosion(full, _EIGHT, border_value=1)),
         )
 
 
-def _domed(mask: NDArray[np.bool_], means: FloatArray, certain: NDArray[np.bool_]) -> FloatArray:
+def _domed(mask: Mask, means: FloatArray, full: Mask) -> FloatArray:
     """Give the light of pixels; no less than the sensor saw where all of a cell clipped."""
     light = with_means(
         dome(rim_distance_px(_doubled(mask), 1.0)), np.where(mask, means, 0).astype(np.float32)
     )
-    return np.maximum(light, _doubled(certain))
+    return np.maximum(light, _doubled(full))
 
 
-def _doubled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _doubled(mask: Mask) -> Mask:
     return mask.repeat(2, axis=0).repeat(2, axis=1)
 
 
@@ -105,6 +108,7 @@ class Painter:
         """
         found = self._recovery
         rows, width = planes.shape[1:]
+        lights = list(self._lights(planes, top, gains))
         for colour, gain in enumerate(gains):
             under = _rows_of_cells(
                 found.veil[colour],
@@ -118,7 +122,8 @@ class Painter:
             under *= np.float32(gain)
             planes[colour] -= under
             planes[colour] *= np.float32(1 / found.core[colour])
-        self._put_lights(planes, top, gains)
+        for target, light, where in lights:
+            np.copyto(target, light, where=where)
 
     def _add_streaks(self, under: FloatArray, colour: int, top: int) -> None:
         cells = self._recovery.fine
@@ -135,7 +140,10 @@ class Painter:
                 region.streaks[colour], 2, moved, top + first, last - first, right - left
             )
 
-    def _put_lights(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:
+    def _lights(
+        self, planes: FloatArray, top: int, gains: tuple[float, ...]
+    ) -> Iterator[tuple[FloatArray, FloatArray, Mask]]:
+        """Yield views of the rows, the lights to put there, and the pixels that they are for."""
         rows, width = planes.shape[1:]
         for spot in self._spots:
             height, breadth = spot.light.shape
@@ -147,9 +155,10 @@ class Painter:
                 slice(first - spot.top, last - spot.top),
                 slice(left - spot.left, right - spot.left),
             )
+            gain = np.float32(gains[spot.colour])
             target = planes[spot.colour, first - top : last - top, left:right]
-            light = spot.light[part] * np.float32(gains[spot.colour])
-            np.copyto(target, light, where=spot.mask[part])
+            where = spot.mask[part] & (spot.certain[part] | (target >= SEEN * gain))
+            yield target, spot.light[part] * gain, where
 
 
 def _rows_of_cells(

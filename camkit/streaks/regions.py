@@ -35,12 +35,15 @@ class Window:
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def finer(self, shape: tuple[int, int]) -> "Window":
-        """Give the same place in cells of half the pitch, of an array of that shape."""
+        """Give the same place in cells of half the pitch, of an array of that shape.
+
+        A last odd row or column there, which no cell covers, goes with its neighbour.
+        """
         return Window(
             top=2 * self.top,
-            bottom=min(2 * self.bottom, shape[0]),
+            bottom=_finer_end(self.bottom, shape[0]),
             left=2 * self.left,
-            right=min(2 * self.right, shape[1]),
+            right=_finer_end(self.right, shape[1]),
         )
 
 
@@ -70,6 +73,10 @@ def windows_of(clipped: Mask, reach: int) -> tuple[Window, ...]:
         for top, bottom, left, right in merged
     ]
     return tuple(sorted(found, key=lambda w: (w.top, w.left)))
+
+
+def _finer_end(end: int, cells: int) -> int:
+    return cells if 2 * end + 1 == cells else 2 * end
 
 
 def _apart(boxes: list[list[int]]) -> list[list[int]]:

@@ -1,6 +1,7 @@
 """Clipped lights found from their streaks before the first row; rows painted as they pass."""
 
 from collections.abc import Iterator, Sequence
+from itertools import takewhile
 from typing import Final
 
 import numpy as np
@@ -27,18 +28,30 @@ BYTES_PER_PX: Final = 26
 BAND_ROWS: Final = 256
 REST_SHARE: Final = 0.4
 FRONT: Final = ("linearise", "repair")
+LEAST_PX: Final = 4
+"""Side of the coarser cells."""
 
 
-def prepare(_entry: Highlights, job: Job) -> StageWork:
-    """Say which planes are looked at."""
-    light, mask = _looked_at(job.setup.stages)
+def prepare(entry: Highlights, job: Job) -> StageWork:
+    """Say which planes are looked at.
+
+    Raises:
+        ContractError: If no stage gives them, or the capture is smaller than a cell.
+    """
+    height, width = job.capture.height, job.capture.width
+    if min(height, width) < LEAST_PX:
+        raise ContractError(
+            f"lights are sought in pictures of {LEAST_PX} px and more on each side; this one has "
+            f"{width} x {height}. Leave the stage out with another bundle, or --bundle none"
+        )
+    light, mask = _looked_at(entry, job.setup.stages)
     found: list[Recovery] = []
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (picture,) = taken
         return (picture.with_bands(_painted(picture, job, (light, mask), found)),)
 
-    held = BYTES_PER_PX * job.capture.height * job.capture.width
+    held = BYTES_PER_PX * height * width
     return StageWork(run=run, held_bytes=held, warnings=lambda: _warnings(found))
 
 
@@ -47,13 +60,14 @@ def seconds(_entry: Highlights, subject: Subject, _work: Work, speed: Speed) -> 
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
-def _looked_at(stages: Sequence[Stage]) -> tuple[str, str]:
+def _looked_at(entry: Highlights, stages: Sequence[Stage]) -> tuple[str, str]:
     """Name the planes of light and of what clipped, as they are before any gain.
 
     Raises:
         ContractError: If there are none.
     """
-    given = [stage.gives for stage in stages if stage.type in FRONT and len(stage.gives) > 1]
+    before = takewhile(lambda stage: stage != entry and stage.type != "white_balance", stages)
+    given = [stage.gives for stage in before if stage.type in FRONT and len(stage.gives) > 1]
     if not given:
         raise ContractError("highlights needs a stage that gives light and a mask of what clipped")
     return given[-1][0], given[-1][1]
