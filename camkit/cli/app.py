@@ -21,6 +21,7 @@ from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
 from camkit.cli.judge.stress import stress
 from camkit.cli.say import say
+from camkit.cli.use.calibrate.app import calibrate_app
 from camkit.cli.use.info import info
 from camkit.cli.use.merge import merge
 from camkit.cli.use.plan import plan
@@ -54,6 +55,7 @@ for command in (
 ):
     app.command()(command)
 app.add_typer(lens_app)
+app.add_typer(calibrate_app)
 app.add_typer(plate_app)
 
 

@@ -175,7 +175,7 @@ class _Linear:
         """Give what rows say, exposed by a share of the longest time."""
         shape = (-1, bottom - top, capture.width)
         light = capture.linear_rows(top, bottom).reshape(shape)
-        clipped = self._clipped(capture, top, bottom).reshape(shape)
+        clipped = clipped_rows(capture, top, bottom).reshape(shape)
         usable = ~clipped & np.isfinite(light)
         shot, read = (_rows_of(part, bottom - top) for part in (self._shot, self._read))
         hidden: FloatArray | np.float32 = np.float32(0)
@@ -194,11 +194,13 @@ class _Linear:
             clipped=clipped,
         )
 
-    def _clipped(self, capture: Capture, top: int, bottom: int) -> BoolArray:
-        if np.issubdtype(capture.samples.dtype, np.floating):
-            limit = SATURATION_SHARE * capture.white_level
-            return np.asarray(capture.samples[..., top:bottom, :] >= limit)
-        return capture.saturated_rows(top, bottom)
+
+def clipped_rows(capture: Capture, top: int, bottom: int) -> BoolArray:
+    """Tell which samples of rows are clipped; those of floats clip at 1, as exposures do."""
+    if np.issubdtype(capture.samples.dtype, np.floating):
+        limit = SATURATION_SHARE * capture.white_level
+        return np.asarray(capture.samples[..., top:bottom, :] >= limit)
+    return capture.saturated_rows(top, bottom)
 
 
 def _read_variance(like: Capture, noise: NoiseModel) -> tuple[float, ...]:

@@ -176,14 +176,25 @@ def _joined(
         )
     like, is_raw = found[0][1], not is_picture(longest.path) or found[0][1].cfa is not None
     lattices = [codes for _, _, codes in found if codes is not None]
-    notes = [f"{frame.path.name}: {note}" for frame, capture, _ in found for note in capture.notes]
     return Survey(
         frames=frames,
         like=like,
         is_raw=is_raw,
         codes=np.stack(lattices) if lattices else None,
         mosaic=mosaic,
-        notes=tuple(notes),
+        notes=_notes([(frame.path, capture.notes) for frame, capture, _ in found]),
+    )
+
+
+def _notes(told: Sequence[tuple[Path, tuple[str, ...]]]) -> tuple[str, ...]:
+    """Say each note once, with the frame or the number of frames that it is about."""
+    by_note: dict[str, list[str]] = {}
+    for path, notes in told:
+        for note in notes:
+            by_note.setdefault(note, []).append(path.name)
+    return tuple(
+        f"{names[0] if len(names) == 1 else f'{len(names)} frames'}: {note}"
+        for note, names in by_note.items()
     )
 
 

@@ -1,0 +1,5 @@
+"""`camkit calibrate`: what a camera is, measured on photographs of something known.
+
+app  the commands joined
+psf  the point spread function, from a bracket of a point light
+"""

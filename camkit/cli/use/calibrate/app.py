@@ -1,0 +1,15 @@
+"""The commands of `camkit calibrate` joined."""
+
+import typer
+
+from camkit.cli.use.calibrate.psf import psf
+
+calibrate_app = typer.Typer(
+    name="calibrate", help="Measure a camera on photographs.", no_args_is_help=True
+)
+calibrate_app.command()(psf)
+
+
+@calibrate_app.callback()
+def calibrate() -> None:
+    """Measure a camera on photographs."""

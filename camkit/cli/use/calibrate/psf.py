@@ -1,0 +1,108 @@
+"""`camkit calibrate psf`: a bracket of a point light to a frozen PSF."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
+from camkit.cli.use.merge import BlackLevel, MosaicCfa, Times, WhiteLevel
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.runtime.calibration.psf import MeasuredPoint
+    from camkit.runtime.merging.survey import Survey
+
+
+def psf(
+    files: Annotated[
+        list[Path], typer.Argument(help="Exposures of a point light in the dark, linear.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The PSF (safetensors) to write.")],
+    times: Times = None,
+    dark: Annotated[
+        list[Path] | None,
+        typer.Option(help="A frame without light; may be given again, at every exposure time."),
+    ] = None,
+    side_px: Annotated[
+        int | None,
+        typer.Option(help="Odd side of the kernels; default: as far as light is seen."),
+    ] = None,
+    pixel_pitch_um: Annotated[
+        float | None, typer.Option(help="Pixel pitch; default: what the frames state.")
+    ] = None,
+    depth_m: Annotated[
+        float, typer.Option(help="Distance of the light in m; 'inf' is infinity.")
+    ] = float("inf"),
+    mosaic: MosaicCfa = None,
+    black_level: BlackLevel = None,
+    white_level: WhiteLevel = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Merge a bracket of a point light, centre it and normalise every colour to a PSF."""
+    if out.suffix.lower() != ".safetensors":
+        raise ContractError(f"a PSF is safetensors; expected a name in .safetensors, got {out}")
+    if out.exists() and not overwrite:
+        raise ContractError(f"{out} exists; say --overwrite or another name")
+    from camkit.bundle.psf_file import psf_to_bytes
+    from camkit.cli.use.mosaic import mosaic_options
+    from camkit.runtime.calibration.darks import Darks
+    from camkit.runtime.calibration.psf import PointOptions, measure_point
+    from camkit.runtime.merging.survey import survey
+    from camkit.runtime.output.part_file import atomic_output
+
+    options = PointOptions(side_px=side_px, pixel_pitch_um=pixel_pitch_um, depth_m=depth_m)
+    said = mosaic_options(mosaic, black_level, white_level)
+    times_s, dark_times_s = _times(times, files, dark or [])
+    bracket = survey(files, times_s, mosaic=said)
+    darks = Darks.read(dark, dark_times_s, bracket, said) if dark else None
+    found = measure_point(bracket, options, None if darks is None else darks.rows)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_output(out) as part:
+        part.write_bytes(psf_to_bytes(found.psf))
+    _tell(out, bracket, found, as_json=json_)
+
+
+def _times(
+    text: str | None, files: list[Path], darks: list[Path]
+) -> tuple[tuple[float, ...] | None, tuple[float, ...] | None]:
+    """Give the times of frames and dark frames, which a list may leave to their files."""
+    if text is None:
+        return None, None
+    from camkit.runtime.merging.times import stated_times
+
+    try:
+        every = stated_times(text, [*files, *darks])
+    except ContractError:
+        return stated_times(text, files), None
+    return every[: len(files)], every[len(files) :]
+
+
+def _tell(out: Path, bracket: "Survey", found: "MeasuredPoint", *, as_json: bool) -> None:
+    x, y = found.centre_px
+    if as_json:
+        record: dict[str, Any] = {
+            "frames": [frame.path.name for frame in bracket.frames],
+            "times_s": [frame.time_s for frame in bracket.frames],
+            "centre_px": [round(x, 4), round(y, 4)],
+            "side_px": found.side_px,
+            "pixel_pitch_um": found.psf.pixel_pitch_um,
+            "colours": [colour.to_json() for colour in found.colours],
+            "filled_samples": found.filled_samples,
+            "notes": [*bracket.notes, *found.notes],
+            "out": str(out),
+        }
+        say(json.dumps(record))
+        return
+    for note in (*bracket.notes, *found.notes):
+        say(f"note: {note}", err=True)
+    say(f"{out}: {found.side_px} px, the light at ({x:.2f}, {y:.2f})")
+    for colour in found.colours:
+        say(
+            f"  {colour.colour:<5}  {colour.core_share:.2%} within 3 px, "
+            f"noise {colour.noise_floor:.1e} of the peak"
+        )

@@ -1,0 +1,8 @@
+"""What a camera is, from photographs of something known.
+
+darks    what a sensor shows without light, taken off every exposure
+lattice  the samples of one colour on their own lattice, and their values anywhere
+light    the point light of a merged bracket found: its place, its core, the dark around it
+trim     how far its light stands out of the noise, and the noise itself smoothed
+psf      all of it: a bracket of a point light to a frozen PSF
+"""

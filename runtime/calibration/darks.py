@@ -1,0 +1,77 @@
+"""What a sensor shows without light: its dark current, its hot pixels, its error of the black."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.merging.merge import clipped_rows
+from camkit.runtime.merging.survey import Frame, Survey, check_alike, read_frame
+
+SAME_TIME: Final = 0.01
+BROKEN_LIGHT: Final = 0.5
+"""Share of white that the dark alone reaches from which on a sample says nothing of the light."""
+
+
+class Darks:
+    """Dark frames by exposure time, their mean where one time has several.
+
+    A frame takes the dark of its own time, else that of the nearest time, in proportion: above
+    black the dark is a current. `rows` is what `merging.merge.merge` asks for.
+    """
+
+    def __init__(self, means: dict[float, FloatArray]) -> None:
+        """Take dark light by exposure time, NaN where the dark itself is clipped."""
+        self._means = means
+
+    @classmethod
+    def read(
+        cls,
+        files: Sequence[Path],
+        times_s: Sequence[float] | None,
+        bracket: Survey,
+        mosaic: MosaicOptions | None = None,
+    ) -> Self:
+        """Read dark frames of a bracket.
+
+        Args:
+            files: The frames, one or more.
+            times_s: One for each; None for what the files state.
+            bracket: The frames that they belong to.
+            mosaic: As for the bracket.
+
+        Raises:
+            ContractError: If a time is not known.
+            DecodeError: If a frame cannot be read or differs from the bracket.
+        """
+        sums: dict[float, tuple[FloatArray, int]] = {}
+        for number, path in enumerate(files):
+            capture = read_frame(path, mosaic)
+            check_alike(bracket.like, bracket.frames[0].path, capture, path)
+            told = capture.metadata.exposure_time_s or capture.exposure_time_s
+            time_s = told if times_s is None else times_s[number]
+            if time_s is None:
+                raise ContractError(
+                    f"the dark frame {path.name} states no exposure time; say --times with one "
+                    "for each of FILES and then for each dark frame"
+                )
+            light = capture.linear_rows(0, capture.height)
+            light[clipped_rows(capture, 0, capture.height)] = np.nan
+            light = light.reshape(capture.plane_shape)
+            before, count = sums.get(time_s, (np.zeros_like(light), 0))
+            sums[time_s] = before + light, count + 1
+        return cls({time_s: total / np.float32(count) for time_s, (total, count) in sums.items()})
+
+    def rows(self, frame: Frame, top: int, bottom: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Give the dark light of rows of a frame, and where it leaves nothing to measure."""
+        nearest = min(self._means, key=lambda time_s: abs(np.log(time_s / frame.time_s)))
+        dark = self._means[nearest][:, top:bottom]
+        if abs(nearest / frame.time_s - 1) > SAME_TIME:
+            dark = dark * np.float32(frame.time_s / nearest)
+        broken = ~(dark <= BROKEN_LIGHT)
+        return np.where(broken, np.float32(0), dark), broken

@@ -1,0 +1,110 @@
+"""`camkit calibrate psf`: a file that the design side reads, what is said, what is refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.bundle.psf_file import read_psf
+from camkit.cli.exit_code import ExitCode
+from tests.runtime.calibration.point_factory import Point, exposed, write_bracket, write_pictures
+from tests.runtime.calibration.point_factory import write_mosaic as write_dark
+
+SMALL = Point(side=96, x=47.7, y=46.2, reach=20, streak=1e-3)
+TIMES_S = (1.0, 1 / 8, 1 / 64)
+
+
+@pytest.fixture
+def bracket(tmp_path: Path) -> list[Path]:
+    """Three linear pictures, longest first."""
+    return write_pictures(tmp_path, SMALL, times_s=TIMES_S)
+
+
+def test_raw_frames_and_darks_become_a_psf_and_one_object(camkit_command, tmp_path: Path) -> None:
+    files = write_bracket(tmp_path, SMALL, times_s=TIMES_S)
+    dark = tmp_path / "dark.dng"
+    write_dark(dark, exposed(np.zeros((96, 96)), 1.0, 7), 1.0)
+    out = tmp_path / "new" / "psf.safetensors"
+    asked = ("-o", out, "--dark", dark, "--pixel-pitch-um", 4.2, "--depth-m", 3, "--side-px", 41)
+    done = camkit_command("calibrate", "psf", *files, *asked, "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["frames"] == ["0.dng", "1.dng", "2.dng"]
+    assert told["times_s"] == [1, 0.125, 0.015625]
+    assert told["centre_px"] == pytest.approx([47.7, 46.2], abs=0.03)
+    assert (told["side_px"], told["filled_samples"]) == (41, 0)
+    assert told["notes"] == ["3 frames: no colour matrix is known for this camera"]
+    assert [c["colour"] for c in told["colours"]] == ["blue", "green", "red"]
+    assert all(0.8 < c["core_share"] < 1 for c in told["colours"])
+    psf = read_psf(out)
+    assert psf.pixel_pitch_um == 4.2
+    assert psf.depths_mm.tolist() == [3000]
+    truth = SMALL.kernels(20)
+    assert np.abs(psf.kernels[0, 0] - truth).max() < 0.03 * truth.max()
+
+
+def test_the_same_is_said_for_people(camkit_command, bracket: list[Path], tmp_path: Path) -> None:
+    out = tmp_path / "psf.safetensors"
+    asked = ("--times", "1,1/8,1/64", "--pixel-pitch-um", 5, "-o", out)
+    done = camkit_command("calibrate", "psf", *bracket, *asked)
+    assert done.code == 0, done.err
+    assert "the light at (47." in done.out
+    assert "green" in done.out
+    again = camkit_command("calibrate", "psf", *bracket, *asked)
+    assert again.code == ExitCode.USAGE
+    assert camkit_command("calibrate", "psf", *bracket, *asked, "--overwrite").code == 0
+
+
+def test_a_list_of_times_may_name_the_darks_too(
+    camkit_command, bracket: list[Path], tmp_path: Path
+) -> None:
+    dark = tmp_path / "dark.png"
+    dark.write_bytes(write_pictures(tmp_path, Point(side=96, x=-500), times_s=(1.0,))[0].read_bytes())  # noqa: E501 # fmt: skip
+    bracket = write_pictures(tmp_path, SMALL, times_s=TIMES_S)
+    out, asked = tmp_path / "psf.safetensors", ("--dark", dark, "--pixel-pitch-um", 5)
+    for times in ("1,0.125,0.015625,1", "1,0.125,0.015625"):
+        done = camkit_command("calibrate", "psf", *bracket, *asked, "-o", out, "--times", times)
+        assert (done.code == 0) == (times.count(",") == 3), done.err
+        out.unlink(missing_ok=True)
+    assert "dark frame dark.png states no exposure time" in done.err
+    done = camkit_command("calibrate", "psf", *bracket, *asked, "-o", out, "--times", "1,2")
+    assert "2 times for 3 files" in done.err
+
+
+@pytest.mark.parametrize(
+    ("out", "options", "told"),
+    [
+        ("psf.npz", [], "expected a name in .safetensors"),
+        ("psf.safetensors", [], "say --pixel-pitch-um"),
+        ("psf.safetensors", ["--side-px", 40], "must be odd"),
+        ("psf.safetensors", ["--pixel-pitch-um", 5, "--side-px", 201], "at most"),
+    ],
+)
+def test_wrong_wishes_give_one_line_and_no_file(
+    camkit_command, bracket: list[Path], tmp_path: Path, out: str, options: list, told: str
+) -> None:
+    asked = ("--times", "1,1/8,1/64", *options)
+    done = camkit_command("calibrate", "psf", *bracket, "-o", tmp_path / out, *asked)
+    assert done.code == ExitCode.USAGE
+    assert told in done.err
+    assert len(done.err.strip().splitlines()) == 1
+    assert not list(tmp_path.glob("psf*"))
+
+
+def test_a_peak_that_clips_fails_the_input(camkit_command, tmp_path: Path) -> None:
+    files = write_pictures(tmp_path, SMALL, peak=1.5, times_s=TIMES_S)
+    asked = ("--times", "1,1/8,1/64", "--pixel-pitch-um", 5, "-o", tmp_path / "psf.safetensors")
+    done = camkit_command("calibrate", "psf", *files, *asked)
+    assert done.code == ExitCode.INPUT_FAILED
+    assert "add a shorter one" in done.err
+    assert not (tmp_path / "psf.safetensors").exists()
+
+
+def test_notes_are_said_on_stderr(camkit_command, tmp_path: Path) -> None:
+    wide = Point(side=96, x=47.7, y=46.2, reach=90, streak=3e-2)
+    files = write_pictures(tmp_path, wide, times_s=TIMES_S)
+    asked = ("--times", "1,1/8,1/64", "--pixel-pitch-um", 5, "-o", tmp_path / "psf.safetensors")
+    done = camkit_command("calibrate", "psf", *files, *asked)
+    assert done.code == 0
+    assert "note: light is still seen" in done.err

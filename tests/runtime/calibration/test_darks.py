@@ -1,0 +1,55 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.calibration.darks import Darks
+from camkit.runtime.merging.survey import Survey, survey
+from tests.runtime.calibration.point_factory import Point, write_bracket, write_mosaic
+
+SMALL = Point(side=64, x=31.4, y=30.2, reach=10)
+
+
+@pytest.fixture
+def bracket(tmp_path: Path) -> Survey:
+    """Two frames of 1 and 1/8 s."""
+    return survey(write_bracket(tmp_path, SMALL, times_s=(1.0, 0.125)), None)
+
+
+def _dark(path: Path, level: float, time_s: float, side: int = 64) -> Path:
+    rng = np.random.default_rng(int(1e4 * level))
+    write_mosaic(path, rng.normal(level, 1e-3, (side, side)), time_s)
+    return path
+
+
+def test_a_frame_takes_the_mean_of_its_own_time_else_the_nearest_in_proportion(
+    tmp_path: Path, bracket: Survey
+) -> None:
+    files = [_dark(tmp_path / f"d{n}.dng", level, 1.0) for n, level in enumerate((0.02, 0.04))]
+    darks = Darks.read(files, None, bracket)
+    own, broken = darks.rows(bracket.frames[0], 4, 8)
+    assert own.shape == (1, 4, 64)
+    assert own.mean() == pytest.approx(0.03, abs=5e-4)
+    assert not broken.any()
+    scaled, _ = darks.rows(bracket.frames[1], 4, 8)
+    assert scaled.mean() == pytest.approx(0.03 / 8, abs=1e-4)
+
+
+def test_times_may_be_stated_and_hot_pixels_say_nothing(tmp_path: Path, bracket: Survey) -> None:
+    lit = np.full((64, 64), 0.01)
+    lit[5, 7] = 0.9
+    write_mosaic(tmp_path / "d.dng", lit, 3.0)
+    dark, broken = Darks.read([tmp_path / "d.dng"], [1.0], bracket).rows(bracket.frames[0], 0, 64)
+    assert np.argwhere(broken[0]).tolist() == [[5, 7]]
+    assert np.median(dark) == pytest.approx(0.01, abs=3e-4)
+
+
+def test_a_dark_frame_of_another_size_or_without_a_time_is_refused(
+    tmp_path: Path, bracket: Survey
+) -> None:
+    with pytest.raises(DecodeError, match="differ in size"):
+        Darks.read([_dark(tmp_path / "d.dng", 0.02, 1.0, side=48)], None, bracket)
+    _dark(tmp_path / "e.dng", 0.02, 0.0)
+    with pytest.raises(ContractError, match=r"dark frame e\.dng states no exposure time"):
+        Darks.read([tmp_path / "e.dng"], None, bracket)
