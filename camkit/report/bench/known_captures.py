@@ -1,12 +1,13 @@
-"""Captures with a known truth: the golden cases as stored, or pictures of a folder photographed.
+"""Captures with a known truth: the golden cases as stored, or pictures and scenes photographed.
 
 golden     capture and sharp reference of the bundle; through the bundle's own PSF
-pictures   the field positions and sensitivities of the kind of camera, fabricated lenses traced
-           afresh where the bundle holds its prescription and torch is there
+scenes     of the source that the kind of camera names, by their seeds; photographed as pictures
+pictures   of a folder, at the field positions and sensitivities of the kind of camera, fabricated
+           lenses traced afresh where the bundle holds its prescription and torch is there
            (`camkit.report.quality`)
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import util
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.golden import IMAGE, golden_from_bytes
 from camkit.bundle.reader import GOLDEN, PRESCRIPTION, Bundle
+from camkit.bundle.sensor import ColorSensor
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
@@ -35,10 +37,14 @@ from camkit.report.quality import (
 from camkit.runtime.twin.light import stated_balance
 from camkit.runtime.twin.saturation import exposure_for_share
 from camkit.runtime.twin.truth import light_sensor, picture_scale
+from camkit.scenes import named_scene
 from camkit.scenes.saturation import with_exposure
 
 MOST_PX: Final = 1024
 """Of a larger picture the middle is taken."""
+SCENES: Final = 8
+"""Of a source, where no number is asked for."""
+SCENE_PX: Final = 512
 LEAST_PX: Final = 96
 """Of a smaller one too little would be left inside the border."""
 
@@ -114,6 +120,24 @@ def picture_captures(
     Raises:
         ContractError: If the folder holds no pictures, or one is too small, or as `bench_scene`.
     """
+    shown = ((path, bench_scene(path, bundle, saturate)) for path in list_set(folder, count))
+    return _photographed(bundle, folder.name, shown, cache_folder)
+
+
+def scene_captures(
+    bundle: Bundle, count: int | None, cache_folder: Path, saturate: float | None = None
+) -> Iterator[KnownCapture]:
+    """Photograph the first scenes of the source that the kind of a camera names, likewise."""
+    source = find_part(bundle.manifest.kind, "bench", BenchPart).source
+    names = [f"{source}:{seed}" for seed in range(count or SCENES)]
+    shown = ((Path(name), drawn_scene(name, bundle, saturate)) for name in names)
+    return _photographed(bundle, str(source), shown, cache_folder)
+
+
+def _photographed(
+    bundle: Bundle, set_name: str, shown: Iterable[tuple[Path, FloatArray]], cache_folder: Path
+) -> Iterator[KnownCapture]:
+    """Photograph named scenes at every place and sensitivity of a kind of camera."""
     psf = psf_source(bundle)
     part = find_part(bundle.manifest.kind, "bench", BenchPart)
 
@@ -121,8 +145,7 @@ def picture_captures(
     def lens(seed: int) -> FrozenPsf:
         return fabricated_psf(bundle, seed, cache_folder=cache_folder)
 
-    for number, path in enumerate(list_set(folder, count)):
-        scene = bench_scene(path, bundle, saturate)
+    for number, (path, scene) in enumerate(shown):
         if min(scene.shape[1:]) < LEAST_PX:
             raise ContractError(
                 f"{path} has {scene.shape[2]}x{scene.shape[1]} pixels; a picture to measure on "
@@ -131,7 +154,7 @@ def picture_captures(
         for position in part.positions:
             for iso in part.isos:
                 shot = Shot(
-                    set_name=folder.name,
+                    set_name=set_name,
                     picture=path,
                     number=number,
                     position=position,
@@ -160,13 +183,25 @@ def bench_scene(path: Path, bundle: Bundle, saturate: float | None = None) -> Fl
     """
     sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
     most_px = min(MOST_PX, scale * sensor.width_px, scale * sensor.height_px)
-    scene = _whole_pixels(read_picture(path, most_px), scale)
+    return _exposed(_whole_pixels(read_picture(path, most_px), scale), sensor, saturate, path)
+
+
+def drawn_scene(name: str, bundle: Bundle, saturate: float | None = None) -> FloatArray:
+    """Give a scene of the register, at most `SCENE_PX` a side; else as `bench_scene`."""
+    sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
+    width, height = (scale * min(SCENE_PX, side) for side in (sensor.width_px, sensor.height_px))
+    return _exposed(named_scene(name, height, width), sensor, saturate, name)
+
+
+def _exposed(
+    scene: FloatArray, sensor: ColorSensor, saturate: float | None, what: object
+) -> FloatArray:
     if saturate is None:
         return scene
     try:
         return with_exposure(scene, exposure_for_share(scene, sensor, saturate).exposure)
     except ContractError as error:
-        raise ContractError(f"{path}: {error}") from error
+        raise ContractError(f"{what}: {error}") from error
 
 
 def psf_source(bundle: Bundle) -> PsfSource:

@@ -20,6 +20,8 @@ class BenchPart:
         isos: Sensitivities.
         rows: Row makers of its own; one called as a common maker stands in its place.
         metrics: Of its own, beside the common ones; the kind names those that count.
+        source: Of the register of scenes (`camkit.scenes.named`): its scenes are photographed
+            where there is no folder of pictures; None takes the golden cases.
     """
 
     photograph: Callable[[Shot, FloatArray, Bundle, FrozenPsf], Exposed]
@@ -27,3 +29,4 @@ class BenchPart:
     isos: tuple[float, ...] = (100.0, 1600.0)
     rows: tuple[RowMaker, ...] = ()
     metrics: tuple[Metric, ...] = ()
+    source: str | None = None

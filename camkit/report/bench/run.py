@@ -13,10 +13,12 @@ from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accurac
 from camkit.report.bench.crops import MOST_CAPTURES, CropCollector, Patch
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.report.bench.known_captures import (
+    SCENES,
     KnownCapture,
     bench_scene,
     golden_captures,
     picture_captures,
+    scene_captures,
 )
 from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
@@ -119,6 +121,9 @@ def _check(settings: Settings, bundles: Sequence[Bundle]) -> None:
         raise ContractError(
             f"none of these cameras is judged by a metric that takes {', '.join(unknown)}"
         )
+    sources = [find_part(b.manifest.kind, "bench", BenchPart).source for b in bundles]
+    if settings.saturate is not None and settings.data is None and None in sources:
+        raise ContractError("a share to saturate is one of pictures; give their folder as data")
     for path in () if settings.data is None else list_set(settings.data, settings.images):
         if settings.saturate is not None:
             for bundle in bundles:
@@ -246,16 +251,21 @@ def _known_captures(
     bundle: Bundle, settings: Settings, folder: Path
 ) -> tuple[Iterable[KnownCapture], int, str]:
     """Give the captures to judge on, how many there are, and what they are."""
-    if settings.data is None:
+    part = find_part(bundle.manifest.kind, "bench", BenchPart)
+    asked, psf = settings.images, folder / "psf"
+    if settings.data is not None:
+        pictures = len(list_set(settings.data, asked))
+        captures = picture_captures(bundle, settings.data, asked, psf, settings.saturate)
+        what = f"{pictures} pictures of {settings.data.name}"
+    elif part.source is not None:
+        pictures = asked or SCENES
+        captures = scene_captures(bundle, asked, psf, settings.saturate)
+        what = f"scenes {part.source}:0 to {part.source}:{pictures - 1}"
+    else:
         golden = golden_captures(bundle)
         return golden, len(golden), f"{len(golden)} golden cases of the bundle"
-    pictures = len(list_set(settings.data, settings.images))
-    captures = picture_captures(
-        bundle, settings.data, settings.images, folder / "psf", settings.saturate
-    )
-    part = find_part(bundle.manifest.kind, "bench", BenchPart)
     text = (
-        f"{pictures} pictures of {settings.data.name}, {len(part.positions)} field positions, "
+        f"{what}, {len(part.positions)} field positions, "
         f"ISO {' and '.join(f'{iso:g}' for iso in part.isos)}"
     )
     if settings.saturate is not None:

@@ -29,7 +29,8 @@ class Settings:
         small: A side that is not given is that of `QUICK_SIZE_PX`, if the sensor is larger.
         capture: A capture to time instead of the procedural one.
         photo: A sharp picture that every camera photographs for it, likewise.
-        data: Folder of sharp pictures to measure accuracy on; None for the golden cases.
+        data: Folder of sharp pictures to measure accuracy on; None for the golden cases, or for
+            the scenes that a kind of camera names.
         images: Only the first N of them.
         saturate: Share of their pixels that are exposed to saturate the sensor; None leaves them
             as bright as they are.
@@ -75,8 +76,6 @@ class Settings:
         self._check_accuracy()
 
     def _check_accuracy(self) -> None:
-        if self.saturate is not None and self.data is None:
-            raise ContractError("a share to saturate is one of pictures; give their folder as data")
         if self.saturate is not None and not 0 < self.saturate < 1:
             raise ContractError(f"saturate must lie between 0 and 1; got {self.saturate:g}")
         for name, number in self.constants.items():

@@ -16,7 +16,7 @@ from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import BundleError, ContractError, DecodeError
 from camkit.kinds import find_kind
 from camkit.report.bench import known_captures, line_up, run
-from camkit.report.bench.known_captures import bench_scene, picture_captures
+from camkit.report.bench.known_captures import bench_scene, drawn_scene, picture_captures
 from camkit.report.bench.metrics import hdr
 from camkit.report.bench.output import write_bench
 from camkit.report.bench.run import open_entrants, run_bench
@@ -27,7 +27,9 @@ from camkit.report.kinds import bayer
 from camkit.report.quality import Exposed, Shot, expose
 from camkit.runtime.twin.saturation import saturation_of
 from camkit.runtime.twin.truth import light_sensor, true_picture
+from camkit.scenes.saturation import CEILING
 from tests.bundle_factory import write_tiny_bundle
+from tests.hdr_bundle import write_hdr_bundle
 from tests.hdr_pictures import hdr_pair
 from tests.psf_factory import texture
 from tests.wide_bundle import write_wide_bundle
@@ -209,6 +211,52 @@ def test_a_scene_that_cannot_saturate_is_an_error_before_the_timing(tmp_path: Pa
     assert told == []
 
 
+def test_a_share_to_saturate_needs_pictures_or_a_kind_with_scenes(tmp_path: Path) -> None:
+    settings = Settings(bundles=(str(write_tiny_bundle(tmp_path)),), saturate=0.015)
+    with pytest.raises(ContractError, match="give their folder as data"):
+        run_bench(settings)
+
+
+def test_a_kind_that_names_scenes_is_judged_on_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle = write_hdr_bundle(tmp_path)
+    monkeypatch.setattr(hdr, "obstacle", lambda: "not here")
+    told: list[str] = []
+    settings = Settings(
+        bundles=(str(bundle.path),),
+        axes=Axes(methods=("physics",), threads=(1,)),
+        repeat=1,
+        images=2,
+        saturate=0.02,
+        work_dir=tmp_path / "work",
+        gemm_s=0.01,
+    )
+    report = run_bench(settings, told.append).report
+    (camera,) = report["cameras"].values()
+    assert camera["accuracy"].startswith("scenes night:0 to night:1, 1 field positions, ISO 100")
+    (row,) = report["rows"]
+    assert (row["error"], row["captures"], set(row["pictures"])) == (
+        None,
+        2,
+        {"night:0", "night:1"},
+    )
+    assert row["hdr_psnr_db"] != row["input_hdr_psnr_db"]
+    assert any("judging night:1, 0% of the way" in line for line in told)
+
+
+def test_scenes_of_a_source_fill_a_small_sensor_and_saturate_their_share(tmp_path: Path) -> None:
+    bundle = write_hdr_bundle(tmp_path)
+    sensor = light_sensor(bundle.manifest)
+    scene = drawn_scene("night:2", bundle, 0.03)
+    assert scene.shape == (3, sensor.height_px, sensor.width_px)
+    found = saturation_of(scene, sensor, 1.0)
+    assert found.saturated_fraction == pytest.approx(0.03, rel=0.1)
+    assert found.peak <= CEILING
+    with pytest.raises(ContractError, match=r"night:2: .* less than one"):
+        drawn_scene("night:2", bundle, 1e-6)
+
+
 def test_a_setting_that_no_metric_takes_is_refused(tmp_path: Path) -> None:
     bundle = write_wide_bundle(tmp_path)
     settings = Settings(bundles=(str(bundle.path),), constants={"nits_per_unit": 100.0})
@@ -219,7 +267,6 @@ def test_a_setting_that_no_metric_takes_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"saturate": 0.015}, "folder as data"),
         ({"saturate": 1.0, "data": Path()}, "between 0 and 1; got 1"),
         ({"saturate": float("nan"), "data": Path()}, "between 0 and 1; got nan"),
         ({"constants": {"nits_per_unit": 0.0}}, "nits_per_unit must be > 0; got 0"),
