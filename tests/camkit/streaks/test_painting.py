@@ -1,0 +1,252 @@
+"""A recovery laid over pixels: nearer to the scene, in any bands the same, nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from camkit.contracts import CfaPattern, FloatArray
+from camkit.scenes.saturation import CEILING
+from camkit.streaks.cells import COLOURS, Cells
+from camkit.streaks.painting import SEEN, Painter, _rows_of_cells, spots_of
+from camkit.streaks.recovery import Recovery, Region, recover
+from camkit.streaks.regions import Window
+from tests.streak_factory import blurred, captured_cells, star, star_kernels, street, with_lamps
+
+GAINS = (1.9, 1.0, 1.5)
+ONES = (1.0, 1.0, 1.0)
+LAMPS = [
+    (50, 60, 4.0, (40.0, 30.0, 20.0)),
+    (100, 140, 2.0, (200.0, 150.0, 90.0)),
+    (40, 180, 1.5, (90.0, 90.0, 90.0)),
+]
+HEIGHT, WIDTH = 161, 209
+
+
+def _db(found: FloatArray, truth: FloatArray, peak: float) -> float:
+    gap = np.clip(found, 0, peak) - np.minimum(truth, peak)
+    return float(10 * np.log10(peak**2 / np.mean(gap**2, dtype=np.float64)))
+
+
+@pytest.fixture(scope="module")
+def night() -> tuple[FloatArray, FloatArray]:
+    scene = with_lamps(street(HEIGHT, WIDTH), LAMPS)
+    return scene, blurred(scene, star())
+
+
+@pytest.fixture(scope="module")
+def found(night: tuple[FloatArray, FloatArray]) -> Recovery:
+    return recover(captured_cells(night[1]), star_kernels())
+
+
+def _painted(recovery: Recovery, planes: FloatArray, gains: tuple[float, ...]) -> FloatArray:
+    """Paint a picture in one band."""
+    out = planes * np.array(gains, np.float32)[:, None, None]
+    Painter(recovery).paint(out, 0, gains)
+    return out
+
+
+# ------------------------------------------------------------------------ what it is for
+
+
+@pytest.mark.parametrize(("cfa", "gain_db"), [("RGGB", 3.0), ("GRBG", 3.0), (None, 4.0)])
+def test_lights_and_what_lies_beside_them_end_nearer_to_the_scene(
+    night: tuple[FloatArray, FloatArray], cfa: CfaPattern | None, gain_db: float
+) -> None:
+    """Full planes are painted, so that no demosaic is judged."""
+    scene, light = night
+    seen = np.minimum(light, 1)
+    got = _painted(recover(captured_cells(light, cfa), star_kernels(cfa)), seen, ONES)
+    assert _db(got, scene, CEILING) > _db(seen, scene, CEILING) + gain_db
+    beside = (light < 1).all(axis=0)
+    assert _db(got[:, beside], scene[:, beside], 1) > _db(seen[:, beside], scene[:, beside], 1) + 3
+
+
+def test_without_lights_the_veil_alone_goes() -> None:
+    """What is left is the blur of the core, of 4 px."""
+    scene = street(128, 160, 3) * 2
+    scene[:, 30:60, 40:90] = 0.9
+    kernels, middle = star(), star().shape[-1] // 2
+    inner = np.s_[:, middle - 5 : middle + 6, middle - 5 : middle + 6]
+    core = kernels[inner] / kernels[inner].sum((-2, -1), keepdims=True)
+    wanted, seen = blurred(scene, core), blurred(scene, kernels)
+    got = _painted(recover(captured_cells(seen), star_kernels()), seen, ONES)
+    assert _db(seen, wanted, 1) < 42
+    assert _db(got, wanted, 1) > 55
+
+
+def test_an_even_grey_picture_stays_what_it_is() -> None:
+    grey = np.full((3, 64, 80), 0.25, np.float32)
+    got = _painted(recover(captured_cells(grey), star_kernels()), grey, GAINS)
+    np.testing.assert_allclose(got / 0.25, np.array(GAINS)[:, None, None] + 0 * got, rtol=1e-3)
+
+
+def test_too_much_clipped_puts_no_lights_in_but_takes_the_veil() -> None:
+    scene = street(96, 128)
+    scene[:, :, 80:] = 3
+    seen = np.minimum(blurred(scene, star()), 1)
+    got = _painted(recover(captured_cells(blurred(scene, star())), star_kernels()), seen, ONES)
+    assert got.max() < 1.1
+    assert got[:, 40, 40].max() < seen[:, 40, 40].min() + 0.1
+
+
+# ------------------------------------------------------------------------ bands and gains
+
+
+@pytest.mark.parametrize("band", [1, 7, 64, HEIGHT - 1])
+def test_bands_of_any_height_have_the_same_bits(
+    night: tuple[FloatArray, FloatArray], found: Recovery, band: int
+) -> None:
+    seen = np.minimum(night[1], 1)
+    whole = _painted(found, seen, GAINS)
+    painter = Painter(found)
+    rows = seen * np.array(GAINS, np.float32)[:, None, None]
+    for top in range(0, HEIGHT, band):
+        painter.paint(rows[:, top : top + band], top, GAINS)
+    np.testing.assert_array_equal(rows, whole)
+
+
+def test_gains_multiply_what_is_painted(
+    night: tuple[FloatArray, FloatArray], found: Recovery
+) -> None:
+    seen = np.minimum(night[1], 1)
+    one, other = (_painted(found, seen, gains) for gains in (ONES, GAINS))
+    np.testing.assert_allclose(other, one * np.array(GAINS)[:, None, None], rtol=1e-4, atol=1e-5)
+
+
+# ------------------------------------------------------------------------ spots
+
+
+def test_lights_are_put_where_samples_clipped_and_nowhere_else(
+    night: tuple[FloatArray, FloatArray], found: Recovery
+) -> None:
+    seen = np.minimum(night[1], 1)
+    bare = _painted(replace(found, regions=()), seen, ONES)
+    dark = tuple(replace(r, streaks=np.zeros_like(r.streaks)) for r in found.regions)
+    got = _painted(replace(found, regions=dark), seen, ONES)
+    changed = got != bare
+    clipped = night[1] >= 1
+    assert not changed[seen < SEEN].any()
+    assert changed[clipped].mean() > 0.7  # samples of a mosaic miss some pixels of a rim
+    beside = np.zeros_like(clipped)
+    for y, x in np.ndindex(3, 3):
+        beside |= np.roll(clipped, (y - 1, x - 1), (1, 2))
+    assert not changed[~beside].any()
+
+
+def test_a_hole_that_a_demosaic_made_within_a_light_is_filled(
+    night: tuple[FloatArray, FloatArray], found: Recovery
+) -> None:
+    seen = np.minimum(night[1], 1)
+    holed = seen.copy()
+    holed[:, 50, 60] = 0.5
+    assert (_painted(found, holed, ONES)[:, 50, 60] > 5).all()
+    assert (_painted(found, seen, ONES)[:, 50, 60] > 5).all()
+
+
+@pytest.mark.parametrize(
+    ("offset", "rows"), [((0.0, 0.0), (7, 9)), ((0.5, 0.5), (8, 10)), ((1.0, 1.0), (8, 10))]
+)
+def test_a_cell_is_the_pixels_around_its_samples(
+    offset: tuple[float, float], rows: tuple[int, int]
+) -> None:
+    """A sample at the first pixel of a cell has the pixel before it, others the one behind."""
+    clipped = np.zeros((COLOURS, 10, 12), np.float32)
+    clipped[:, 4, 5] = 1
+    (spot, *_) = spots_of(_one_cell(clipped, offset))
+    on = np.argwhere(spot.mask) + np.array([spot.top, spot.left])
+    assert on[:, 0].min() == rows[0]
+    assert on[:, 0].max() + 1 == rows[1]
+    assert on[:, 1].min() == rows[0] + 2
+    assert spot.light[spot.mask].mean() == pytest.approx(9, rel=0.05)
+
+
+def _one_cell(clipped: FloatArray, offset: tuple[float, float]) -> Recovery:
+    cells = Cells(
+        light=np.zeros_like(clipped), clipped=clipped, pitch_px=2, offset_px=(offset,) * COLOURS
+    )
+    _, height, width = clipped.shape
+    region = Region(
+        window=Window(top=0, bottom=height, left=0, right=width),
+        light=9 * (clipped > 0).astype(np.float32),
+        streaks=np.zeros_like(clipped),
+        thrown=(0, 0, 0),
+    )
+    return Recovery(
+        fine=cells,
+        coarse=replace(cells, pitch_px=4),
+        veil=np.zeros((COLOURS, height // 2, width // 2), np.float32),
+        core=(1.0,) * COLOURS,
+        regions=(region,),
+    )
+
+
+def test_a_light_within_a_ring_of_light_is_a_spot_of_its_own() -> None:
+    """Its box lies in that of the ring; each is painted by its own spot alone."""
+    y, x = np.indices((16, 18))
+    away = np.maximum(np.abs(y - 8), np.abs(x - 8))
+    clipped = np.zeros((COLOURS, 16, 18), np.float32)
+    clipped[0, (away == 0) | (away == 3) | (away == 4)] = 1
+    found = _one_cell(clipped, (0.5, 0.5))
+    ring, dot = spots_of(found)
+    owners = np.zeros((32, 36), int)
+    for spot in (ring, dot):
+        rows, columns = np.nonzero(spot.mask)
+        owners[rows + spot.top, columns + spot.left] += 1
+    np.testing.assert_array_equal(owners, clipped[0].repeat(2, 0).repeat(2, 1))
+    assert dot.mask.sum() == 4
+
+
+def test_no_light_of_a_wholly_clipped_cell_is_below_what_the_sensor_saw() -> None:
+    clipped = np.zeros((COLOURS, 8, 8), np.float32)
+    clipped[0, 2:5, 2:5] = 1
+    clipped[0, 2, 2] = 0.5
+    found = _one_cell(clipped, (0.5, 0.5))
+    dim = replace(found.regions[0], light=found.regions[0].light / 900)
+    (spot,) = spots_of(replace(found, regions=(dim,)))
+    full = (clipped[0] == 1).repeat(2, 0).repeat(2, 1)
+    whole = np.zeros((16, 16), np.float32)
+    height, width = spot.light.shape
+    whole[spot.top : spot.top + height, spot.left : spot.left + width] = spot.light
+    assert (whole[full] >= 1).all()
+    assert whole[4:6, 4:6].max() < 1
+
+
+# ------------------------------------------------------------------------ between cells
+
+
+@pytest.mark.parametrize("pitch", [2, 4])
+@pytest.mark.parametrize("offset", [(0.0, 0.5), (1.5, 1.0), (2.5, 0.0)])
+def test_rows_lie_on_the_lines_between_the_middles_of_cells(
+    pitch: int, offset: tuple[float, float]
+) -> None:
+    """Beyond the outermost middles the light is even."""
+    field = np.random.default_rng(0).uniform(0, 9, (6, 7)).astype(np.float32)
+    top, rows, width = 3, 4 * pitch, 7 * pitch + 3
+    at_y = (np.arange(top, top + rows) - offset[0]) / pitch
+    at_x = (np.arange(width) - offset[1]) / pitch
+    lines = np.stack([np.interp(at_y, np.arange(6), column) for column in field.T], axis=1)
+    wanted = np.stack([np.interp(at_x, np.arange(7), line) for line in lines])
+    got = _rows_of_cells(field, pitch, offset, top, rows, width)
+    assert got.shape == (rows, width)
+    np.testing.assert_allclose(got, wanted, atol=1e-5)
+
+
+def test_streaks_of_a_window_end_with_it() -> None:
+    clipped = np.zeros((COLOURS, 20, 24), np.float32)
+    clipped[:, 9, 11] = 1
+    whole = _one_cell(clipped, (0.5, 0.5))
+    window = Window(top=6, bottom=13, left=7, right=16)
+    part = replace(
+        whole.regions[0],
+        window=window,
+        light=np.zeros((COLOURS, *window.shape), np.float32),
+        streaks=np.full((COLOURS, *window.shape), 0.125, np.float32),
+    )
+    bright = np.full((COLOURS, 40, 48), 0.5, np.float32)
+    got = _painted(replace(whole, regions=(part,)), bright, ONES)
+    inside = np.zeros((40, 48), bool)
+    inside[2 * 6 - 1 : 2 * 13 + 1, 2 * 7 - 1 : 2 * 16 + 1] = True
+    unlit = got[:, ~inside]
+    np.testing.assert_array_equal(unlit, np.full_like(unlit, 0.5))
+    assert (got[:, 14:17, 16:19] == 0.375).all()
