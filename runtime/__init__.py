@@ -13,6 +13,7 @@
     envelope                           is a capture inside the bundle's measured ranges?
     options, job/                      one capture: what is decided, then the stages joined
     pipeline, development, batch       one capture in memory, one file, many files
+    merging/, calibration/             brackets to one picture; what a camera is, measured
     check, proofs, golden_run          a bundle proves itself
     simulate                           the digital twin: a scene becomes a RAW file
 

@@ -131,7 +131,7 @@ def test_the_reference_has_a_section_for_every_command() -> None:
     assert set(_sections()) == set(_commands())
 
 
-@pytest.mark.parametrize("command", ["process", "info", "check", "simulate", "doctor"])
+@pytest.mark.parametrize("command", ["process", "info", "check", "simulate", "merge", "doctor"])
 def test_the_reference_lists_the_options_of_use_time(command: str) -> None:
     _check_options(command)
 

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.merging.merge import choose_response, merge
 from camkit.runtime.merging.response import srgb_response
 from camkit.runtime.merging.survey import Survey, read_frame, survey
+from camkit.runtime.signal.noise import fallback_noise
 from tests.runtime.merging.bracket_factory import NOISE, TIMES_S, scene, write_coded, write_dng
 from tests.runtime.merging.test_estimate import film_curve
 
@@ -92,6 +93,14 @@ def test_noise_that_files_do_not_state_is_measured(tmp_path: Path) -> None:
     merged = merge(survey(paths, None), None)
     stated = np.sqrt(merged.precision[0] / (2e-2**2 / (1e-4 * light * 0.02 + 1e-6)) * 0.02**2)
     assert 0.4 < np.median(stated) < 3
+
+
+def test_noise_of_other_channels_than_the_planes_have_is_not_taken(tmp_path: Path) -> None:
+    found = survey(_coded_bracket(tmp_path, (1.0, 0.25)), (1.0, 0.25))
+    one = NoiseModel(shot=(0.5,), read_variance=(0.5,))
+    stated = replace(found, frames=tuple(replace(f, noise=one) for f in found.frames))
+    usual = replace(found, frames=tuple(replace(f, noise=fallback_noise()) for f in found.frames))
+    assert (merge(stated, None).precision == merge(usual, None).precision).all()
 
 
 def test_the_order_of_the_files_changes_no_bit(tmp_path: Path) -> None:

@@ -31,11 +31,20 @@ def test_every_inner_frame_is_predicted_each_way(
     monkeypatch.setattr(sys, "argv", ["leave_one_out", str(folder), "-o", str(out)])
     leave_one_out.main()
     record = json.loads(out.read_text())["film"]
+    monkeypatch.setattr(sys, "argv", ["leave_one_out", str(folder)])
+    monkeypatch.setattr(leave_one_out, "WAYS", {"opencv": leave_one_out.by_opencv})
+    leave_one_out.main()
     assert record["left_out_s"] == [0.5, 0.25, 0.125]
     assert max(record["estimate"]) < 1.5  # the noise of the frame itself is 0.4
     assert np.mean(record["estimate"]) < 0.3 * np.mean(record["srgb"])
     assert np.mean(record["estimate"]) < np.mean(record["opencv"])
     assert "| film |" in capsys.readouterr().out
+
+
+def test_a_way_without_a_curve_is_none(tmp_path: Path) -> None:
+    pictures, times_s = leave_one_out.read_bracket(_bracket(tmp_path / "film", 3))
+    with pytest.raises(SystemExit, match="linear is no curve"):
+        leave_one_out.by_camkit("linear")(pictures, times_s, 0.5)
 
 
 def test_blue_borders_are_cut_off_and_no_more() -> None:
