@@ -3,8 +3,11 @@
     capture + Wiener planes -> lean_unet      the CPU-first family, sizes S, M, L
                             -> trimmed_unet   the thesis's trimmed U-Net, a reference
                             -> full_unet      its generator: the trimmed one with its deep scales
+                            -> constant_unet  the single-stage U-Net of Deep Optics, a reference
                                catalog        their names, for recipes and checkpoints
     restored and true picture -> discriminator   opponents in fine-tuning, never exported
+                              -> vgg             features of VGG-19, weights from the user
+    capture of highlights     -> thesis          the networks of chapter 5, references
 
 Every network of the catalogue takes (batch, 6 or 3, h, w) float32 stabilised planes, h and w
 multiples of its total stride, and gives (batch, 3, h, w). The last three input planes are the ones

@@ -8,6 +8,7 @@ from typing import Any, Final
 from torch import nn
 
 from camkit.errors import ContractError
+from camkit.models_def.networks.constant_unet import ConstantConfig, ConstantUnet
 from camkit.models_def.networks.full_unet import FullConfig, FullUnet
 from camkit.models_def.networks.lean_unet import LEAN_L, LEAN_M, LEAN_S, LeanConfig, LeanUnet
 from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
@@ -25,12 +26,17 @@ def _full(**config: Any) -> nn.Module:
     return FullUnet(FullConfig(**config))
 
 
+def _constant(**config: Any) -> nn.Module:
+    return ConstantUnet(ConstantConfig(**config))
+
+
 _BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
     "lean_s": partial(_lean, LEAN_S),
     "lean_m": partial(_lean, LEAN_M),
     "lean_l": partial(_lean, LEAN_L),
     "trimmed_unet": _trimmed,
     "full_unet": _full,
+    "constant_unet": _constant,
 }
 
 NETWORK_NAMES: Final = tuple(_BUILDERS)

@@ -1,4 +1,5 @@
 """High dynamic range.
 
+- `network_costs`: parameters and multiplications of the thesis's networks and ours
 - `leave_one_out`: merging of brackets beside OpenCV's, frame by frame predicted from the others
 """

@@ -14,6 +14,7 @@ COSTS = {
     "lean_l": (586_944, 34.49, 16),
     "trimmed_unet": (468_237, 98.85, 4),
     "full_unet": (33_608_861, 236.70, 64),
+    "constant_unet": (845_525, 217.31, 16),
 }
 
 
@@ -54,7 +55,8 @@ def test_lists_of_a_recipe_are_taken_for_tuples() -> None:
 
 def test_unknown_name_lists_the_known_ones() -> None:
     with pytest.raises(
-        ContractError, match="lean_s, lean_m, lean_l, trimmed_unet, full_unet; got 'unet'"
+        ContractError,
+        match="lean_s, lean_m, lean_l, trimmed_unet, full_unet, constant_unet; got 'unet'",
     ):
         build_network("unet")
 

@@ -11,10 +11,11 @@ from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
 from camkit.models_def.kinds.bayer.fine_tuning.fitter import FineTuningFitter, FineTuningParts
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples, read_pairs
-from camkit.models_def.kinds.bayer.fine_tuning.vgg import file_digest, read_vgg
+from camkit.models_def.kinds.bayer.fine_tuning.vgg import read_vgg
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
+from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.training.first_weights import read_first_weights

@@ -8,12 +8,8 @@ from safetensors.torch import save_file
 from torch.nn import functional
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.bayer.fine_tuning.vgg import (
-    CONVOLUTIONS,
-    VggFeatures,
-    file_digest,
-    read_vgg,
-)
+from camkit.models_def.kinds.bayer.fine_tuning.vgg import CONVOLUTIONS, VggFeatures, read_vgg
+from camkit.models_def.networks.vgg import file_digest
 
 
 @pytest.fixture(scope="module")

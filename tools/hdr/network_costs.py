@@ -1,0 +1,77 @@
+"""What the thesis's networks and those beside them cost: parameters, and multiplications per pixel.
+
+    python -m tools.hdr.network_costs -o docs/results/thesis-networks.json
+
+Shapes alone are computed, no values. Multiplications are those of convolutions, as torch's counter
+finds them; they hold on any machine.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+from torch.utils.flop_counter import FlopCounterMode
+
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.thesis.chain import ThesisChain
+from camkit.models_def.networks.thesis.fusion import FusionNetwork
+from camkit.models_def.networks.thesis.highlight import HighlightUnet
+from camkit.models_def.networks.thesis.splitting import SplittingConfig, SplittingNetwork
+
+SIDE_PX: Final = 256
+FLOPS_PER_MAC: Final = 2
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("-o", "--output", type=Path)
+    arguments = parser.parse_args()
+    found = all_costs()
+    print("| network | parameters | trained | kMAC/pixel |")
+    print("|---|---|---|---|")
+    for name, cost in found.items():
+        row = f"{cost['parameters']:,} | {cost['trained']:,} | {cost['kmac_per_px']:.1f}"
+        print(f"| {name} | {row} |")
+    if arguments.output is not None:
+        arguments.output.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+def all_costs() -> dict[str, dict[str, float]]:
+    """Give the cost of every network by its name."""
+    with torch.device("meta"):
+        picture = torch.zeros(1, 3, SIDE_PX, SIDE_PX)
+        return {
+            "splitting": cost(SplittingNetwork(), picture),
+            "splitting, 1x1 behind the upsampling": cost(
+                SplittingNetwork(SplittingConfig(early=False)), picture
+            ),
+            "highlight": cost(HighlightUnet(), picture),
+            "fusion": cost(FusionNetwork(), picture, picture),
+            "all three": cost(ThesisChain(), picture),
+            "constant_unet": cost(build_network("constant_unet", in_channels=3), picture),
+            "lean_s": cost(build_network("lean_s"), torch.cat([picture, picture], dim=1)),
+            "lean_m": cost(build_network("lean_m"), torch.cat([picture, picture], dim=1)),
+        }
+
+
+def cost(network: nn.Module, *pictures: Tensor) -> dict[str, float]:
+    """Give parameters, those that are trained, and thousands of multiplications per pixel."""
+    with torch.no_grad(), FlopCounterMode(display=False) as counter:
+        network(*pictures)
+    pixels = pictures[0].shape[-2] * pictures[0].shape[-1]
+    macs = counter.get_total_flops() / FLOPS_PER_MAC
+    return {
+        "parameters": sum(p.numel() for p in network.parameters()),
+        "trained": sum(p.numel() for p in network.parameters() if p.requires_grad),
+        "kmac_per_px": round(macs / pixels / 1000, 3),
+    }
+
+
+if __name__ == "__main__":
+    main()
