@@ -10,11 +10,15 @@ meets it in every colour.
 import itertools
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
+
+_NOTHING: Final = 0.005
+"""Of the light; less is not looked at for its length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +95,8 @@ class Reached:
     Attributes:
         core_share: Of the bare lens's core, left.
         streak_share: Of the light, written to the streaks.
-        far_share: Of what is written, beyond a third of the streaks' length.
+        far_share: Of what is written, beyond a third of the streaks' length; 0 where next to
+            nothing is written.
     """
 
     core_share: tuple[float, ...]
@@ -166,7 +171,8 @@ def reached(light: Tensor, bare: Tensor, masks: Masks) -> Reached:
     core = (light * masks.core).sum((-2, -1)) / (bare * masks.core).sum((-2, -1))
     added = light - core[:, None, None] * bare
     written = (added * masks.parts.sum(0)).sum((-2, -1))
-    far = (added * masks.far).sum((-2, -1)) / written.clamp_min(1e-9)
+    far = (added * masks.far).sum((-2, -1)) / written
+    far = torch.where(written > _NOTHING, far, torch.zeros_like(far))
     return Reached(
         core_share=tuple(core.tolist()),
         streak_share=tuple(written.tolist()),

@@ -100,6 +100,11 @@ def _fit(
     near = [(al > 0) & (np.abs(ac) <= SECTION_PX) & outside for al, ac in axes]
     alone = [mine & (np.sum(near, axis=0) == 1) for mine in near]
     usable = outside & ~np.any(near, axis=0)
+    if not usable.any():
+        raise NoStreaksError(
+            f"kernels of {kernel.shape[0]} px have no place beside core and arms: compute a wider "
+            "window"
+        )
     arms = np.zeros_like(kernel)
     for _ in range(_ROUNDS):
         haze = _haze(kernel - arms, usable)

@@ -63,6 +63,11 @@ def test_what_is_reached_is_told_by_colour() -> None:
     assert found.far_share == pytest.approx((2 / 3, 2 / 3), abs=0.02)
 
 
+def test_the_length_of_nothing_is_none() -> None:
+    bare = _bare()
+    assert reached(bare[None], bare[None], masks_of(GOAL, SIDE)).far_share == (0.0,)
+
+
 def test_masks_lie_where_lines_do_and_do_not_overlap() -> None:
     masks = masks_of(replace(GOAL, lengths=3), SIDE)
     assert float(masks.parts.sum(0).max()) == 1

@@ -8,17 +8,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from camkit.bundle.psf_file import read_psf
 from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
+from camkit.bundle.streak_file import read_streaks
 from camkit.cli.app import app
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction import freezing
-from camkit.models_def.optics.diffraction.freezing import MISPLACED_LIMIT, WINDOW, freeze_plate
+from camkit.models_def.optics.diffraction.freezing import (
+    MISPLACED_LIMIT,
+    STREAKS_LIMIT,
+    WINDOW,
+    freeze_plate,
+)
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.gratings import Streaks, chirped_gratings
-from camkit.models_def.optics.diffraction.plate import Plate, write_plate
+from camkit.models_def.optics.diffraction.patterns import FlatPattern, Pattern, PeakPattern
+from camkit.models_def.optics.diffraction.plate import Plate, pattern_plate, write_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics, plate_kernels
 from camkit.models_def.sensors.psf import wavelength_weights
 
@@ -27,6 +35,7 @@ STREAKS = Streaks(
     angles_rad=(0.0, math.pi / 2), near_um=30.0, far_um=120.0, share=0.1,
     wavelength_um=0.55, index=1.46,
 )  # fmt: skip
+PEAK = PeakPattern(right_um=72.0, down_um=60.0, share=0.2)
 SMALL = replace(WINDOW, max_side_px=61)
 
 
@@ -53,36 +62,75 @@ def sensor() -> PlanesSensor:
     )
 
 
-def test_the_kernels_of_colours_are_those_of_the_plate(
-    optics: PlateOptics, sensor: PlanesSensor, tmp_path: Path
+def _off(
+    optics: PlateOptics,
+    sensor: PlanesSensor,
+    kernels: NDArray[np.float32],
+    wavelengths_um: NDArray[np.float64],
+) -> float:
+    """Give the share of a colour's light that kernels of 2 m have elsewhere than the plate."""
+    response_um, response = sensor.response_arrays()
+    many_um = np.linspace(0.45, 0.65, 81)
+    light = plate_kernels(
+        optics.plate,
+        depths_m=(2.0,),
+        wavelengths_um=tuple(many_um),
+        side_px=kernels.shape[-1],
+        pitch_um=6.0,
+    )[0]
+    true = np.einsum("cw,wyx->cyx", wavelength_weights(many_um, response_um, response), light)
+    few = wavelength_weights(wavelengths_um, response_um, response)
+    found = np.einsum("cw,wyx->cyx", few, kernels)
+    found, true = (one / one.sum((-2, -1), keepdims=True) for one in (found, true))
+    return float(np.abs(found - true).sum((-2, -1)).max()) / 2
+
+
+@pytest.mark.parametrize("pattern", [PEAK, FlatPattern()], ids=["peak", "flat"])
+def test_what_writes_no_streaks_is_frozen_as_kernels_of_the_right_colours(
+    pattern: Pattern, sensor: PlanesSensor, tmp_path: Path
 ) -> None:
+    plate = pattern_plate("no-streaks", pattern, cells=128, bench=BENCH)
     lines: list[str] = []
     out = tmp_path / "psf.safetensors"
     grid = replace(SMALL, depths_mm=(1000.0, 2000.0))
+    optics = PlateOptics(plate=plate)
     report = freeze_plate(optics, out, sensor=sensor, grid=grid, tell=lines.append)
     psf = read_psf(out)
     assert psf.symmetry == "uniform"
     assert psf.depths_mm.tolist() == [1000.0, 2000.0]
-    assert report.misplaced <= MISPLACED_LIMIT
-    assert len(lines) >= 1
+    assert report.form == "kernels"
+    assert "frozen as kernels" in "".join(lines)
     assert report.wavelengths == psf.wavelengths_um.size
-    assert report.side_px == 61
-    response_um, response = sensor.response_arrays()
-    many_um = np.linspace(0.45, 0.65, 81)
-    side_px = psf.kernels.shape[-1]
-    light = plate_kernels(
-        optics.plate, depths_m=(2.0,), wavelengths_um=tuple(many_um), side_px=side_px, pitch_um=6.0
-    )[0]
-    weights = wavelength_weights(many_um, response_um, response)
-    true = np.einsum("cw,wyx->cyx", weights, light)
-    few = wavelength_weights(psf.wavelengths_um, response_um, response)
-    found = np.einsum("cw,wyx->cyx", few, psf.kernels[0, 1])
-    off = np.abs(found - true / true.sum((-2, -1), keepdims=True)).sum((-2, -1)) / 2
-    assert off.max() <= 1.2 * MISPLACED_LIMIT
-    assert report.energy_kept == pytest.approx(true.sum((-2, -1)).min(), abs=2e-3)
+    off = _off(optics, sensor, psf.kernels[0, 1], psf.wavelengths_um)
+    assert off <= 1.2 * MISPLACED_LIMIT
+    assert report.misplaced <= MISPLACED_LIMIT
+    assert 0.95 < report.energy_kept < 1
     told = report.to_json()
     assert told["depths_mm"] == "1000, 2000"
     assert told["efl_mm"] == 20.0
+
+
+def test_streaks_are_frozen_by_their_parts_and_what_that_costs_is_told(
+    optics: PlateOptics, sensor: PlanesSensor, tmp_path: Path
+) -> None:
+    out = tmp_path / "psf.safetensors"
+    report = freeze_plate(optics, out, sensor=sensor, grid=replace(SMALL, max_side_px=81))
+    streaks = read_streaks(out)
+    assert report.form == "streaks"
+    assert sorted(np.degrees(streaks.angles_rad).round() % 360) == [0, 90, 180, 270]
+    assert report.misplaced <= STREAKS_LIMIT
+    light = streaks.dense()[0]
+    off = _off(optics, sensor, light, streaks.wavelengths_um)
+    assert report.misplaced == pytest.approx(off, rel=0.1)
+    assert report.side_px == light.shape[-1]
+    assert report.energy_kept == pytest.approx(light.sum((-2, -1)).min(), abs=3e-3)
+    with pytest.raises(ContractError, match=r"wanted 0\.9999"):
+        freeze_plate(
+            optics,
+            out,
+            sensor=sensor,
+            grid=replace(SMALL, max_side_px=81, energy=0.9999, least_energy=None),
+        )
 
 
 def test_a_window_that_holds_too_little_is_refused_before_anything_is_written(
@@ -103,6 +151,7 @@ def test_colours_that_no_number_of_wavelengths_places_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(freezing, "WAVELENGTH_COUNTS", (1,))
+    monkeypatch.setattr(freezing, "STREAKS_LIMIT", 0.0)
     out = tmp_path / "psf.safetensors"
     with pytest.raises(ContractError, match="1 wavelengths misplace 0"):
         freeze_plate(optics, out, sensor=sensor, grid=SMALL)
