@@ -36,6 +36,11 @@ class Core:
     height: float
     form: FloatGrid
 
+    @property
+    def spread_px(self) -> float:
+        """Give its standard deviation where it is narrowest."""
+        return float(1 / np.sqrt(np.linalg.eigvalsh(self.form).max()))
+
     def at(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
         """Give its values at pixels."""
         dy, dx, form = y - self.y, x - self.x, self.form

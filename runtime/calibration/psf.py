@@ -31,6 +31,11 @@ CORE_SHARE_PX: Final = 3.0
 MOST_HALF_PX: Final = 511
 CLIP_PX: Final = 8
 LEAST_BORDER_PX: Final = 12
+LEAST_SPREADS: Final = 0.4
+"""Standard deviation of a core, in pitches of its lattice, below which samples miss it: a Gaussian
+then keeps a twentieth of its amplitude at the finest wave that the lattice holds."""
+MOST_REST: Final = 0.15
+REST_PX: Final = 4.0
 _EDGE_PX: Final = 3
 _WHITE: Final = 0.98
 
@@ -137,7 +142,7 @@ def measure_point(survey: Survey, options: PointOptions, dark: DarkRows | None) 
     half = _most_half(survey, row, column, options.side_px)
     patch = _Patch(merged, survey, (row, column), half)
     planes, noise, facts = _centred(patch, half)
-    notes = []
+    notes = _doubts(patch, facts)
     if options.side_px is None:
         found = reach_px(planes, noise)
         if found == half:
@@ -276,6 +281,21 @@ def _centred(patch: _Patch, half: int) -> tuple[FloatGrid, FloatGrid, list[Core]
         planes.append(rest.at(y, x) + core.at(y, x))
         noise.append(np.sqrt(np.maximum(variance.at(y, x, order=1), 1e-30)))
     return np.stack(planes), np.stack(noise), cores
+
+
+def _doubts(patch: _Patch, cores: Sequence[Core]) -> list[str]:
+    """Say whether the core is too fine for the lattice of a colour, as any of them shows."""
+    for lattice, core in zip(patch.light, cores, strict=True):
+        y, x = lattice.places()
+        rest = np.abs(lattice.values - core.at(y, x))[np.hypot(y - core.y, x - core.x) <= REST_PX]
+        pitch_px = float(np.abs(np.linalg.det(lattice.matrix)) ** -0.5)
+        narrow = core.spread_px < LEAST_SPREADS * pitch_px
+        if pitch_px > 1 and (narrow or np.nanmax(rest) > MOST_REST * core.height):
+            return [
+                "the core is too fine for the mosaic: what lies between the samples of a colour "
+                "is a guess; measure such optics on a sensor without a mosaic"
+            ]
+    return []
 
 
 def _facts(

@@ -122,6 +122,16 @@ def test_light_up_to_the_border_of_the_frame_is_said(tmp_path: Path) -> None:
     assert "light is still seen" in found.notes[0]
 
 
+@pytest.mark.parametrize("spread_px", [0.5, 1.2])
+def test_a_core_too_fine_for_a_mosaic_is_said(tmp_path: Path, spread_px: float) -> None:
+    point = replace(SMALL, spreads_px=(spread_px,) * 3)
+    files = write_bracket(tmp_path, point, times_s=SHORT_S)
+    found = measure_point(survey(files, None), FIVE_UM, None)
+    assert any("too fine for the mosaic" in note for note in found.notes) == (spread_px < 1)
+    planes = measure_point(_pictures(tmp_path, point), FIVE_UM, None)
+    assert planes.notes == ()
+
+
 @pytest.mark.parametrize(
     ("point", "peak", "told"),
     [
