@@ -6,6 +6,7 @@
     sample                         what a network is given, and what it should make of it
     pool, pool_worker              finished samples on disk, made beside the training
     losses, schedule, fitter       one step
+    fitting                        the steps that a kind brings
     trainer, progress, log         the run, its bar and its log
     checkpoint, credits            what is kept, and what it was trained on
     first_weights, refinement      what was trained before goes on

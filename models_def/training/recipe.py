@@ -187,7 +187,11 @@ class CommonTables:
 
 
 def common_tables(
-    table: Mapping[str, Any], *, own: Iterable[str], roles: Sequence[str]
+    table: Mapping[str, Any],
+    *,
+    own: Iterable[str],
+    roles: Sequence[str],
+    main: str | None = None,
 ) -> CommonTables:
     """Check the common tables of a recipe.
 
@@ -195,6 +199,7 @@ def common_tables(
         table: The whole recipe.
         own: Keys of its kind.
         roles: Of the networks of its kind.
+        main: The role of [networks.SIZE]; None for the only one.
 
     Raises:
         ContractError: If a key is unknown, missing or wrong.
@@ -205,7 +210,7 @@ def common_tables(
         name=typed("name", table.get("name"), str),
         kind=typed("kind", table.get("kind", DEFAULT_KIND), str),
         sensor=_sensor(table.get("sensor", {})),
-        networks=_networks(table.get("networks"), schedule, roles),
+        networks=_networks(table.get("networks"), schedule, roles, main),
     )
 
 
@@ -274,7 +279,7 @@ def _refusal(where: str, error: ValidationError) -> ContractError:
 
 
 def _networks(
-    table: Any, schedule: ScheduleRecipe, roles: Sequence[str]
+    table: Any, schedule: ScheduleRecipe, roles: Sequence[str], main: str | None
 ) -> dict[str, dict[str, NetworkRecipe]]:
     if not isinstance(table, Mapping) or not table:
         raise ContractError("a recipe needs at least one table [networks.SIZE]")
@@ -288,12 +293,12 @@ def _networks(
                     f"networks.{name}.{size}", one, schedule
                 )
             continue
-        if len(roles) != 1:
+        if main is None and len(roles) != 1:
             raise ContractError(
                 f"networks.{name} is of no role; write [networks.ROLE.{name}] with one of the "
                 f"roles {', '.join(roles)}"
             )
-        found.setdefault(roles[0], {})[name] = _network(f"networks.{name}", entry, schedule)
+        found.setdefault(main or roles[0], {})[name] = _network(f"networks.{name}", entry, schedule)
     return found
 
 

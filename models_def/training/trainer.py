@@ -28,6 +28,7 @@ from camkit.models_def.training.first_weights import (
     take_first_weights,
 )
 from camkit.models_def.training.fitter import Fits, Fitter
+from camkit.models_def.training.fitting import FitRequest, OwnFitting, own_fitting
 from camkit.models_def.training.kind import (
     Judge,
     Material,
@@ -68,6 +69,7 @@ class TrainOptions:
         threads: Threads of torch.
         workers: Processes that make samples; 0 makes them in this process.
         device: cpu or cuda.
+        vgg: Weights of VGG-19, where the loss of the role looks at it.
         checkpoint_s: Seconds between checkpoints.
         validate_s: Seconds between validations.
     """
@@ -86,6 +88,7 @@ class TrainOptions:
     threads: int = 1
     workers: int = 1
     device: str = "cpu"
+    vgg: Path | None = None
     checkpoint_s: float = 100.0
     validate_s: float = 180.0
 
@@ -178,6 +181,17 @@ def train(
         first = read_first_weights(options.start, options.size, role)
     if first is not None:
         take_first_weights(network, first)
+    own = None
+    if refinement is None:
+        request = FitRequest(
+            recipe=recipe,
+            role=role,
+            entry=entry,
+            device=options.device,
+            first=first,
+            vgg=options.vgg,
+        )
+        own = own_fitting(recipe.kind, request)
     path = checkpoint_path(recipe, options, refinement)
     if path.exists() and not (options.resume or options.overwrite):
         raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
@@ -190,7 +204,7 @@ def train(
     pool = open_pool(samples, recipe_path, material, options.data_folder, seed=seed, role=role)
     with pool, TrainingBar(f"{recipe.name} {_label(role, options.size)}") as bar:
         pool.start_workers(options.workers)
-        run = _Run(recipe_path, kind, material, options, refinement, first)
+        run = _Run(recipe_path, kind, material, options, refinement, first, own)
         run.loop(pool, bar)
         return run.result()
 
@@ -243,6 +257,7 @@ class _Run:
         options: TrainOptions,
         refinement: Refinement | None,
         first: FirstWeights | None,
+        own: OwnFitting | None,
     ) -> None:
         self.options, self.material_digest = options, material.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
@@ -253,8 +268,11 @@ class _Run:
         self.judge: Judge = kind.judge(self.recipe, self.role, material, options.valid_folder)
         data = describe_data(self.recipe.data, options.data_folder)
         self.data = data + ("" if first is None else first.credit(data))
-        if refinement is None:
-            self.fitter: Fits = Fitter(self.entry, kind.build_network, options.device, first)
+        if own is not None:
+            self.data += own.credit
+            self.fitter: Fits = own.make()
+        elif refinement is None:
+            self.fitter = Fitter(self.entry, kind.build_network, options.device, first)
         else:
             self.data += refinement.credit
             self.entry = replace(self.entry, schedule=refinement.schedule)

@@ -48,7 +48,8 @@ def train(
         typer.Option(help="Fine-tune this checkpoint or bundle against discriminators."),
     ] = None,
     vgg: Annotated[
-        Path | None, typer.Option(help="With --fine-tune: VGG-19 weights (.pth or .safetensors).")
+        Path | None,
+        typer.Option(help="VGG-19 weights (.pth or .safetensors), where a loss looks at them."),
     ] = None,
     pairs: Annotated[
         Path | None, typer.Option(help="With --fine-tune: folder of real pairs to fine-tune on.")
@@ -71,8 +72,8 @@ def train(
     refinement: Refinement | None = None
     if fine_tune is not None:
         refinement = _fine_tuning(recipe, fine_tune, size, vgg, pairs, device)
-    elif vgg is not None or pairs is not None:
-        raise ContractError("--vgg and --pairs belong to fine-tuning; say --fine-tune FROM too")
+    elif pairs is not None:
+        raise ContractError("--pairs belongs to fine-tuning; say --fine-tune FROM too")
     result = run(
         recipe,
         TrainOptions(
@@ -89,6 +90,7 @@ def train(
             threads=threads,
             workers=workers,
             device=device,
+            vgg=None if refinement is not None else vgg,
         ),
         refinement=refinement,
     )

@@ -3,16 +3,19 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from camkit.bundle.sensor import BayerSensor
 from camkit.errors import ContractError
+from camkit.models_def.kinds.hdr.thesis_recipe import GlareRecipe, ThesisRecipe
 from camkit.models_def.toml_table import section, typed
 from camkit.models_def.training.recipe import DataRecipe, Recipe, check_share, common_tables
 
 ROLES: Final = ("highlights",)
-OWN: Final = ("object_distance_mm", "scale", "plate")
+REFERENCE_ROLES: Final = ("split", "highlight", "fusion", "whole")
+"""Of networks that are compared with, see `thesis`; no bundle holds them."""
+OWN: Final = ("object_distance_mm", "scale", "plate", "thesis", "glare")
 CAMERA_PARTS: Final = ("name", "object_distance_mm", "scale", "sensor", "plate")
 """What says which camera it is; how its networks are trained may differ."""
 
@@ -85,6 +88,8 @@ class HdrRecipe(Recipe):
         object_distance_mm: Distance the lens is focused on; inf is allowed.
         scale: Divisor of the stabilised planes, see the manifest.
         plate: What stands before the lens.
+        thesis: How the networks of the thesis are trained.
+        glare: Of a windshield, where `thesis` says so.
     """
 
     sensor: BayerSensor
@@ -92,6 +97,8 @@ class HdrRecipe(Recipe):
     object_distance_mm: float
     scale: float
     plate: PlateRecipe
+    thesis: ThesisRecipe = field(default_factory=ThesisRecipe)
+    glare: GlareRecipe = field(default_factory=GlareRecipe)
 
 
 def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
@@ -100,7 +107,7 @@ def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
     Raises:
         ContractError: If a key is unknown, missing or wrong, or the sensor has no mosaic.
     """
-    common = common_tables(table, own=OWN, roles=ROLES)
+    common = common_tables(table, own=OWN, roles=(*ROLES, *REFERENCE_ROLES), main=ROLES[0])
     if not isinstance(common.sensor, BayerSensor):
         raise ContractError("a snapshot HDR camera has a Bayer mosaic; sensor.cfa is missing")
     if common.sensor.extent is None or common.sensor.channel_response is None:
@@ -114,6 +121,8 @@ def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
         scale=typed("scale", table.get("scale", 64.0), float),
         plate=section("plate", PlateRecipe, table.get("plate", {})),
         data=section("data", HdrDataRecipe, table.get("data", {})),
+        thesis=section("thesis", ThesisRecipe, table.get("thesis", {})),
+        glare=section("glare", GlareRecipe, table.get("glare", {})),
     )
 
 
@@ -128,3 +137,12 @@ def samples_digest(recipe: HdrRecipe, seed: int) -> str:
         "seed": seed,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def reference_digest(recipe: HdrRecipe, role: str, seed: int) -> str:
+    """Give a hash of all that decides the samples of a reference role."""
+    own = {"role": role, "optics": recipe.thesis.optics}
+    if recipe.thesis.optics == "glare":
+        own |= {key: str(value) for key, value in asdict(recipe.glare).items()}
+    text = samples_digest(recipe, seed) + json.dumps(own, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -5,7 +5,7 @@ scene -> exposure, camera space -> blur of the plate -> CFA, noise, clip
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 import torch
@@ -14,7 +14,7 @@ from torch import Tensor
 
 from camkit.bundle.facts import Port
 from camkit.colorimetry import camera_from_rec709
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.contracts import CfaPattern, FloatArray, NoiseModel
 from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.sensors.demosaic import demosaic, mosaic
@@ -57,6 +57,20 @@ class Shot:
     noise: NoiseModel
 
 
+class Located(Protocol):
+    """A capture that says where its lights are."""
+
+    @property
+    def clipped(self) -> NDArray[np.bool_]:
+        """Give (h, w) where a sample clipped."""
+        ...
+
+    @property
+    def sharp(self) -> FloatArray:
+        """Give (3, h, w), the truth."""
+        ...
+
+
 class HdrCamera:
     """The camera of a recipe, its kernels ready."""
 
@@ -82,10 +96,10 @@ class HdrCamera:
         flat = torch.from_numpy(self.matrix).float() @ torch.from_numpy(scene).reshape(3, -1)
         sharp = flat.reshape(1, 3, height, width).clamp_(min=0)
         inside = np.s_[..., surround_px : height - surround_px, surround_px : width - surround_px]
-        blurred = self._blurred(sharp)[inside]
+        blurred = spread_light(sharp, self._dense)[inside]
         sensor = self.recipe.sensor
         raw, clipped = expose(blurred, self.gains, sensor, iso, rng)
-        rgb = self._developed(raw)
+        rgb = develop(raw, self.gains, sensor.cfa)
         lit = rgb.copy()
         cells = cells_of(raw[None], clipped[None], self._kernels.sites)
         Painter(recover(cells, self._kernels)).paint(lit, 0, self.gains)
@@ -97,22 +111,23 @@ class HdrCamera:
             noise=sensor.noise_at(iso).with_gains(self.gains),
         )
 
-    def _blurred(self, sharp: Tensor) -> Tensor:
-        """Spread light over a scene that goes on beyond its border."""
-        half = self._dense.shape[-1] // 2
-        wide = torch.nn.functional.pad(sharp, (half,) * 4, mode="replicate")
-        size = wide.shape[-2], wide.shape[-1]
-        otf = to_otf(torch.from_numpy(self._dense)[None], size)
-        spread = torch.fft.irfft2(torch.fft.rfft2(wide) * otf, s=size)
-        inner: Tensor = spread[..., half : size[0] - half, half : size[1] - half]
-        return inner.clamp(min=0)
 
-    def _developed(self, raw: FloatArray) -> FloatArray:
-        """White-balance and demosaic a mosaic."""
-        cfa = self.recipe.sensor.cfa
-        samples = torch.from_numpy(raw)[None]
-        gains = torch.tensor(self.gains).reshape(1, 3, 1, 1).expand(1, 3, *samples.shape[1:])
-        return np.ascontiguousarray(demosaic(samples * mosaic(gains, cfa), cfa)[0].numpy())
+def spread_light(sharp: Tensor, kernels: FloatArray) -> Tensor:
+    """Spread (b, 3, h, w) light by (3, n, n) kernels over a scene that goes on at its border."""
+    half = kernels.shape[-1] // 2
+    wide = torch.nn.functional.pad(sharp, (half,) * 4, mode="replicate")
+    size = wide.shape[-2], wide.shape[-1]
+    otf = to_otf(torch.from_numpy(kernels)[None], size)
+    spread = torch.fft.irfft2(torch.fft.rfft2(wide) * otf, s=size)
+    inner: Tensor = spread[..., half : size[0] - half, half : size[1] - half]
+    return inner.clamp(min=0)
+
+
+def develop(raw: FloatArray, gains: tuple[float, float, float], cfa: CfaPattern) -> FloatArray:
+    """Give (3, h, w) white-balanced planes of an (h, w) mosaic."""
+    samples = torch.from_numpy(raw)[None]
+    factors = torch.tensor(gains).reshape(1, 3, 1, 1).expand(1, 3, *samples.shape[1:])
+    return np.ascontiguousarray(demosaic(samples * mosaic(factors, cfa), cfa)[0].numpy())
 
 
 def sample_of(
@@ -131,7 +146,7 @@ def sample_of(
     return Sample(inputs={"rgb": rgb, "lit": lit}, target=sharp, weight=recipe.scale * shots.sqrt())
 
 
-def draw_corner(rng: Generator, shot: Shot, recipe: HdrRecipe) -> tuple[int, int]:
+def draw_corner(rng: Generator, shot: Located, recipe: HdrRecipe) -> tuple[int, int]:
     """Draw where a sample is cut: about a light, mostly."""
     side, data = shot.clipped.shape[0], recipe.data
     free = side - data.sample_px + 1

@@ -21,13 +21,19 @@ from camkit.bundle.stages import (
 from camkit.models_def.kinds.hdr.material import HdrMaterial, compute_material, read_material
 from camkit.models_def.kinds.hdr.recipe import (
     CAMERA_PARTS,
+    REFERENCE_ROLES,
     ROLES,
     HdrRecipe,
+    reference_digest,
     samples_digest,
     to_hdr_recipe,
 )
 from camkit.models_def.kinds.hdr.samples import LAYOUT, HdrCamera, draw_corner, sample_of
 from camkit.models_def.kinds.hdr.scenes import LightSource, exposed, open_lights
+from camkit.models_def.kinds.hdr.thesis.fitter import FITTING
+from camkit.models_def.kinds.hdr.thesis.networks import THESIS_NAMES, build_thesis_network
+from camkit.models_def.kinds.hdr.thesis.samples import CodedCamera, CodedMaker, layout_of
+from camkit.models_def.kinds.hdr.thesis.validation import CodedJudge, make_coded_judge
 from camkit.models_def.kinds.hdr.validation import HdrJudge, make_shots
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.kind import Design
@@ -99,13 +105,14 @@ class HdrTraining:
         )
 
     def build_network(self, name: str, **config: Any) -> nn.Module:
-        """Build a network of the catalogue."""
+        """Build a network of the catalogue, or one of the thesis."""
+        if name in THESIS_NAMES:
+            return build_thesis_network(name, **config)
         return build_network(name, **config)
 
     def layout(self, recipe: HdrRecipe, role: str) -> SampleLayout:
-        """Captured and lit planes in, clean planes out."""
-        del recipe, role
-        return LAYOUT
+        """Captured and lit planes in, clean planes out; see `thesis.samples` for its roles."""
+        return layout_of(recipe, role) if role in REFERENCE_ROLES else LAYOUT
 
     def prepare(self, recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path) -> HdrMaterial:
         """Compute what the plate writes."""
@@ -117,7 +124,8 @@ class HdrTraining:
 
     def samples_digest(self, recipe: HdrRecipe, role: str, seed: int) -> str:
         """Hash what decides the samples."""
-        del role
+        if role in REFERENCE_ROLES:
+            return reference_digest(recipe, role, seed)
         return samples_digest(recipe, seed)
 
     def maker(
@@ -127,25 +135,34 @@ class HdrTraining:
         material: HdrMaterial,
         pictures: Path | None,
         seed: int,
-    ) -> HdrMaker:
+    ) -> HdrMaker | CodedMaker:
         """Open the scenes."""
-        del role
-        data = recipe.data
-        source = open_lights(
-            pictures,
-            picture_share=data.picture_share,
-            scenes=data.procedural_scenes,
-            scene_px=data.scene_px,
-        )
+        source = _open_lights(recipe, pictures)
+        if role in REFERENCE_ROLES:
+            return CodedMaker(recipe, role, CodedCamera(recipe, material), source, seed)
         return HdrMaker(recipe, HdrCamera(recipe, material), source, seed)
 
     def judge(
         self, recipe: HdrRecipe, role: str, material: HdrMaterial, pictures: Path | None
-    ) -> HdrJudge:
+    ) -> HdrJudge | CodedJudge:
         """Photograph scenes that are never trained on."""
-        del role
+        if role in REFERENCE_ROLES:
+            source = _open_lights(recipe, pictures)
+            return make_coded_judge(recipe, role, CodedCamera(recipe, material), source)
         shots = make_shots(recipe, HdrCamera(recipe, material), pictures)
         return HdrJudge(shots=shots, recipe=recipe)
 
 
+def _open_lights(recipe: HdrRecipe, pictures: Path | None) -> LightSource:
+    data = recipe.data
+    return open_lights(
+        pictures,
+        picture_share=data.picture_share,
+        scenes=data.procedural_scenes,
+        scene_px=data.scene_px,
+    )
+
+
 PART: Final = HdrTraining()
+
+__all__ = ["FITTING", "PART"]

@@ -31,5 +31,5 @@ def test_every_layer_learns():
 
 @pytest.mark.parametrize("wrong", [{"width": 0}, {"scales": 1}, {"in_channels": 4}])
 def test_impossible_shapes_are_refused(wrong):
-    with pytest.raises(ContractError, match="width >= 1|in_channels"):
+    with pytest.raises(ContractError, match=r"width >= 1|in_channels"):
         ConstantConfig(**wrong)

@@ -1,4 +1,4 @@
-"""Costs are those of the tables of the thesis, row by row, and what is stored is what is counted."""
+"""Costs are those of the tables of the thesis, row by row; what is stored is what is counted."""
 
 import json
 import sys

@@ -1,0 +1,11 @@
+"""The thesis's way to snapshot HDR (Sun 2021, chapter 5) trained in this house, to compare with.
+
+star         what a windshield writes beside a light
+samples      captures behind a plate, the bare lens or a windshield, and the layers within
+networks     the networks of `models_def/networks/thesis` between planes of roots
+losses       eqs. (5.6) to (5.11)
+fitter       one step by these losses
+validation   fixed captures to choose by
+
+Planes of these samples are the square roots of linear light, 1.0 = white.
+"""

@@ -1,0 +1,224 @@
+"""One step of the thesis's networks by its losses, in linear light.
+
+split       L_U on the picture without streaks, and the perceptual loss of the streaks
+highlight   L_S
+fusion      L_F
+whole       L_total, all three in a row
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final, cast
+
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.kinds.hdr.thesis.losses import (
+    exclusion_loss,
+    fused_loss,
+    perceptual_loss,
+    saturated_loss,
+    total_loss,
+    unsaturated_loss,
+)
+from camkit.models_def.kinds.hdr.thesis.networks import (
+    THESIS_NAMES,
+    BetweenRoots,
+    build_thesis_network,
+    to_light,
+)
+from camkit.models_def.kinds.hdr.thesis_recipe import ThesisRecipe
+from camkit.models_def.networks.thesis.chain import ThesisChain
+from camkit.models_def.networks.vgg import VggLevels, file_digest, take_vgg
+from camkit.models_def.training.checkpoint import State
+from camkit.models_def.training.fitter import Fits, Fitter
+from camkit.models_def.training.fitting import FitRequest, OwnFitting
+from camkit.models_def.training.sample import Batch
+from camkit.scenes.saturation import CEILING
+
+LOSS_BLOCKS: Final = 4
+"""Of VGG-19: the losses look at conv2_2, conv3_2 and conv4_2."""
+OF_ROLE: Final = {
+    "split": "thesis_split",
+    "highlight": "thesis_highlight",
+    "fusion": "thesis_fusion",
+    "whole": "thesis_chain",
+}
+
+Terms = dict[str, Tensor]
+
+
+class ThesisFitter:
+    """Fits one of the thesis's networks, or all three."""
+
+    def __init__(self, request: FitRequest) -> None:
+        recipe: ThesisRecipe = request.recipe.thesis
+        self.recipe, self.role = recipe, request.role
+        self.inner = Fitter(request.entry, build_thesis_network, request.device, request.first)
+        self._features = VggLevels(blocks=LOSS_BLOCKS, widths=recipe.vgg_widths)
+        if request.vgg is not None:
+            give_vgg(self._features, request.vgg)
+            give_vgg(self.inner.network, request.vgg)
+            give_vgg(self.inner.averaged, request.vgg)
+        self._features.to(self.inner.device)
+        self._notes: dict[str, list[float]] = {}
+
+    def fit(self, batch: Batch, step: int, progress: float) -> float:
+        """Make one step and give its loss."""
+        device = self.inner.device
+        given, target = (to_light(x.to(device)) for x in (batch.planes, batch.target))
+        terms = _TERMS[self.role](self, given, target)
+        for name, value in terms.items():
+            self._notes.setdefault(name, []).append(float(value.detach()))
+        loss = self._total(terms, progress)
+        self.inner.descend(loss, step, progress)
+        return float(loss.detach())
+
+    def _total(self, terms: Mapping[str, Tensor], progress: float) -> Tensor:
+        recipe, zero = self.recipe, torch.zeros((), device=self.inner.device)
+        excludes = progress >= recipe.exclusion_from
+        unsaturated = unsaturated_loss(
+            terms.get("clean", zero),
+            terms.get("exclusion", zero),
+            perceptual_weight=recipe.perceptual_weight,
+            exclusion_weight=recipe.exclusion_weight if excludes else 0.0,
+        )
+        saturated = saturated_loss(terms.get("lights", zero), weight=recipe.highlight_weight)
+        total = total_loss(unsaturated, saturated, terms.get("fused", zero))
+        return total + recipe.streak_weight * terms.get("streaks", zero)
+
+    def perceptual(self, found: Tensor, wanted: Tensor) -> Tensor:
+        """Give the perceptual loss of (b, 3, h, w) linear pictures."""
+        with torch.no_grad():
+            truth = self._features(wanted)
+        return perceptual_loss(self._features(found)[1:], truth[1:])
+
+    def network(self) -> BetweenRoots:
+        """Give the network that is being trained."""
+        return cast("BetweenRoots", self.inner.network)
+
+    def notes(self) -> dict[str, float]:
+        """Give the mean of each term since the last call."""
+        means = {name: sum(values) / len(values) for name, values in self._notes.items()}
+        self._notes.clear()
+        return means
+
+    def restore(self, planes: Tensor) -> Tensor:
+        """Run the averaged network on (1, c, h, w) roots."""
+        return self.inner.restore(planes)
+
+    def weights(self) -> State:
+        """Give the weights being trained, VGG-19 among them."""
+        return self.inner.weights()
+
+    def average(self) -> State:
+        """Give the averaged weights."""
+        return self.inner.average()
+
+    def optimizer_state(self) -> dict[str, Any]:
+        """Give the optimiser's state."""
+        return self.inner.optimizer_state()
+
+    def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
+        """Go back to a saved state."""
+        self.inner.load(weights, average, optimizer)
+
+
+def _split_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
+    clean, streaks = torch.split(fitter.network().linear(given), 3, dim=1)
+    terms = {
+        "clean": fitter.perceptual(clean, target[:, :3]),
+        "exclusion": exclusion_loss(clean, streaks),
+    }
+    if fitter.recipe.streak_weight > 0:
+        terms["streaks"] = fitter.perceptual(streaks, target[:, 3:])
+    return terms
+
+
+def _highlight_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
+    return {"lights": fitter.perceptual(fitter.network().linear(given), target)}
+
+
+def _fusion_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
+    return {"fused": fused_loss(fitter.network().linear(given), target)}
+
+
+def _whole_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
+    chain = fitter.network().body
+    if not isinstance(chain, ThesisChain):
+        raise ContractError(f"the role whole is fitted as {OF_ROLE['whole']} here")
+    found = chain.outputs(given)
+    return {
+        "clean": fitter.perceptual(found.clean, target.clamp(max=1)),
+        "exclusion": exclusion_loss(found.clean, found.streaks),
+        "lights": fitter.perceptual(found.lights, target.clamp(1, CEILING)),
+        "fused": fused_loss(found.fused, target),
+    }
+
+
+_TERMS: Final[Mapping[str, Callable[[ThesisFitter, Tensor, Tensor], Terms]]] = {
+    "split": _split_terms,
+    "highlight": _highlight_terms,
+    "fusion": _fusion_terms,
+    "whole": _whole_terms,
+}
+
+
+def give_vgg(network: torch.nn.Module, path: Path) -> None:
+    """Give every VGG-19 within a network the weights of a file; see `take_vgg`."""
+    for part in network.modules():
+        if isinstance(part, VggLevels):
+            take_vgg(part, path)
+
+
+class ThesisFitting:
+    """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
+
+    def fitting(self, request: FitRequest) -> OwnFitting | None:
+        """Give the fitter of the thesis's networks; all others have the house's.
+
+        Raises:
+            ContractError: If the network is not that of the role, weights of VGG-19 are missing,
+                or the schedule wants less than float32.
+        """
+        network = request.entry.network
+        if request.role not in OF_ROLE or (request.role == "whole" and network not in THESIS_NAMES):
+            return None
+        _check(request)
+
+        def make() -> Fits:
+            return ThesisFitter(request)
+
+        return OwnFitting(make=make, credit=_credit(request))
+
+
+def _check(request: FitRequest) -> None:
+    wanted = OF_ROLE[request.role]
+    if request.entry.network != wanted:
+        raise ContractError(
+            f"the network of the role {request.role} is {wanted}; got {request.entry.network}"
+        )
+    if request.entry.schedule.precision != "float32":
+        raise ContractError(
+            'lights of 2^8 need schedule.precision = "float32" with the thesis\'s networks; got '
+            f"{request.entry.schedule.precision!r}"
+        )
+    if request.role != "fusion" and request.vgg is None and not request.recipe.thesis.random_vgg:
+        raise ContractError(
+            f"the role {request.role} looks at pictures through VGG-19: give its weights by "
+            "--vgg FILE (torchvision's vgg19), or say random_vgg = true in [thesis] to try the "
+            "machinery with random ones"
+        )
+
+
+def _credit(request: FitRequest) -> str:
+    if request.role == "fusion":
+        return ""
+    if request.vgg is None:
+        return "; VGG-19 with random weights"
+    digest = file_digest(request.vgg)[:16]
+    return f"; with VGG-19 of {request.vgg.name} (sha256 {digest}...)"
+
+
+FITTING: Final = ThesisFitting()

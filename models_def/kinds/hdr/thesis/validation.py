@@ -1,0 +1,88 @@
+"""Fixed samples that are never trained on, and the linear PSNR by which a role is judged."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from camkit.models_def.kinds.hdr.recipe import HdrRecipe
+from camkit.models_def.kinds.hdr.samples import draw_corner
+from camkit.models_def.kinds.hdr.scenes import LightSource, exposed
+from camkit.models_def.kinds.hdr.thesis.networks import to_light
+from camkit.models_def.kinds.hdr.thesis.samples import CodedCamera, coded_sample, layout_of
+from camkit.models_def.kinds.hdr.validation import ISOS, MOST_DB, SEED
+from camkit.models_def.training.kind import Restorer, Score
+from camkit.scenes.saturation import CEILING
+
+SAMPLES: Final = 6
+SHARE: Final = 0.015
+
+
+def _with_no_streaks(roots: Tensor) -> Tensor:
+    return torch.cat([roots.clamp(max=1), torch.zeros_like(roots)], dim=1)
+
+
+def _pasted(roots: Tensor) -> Tensor:
+    return torch.maximum(*torch.split(roots, 3, dim=1))
+
+
+BASELINES: Final[Mapping[str, tuple[str, Callable[[Tensor], Tensor]]]] = {
+    "split": ("capture", _with_no_streaks),
+    "highlight": ("white", torch.ones_like),
+    "fusion": ("pasted", _pasted),
+    "whole": ("capture", torch.Tensor.contiguous),
+}
+"""Role -> what it must beat: the name and how it is made of the roots that a network is given."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CodedJudge:
+    """Judges one role.
+
+    Attributes:
+        role: Of the networks.
+        samples: (ISO, inputs (1, c, s, s), truth (1, k, s, s)), roots.
+    """
+
+    role: str
+    samples: Sequence[tuple[float, Tensor, Tensor]]
+
+    def baselines(self) -> Mapping[str, float]:
+        """Give the mean dB of what is to be beaten."""
+        name, make = BASELINES[self.role]
+        return {name: self.score(make).mean_db}
+
+    def score(self, restore: Restorer) -> Score:
+        """Judge by the mean PSNR in dB, by ISO; the peak is 1 for layers, 2^8 with lights."""
+        peak = 1.0 if self.role == "split" else CEILING
+        by_iso: dict[str, list[float]] = {}
+        with torch.no_grad():
+            for iso, given, truth in self.samples:
+                gap = to_light(restore(given)).clamp(max=peak) - to_light(truth).clamp(max=peak)
+                mean = max(float(gap.double().square().mean()), 1e-30)
+                db = min(float(10 * np.log10(peak**2 / mean)), MOST_DB)
+                by_iso.setdefault(f"{iso:g}", []).append(db)
+        every = [db for found in by_iso.values() for db in found]
+        return Score(
+            mean_db=float(np.mean(every)),
+            parts={"by_iso": {iso: float(np.mean(found)) for iso, found in by_iso.items()}},
+        )
+
+
+def make_coded_judge(
+    recipe: HdrRecipe, role: str, camera: CodedCamera, source: LightSource
+) -> CodedJudge:
+    """Photograph scenes, cut to a sample about a light each."""
+    made, layout, data = [], layout_of(recipe, role), recipe.data
+    for number in range(SAMPLES):
+        rng = np.random.default_rng((SEED, number))
+        scene = source.draw(rng, data.capture_px + 2 * data.surround_px)
+        scene = exposed(scene, camera.matrix, camera.gains, SHARE)
+        iso = ISOS[number % len(ISOS)]
+        shot = camera.photograph(scene, iso, rng)
+        sample = coded_sample(shot, draw_corner(rng, shot, recipe), recipe, role)
+        made.append((iso, sample.stacked(layout)[None], sample.target[None]))
+    return CodedJudge(role=role, samples=tuple(made))
