@@ -35,7 +35,9 @@ def stress(
     write: Annotated[
         bool, typer.Option("--write", help="Store the measured ranges in the bundle.")
     ] = False,
-    list_: Annotated[bool, typer.Option("--list", help="Name the scenarios and stop.")] = False,
+    list_: Annotated[
+        bool, typer.Option("--list", help="Name the scenarios, those of a BUNDLE if given.")
+    ] = False,
     json_: Annotated[
         bool, typer.Option("--json", help="Print the results as one JSON list.")
     ] = False,
@@ -47,7 +49,8 @@ def stress(
     from camkit.report.stress.scenario import choose
 
     if list_:
-        for scenario in choose(scenarios):
+        opened = None if bundle is None else open_bundle(find_bundle(bundle))
+        for scenario in choose(scenarios) if opened is None else scenarios_for(opened, scenarios):
             say(f"{scenario.name:20} {scenario.title}")
         return
     if bundle is None:
