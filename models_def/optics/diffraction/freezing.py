@@ -29,7 +29,7 @@ from camkit.models_def.sensors.psf import wavelength_weights
 Tell = Callable[[str], None]
 WAVELENGTH_COUNTS: Final = (3, 4, 5, 7, 9, 13)
 MISPLACED_LIMIT: Final = 0.002
-STREAKS_LIMIT: Final = 0.005
+STREAKS_LIMIT: Final = 0.015
 """Of what core, arms and haze may misplace; a second peak, say, is no arm."""
 WINDOW: Final = FreezeGrid(energy=0.999, max_side_px=401, least_energy=0.9)
 """The window of a plate, unless another is asked for: streaks end long before."""
