@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import Final
 
 from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Stage, Wiener
+from camkit.bundle.stages import Stage
 from camkit.contracts import depth_weights
 from camkit.errors import ContractError
 from camkit.runtime.job.setup import DEVELOPMENT
@@ -63,7 +63,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
     if options.unit is not None:
         options.unit.check(bundle)
     if options.depth_m is not None and bundle is not None:
-        assert bundle.manifest.stage(Wiener) is not None  # only a bank knows of depths
+        # a stage that knows of depths never joins without optics
         depth_weights(bundle.psf.depths_mm, options.depth_mm)
 
 
