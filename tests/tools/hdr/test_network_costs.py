@@ -85,11 +85,20 @@ def test_stored_costs_are_those_of_today(costs):
     assert json.loads(STORED.read_text(encoding="utf-8")) == costs
 
 
+def test_both_orders_give_the_same_picture():
+    early, late, difference = network_costs.compare_orders(32)
+    assert 0 <= difference <= 1e-4
+    assert min(early, late) > 0
+
+
 def test_a_table_is_printed_and_stored(tmp_path, monkeypatch, capsys):
     path = tmp_path / "costs.json"
     one = {"fusion": {"parameters": 1000, "trained": 10, "kmac_per_px": 1.25}}
     monkeypatch.setattr(network_costs, "all_costs", lambda: one)
-    monkeypatch.setattr(sys, "argv", ["network_costs", "-o", str(path)])
+    monkeypatch.setattr(network_costs, "SIDE_PX", 16)
+    monkeypatch.setattr(sys, "argv", ["network_costs", "-o", str(path), "--measure"])
     network_costs.main()
-    assert "| fusion | 1,000 | 10 | 1.2 |" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "| fusion | 1,000 | 10 | 1.2 |" in told
+    assert " s of CPU; they differ by " in told
     assert json.loads(path.read_text(encoding="utf-8")) == one
