@@ -154,8 +154,14 @@ class Job:
             self.notes.append(f"a linear RGB capture in a {wanted[0]} bundle: not demosaicked")
 
     def _check_camera(self, name: str) -> None:
-        """Refuse a capture of another camera; warn where that can only be feared."""
+        """Refuse a capture of another camera; warn where that can only be feared.
+
+        A bundle without optics that takes pictures of any size is for every camera.
+        """
         capture, options = self.capture, self.options
+        manifest = self.known_bundle.manifest
+        if manifest.optics is None and manifest.sensor.extent is None:
+            return
         if capture.bundle_name not in (None, name):
             told = f"the capture names bundle {capture.bundle_name}, not {name}"
             if not options.force_bundle:

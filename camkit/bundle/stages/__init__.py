@@ -4,7 +4,7 @@ A stage names the planes that it takes and gives, and says by `join` what it mak
 does stands in the module of the same name in `camkit.runtime.stages`.
 
 linearise, repair, white_balance, demosaic    the front
-wiener, highlights, network                   the restoration
+wiener, highlights, deglare, network          the restoration
 raise_clipped, illumination, undistort, color what every picture needs behind it
 """
 
@@ -13,6 +13,7 @@ from typing import Annotated
 from pydantic import Field
 
 from camkit.bundle.stages.color import Color
+from camkit.bundle.stages.deglare import Deglare
 from camkit.bundle.stages.demosaic import Demosaic
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry
 from camkit.bundle.stages.highlights import Highlights
@@ -27,6 +28,7 @@ from camkit.bundle.stages.wiener import Wiener
 
 __all__ = [
     "Color",
+    "Deglare",
     "Demosaic",
     "Highlights",
     "Illumination",
@@ -49,6 +51,7 @@ Stage = Annotated[
     | WhiteBalance
     | Demosaic
     | Highlights
+    | Deglare
     | Wiener
     | Network
     | RaiseClipped

@@ -22,7 +22,9 @@ def bench(
     bundles: Annotated[
         list[str] | None, typer.Argument(help="Bundle NAMEs or PATHs.", metavar="[BUNDLE]...")
     ] = None,
-    all_: Annotated[bool, typer.Option("--all", help="All built-in bundles.")] = False,
+    all_: Annotated[
+        bool, typer.Option("--all", help="All built-in cameras of a stated size.")
+    ] = False,
     data: Annotated[
         Path | None,
         typer.Option(help="Folder of sharp pictures, EXR and HDR too; default: golden cases."),
@@ -76,7 +78,6 @@ def bench(
     _debug: Debug = False,
 ) -> None:
     """Chart the speed of a bundle against its accuracy, beside classical methods."""
-    from camkit.bundle.reader import built_in_bundles
     from camkit.report.bench.settings import (
         DEFAULT_REPEAT,
         QUICK_METHODS,
@@ -84,7 +85,7 @@ def bench(
     )
     from camkit.report.bench.trial import Axes
 
-    chosen = [*(bundles or ()), *(built_in_bundles() if all_ else ())]
+    chosen = [*(bundles or ()), *(_cameras() if all_ else ())]
     axes = Axes(
         sizes=_words(sizes),
         methods=_words(methods) or (QUICK_METHODS if quick else None),
@@ -113,6 +114,17 @@ def bench(
         gemm_s=0.2 if quick else 1.0,
     )
     _run(settings, out_dir, as_json=json_)
+
+
+def _cameras() -> list[str]:
+    """Name the built-in bundles that can be simulated: those that state a sensor's size."""
+    from camkit.bundle.reader import built_in_bundles, open_bundle
+
+    return [
+        name
+        for name, path in built_in_bundles().items()
+        if open_bundle(path).manifest.sensor.extent is not None
+    ]
 
 
 def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:

@@ -1,0 +1,98 @@
+"""A night scene behind a wiped windshield: a two-point star through every light.
+
+The star of Sun 2021, section 5.7.1, after Rouf et al. 2011: the light itself stays whole, the
+streaks are added to it. As optics, core 1, two opposite arms, no haze.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+import scipy.signal
+
+from camkit.contracts import FloatArray
+from camkit.scenes import named_scene
+from camkit.scenes.saturation import saturating_exposure, with_exposure
+from camkit.streaks.optics import SECTION_STEP_PX, StreakOptics
+
+REACH_PX: Final = 160
+SHARE: Final = 0.06
+SATURATED: Final = 0.015
+READ_NOISE: Final = 0.002
+SHOT_NOISE: Final = 1e-4
+STEPS: Final = 4095
+FADING_PER_PX: Final = 0.014
+"""m of the thesis."""
+Fading = Literal["exponential", "even"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """A photograph through the star, and what it should have been.
+
+    Attributes:
+        seen: (3, h, w) float32: clips at 1, with noise, in steps of 12 bits.
+        wanted: (3, h, w) float32: the scene without streaks, clipped at 1.
+    """
+
+    seen: FloatArray
+    wanted: FloatArray
+
+
+def two_point_star(
+    angle_rad: float, fading: Fading = "exponential", share: float = SHARE
+) -> StreakOptics:
+    """Give the optics: two arms, `angle_rad` from the vertical, of a share of the light in all."""
+    distance = np.arange(REACH_PX + 1, dtype=np.float64)
+    profile = np.exp(-FADING_PER_PX * distance) if fading == "exponential" else distance * 0 + 1
+    profile *= share / (2 * profile.sum())
+    offset = SECTION_STEP_PX * np.arange(-4, 5)
+    section = np.clip(1 - np.abs(offset), 0, None)
+    core = np.ones((1, 1, 1, 1), np.float32)
+    down = math.pi / 2 - angle_rad
+    return StreakOptics(
+        core=core,
+        bare_core=core,
+        profiles=np.broadcast_to(profile, (1, 1, 2, profile.size)).astype(np.float32),
+        sections=np.broadcast_to(section, (1, 2, section.size)).astype(np.float32),
+        angles_rad=np.array([down, down + math.pi]),
+        haze=np.zeros((1, 1, 1, 1), np.float32),
+        depths_mm=np.array([np.inf]),
+        wavelengths_um=np.array([0.55]),
+        pixel_pitch_um=1.0,
+    )
+
+
+def exposed_scene(name: str, height: int, width: int) -> FloatArray:
+    """Give a scene (3, h, w) exposed so that some of it saturates."""
+    scene = named_scene(name, height, width)
+    found = saturating_exposure(scene, np.eye(3), (1.0, 1.0, 1.0), SATURATED)
+    return with_exposure(scene, found.exposure)
+
+
+def photographed(scene: FloatArray, star: StreakOptics | None, seed: int = 0) -> Shot:
+    """Photograph a scene through a star, or through nothing.
+
+    Args:
+        scene: (3, h, w) float32 linear, may exceed 1.
+        star: The optics; None for clean ones.
+        seed: Of the noise.
+    """
+    light = scene
+    if star is not None:
+        kernel = star.dense()[0, 0]
+        light = np.stack([scipy.signal.fftconvolve(c, kernel, mode="same") for c in scene])
+    rng = np.random.default_rng(seed)
+    sigma = np.sqrt(READ_NOISE**2 + SHOT_NOISE * np.clip(light, 0, 1))
+    noisy = np.clip(light + rng.standard_normal(light.shape) * sigma, 0, 1)
+    return Shot(
+        seen=(np.round(noisy * STEPS) / STEPS).astype(np.float32),
+        wanted=np.minimum(scene, 1).astype(np.float32),
+    )
+
+
+def psnr_db(picture: FloatArray, shot: Shot, level: float) -> float:
+    """Give the PSNR of what is no light, linear, peak 1."""
+    dim = shot.seen.max(axis=0) < level
+    return float(-10 * np.log10(np.mean((picture - shot.wanted)[:, dim] ** 2, dtype=np.float64)))
