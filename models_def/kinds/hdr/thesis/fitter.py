@@ -145,10 +145,7 @@ def _fusion_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
 
 
 def _whole_terms(fitter: ThesisFitter, given: Tensor, target: Tensor) -> Terms:
-    chain = fitter.network().body
-    if not isinstance(chain, ThesisChain):
-        raise ContractError(f"the role whole is fitted as {OF_ROLE['whole']} here")
-    found = chain.outputs(given)
+    found = cast("ThesisChain", fitter.network().body).outputs(given)
     return {
         "clean": fitter.perceptual(found.clean, target.clamp(max=1)),
         "exclusion": exclusion_loss(found.clean, found.streaks),
