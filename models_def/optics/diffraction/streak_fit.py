@@ -32,6 +32,9 @@ SECTION_PX: Final = 6.0
 _ROUNDS: Final = 4
 _REACHED: Final = 0.995
 """Of an arm's light; beyond, it is haze."""
+_TAIL_PX: Final = 4
+_ENDED: Final = 0.5
+"""Of an arm's mean brightness; one that is brighter at the border of the kernels goes on there."""
 _TINY: Final = 1e-12
 FloatGrid = NDArray[np.float64]
 
@@ -191,8 +194,7 @@ def _line(light: FloatGrid, place: FloatGrid, weight: FloatGrid, count: int) -> 
 def _reach(profiles: FloatGrid, half: int) -> int:
     """Give the distance within which nearly all light of the longest arms lies."""
     beyond = profiles[..., half + 1 :]
-    share = np.cumsum(beyond, axis=-1) / np.maximum(beyond.sum(axis=-1, keepdims=True), _TINY)
-    reach = half + 1 + int((share < _REACHED).sum(axis=-1).max())
-    if reach >= profiles.shape[-1]:
+    if (beyond[..., -_TAIL_PX:].mean(axis=-1) > _ENDED * beyond.mean(axis=-1)).any():
         raise NoStreaksError("the arms do not end within the kernels: compute a wider window")
-    return reach
+    share = np.cumsum(beyond, axis=-1) / np.maximum(beyond.sum(axis=-1, keepdims=True), _TINY)
+    return half + 1 + int((share < _REACHED).sum(axis=-1).max())
