@@ -14,15 +14,26 @@ from camkit.contracts import FloatArray
 
 DOME_PX: Final = 5.0
 """Farther from its rim a light rises no more."""
+FARTHEST_CELLS: Final = 64
+STRIP_ROWS: Final = 256
 _ROUNDS: Final = 4
 _TINY: Final = 1e-6
 
 
 def rim_distance_px(mask: NDArray[np.bool_], pitch_px: float) -> FloatArray:
-    """Give the distance of every cell of a mask (h, w) from its rim, 0 outside."""
-    if not mask.any():
-        return np.zeros(mask.shape, np.float32)
-    return (scipy.ndimage.distance_transform_edt(mask) * pitch_px).astype(np.float32)
+    """Give the distance of every cell of a mask (h, w) from its rim, 0 outside.
+
+    Farther than `FARTHEST_CELLS` from a rim nothing grows, so that strips of rows can be measured
+    one by one, in the memory of a few.
+    """
+    distance = np.zeros(mask.shape, np.float32)
+    for top in range(0, mask.shape[0], STRIP_ROWS):
+        above = max(top - FARTHEST_CELLS, 0)
+        strip = mask[above : top + STRIP_ROWS + FARTHEST_CELLS]
+        if strip.any():
+            found = scipy.ndimage.distance_transform_edt(strip)
+            distance[top : top + STRIP_ROWS] = found[top - above :][:STRIP_ROWS]
+    return np.minimum(distance, FARTHEST_CELLS) * np.float32(pitch_px)
 
 
 def dome(distance_px: FloatArray) -> FloatArray:

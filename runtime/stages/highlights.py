@@ -1,6 +1,7 @@
 """Clipped lights found from their streaks before the first row; rows painted as they pass."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import takewhile
 from typing import Final
 
@@ -16,14 +17,14 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows
-from camkit.streaks.cells import Cells, cells_of, sample_sites
+from camkit.streaks.cells import COLOURS, Cells, cells_of, sample_sites
 from camkit.streaks.kernels import StreakKernels, streak_kernels
 from camkit.streaks.painting import Painter
 from camkit.streaks.recovery import Recovery, recover
 
 METHODS: Final = ("physics",)
 OPTIONS: Final = ("depth_m",)
-BYTES_PER_PX: Final = 26
+BYTES_PER_PX: Final = 18
 """Cells, veil, lights and streaks of a picture that is one window (measured)."""
 BAND_ROWS: Final = 256
 REST_SHARE: Final = 0.4
@@ -80,12 +81,12 @@ def _painted(
     cells, kernels = _cells(job, *looked_at), _kernels(job)
     recovery = recover(cells, kernels, lambda: check_cancelled(job.cancel))
     found[:] = [recovery]
+    job.record["hdr"] = recovery.to_json()
     painter, top = Painter(recovery), 0
     for band in picture.bands():
         painter.paint(band, top, picture.gains)
         top += band.shape[1]
         yield band
-    job.record["hdr"] = recovery.to_json()
 
 
 def _kernels(job: Job) -> StreakKernels:
@@ -103,16 +104,14 @@ def _cells(job: Job, light: str, mask: str) -> Cells:
     samples, clipped = job.probe(light), job.probe(mask)
     sites = sample_sites(job.capture.cfa)
     height = samples.shape[1] // 2 * 2
-    parts = []
+    shape = COLOURS, height // 2, samples.shape[2] // 2
+    whole = np.empty(shape, np.float32), np.empty(shape, np.float32)
     for top in range(0, height, BAND_ROWS):
         bottom = min(top + BAND_ROWS, height)
-        parts.append(cells_of(samples.read(top, bottom), clipped.read(top, bottom), sites))
-    return Cells(
-        light=np.concatenate([part.light for part in parts], axis=1),
-        clipped=np.concatenate([part.clipped for part in parts], axis=1),
-        pitch_px=parts[0].pitch_px,
-        offset_px=parts[0].offset_px,
-    )
+        part = cells_of(samples.read(top, bottom), clipped.read(top, bottom), sites)
+        for plane, made in zip(whole, (part.light, part.clipped), strict=True):
+            plane[:, top // 2 : bottom // 2] = made
+    return replace(part, light=whole[0], clipped=whole[1])
 
 
 def _warnings(found: Sequence[Recovery]) -> tuple[str, ...]:
