@@ -6,8 +6,10 @@ from typing import Final
 
 import numpy as np
 
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.stages import Deglare
 from camkit.contracts import FloatArray
+from camkit.errors import BundleError
 from camkit.runtime.cancel import check_cancelled
 from camkit.runtime.job.job import Gains, Job
 from camkit.runtime.job.stage_work import StageWork
@@ -47,6 +49,17 @@ def prepare(entry: Deglare, job: Job) -> StageWork:
         held_bytes=BYTES_PER_COLUMN * job.capture.width,
         warnings=lambda: tuple(note for glare in found for note in glare.notes),
     )
+
+
+def check(_entry: Deglare, manifest: Manifest, _max_bytes: int) -> None:
+    """Refuse several: each reads twice what lies before it, another one included.
+
+    Raises:
+        BundleError: If there are.
+    """
+    count = len(manifest.stages_of(Deglare))
+    if count > 1:
+        raise BundleError(f"a bundle has one stage deglare at most; {manifest.name} has {count}")
 
 
 def seconds(_entry: Deglare, subject: Subject, _work: Work, speed: Speed) -> float:

@@ -1,7 +1,7 @@
 """Build the bundle that removes glare: `python -m tools.hdr.glare_bundle -o deglare.camkit`.
 
-It holds physics alone: no optics, no network, pictures of any size. Its golden cases are a mosaic
-with streaks, the same without, and linear planes with streaks. `--angles LOW HIGH` builds one for
+It holds physics alone: no optics, no network, pictures of any size. Its golden cases are a night
+scene with streaks as a mosaic and as linear planes. `--angles LOW HIGH` builds one for
 streaks of other angles from the vertical.
 """
 
@@ -41,11 +41,11 @@ NAME: Final = "deglare"
 VERSION: Final = "0.1.0"
 BLACK: Final = 256
 WHITE: Final = 4095
-SIDE_PX: Final = (144, 192)
+SIDE_PX: Final = (192, 256)
 """(rows, columns) of a golden case."""
-ANGLE_DEG: Final = 5.0
-SCENE: Final = "night:4"
-CASES: Final = ("streaks", "none", "planes")
+ANGLE_DEG: Final = -5.0
+SCENE: Final = "night:6"
+CASES: Final = ("streaks", "planes")
 CARD_TEXT: Final = """# deglare
 
 Takes away the two opposite streaks that a wiped windshield writes through every light. Physics
@@ -135,11 +135,11 @@ def _rows(matrix: NDArray[np.floating]) -> Any:
 
 def _case(name: str) -> tuple[GoldenCase, GoldenArrays]:
     """Photograph a golden case, its output still to be added."""
-    star = None if name == "none" else two_point_star(math.radians(ANGLE_DEG))
+    star = two_point_star(math.radians(ANGLE_DEG))
     shot = photographed(exposed_scene(SCENE, *SIDE_PX), star)
     case = GoldenCase(
         name=name,
-        recipe={"scene": SCENE, "angle_deg": ANGLE_DEG if star is not None else 0.0},
+        recipe={"scene": SCENE, "angle_deg": ANGLE_DEG},
         iso=100,
         white_balance=(1.0, 1.0, 1.0),
     )

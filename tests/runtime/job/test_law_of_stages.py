@@ -1,5 +1,6 @@
 """What the bundle says is what runs: the stages it lists, in that order, and nothing else."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.sensor import RGB
 from camkit.bundle.stages import (
     Color,
+    Deglare,
     Demosaic,
     Highlights,
     Illumination,
@@ -50,6 +52,7 @@ from camkit.runtime.signal.noise import repair_mosaic
 from camkit.runtime.signal.stabilise import stabilise, unstabilise
 from camkit.runtime.stage_finder import stage_module
 from camkit.streaks.cells import cells_of, sample_sites
+from camkit.streaks.glare.removal import GlareSettings, find_glare
 from camkit.streaks.kernels import streak_kernels
 from camkit.streaks.painting import Painter
 from camkit.streaks.recovery import recover
@@ -65,6 +68,7 @@ POOL: tuple[Callable[..., Stage], ...] = (
     Demosaic,
     lambda **wiring: Wiener(**BANK, **wiring),
     Highlights,
+    Deglare,
     Network,
     RaiseClipped,
     Illumination,
@@ -86,6 +90,8 @@ class _Drawn:
     def tried(self, make: Callable[..., Stage]) -> Stage | None:
         """Give the stage wired to what there is, None if it does not join."""
         kind = make(takes=("x",), gives=("y",))
+        if isinstance(kind, Deglare) and any(isinstance(s, Deglare) for s in self.stages):
+            return None  # a runtime takes one: each reads twice what lies before it
         number = len(self.stages)
         takes = [self.main]
         gives = [f"p{number}"]
@@ -210,6 +216,8 @@ def _slowly(  # noqa: C901, PLR0912 - one arm for each stage
                 made = [unstabilise(stable, noise.with_gains(gain), scale=stage.scale)]
             case Highlights():
                 made = [_lit(taken[0], gain, looked_at, bundle)]
+            case Deglare():
+                made = [_cleared(taken[0], gain, stage)]
             case RaiseClipped():
                 made = [recover_highlights(taken[0], gain)]
             case Illumination():
@@ -242,6 +250,17 @@ def _lit(
     lit = planes.copy()
     Painter(recover(cells_of(light, clipped, sites), kernels)).paint(lit, 0, gain)
     return lit
+
+
+def _cleared(planes: FloatArray, gain: tuple[float, float, float], stage: Deglare) -> FloatArray:
+    """Take the streaks out of a whole picture."""
+    seen = planes / np.array(gain, np.float32)[:, None, None]
+    least, most = math.radians(stage.least_angle_deg), math.radians(stage.most_angle_deg)
+    settings = GlareSettings(least_rad=least, most_rad=most, reach=stage.reach, level=stage.level)
+    glare = find_glare(lambda: lambda a, b: seen[:, a:b], *seen.shape[1:], settings)
+    cleared = planes.copy()
+    glare.paint(cleared, 0, gain)
+    return cleared
 
 
 OPTICS = {
@@ -277,7 +296,12 @@ def test_the_listed_stages_run_in_their_order_and_nothing_else_does(
         )
         got = work.fill()
     assert ran[: len(stages)] == [stage.type for stage in stages]
-    assert set(ran[len(stages) :]) <= {"linearise", "repair"}  # highlights looks at them before
+    # highlights and deglare look at what lies before them
+    looked_at = {"linearise", "repair"}
+    for number, stage in enumerate(stages):
+        if isinstance(stage, Deglare):
+            looked_at |= {before.type for before in stages[:number]}
+    assert set(ran[len(stages) :]) <= looked_at
     expected = _slowly(stages, bundle, work.capture)
     np.testing.assert_array_equal(got, expected)
 
