@@ -8,8 +8,6 @@ from camkit.report.stress.scene import Scene
 
 def _shoot(judge: HdrJudge, scene: Scene, value: float) -> HdrShot:
     lit = judge.lit(scene)
-    if value == SCENARIO.nominal:
-        return judge.shoot(lit)
     return judge.shoot(lit.showing(with_peak(lit.linear, value), f"{lit.name} peak {value:g}"))
 
 
@@ -25,6 +23,6 @@ SCENARIO = Scenario(
     log=True,
     applies=writes_streaks,
     rival=False,
-    note="The same lights, the logarithm of their brightness scaled. 256 stands for the scenes as "
-    "they are, which end there. PSNR has the peak 2^8 throughout.",
+    note="The same lights, the logarithm of their brightness scaled. PSNR has the peak 2^8 "
+    "throughout.",
 )
