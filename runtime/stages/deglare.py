@@ -21,7 +21,7 @@ from camkit.streaks.glare.removal import Glare, GlareSettings, Read, find_glare
 
 METHODS: Final = ("deglare",)
 OPTIONS: Final[tuple[str, ...]] = ()
-BYTES_PER_COLUMN: Final = 40_000
+BYTES_PER_COLUMN: Final = 52_000
 """Of the slant with its fields, and of rows on their way (measured)."""
 REST_SHARE: Final = 1.0
 """What lies before it is read twice more."""
