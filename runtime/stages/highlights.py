@@ -20,15 +20,18 @@ from camkit.runtime.rows import Rows
 from camkit.streaks.cells import COLOURS, Cells, cells_of, sample_sites
 from camkit.streaks.kernels import StreakKernels, streak_kernels
 from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import Recovery, recover
+from camkit.streaks.recovery import FINE_CELLS, Recovery, recover
 
 METHODS: Final = ("physics",)
 OPTIONS: Final = ("depth_m",)
-BYTES_PER_PX: Final = 18
+BYTES_PER_PX: Final = 25
 """Cells, veil, lights and streaks of a picture that is one window (measured)."""
+FINE_BYTES_PER_PX: Final = 47
+"""The same of one so small that its lights are sought in cells of 2 px too (measured)."""
 BAND_ROWS: Final = 256
 REST_SHARE: Final = 0.4
 FRONT: Final = ("linearise", "repair")
+FINE_PITCH_PX: Final = 2
 LEAST_PX: Final = 4
 """Side of the coarser cells."""
 
@@ -52,13 +55,19 @@ def prepare(entry: Highlights, job: Job) -> StageWork:
         (picture,) = taken
         return (picture.with_bands(_painted(picture, job, (light, mask), found)),)
 
-    held = BYTES_PER_PX * height * width
+    held = held_bytes(height * width)
     return StageWork(run=run, held_bytes=held, warnings=lambda: _warnings(found))
 
 
 def seconds(_entry: Highlights, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
+
+
+def held_bytes(pixels: int) -> int:
+    """Give the memory that a picture takes at most."""
+    fine_px = min(pixels, FINE_CELLS * FINE_PITCH_PX**2)
+    return max(BYTES_PER_PX * pixels, FINE_BYTES_PER_PX * fine_px)
 
 
 def _looked_at(entry: Highlights, stages: Sequence[Stage]) -> tuple[str, str]:

@@ -1,6 +1,7 @@
 """Lights found before the first row: the same bits whatever bands, threads and memory."""
 
 import json
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +35,7 @@ from camkit.streaks.painting import Painter
 from camkit.streaks.recovery import Recovery, recover
 from tests.hdr_bundle import DEEP_MM, SIZE_PX, write_hdr_bundle
 from tests.job_factory import made_job, start, stream_of
-from tests.streak_factory import blurred, captured, star, street, with_lamps
+from tests.streak_factory import blurred, captured, star, star_kernels, street, with_lamps
 
 WIDTH, HEIGHT = SIZE_PX
 LAMPS = [
@@ -229,9 +230,28 @@ def test_a_capture_of_other_pixels_has_kernels_of_its_scale(
 
 def test_it_says_what_it_holds(camera: Bundle, light: FloatArray) -> None:
     work = highlights.prepare(_entry(camera), made_job(_mosaic(light), camera))
-    assert work.held_bytes == highlights.BYTES_PER_PX * HEIGHT * WIDTH
+    assert work.held_bytes == highlights.held_bytes(HEIGHT * WIDTH)
     assert work.fit is None
     assert work.warnings() == ()
+
+
+def test_a_picture_that_is_one_window_holds_what_is_stated() -> None:
+    """But for what its windows are wider than it, which is little in larger ones."""
+    side, middles = 384, range(16, 384, 32)
+    lamps = [(y, x, 3.0, (50.0, 50.0, 50.0)) for y in middles for x in middles]
+    samples, over = captured(blurred(with_lamps(street(side, side), lamps), star()), "RGGB")
+    kernels, sites = star_kernels(), sample_sites("RGGB")
+    planes = np.zeros((3, side, side), np.float32)
+    tracemalloc.start()
+    found = recover(cells_of(samples, over, sites), kernels)
+    Painter(found).paint(planes, 0, GAINS)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert found.to_json()["window_fraction"] == 1
+    held = highlights.held_bytes(side * side)
+    assert 0.7 * held < peak < 1.1 * held
+    large = 24_000_000
+    assert highlights.held_bytes(large) == highlights.BYTES_PER_PX * large
 
 
 def _entry(camera: Bundle) -> Highlights:
