@@ -2,7 +2,9 @@
 
 Night scenes behind a two-point star, and behind nothing. For each the PSNR (linear, peak 1, pixels
 that are no light) before and after, the angle that was found and the one that was set; and for
-scenes without streaks the PSNR of the result to what came in (null: the same picture).
+scenes without streaks the PSNR of the result to what came in (null: the same picture). `--pictures`
+does both with scenes of high dynamic range (EXR, HDR), and the second with any other picture, all
+of them reduced to 1024 px at most.
 """
 
 import argparse
@@ -15,8 +17,11 @@ import numpy as np
 
 from camkit.bundle.stages import Deglare
 from camkit.contracts import FloatArray
+from camkit.runtime.files.picture import read_light
+from camkit.scenes.saturation import saturating_exposure, with_exposure
 from camkit.streaks.glare.removal import Glare, GlareSettings, find_glare
 from tools.hdr.glare_twin import (
+    SATURATED,
     Fading,
     exposed_scene,
     photographed,
@@ -28,6 +33,8 @@ SIDES_PX: Final = (384, 512)
 SEEDS: Final = tuple(range(8))
 ANGLES_DEG: Final = (5.0, -5.0, 3.1, -7.4)
 FADINGS: Final[tuple[Fading, ...]] = ("exponential", "even")
+MOST_PX: Final = 1024
+LIGHT_SUFFIXES: Final = (".exr", ".hdr")
 CLEAN_SEEDS: Final = tuple(range(20, 32))
 
 
@@ -39,28 +46,52 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path)
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     parser.add_argument("--clean-seeds", type=int, nargs="*", default=CLEAN_SEEDS)
+    parser.add_argument("--pictures", type=Path, nargs="*", default=[])
     arguments = parser.parse_args()
-    rows = [with_streaks(seed) for seed in arguments.seeds]
-    clean = [without_streaks(seed) for seed in arguments.clean_seeds]
+    rows = [with_streaks(f"night:{seed}", night(seed), seed) for seed in arguments.seeds]
+    clean = [without_streaks(f"night:{seed}", night(seed), seed) for seed in arguments.clean_seeds]
+    real = []
+    for path in arguments.pictures:
+        scene = picture(path)
+        clean.append(without_streaks(path.name, scene))
+        if path.suffix in LIGHT_SUFFIXES:
+            real.append(with_streaks(path.name, scene))
     print("| scene | fading | angle | found | before | after |\n|---|---|---|---|---|---|")
-    for row in rows:
+    for row in (*rows, *real):
         print("| " + " | ".join(str(cell) for cell in row.values()) + " |")
     means = [float(np.mean([row[name] for row in rows])) for name in ("before_db", "after_db")]
     print(f"mean {means[0]:.1f} -> {means[1]:.1f} dB")
     print("changed without streaks:", [row for row in clean if row["to_itself_db"] is not None])
     if arguments.output is not None:
-        record = {"streaks": rows, "clean": clean}
+        record = {"streaks": rows, "real": real, "clean": clean}
         arguments.output.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
-def with_streaks(seed: int) -> dict[str, Any]:
-    """Measure a scene behind the star."""
+def night(seed: int) -> FloatArray:
+    """Give a night scene, exposed."""
+    return exposed_scene(f"night:{seed}", *SIDES_PX)
+
+
+def picture(path: Path) -> FloatArray:
+    """Give a picture (3, h, w), linear; one of high dynamic range exposed as the night scenes."""
+    light = read_light(path)
+    side = -(-max(light.shape) // MOST_PX)
+    height, width = light.shape[1] // side, light.shape[2] // side
+    cells = light[:, : height * side, : width * side].reshape(3, height, side, width, side)
+    small = np.asarray(cells.mean(axis=(2, 4), dtype=np.float32))
+    if path.suffix not in LIGHT_SUFFIXES:
+        return small
+    found = saturating_exposure(small, np.eye(3), (1.0, 1.0, 1.0), SATURATED)
+    return with_exposure(small, found.exposure)
+
+
+def with_streaks(name: str, scene: FloatArray, seed: int = 0) -> dict[str, Any]:
+    """Measure a scene behind the star; the seed chooses its angle and fading."""
     angle_deg, fading = ANGLES_DEG[seed % len(ANGLES_DEG)], FADINGS[seed % len(FADINGS)]
-    star = two_point_star(math.radians(angle_deg), fading)
-    shot = photographed(exposed_scene(f"night:{seed}", *SIDES_PX), star, seed)
+    shot = photographed(scene, two_point_star(math.radians(angle_deg), fading), seed)
     glare, cleared = deglared(shot.seen)
     return {
-        "scene": f"night:{seed}",
+        "scene": name,
         "fading": fading,
         "angle_deg": angle_deg,
         "found_deg": glare.to_json()["angle_deg"],
@@ -69,13 +100,13 @@ def with_streaks(seed: int) -> dict[str, Any]:
     }
 
 
-def without_streaks(seed: int) -> dict[str, Any]:
+def without_streaks(name: str, scene: FloatArray, seed: int = 0) -> dict[str, Any]:
     """Measure a scene that needs nothing."""
-    shot = photographed(exposed_scene(f"night:{seed}", *SIDES_PX), None, seed)
+    shot = photographed(scene, None, seed)
     glare, cleared = deglared(shot.seen)
     off = float(np.mean((cleared - shot.seen) ** 2, dtype=np.float64))
     return {
-        "scene": f"night:{seed}",
+        "scene": name,
         "found_deg": glare.to_json()["angle_deg"],
         "to_itself_db": round(-10 * math.log10(off), 2) if off else None,
     }
