@@ -9,6 +9,7 @@
     descent      the light of clipped cells that explains what lies around them
     recovery     all of it: cells -> lights, their streaks, the veil of everything else
     painting     lights put into the rows of a picture, veil and streaks taken out
+    glare        streaks of a wiped windshield, whose optics nobody knows, taken away
 
 Numpy and scipy alone: the training side makes its samples with the code that runs at use time.
 """
