@@ -159,14 +159,19 @@ def _region(
             continue
         light[colour] = _sought(colour, window, clipped, cells, veil, kernels)
         streaks[colour] = Convolution(kernels.fine.veil[colour], place.shape).spread(light[colour])
-    hidden = fine.clipped[(slice(None), *place.at)] > 0
-    beyond = np.maximum(streaks - fine.light[(slice(None), *place.at)], 0)
-    return Region(
-        window=place,
-        light=light,
-        streaks=streaks,
-        thrown=(_sum(streaks[hidden]), _sum(beyond[~hidden]), _sum(streaks)),
-    )
+    return Region(window=place, light=light, streaks=streaks, thrown=_thrown(streaks, fine, place))
+
+
+def _thrown(streaks: FloatArray, fine: Cells, place: Window) -> tuple[float, float, float]:
+    """Sum the streaks: on clipped cells, beyond what is seen elsewhere, in all."""
+    hidden, beyond, every = 0.0, 0.0, 0.0
+    for colour, plane in enumerate(streaks):
+        clipped = fine.clipped[(colour, *place.at)] > 0
+        over = np.maximum(plane - fine.light[(colour, *place.at)], 0)
+        hidden += _sum(plane[clipped])
+        beyond += _sum(over[~clipped])
+        every += _sum(plane)
+    return hidden, beyond, every
 
 
 def _sum(light: FloatArray) -> float:

@@ -24,7 +24,7 @@ from camkit.streaks.recovery import FINE_CELLS, Recovery, recover
 
 METHODS: Final = ("physics",)
 OPTIONS: Final = ("depth_m",)
-BYTES_PER_PX: Final = 25
+BYTES_PER_PX: Final = 22
 """Cells, veil, lights and streaks of a picture that is one window (measured)."""
 FINE_BYTES_PER_PX: Final = 47
 """The same of one so small that its lights are sought in cells of 2 px too (measured)."""

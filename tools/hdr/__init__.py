@@ -2,6 +2,7 @@
 
 - `network_costs`: parameters and multiplications of the thesis's networks and ours
 - `leave_one_out`: merging of brackets beside OpenCV's, frame by frame predicted from the others
+- `gallery`: a night photographed through a plate and read back, as pictures
 - `glare_twin`, `glare_bundle`, `glare_table`: streaks of a windshield, the bundle that removes
   them, and what that gains
 """
