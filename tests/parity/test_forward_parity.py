@@ -9,8 +9,8 @@ import torch
 from camkit.bundle.sensor import BayerSensor, ColorSensor, Extent
 from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import FrozenPsf
-from camkit.models_def.kinds.bayer import samples as training
 from camkit.models_def.sensors.demosaic import mosaic
+from camkit.models_def.sensors.exposure import expose as record
 from camkit.models_def.sensors.forward import block_centres_px, scatter
 from camkit.models_def.sensors.psf import color_kernels
 from camkit.models_def.training.kind import read_recipe
@@ -128,6 +128,6 @@ def test_noise_of_training_and_simulation_has_the_same_spread() -> None:
     dn = expose(light, sensor, Setting(iso=1600, seed=0))
     signal = (dn.astype(float) - sensor.black_level) / (sensor.white_level - sensor.black_level)
     balanced = torch.tensor(gains).reshape(1, 3, 1, 1) * torch.full((1, 3, 300, 300), level)
-    found, _ = training._expose(balanced, gains, recipe, 1600, np.random.default_rng(0))
+    found, _ = record(balanced, gains, sensor, 1600, np.random.default_rng(0))
     assert found.var() == pytest.approx(signal.var(), rel=0.04)
     assert found.mean() == pytest.approx(signal.mean(), abs=2e-4)

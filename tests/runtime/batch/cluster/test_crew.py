@@ -208,6 +208,7 @@ def test_who_takes_too_long_is_left_alone() -> None:
         within(5, lambda: 1 / 0)
 
 
+@pytest.mark.slow
 def test_one_silent_worker_does_not_keep_the_answers_of_others(
     farm: Farm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

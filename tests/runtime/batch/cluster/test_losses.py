@@ -112,6 +112,7 @@ def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
     _check_whole(results, out, expected)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_lost_is_waited_for(tmp_path: Path) -> None:
     captures, out = tmp_path / "in", tmp_path / "out"
     captures.mkdir()
@@ -184,6 +185,7 @@ def test_a_file_that_died_with_its_worker_though_alone_has_failed() -> None:
     assert [losses.fate(n) for n in (0, 1)] == ["failed", "again"]
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_of_a_file_costs_that_file(tmp_path: Path) -> None:
     _one_file_is_lost(tmp_path, KILLS_ITS_WORKER)
 
