@@ -1,6 +1,6 @@
 """A night photographed through a plate, its lights read back: a sheet of exposures and the PSF.
 
-    python -m tools.hdr.gallery --out-dir out --bundle streak-hdr
+    python -m tools.hdr.gallery --out-dir out --bundle streak-hdr.camkit
 
 Leaves night.dng and night.exr with its sidecar; night.png, rows as developed, by physics, with the
 network and as it was, columns at 0, -4 and -8 EV; streaks.png, the PSF of red, green and blue.
@@ -37,7 +37,7 @@ def main() -> None:
     """Photograph, process and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out-dir", type=Path, default=Path("out"))
-    parser.add_argument("--bundle", default="streak-hdr")
+    parser.add_argument("--bundle", required=True)
     arguments = parser.parse_args()
     show_gallery(arguments.bundle, arguments.out_dir)
 

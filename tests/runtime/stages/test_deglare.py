@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.chain import capture_plane
 from camkit.bundle.manifest import Manifest, planes_of
-from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Color, Deglare, Demosaic, JoinError, Linearise, Parts
 from camkit.bundle.stages.entry import StageEntry
 from camkit.contracts import FloatArray
@@ -30,15 +30,17 @@ from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.stages import deglare
 from camkit.streaks.glare.removal import GlareSettings, find_glare
 from tests.job_factory import start
-from tools.hdr.glare_bundle import mosaic_of
+from tools.hdr.glare_bundle import build, mosaic_of
 from tools.hdr.glare_twin import exposed_scene, photographed, two_point_star
 
 SHAPE = (192, 256)
 
 
 @pytest.fixture(scope="module")
-def bundle() -> Bundle:
-    return open_bundle(find_bundle("deglare"))
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    path = tmp_path_factory.mktemp("glare") / "deglare.camkit"
+    build(path, Deglare())
+    return open_bundle(path)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +53,7 @@ def _capture(pipeline: Pipeline, samples: NDArray[Any]) -> Capture:
     return pipeline.capture_of(samples, iso=100, white_balance=None, origin_px=None)
 
 
-def test_the_built_in_bundle_proves_itself(bundle: Bundle) -> None:
+def test_the_bundle_proves_itself_and_may_be_built_in(bundle: Bundle) -> None:
     assert check_bundle(bundle.path, run=case_work).passed
     assert bundle.path.stat().st_size < 2_000_000
     assert [case.name for case in bundle.manifest.golden] == ["streaks", "planes"]
