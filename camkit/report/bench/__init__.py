@@ -3,6 +3,7 @@
 settings        what a caller may ask for
 trial           one way to do the work, and the axes along which trials vary
 row_maker       what makes the rows of one sort
+one_method      the rows of a single method that a bundle offers
 rows/           which trials a bundle gives; a new sort of row is one new file
 part            what a kind of camera brings: how it photographs, rows, metrics
 line_up         the makers and metrics of a camera, and all trials

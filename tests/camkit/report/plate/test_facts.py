@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 import torch
 
-from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.optics.diffraction.patterns import FlatPattern, StarPattern
@@ -15,25 +14,10 @@ from camkit.report.plate.cut_chart import along, farther
 from camkit.report.plate.facts import Look, PlateFacts, analyse, to_json
 from camkit.report.plate.output import write_plate_page
 from camkit.report.plate.page import to_html
+from tests.two_colours import red_and_blue_sensor
 
 BENCH = Bench(diameter_mm=2.0, focal_length_mm=25.0, focus_mm=2000.0)
 STAR = StarPattern(angles_deg=(0.0, 60.0), near_um=40.0, far_um=200.0, share=0.1)
-
-
-def _sensor() -> PlanesSensor:
-    return PlanesSensor(
-        extent=Extent(width_px=400, height_px=300, pixel_pitch_um=6.0),
-        channels=("R", "B"),
-        black_level=64,
-        white_level=4095,
-        full_well_e=9000,
-        noise=(IsoNoise(iso=100, gain_e_per_dn=2.2, read_noise_e=2.0),),
-        channel_response=ChannelResponse(
-            wavelengths_um=(0.45, 0.5, 0.55, 0.6, 0.65),
-            response=((0.0, 0.0, 0.3, 1.0, 0.5), (1.0, 0.5, 0.1, 0.0, 0.0)),
-            source="made up",
-        ),
-    )
 
 
 def _plate() -> Plate:
@@ -42,7 +26,7 @@ def _plate() -> Plate:
 
 @pytest.fixture(scope="module")
 def facts() -> PlateFacts:
-    return analyse(_plate(), Look(sensor=_sensor(), side_px=121))
+    return analyse(_plate(), Look(sensor=red_and_blue_sensor(), side_px=121))
 
 
 def test_streaks_and_shares_are_those_of_the_design(facts: PlateFacts) -> None:
@@ -67,7 +51,7 @@ def test_strehl_is_one_less_what_was_taken_from_the_core(facts: PlateFacts) -> N
 
 def test_a_flat_plate_has_no_streaks_and_all_shares_of_its_lens() -> None:
     flat = pattern_plate("flat", FlatPattern(), cells=160, bench=BENCH)
-    told = to_json(analyse(flat, Look(sensor=_sensor(), depth_mm=math.inf, side_px=61)))
+    told = to_json(analyse(flat, Look(sensor=red_and_blue_sensor(), depth_mm=math.inf, side_px=61)))
     assert told["streaks"] == []
     assert told["depth_m"] == "inf"
     assert {name: told[name] for name in told["bare"]} == told["bare"]
@@ -75,7 +59,7 @@ def test_a_flat_plate_has_no_streaks_and_all_shares_of_its_lens() -> None:
 
 def test_a_depth_that_is_none_is_refused() -> None:
     with pytest.raises(ContractError, match="depth must be > 0"):
-        analyse(_plate(), Look(sensor=_sensor(), depth_mm=0.0, side_px=21))
+        analyse(_plate(), Look(sensor=red_and_blue_sensor(), depth_mm=0.0, side_px=21))
 
 
 def test_the_page_holds_all_and_is_complete_or_not_there(facts: PlateFacts, tmp_path: Path) -> None:
@@ -91,7 +75,7 @@ def test_the_page_holds_all_and_is_complete_or_not_there(facts: PlateFacts, tmp_
 def test_the_page_of_a_bare_lens_says_that_there_are_no_streaks() -> None:
     bench = Bench(diameter_mm=1.0, sensor_mm=30.0)
     flat = pattern_plate("flat", FlatPattern(), cells=96, bench=bench)
-    facts = analyse(flat, Look(sensor=_sensor(), depth_mm=500.0, side_px=31))
+    facts = analyse(flat, Look(sensor=red_and_blue_sensor(), depth_mm=500.0, side_px=31))
     page = to_html(facts, {})
     assert "None." in page
     assert "∞" in page

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from camkit.bundle.psf_file import read_psf
-from camkit.bundle.sensor import ChannelResponse, Extent, IsoNoise, PlanesSensor
+from camkit.bundle.sensor import PlanesSensor
 from camkit.bundle.streak_file import read_streaks
 from camkit.cli.app import app
 from camkit.errors import ContractError
@@ -29,6 +29,7 @@ from camkit.models_def.optics.diffraction.patterns import FlatPattern, Pattern, 
 from camkit.models_def.optics.diffraction.plate import Plate, pattern_plate, write_plate
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics, plate_kernels
 from camkit.models_def.sensors.psf import wavelength_weights
+from tests.two_colours import red_and_blue_sensor
 
 BENCH = Bench(diameter_mm=2.0, focal_length_mm=20.0, focus_mm=2000.0)
 STREAKS = Streaks(
@@ -47,19 +48,7 @@ def optics() -> PlateOptics:
 
 @pytest.fixture(scope="module")
 def sensor() -> PlanesSensor:
-    return PlanesSensor(
-        extent=Extent(width_px=400, height_px=300, pixel_pitch_um=6.0),
-        channels=("R", "B"),
-        black_level=64,
-        white_level=4095,
-        full_well_e=9000,
-        noise=(IsoNoise(iso=100, gain_e_per_dn=2.2, read_noise_e=2.0),),
-        channel_response=ChannelResponse(
-            wavelengths_um=(0.45, 0.5, 0.55, 0.6, 0.65),
-            response=((0.0, 0.0, 0.3, 1.0, 0.5), (1.0, 0.5, 0.1, 0.0, 0.0)),
-            source="made up",
-        ),
-    )
+    return red_and_blue_sensor()
 
 
 def _off(
