@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from camkit.bundle.sensor import Sensor, nested_sensor
+from camkit.bundle.sensor import BayerSensor, Sensor, nested_sensor
 from camkit.errors import ContractError
 from camkit.models_def.toml_table import check_keys, section, typed
 
@@ -212,6 +212,19 @@ def common_tables(
         sensor=_sensor(table.get("sensor", {})),
         networks=_networks(table.get("networks"), schedule, roles, main),
     )
+
+
+def mosaic_sensor(sensor: Sensor) -> BayerSensor:
+    """Give a sensor with a mosaic of which training knows all that it simulates.
+
+    Raises:
+        ContractError: If it is another, or its size or response is not stated.
+    """
+    if not isinstance(sensor, BayerSensor):
+        raise ContractError("this kind of camera has a Bayer mosaic; sensor.cfa is missing")
+    if sensor.extent is None or sensor.channel_response is None:
+        raise ContractError("sensor needs width_px, height_px, pixel_pitch_um, channel_response")
+    return sensor
 
 
 def with_new_names(table: Mapping[str, Any], older: Mapping[str, str]) -> Mapping[str, Any]:

@@ -20,6 +20,7 @@ from camkit.models_def.training.recipe import (
     check_share,
     common_tables,
     model,
+    mosaic_sensor,
     own_schedule,
     with_new_names,
 )
@@ -207,14 +208,10 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
     """
     table = with_new_names(table, _OLDER)
     common = common_tables(table, own=OWN, roles=ROLES)
-    if not isinstance(common.sensor, BayerSensor):
-        raise ContractError("training simulates cameras with a Bayer mosaic; sensor.cfa is missing")
-    if common.sensor.extent is None or common.sensor.channel_response is None:
-        raise ContractError("sensor needs width_px, height_px, pixel_pitch_um, channel_response")
     return BayerRecipe(
         name=common.name,
         kind=common.kind,
-        sensor=common.sensor,
+        sensor=mosaic_sensor(common.sensor),
         networks=common.networks,
         object_distance_mm=typed("object_distance_mm", table.get("object_distance_mm"), float),
         scale=typed("scale", table.get("scale", 64.0), float),

@@ -10,7 +10,13 @@ from camkit.bundle.sensor import BayerSensor
 from camkit.errors import ContractError
 from camkit.models_def.kinds.hdr.thesis_recipe import GlareRecipe, ThesisRecipe
 from camkit.models_def.toml_table import section, typed
-from camkit.models_def.training.recipe import DataRecipe, Recipe, check_share, common_tables
+from camkit.models_def.training.recipe import (
+    DataRecipe,
+    Recipe,
+    check_share,
+    common_tables,
+    mosaic_sensor,
+)
 
 ROLES: Final = ("highlights",)
 REFERENCE_ROLES: Final = ("split", "highlight", "fusion", "whole")
@@ -108,14 +114,10 @@ def to_hdr_recipe(table: Mapping[str, Any]) -> HdrRecipe:
         ContractError: If a key is unknown, missing or wrong, or the sensor has no mosaic.
     """
     common = common_tables(table, own=OWN, roles=(*ROLES, *REFERENCE_ROLES), main=ROLES[0])
-    if not isinstance(common.sensor, BayerSensor):
-        raise ContractError("a snapshot HDR camera has a Bayer mosaic; sensor.cfa is missing")
-    if common.sensor.extent is None or common.sensor.channel_response is None:
-        raise ContractError("sensor needs width_px, height_px, pixel_pitch_um, channel_response")
     return HdrRecipe(
         name=common.name,
         kind=common.kind,
-        sensor=common.sensor,
+        sensor=mosaic_sensor(common.sensor),
         networks=common.networks,
         object_distance_mm=typed("object_distance_mm", table.get("object_distance_mm"), float),
         scale=typed("scale", table.get("scale", 64.0), float),

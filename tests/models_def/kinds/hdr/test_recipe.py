@@ -51,7 +51,7 @@ def test_the_shipped_recipe_is_a_camera_of_this_kind() -> None:
         ("data__iso_max", 50.0, "data.iso_min must be in"),
         ("object_distance_mm", None, "object_distance_mm"),
         ("object_distance_mm", "far", "object_distance_mm must be of type float"),
-        ("sensor__cfa", None, "snapshot HDR camera has a Bayer mosaic; sensor.cfa is missing"),
+        ("sensor__cfa", None, "this kind of camera has a Bayer mosaic; sensor.cfa is missing"),
         ("sensor__channel_response", None, "sensor needs .*channel_response"),
     ],
 )
