@@ -202,7 +202,7 @@ def develop_file(
             "exposure_time_s": capture.exposure_time_s,
             "metadata": {} if write.strip_metadata else work.origin.metadata.stated(),
         }
-        proof.write_text(sidecar_text(record), encoding="utf-8")
+        proof.write_text(sidecar_text(record, work.sections), encoding="utf-8")
     return result
 
 

@@ -58,6 +58,7 @@ class Recovery:
         core: (3,): share of the light that stays where it is.
         regions: From top to bottom; none where so much clipped that nothing can be told.
         notes: What the user should know.
+        fallbacks: Places whose lights were left as the sensor saw them; the notes say why.
     """
 
     fine: Cells
@@ -66,6 +67,7 @@ class Recovery:
     core: tuple[float, ...]
     regions: tuple[Region, ...]
     notes: tuple[str, ...] = ()
+    fallbacks: int = 0
 
     def to_json(self) -> dict[str, int | float]:
         """Give what a sidecar says of it.
@@ -84,6 +86,7 @@ class Recovery:
             "unexplained": round(float(beyond / thrown), 4) if thrown else 0.0,
             "peak": round(max((float(r.light.max()) for r in self.regions), default=1.0), 2),
             "window_fraction": round(inside / cells, 4),
+            "fallbacks": self.fallbacks,
         }
 
 
@@ -122,6 +125,7 @@ def recover(
         core=kernels.coarse.core,
         regions=tuple(regions),
         notes=tuple(notes),
+        fallbacks=int(blind),
     )
 
 

@@ -44,6 +44,7 @@ class Job:
         meter: How far it is.
         notes: What the user should know, in the order it was found.
         record: The plan as the sidecar keeps it.
+        sections: What stages found, as the sidecar keeps it: each under a name of its own.
         white_balance: Gains in use; ones where the stages balance nothing.
         color: From the colour of the stages to that asked for; None until a stage says so.
         falls_back: The capture lies outside what the bundle was shown to help with, and the caller
@@ -74,6 +75,7 @@ class Job:
         self.clock = StageClock()
         self.notes = list(capture.notes)
         self.record: dict[str, Any] = {}
+        self.sections: dict[str, Any] = {}
         self.white_balance: Gains = (1.0,) * capture.channels
         self.color: ColorStage | None = None
         self.falls_back = False

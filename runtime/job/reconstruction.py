@@ -115,6 +115,14 @@ class Reconstruction:
         return self.job.record
 
     @property
+    def sections(self) -> dict[str, Any]:
+        """Give what stages found, for the sidecar: name of a section -> what it holds.
+
+        Complete once all rows are out.
+        """
+        return self.job.sections
+
+    @property
     def white_balance(self) -> tuple[float, ...]:
         """Give the gains in use."""
         return self.job.white_balance

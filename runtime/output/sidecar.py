@@ -33,20 +33,28 @@ def sidecar_path(output: Path) -> Path:
     return output.with_name(output.stem + SIDECAR_SUFFIX)
 
 
-def sidecar_text(record: Mapping[str, Any]) -> str:
+def sidecar_text(record: Mapping[str, Any], sections: Mapping[str, Any] | None = None) -> str:
     """Give what the sidecar of a picture holds.
 
     Args:
         record: Plain JSON values, with at least the keys of `REQUIRED`.
+        sections: What stages found, each under a key of its own; they come last.
 
     Raises:
-        ContractError: If a key is missing or a value is not JSON (NaN, inf, an object).
+        ContractError: If a key is missing, a section has the name of another key, or a value is not
+            JSON (NaN, inf, an object).
     """
     missing = sorted(REQUIRED - record.keys())
     if missing:
         raise ContractError(f"the sidecar lacks {', '.join(missing)}")
+    whole = {"sidecar_version": SIDECAR_VERSION, **record}
+    found = dict(sections or {})
+    if taken := sorted(whole.keys() & found.keys()):
+        raise ContractError(
+            f"a section of the sidecar needs a name of its own; taken: {', '.join(taken)}"
+        )
     try:
-        text = json.dumps({"sidecar_version": SIDECAR_VERSION, **record}, indent=2, allow_nan=False)
+        text = json.dumps(whole | found, indent=2, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ContractError(f"the sidecar must hold plain JSON values: {error}") from error
     return text + "\n"

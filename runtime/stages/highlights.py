@@ -90,7 +90,7 @@ def _painted(
     cells, kernels = _cells(job, *looked_at), _kernels(job)
     recovery = recover(cells, kernels, lambda: check_cancelled(job.cancel))
     found[:] = [recovery]
-    job.record["hdr"] = recovery.to_json()
+    job.sections["hdr"] = recovery.to_json()
     painter, top = Painter(recovery), 0
     for band in picture.bands():
         painter.paint(band, top, picture.gains)

@@ -91,6 +91,7 @@ def test_what_a_sidecar_says_is_what_was_found(lit: tuple[FloatArray, Cells, Rec
     )
     assert told["clipped_streak_fraction"] == pytest.approx(hidden / thrown, abs=1e-3)
     assert 0 <= told["unexplained"] < 0.05
+    assert told["fallbacks"] == 0
     assert found.notes == ()
 
 
@@ -107,6 +108,7 @@ def test_nothing_clipped_leaves_the_veil_alone(cfa: CfaPattern | None) -> None:
         "unexplained": 0.0,
         "peak": 1.0,
         "window_fraction": 0.0,
+        "fallbacks": 0,
     }
     assert found.veil.shape == coarser(cells).light.shape
 
@@ -138,6 +140,7 @@ def test_too_much_clipped_is_left_as_the_sensor_saw_it_and_that_is_said() -> Non
     scene[:, :, 80:] = 3
     found = recover(captured_cells(blurred(scene, star())), star_kernels())
     assert found.regions == ()
+    assert found.to_json()["fallbacks"] == found.fallbacks == 1
     (note,) = found.notes
     assert f"more than {MOST_CLIPPED:.0%} did" in note
     assert "of the picture clipped: its lights were left as the sensor saw them" in note

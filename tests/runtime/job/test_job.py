@@ -57,6 +57,12 @@ def test_an_assumed_place_is_noted_and_a_wrong_size_is_refused(bundle: Bundle) -
         start(bundle, small)
 
 
+def test_a_walk_that_nobody_hears_adds_no_section(bundle: Bundle) -> None:
+    job = made_job(made_mosaic(), bundle)
+    job.unheard().sections["hdr"] = {"regions": 1}
+    assert job.sections == {}
+
+
 def test_noise_is_the_files_before_the_bundles_before_a_measured_one(bundle: Bundle) -> None:
     stated = NoiseModel(shot=(1e-3,) * 3, read_variance=(1e-6,) * 3)
     captures = {

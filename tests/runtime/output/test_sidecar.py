@@ -44,6 +44,26 @@ def test_values_that_are_not_json_are_refused(value: object) -> None:
         sidecar_text(record(plan=value))
 
 
+def test_sections_of_stages_stand_beside_the_plan_and_come_back(tmp_path: Path) -> None:
+    output = tmp_path / "a.exr"
+    sidecar_path(output).write_text(sidecar_text(record(), {"hdr": {"regions": 2}}))
+    found = read_sidecar(output)
+    assert found is not None
+    assert found["hdr"] == {"regions": 2}
+    assert {k: v for k, v in found.items() if k not in ("sidecar_version", "hdr")} == record()
+
+
+@pytest.mark.parametrize("name", ["plan", "output_sha256", "sidecar_version"])
+def test_a_section_never_takes_the_place_of_another_key(name: str) -> None:
+    with pytest.raises(ContractError, match=f"name of its own; taken: {name}$"):
+        sidecar_text(record(), {name: {"regions": 2}})
+
+
+def test_a_section_that_is_not_json_is_refused() -> None:
+    with pytest.raises(ContractError, match="plain JSON"):
+        sidecar_text(record(), {"hdr": {"peak": float("nan")}})
+
+
 @pytest.mark.parametrize(
     "content",
     [b"", b"{", b"[]", b"null", b"{}", b'{"sidecar_version": 1}', b"\xff\xfe", b"[" * 100_000],

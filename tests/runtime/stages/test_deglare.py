@@ -73,8 +73,8 @@ def test_planes_come_out_as_the_core_says(bundle: Bundle, seen: FloatArray) -> N
     pipeline = Pipeline(bundle, Options(threads=2))
     work = pipeline.start(_capture(pipeline, seen))
     np.testing.assert_allclose(work.fill(), wanted, atol=1e-6)
-    assert work.record["glare"] == glare.to_json()
-    assert work.record["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)
+    assert work.sections["glare"] == glare.to_json()
+    assert work.sections["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)
 
 
 def test_threads_and_memory_change_no_bit_of_a_mosaic(bundle: Bundle, seen: FloatArray) -> None:
@@ -104,7 +104,8 @@ def test_files_of_any_size_are_taken_and_the_sidecar_says_the_angle(
     result = develop_file(path, target, Pipeline(bundle, Options()), WriteOptions())
     assert result.status == "ok"
     record = json.loads((tmp_path / "night.camkit.json").read_text(encoding="utf-8"))
-    assert record["plan"]["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)
+    assert record["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)
+    assert "glare" not in record["plan"]
 
 
 def test_samples_that_are_no_numbers_spoil_nothing_else(bundle: Bundle, seen: FloatArray) -> None:
@@ -114,7 +115,7 @@ def test_samples_that_are_no_numbers_spoil_nothing_else(bundle: Bundle, seen: Fl
     work = pipeline.start(_capture(pipeline, broken))
     out = work.fill()
     assert np.isnan(out).sum() <= 3
-    assert work.record["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)
+    assert work.sections["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)
 
 
 def test_a_picture_without_light_is_unchanged_and_says_so(bundle: Bundle) -> None:

@@ -156,7 +156,7 @@ def test_lamps_come_back_and_the_record_says_so(camera: Bundle, light: FloatArra
     capture = _mosaic(light)
     work = start(camera, capture)
     work.fill()
-    told = work.record["hdr"]
+    told = work.sections["hdr"]
     _, found = _slowly(capture, camera, np.zeros((3, HEIGHT, WIDTH), np.float32))
     assert told == found.to_json()
     assert told["regions"] == len(found.regions) > 0
@@ -170,9 +170,9 @@ def test_the_record_is_there_with_the_first_band(camera: Bundle, light: FloatArr
     walk = Walk(job)
     walk.settle()
     bands = walk.stream("lit").bands()
-    assert "hdr" not in job.record
+    assert "hdr" not in job.sections
     next(iter(bands))
-    assert job.record["hdr"]["regions"] > 0
+    assert job.sections["hdr"]["regions"] > 0
 
 
 def test_what_could_not_be_told_is_warned_of_once_the_rows_are_out(camera: Bundle) -> None:
@@ -185,7 +185,7 @@ def test_what_could_not_be_told_is_warned_of_once_the_rows_are_out(camera: Bundl
 def test_nothing_clipped_costs_no_window(camera: Bundle) -> None:
     work = start(camera, _mosaic(blurred(street(HEIGHT, WIDTH), star())))
     work.fill()
-    assert work.record["hdr"]["regions"] == 0
+    assert work.sections["hdr"]["regions"] == 0
     assert not any("lights" in note for note in work.warnings)
 
 
@@ -196,7 +196,7 @@ def test_whoever_waits_may_stop_before_a_window(camera: Bundle, light: FloatArra
     walk.settle()
     with pytest.raises(Cancelled):
         list(walk.stream("lit").bands())
-    assert "hdr" not in job.record
+    assert "hdr" not in job.sections
 
 
 def test_the_depth_asked_for_is_that_of_the_kernels(tmp_path: Path, light: FloatArray) -> None:
