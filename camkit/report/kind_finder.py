@@ -30,6 +30,22 @@ def find_part(kind: str, tool: str, expected: type[_T]) -> _T:
     return part
 
 
+def check_photographs(manifest: Manifest, instead: str) -> None:
+    """Refuse a bundle that only takes captures that are there.
+
+    Args:
+        manifest: Of the bundle.
+        instead: What to do with it, for the message.
+
+    Raises:
+        ContractError: If it states no optics.
+    """
+    if manifest.optics is None:
+        raise ContractError(
+            f"{manifest.name} states no optics, so nothing can be photographed with it; {instead}"
+        )
+
+
 def camera_of(manifest: Manifest) -> tuple[object, ...]:
     """Give what two bundles of one camera have in common."""
     return manifest.kind, manifest.sensor

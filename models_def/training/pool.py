@@ -25,10 +25,9 @@ from numpy.typing import NDArray
 
 from camkit.errors import ContractError
 from camkit.models_def.training.kind import Material, SampleMaker, read_recipe, training_kind
-from camkit.models_def.training.recipe import Recipe
+from camkit.models_def.training.recipe import AHEAD, Recipe
 from camkit.models_def.training.sample import Batch, Sample, SampleLayout
 
-AHEAD: Final = 32
 MAX_WORKERS: Final = 16
 POLL_S: Final = 0.02
 RECIPE: Final = "recipe.toml"

@@ -20,6 +20,8 @@ from camkit.models_def.toml_table import check_keys, section, typed
 
 LOSSES = ("log_mse", "mse")
 PRECISIONS = ("float32", "bfloat16")
+AHEAD: Final = 32
+"""Samples made beyond those that a step may draw; their slots are taken."""
 COMMON: Final = frozenset({"name", "kind", "sensor", "data", "schedule", "networks"})
 DEFAULT_KIND: Final = "bayer"
 
@@ -50,7 +52,7 @@ class DataRecipe:
         procedural_scenes: Different procedural scenes of `scene_px` a side.
         scene_px: Side of a procedural scene.
         sample_px: Side of a finished sample; training patches are cut from it.
-        pool_samples: Samples held on disk at one time.
+        pool_samples: Samples held on disk at one time; more than `AHEAD`.
         first_samples: Samples that must exist before the first step.
         steps_per_sample: Training steps after which one more sample replaces the oldest.
     """
@@ -67,6 +69,11 @@ class DataRecipe:
         check_share("data.picture_share", self.picture_share)
         if not 0 < self.first_samples < self.pool_samples:
             raise ContractError("data.first_samples must lie between 0 and pool_samples")
+        if self.pool_samples <= AHEAD:
+            raise ContractError(
+                f"data.pool_samples must exceed the {AHEAD} samples that are made ahead of training"
+                f"; got {self.pool_samples}"
+            )
         if min(self.sample_px, self.scene_px, self.procedural_scenes, self.steps_per_sample) < 1:
             raise ContractError("sizes and counts of data must be positive")
 

@@ -30,10 +30,11 @@ from camkit.report.bench.timed.capture import SCENE_TEXT, timed_capture
 from camkit.report.bench.timed.process_run import Job, Run, run_job
 from camkit.report.bench.timed.timing import interleaved
 from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
-from camkit.report.kind_finder import camera_of, find_part
+from camkit.report.kind_finder import camera_of, check_photographs, find_part
 from camkit.report.quality import LIGHT_SUFFIXES, list_set, read_picture
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads, usable_providers
+from camkit.runtime.plan.ways import offered_methods
 
 REPORT_VERSION: Final = 1
 Tell = Callable[[str], None]
@@ -93,9 +94,7 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     )
     trials, skips = make_trials(entrants, settings.axes, ground)
     if not trials:
-        raise ContractError(
-            f"nothing to measure: {'; '.join(f'{s.what}: {s.reason}' for s in skips)}"
-        )
+        raise ContractError(_nothing(entrants, skips))
     cameras = {}
     for entrant in entrants:
         if not entrant.is_reference:
@@ -114,6 +113,17 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     return _join(trials, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
 
 
+def _nothing(entrants: Sequence[Entrant], skips: Sequence[Skip]) -> str:
+    """Say why there is nothing to measure, and what there is."""
+    why = [f"{skip.what}: {skip.reason}" for skip in skips]
+    have = [
+        f"{entrant.label} has {', '.join(offered_methods(manifest.stages, manifest.all_planes))}"
+        for entrant in entrants
+        if (manifest := entrant.bundle.manifest)
+    ]
+    return f"nothing to measure: {'; '.join([*why, *have])} (--methods)"
+
+
 def _check(settings: Settings, bundles: Sequence[Bundle]) -> None:
     """Refuse settings and pictures that do not fit the cameras, before anything is timed."""
     known = {name for b in bundles for m in metrics_of(b.manifest) for name in m.takes}
@@ -121,6 +131,12 @@ def _check(settings: Settings, bundles: Sequence[Bundle]) -> None:
         raise ContractError(
             f"none of these cameras is judged by a metric that takes {', '.join(unknown)}"
         )
+    if settings.data is not None or settings.saturate is not None:
+        for bundle in bundles:
+            check_photographs(
+                bundle.manifest,
+                "leave out --data and --saturate: its golden cases say how well it does",
+            )
     sources = [find_part(b.manifest.kind, "bench", BenchPart).source for b in bundles]
     if settings.saturate is not None and settings.data is None and None in sources:
         raise ContractError("a share to saturate is one of pictures; give their folder as data")

@@ -16,6 +16,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.report.kind_finder import check_photographs
 from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.shot import NOISE_SEED, Shot
@@ -114,9 +115,12 @@ class Rig:
             chosen: Further fields of `Options`, for all methods.
 
         Raises:
-            ContractError: If the bundle lacks a size.
+            ContractError: If the bundle states no optics, or lacks a size.
             UnsupportedError: If its sensor counts photons.
         """
+        check_photographs(
+            bundle.manifest, "stress is for cameras (`camkit bench --capture FILE` measures it)"
+        )
         self.bundle = bundle
         self.before = before
         self.sensor = light_sensor(bundle.manifest)

@@ -4,7 +4,8 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.material import BayerMaterial
-from camkit.models_def.training.pool import AHEAD, MAX_WORKERS, open_pool
+from camkit.models_def.training.pool import MAX_WORKERS, open_pool
+from camkit.models_def.training.recipe import AHEAD
 from tests.gaussian_bank import gaussian_bank
 
 

@@ -6,6 +6,7 @@ from camkit.bundle.sensor import PlanesSensor
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.training.kind import to_recipe, training_kind
 from camkit.models_def.training.recipe import (
+    AHEAD,
     DataRecipe,
     Recipe,
     common_tables,
@@ -97,6 +98,7 @@ def test_wrong_common_tables_are_refused_by_naming_the_key(change, message):
     ("change", "message"),
     [
         ({"first_samples": 9, "pool_samples": 9}, "between 0 and pool_samples"),
+        ({"first_samples": 9, "pool_samples": AHEAD}, "must exceed the 32 samples .* got 32$"),
         ({"picture_share": -0.1}, r"picture_share must lie in 0\.\.1"),
         ({"scene_px": 0}, "must be positive"),
     ],

@@ -10,10 +10,11 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Sensor
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.report.kind_finder import check_photographs
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.kind import part_of
 from camkit.runtime.network.engine import available_threads
-from camkit.runtime.twin.simulate import SimulationOptions
+from camkit.runtime.twin.simulate import SimulationOptions, photograph
 from camkit.scenes import procedural_scene
 
 SCENE_SEED: Final = 7
@@ -46,10 +47,13 @@ def timed_capture(
         The file and its (width, height).
 
     Raises:
-        ContractError: If the size does not fit the sensor, or the photo is smaller.
+        ContractError: If the bundle states no optics for camkit's own twin, the size does not fit
+            the sensor, or the photo is smaller.
         UnsupportedError: If the camera cannot be simulated.
     """
     manifest, part = bundle.manifest, part_of(bundle.manifest)
+    if part.simulate is photograph:
+        check_photographs(manifest, "give a capture to time with --capture FILE")
     width, height = _sides(manifest.sensor, width_px, height_px, bundle.path.name)
     optics = manifest.optics
     lens = None if optics is None else manifest.members[optics.member].sha256

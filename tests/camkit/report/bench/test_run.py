@@ -29,6 +29,7 @@ from camkit.runtime.twin.saturation import saturation_of
 from camkit.runtime.twin.truth import light_sensor, true_picture
 from camkit.scenes.saturation import CEILING
 from tests.bundle_factory import write_tiny_bundle
+from tests.glare_bundle import write_glare_bundle
 from tests.hdr_bundle import write_hdr_bundle
 from tests.hdr_pictures import hdr_pair
 from tests.psf_factory import texture
@@ -346,6 +347,32 @@ def test_nothing_to_measure_is_an_error_with_the_reasons(tmp_path: Path) -> None
     )
     with pytest.raises(ContractError, match="tiny L: the bundle holds M"):
         run_bench(settings)
+
+
+def test_methods_that_no_bundle_has_are_answered_with_those_it_has(tmp_path: Path) -> None:
+    path = write_glare_bundle(tmp_path)
+    quick = Settings(bundles=(str(path),), axes=Axes(methods=("net", "wiener")), work_dir=tmp_path)
+    with pytest.raises(ContractError, match=r"deglare has .*deglare.* \(--methods\)$"):
+        run_bench(quick)
+
+
+@pytest.mark.parametrize(
+    ("changes", "instead"),
+    [
+        ({}, "give a capture to time with --capture FILE"),
+        ({"small": True}, "give a capture to time with --capture FILE"),
+        ({"data": Path("pictures")}, "leave out --data and --saturate"),
+        ({"saturate": 0.015}, "leave out --data and --saturate"),
+    ],
+)
+def test_a_bundle_without_optics_photographs_nothing(
+    changes: dict[str, Any], instead: str, tmp_path: Path
+) -> None:
+    path = write_glare_bundle(tmp_path)
+    settings = Settings(bundles=(str(path),), work_dir=tmp_path / "kept", **changes)
+    with pytest.raises(ContractError, match=f"deglare states no optics, .*; {instead}"):
+        run_bench(settings)
+    assert list((tmp_path / "kept").glob("*")) == []
 
 
 @pytest.mark.parametrize(

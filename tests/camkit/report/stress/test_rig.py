@@ -1,22 +1,24 @@
 """What the rig restores is what the pipeline restores, and it photographs as `simulate` does."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from camkit.bundle.reader import Bundle
+from camkit.bundle.reader import Bundle, open_bundle
 from camkit.colorimetry import encode_srgb
 from camkit.errors import ContractError
 from camkit.report.stress.rig import INPUT, Rig, restored_plane
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge
+from camkit.report.stress.score import Judge, judge_of
 from camkit.report.stress.shot import NOISE_SEED
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.exposure import Setting
 from camkit.runtime.twin.simulate import SimulationOptions, simulate
+from tests.glare_bundle import write_glare_bundle
 
 
 @pytest.mark.parametrize(
@@ -112,6 +114,11 @@ def test_a_network_that_explodes_is_a_fault_and_not_a_picture(bundle: Bundle, sc
     outcome = Judge(rig).score(rig.shoot(scene)).outcomes["M"]
     assert outcome.psnr_db is None
     assert "tile (row 0, column 0)" in (outcome.fault or "")
+
+
+def test_a_bundle_without_optics_is_no_camera_and_not_stressed(tmp_path: Path) -> None:
+    with pytest.raises(ContractError, match=r"deglare states no optics, .* stress is for cameras"):
+        judge_of(open_bundle(write_glare_bundle(tmp_path)), (), None)
 
 
 def test_a_size_that_the_bundle_lacks_is_refused(bundle: Bundle) -> None:
