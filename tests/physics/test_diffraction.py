@@ -186,6 +186,20 @@ def test_cells_that_are_too_wide_are_refused_with_their_limit() -> None:
         plate_psf(_bare(1024), INDEX, WAVE_UM, bench=_lens(), grid=wide)
 
 
+def test_one_sample_a_fringe_holds_the_light_and_fewer_are_refused() -> None:
+    """What falls outside the band folds onto the sum: two per pixel lose 27 % of this core."""
+    bench = Bench(diameter_mm=9.162, focal_length_mm=50, focus_mm=5000)
+    sums = []
+    for samples in (3, None):
+        grid = PixelGrid(side_px=31, pitch_um=5.97, samples=samples)
+        psf = plate_psf(_bare(382), INDEX, 0.46, bench=bench, grid=grid, depth_mm=5000)
+        sums.append(float(psf.sum()))
+    assert sums[0] == pytest.approx(sums[1], abs=2e-3)
+    two = PixelGrid(side_px=31, pitch_um=5.97, samples=2)
+    with pytest.raises(ContractError, match=r"2 samples per pixel .* 0\.460 um: at least 3"):
+        plate_psf(_bare(382), INDEX, 0.46, bench=bench, grid=two, depth_mm=5000)
+
+
 @pytest.mark.parametrize(
     "height_um", [torch.zeros(3, 4), torch.zeros(3), torch.zeros(4, 4, dtype=torch.int64)]
 )

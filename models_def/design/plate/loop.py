@@ -1,8 +1,11 @@
 """The steps of a design: Adam on the numbers of a map, colour by colour.
 
 Every step computes the PSF of each colour and carries its loss back to the heights before the next
-one begins, so that memory is that of one colour. Nothing is drawn but etch errors, which follow
-from seed and step: a resumed run ends in the same bits.
+one begins, so that memory is that of one colour. What is drawn (etch errors, and with a reader its
+patches) follows from seed and step: a resumed run ends in the same bits.
+
+With a reader the PSFs are computed twice: once for the network, which takes its steps and gives the
+slope of the picture's loss to them, and once to carry that slope and the goal's to the heights.
 """
 
 import math
@@ -15,6 +18,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.design.plate.goal import Reached, goal_loss, masks_of, reached
+from camkit.models_def.design.plate.reader import Picture, PlateReader
 from camkit.models_def.design.plate.recipe import PlateRecipe
 from camkit.models_def.optics.diffraction.map_numbers import HeightMap
 from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
@@ -31,9 +35,11 @@ class Moment:
     Attributes:
         step: Steps done.
         seconds: Since the loop was made or resumed.
-        loss: Mean over colours, of the plate as it is made.
+        loss: Mean over colours, of the plate as it is made; with a reader its weighted loss on
+            fixed patches is added.
         best_loss: The least so far.
         reached: What the colours have of the goal.
+        picture: How the reader does; None without one.
     """
 
     step: int
@@ -41,24 +47,29 @@ class Moment:
     loss: float
     best_loss: float
     reached: Reached
+    picture: Picture | None = None
 
 
 class PlateLoop:
     """Runs a design."""
 
-    def __init__(self, recipe: PlateRecipe, made: HeightMap) -> None:
+    def __init__(
+        self, recipe: PlateRecipe, made: HeightMap, reader: PlateReader | None = None
+    ) -> None:
         """Make ready.
 
         Args:
             recipe: What is wanted.
             made: The map to begin at; its numbers move.
+            reader: The network of a joint design.
 
         Raises:
             ContractError: If the window does not hold the streaks, or the cells are too wide.
         """
-        self.recipe, self.made = recipe, made.float()
+        self.recipe, self.made, self.reader = recipe, made.float(), reader
         self.step, self.best_loss = 0, math.inf
         self.best: State = {}
+        self.best_network: State = {}
         pixels = recipe.pixels
         self._grid = PixelGrid(
             side_px=pixels.side_px, pitch_um=pixels.pitch_um, samples=pixels.samples or None
@@ -66,10 +77,7 @@ class PlateLoop:
         waves = torch.tensor(pixels.wavelengths_um, dtype=torch.float64)
         self._index = refractive_index(find_glass(recipe.glass), waves).tolist()
         self._masks = masks_of(recipe.goal, pixels.side_px)
-        with torch.no_grad():
-            flat = torch.zeros(recipe.cells, recipe.cells)
-            colours = range(len(pixels.wavelengths_um))
-            self._bare = torch.stack([self._light(flat, colour) for colour in colours])
+        self._bare = self._lights(torch.zeros(recipe.cells, recipe.cells))
         self._optimizer = torch.optim.Adam(self.made.parameters(), lr=recipe.schedule.rate)
 
     def run(self, until: int | None = None, seconds: float = math.inf) -> Iterator[Moment]:
@@ -88,45 +96,73 @@ class PlateLoop:
                 return
 
     def _one_step(self) -> None:
+        heights = self.made()
+        leaf = heights.detach().requires_grad_()
+        made = self._etched(leaf, self._errors())
+        slopes = self._read(made.detach())
+        if self.reader is None or self.step >= self.reader.chosen.hold_steps:
+            self._move(heights, self._pushed(leaf, made, slopes))
+        self.step += 1
+
+    def _read(self, made: Tensor) -> Tensor | None:
+        """Let the network take its steps; give the slopes (colour, side, side) of its loss."""
+        if self.reader is None:
+            return None
+        progress = self.step / self.recipe.schedule.steps
+        slopes, _ = self.reader.follow(self._lights(made), self.step, progress)
+        return self.reader.chosen.weight * slopes
+
+    def _pushed(self, leaf: Tensor, made: Tensor, slopes: Tensor | None) -> Tensor:
+        """Give the slope of all losses to the heights."""
+        etched, count = self.recipe.schedule.etched, len(self._bare)
+        pushed = torch.zeros_like(leaf)
+        for colour in range(count):
+            light = self._light(made, colour)
+            loss = goal_loss(light, self._bare[colour], self._masks, self.recipe.goal) / count
+            if slopes is not None:
+                loss = loss + (light * slopes[colour]).sum()
+            (found,) = torch.autograd.grad(loss, leaf, retain_graph=etched)
+            pushed += found
+        return pushed
+
+    def _move(self, heights: Tensor, pushed: Tensor) -> None:
         schedule = self.recipe.schedule
         for group in self._optimizer.param_groups:
             group["lr"] = schedule.rate * (1 - self.step / schedule.steps)
         self._optimizer.zero_grad(set_to_none=True)
-        heights = self.made()
-        leaf = heights.detach().requires_grad_()
-        made = self._etched(leaf, self._errors())
-        count = len(self._bare)
-        pushed = torch.zeros_like(leaf)
-        for colour in range(count):
-            loss = goal_loss(
-                self._light(made, colour), self._bare[colour], self._masks, self.recipe.goal
-            )
-            (found,) = torch.autograd.grad(loss / count, leaf, retain_graph=schedule.etched)
-            pushed += found
-        heights.backward(pushed)
+        heights.backward(pushed)  # type: ignore[no-untyped-call]
         self._optimizer.step()
-        self.step += 1
 
     def judge(self, seconds: float = 0.0) -> Moment:
         """Look at the present map, made without errors; the best are kept."""
         with torch.no_grad():
             made = self._etched(self.made(), ())
-            light = torch.stack([self._light(made, c) for c in range(len(self._bare))])
+            light = self._lights(made)
             losses = [
                 float(goal_loss(one, bare, self._masks, self.recipe.goal))
                 for one, bare in zip(light, self._bare, strict=True)
             ]
-        loss = sum(losses) / len(losses)
+        loss, picture = sum(losses) / len(losses), None
+        if self.reader is not None:
+            picture = self.reader.judge(light)
+            loss += self.reader.chosen.weight * picture.loss
         if loss < self.best_loss:
             self.best_loss = loss
             self.best = {name: value.clone() for name, value in self.made.state_dict().items()}
+            self.best_network = {} if self.reader is None else self.reader.average()
         return Moment(
             step=self.step,
             seconds=seconds,
             loss=loss,
             best_loss=self.best_loss,
             reached=reached(light, self._bare, self._masks),
+            picture=picture,
         )
+
+    def _lights(self, height_um: Tensor) -> Tensor:
+        """Give the PSFs (colour, side, side), without gradients."""
+        with torch.no_grad():
+            return torch.stack([self._light(height_um, c) for c in range(len(self._index))])
 
     def _light(self, height_um: Tensor, colour: int) -> Tensor:
         bench = self.recipe.bench
@@ -155,18 +191,23 @@ class PlateLoop:
         return tuple((schedule.depth_error * drawn).tolist())
 
     def take_best(self) -> None:
-        """Put the best map in place."""
+        """Put the best map in place, and the network that read it then."""
         self.made.load_state_dict(self.best)
+        if self.reader is not None:
+            self.reader.take_average(self.best_network)
 
     def state(self) -> State:
-        """Give all that a resumed run needs."""
-        return {
+        """Give all that a resumed run needs; `weights` is where others look for a network."""
+        state = {
             "step": self.step,
             "best_loss": self.best_loss,
             "best": self.best,
             "map": self.made.state_dict(),
             "optimizer": self._optimizer.state_dict(),
         }
+        if self.reader is not None:
+            state |= {"weights": {"network": self.best_network}, "reader": self.reader.state()}
+        return state
 
     def load(self, state: State) -> None:
         """Go on from a state."""
@@ -174,3 +215,6 @@ class PlateLoop:
         self.best = state["best"]
         self.made.load_state_dict(state["map"])
         self._optimizer.load_state_dict(state["optimizer"])
+        if self.reader is not None:
+            self.best_network = state["weights"]["network"]
+            self.reader.load(state["reader"])

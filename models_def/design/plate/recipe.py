@@ -1,4 +1,4 @@
-"""A design of a plate as TOML: bench, map, goal, pixels, how it is etched, how it runs."""
+"""A design of a plate as TOML: bench, map, goal, pixels, etching, how it runs, who reads it."""
 
 import hashlib
 import json
@@ -9,12 +9,13 @@ from typing import Any, Final, Literal, get_args
 
 from camkit.errors import ContractError
 from camkit.models_def.design.plate.goal import Goal
+from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
 from camkit.models_def.optics.diffraction.fabrication import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
 from camkit.models_def.toml_table import check_keys, read_table, section, typed
 
 MapKind = Literal["full", "rank", "gratings", "zernike", "radial"]
-_TABLES: Final = ("bench", "map", "goal", "pixels", "etching", "schedule")
+_TABLES: Final = ("bench", "map", "goal", "pixels", "etching", "schedule", "reader")
 _KEYS: Final = {"name", "glass", "cells", *_TABLES}
 
 
@@ -127,7 +128,7 @@ class PlateSchedule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateRecipe:
-    """A design of a plate."""
+    """A design of a plate; with a `reader` a network is fitted along."""
 
     name: str
     glass: str
@@ -138,6 +139,7 @@ class PlateRecipe:
     pixels: PlatePixels
     schedule: PlateSchedule
     etching: Etching | None = None
+    reader: ReaderRecipe | None = None
 
 
 def read_plate_recipe(path: Path) -> PlateRecipe:
@@ -165,6 +167,7 @@ def to_plate_recipe(table: Mapping[str, Any]) -> PlateRecipe:
         pixels=section("pixels", PlatePixels, table.get("pixels", {})),
         schedule=section("schedule", PlateSchedule, table.get("schedule", {})),
         etching=section("etching", Etching, table["etching"]) if "etching" in table else None,
+        reader=section("reader", ReaderRecipe, table["reader"]) if "reader" in table else None,
     )
     if recipe.schedule.etched and recipe.etching is None:
         raise ContractError("schedule.etched needs a table [etching]")
@@ -184,4 +187,7 @@ def with_plate_choices(
 
 def plate_recipe_digest(recipe: PlateRecipe) -> str:
     """Give a hash of all that decides a run."""
-    return hashlib.sha256(json.dumps(asdict(recipe), sort_keys=True).encode()).hexdigest()
+    table = asdict(recipe)
+    if recipe.reader is None:  # as before there were readers
+        del table["reader"]
+    return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()

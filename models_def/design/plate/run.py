@@ -13,6 +13,7 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.design.plate.loop import Moment, PlateLoop
 from camkit.models_def.design.plate.maps import begin_map
+from camkit.models_def.design.plate.reader import PlateReader, open_reader, reader_digest
 from camkit.models_def.design.plate.recipe import PlateRecipe, plate_recipe_digest
 from camkit.models_def.optics.diffraction.heights import FullMap
 from camkit.models_def.optics.diffraction.map_numbers import numbers_of
@@ -65,10 +66,26 @@ class PlateRun:
                     f"{there[0]} is there already: give --resume to go on or --overwrite"
                 )
         torch.set_num_threads(options.threads)
-        self.loop = PlateLoop(recipe, begin_map(recipe, options.recipe_folder))
+        self.digest = plate_recipe_digest(recipe)
+        made = begin_map(recipe, options.recipe_folder)
+        self.begun = made().detach().clone()
+        self.loop = PlateLoop(recipe, made, self._reader())
         self._spent_s = self._spent_cpu_s = 0.0
         if options.resume:
             self._load()
+
+    def _reader(self) -> PlateReader | None:
+        recipe, folder = self.recipe, self.options.recipe_folder
+        if recipe.reader is None:
+            return None
+        self.digest += reader_digest(recipe.reader, folder)
+        return open_reader(
+            recipe.reader,
+            psf_px=recipe.pixels.side_px,
+            colours=len(recipe.pixels.wavelengths_um),
+            seed=recipe.schedule.seed,
+            folder=folder,
+        )
 
     def go(self) -> Iterator[Moment]:
         """Run, giving every logged moment, the beginning included, after it is on disk."""
@@ -91,7 +108,7 @@ class PlateRun:
     def _record(self, moment: Moment) -> None:
         table = {
             "format": FORMAT,
-            "digest": plate_recipe_digest(self.recipe),
+            "digest": self.digest,
             "spent_s": self._spent_s,
             "spent_cpu_s": self._spent_cpu_s,
             **self.loop.state(),
@@ -99,7 +116,7 @@ class PlateRun:
         part = self.checkpoint.with_name(self.checkpoint.name + ".part")
         torch.save(table, part)
         part.replace(self.checkpoint)
-        entry = {
+        entry: dict[str, Any] = {
             "step": moment.step,
             "seconds": round(self._spent_s, 3),
             "cpu_s": round(self._spent_cpu_s, 3),
@@ -109,6 +126,7 @@ class PlateRun:
             "streak_share": [round(share, 5) for share in moment.reached.streak_share],
             "far_share": [round(share, 5) for share in moment.reached.far_share],
         }
+        entry |= _told(moment)
         with self.log.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
 
@@ -118,7 +136,7 @@ class PlateRun:
         table = read_table(self.checkpoint)
         if table.get("format") != FORMAT or "digest" not in table:
             raise ContractError(f"{self.checkpoint} is no checkpoint of a plate's design")
-        if table["digest"] != plate_recipe_digest(self.recipe):
+        if table["digest"] != self.digest:
             raise ContractError(
                 f"{self.checkpoint} belongs to another recipe, or to other --steps or --seed; say "
                 "the same again, or give --overwrite or another -o"
@@ -145,7 +163,8 @@ class PlateRun:
             ),
             self.options.out,
         )
-        last = self.loop.judge().reached
+        judged = self.loop.judge()
+        last = judged.reached
         entries = [json.loads(line) for line in self.log.read_text("utf-8").splitlines()]
         return {
             "name": recipe.name,
@@ -162,4 +181,18 @@ class PlateRun:
             "plate": str(self.options.out),
             "checkpoint": str(self.checkpoint),
             "log": str(self.log),
+            **{f"begin_{key}": entries[0][key] for key in _told(judged)},
+            **_told(judged),
         }
+
+
+def _told(moment: Moment) -> dict[str, float]:
+    """Give what the reader makes of fixed patches; nothing without one."""
+    if moment.picture is None:
+        return {}
+    found = moment.picture
+    return {
+        "picture_loss": round(found.loss, 6),
+        "picture_db": round(found.db, 3),
+        "picture_capture_db": round(found.capture_db, 3),
+    }

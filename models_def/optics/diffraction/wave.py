@@ -165,10 +165,10 @@ def _side(height_um: Tensor) -> int:
     return int(height_um.shape[0])
 
 
-def _needed_samples(bench: Bench, grid: PixelGrid, wave_mm: float) -> int:
-    """Give the samples per pixel that the finest fringes of the light need."""
+def _needed_samples(bench: Bench, grid: PixelGrid, wave_mm: float, fringes: float = 2.0) -> int:
+    """Give the samples per pixel that the finest fringes of the light need, two for each."""
     fringe_mm = wave_mm * bench.distance_mm / bench.diameter_mm
-    return max(1, math.ceil(2 * grid.pitch_um / UM_PER_MM / fringe_mm))
+    return max(1, math.ceil(fringes * grid.pitch_um / UM_PER_MM / fringe_mm))
 
 
 def _check_sampling(
@@ -184,6 +184,13 @@ def _check_sampling(
         raise ContractError(
             f"cells of {cell_mm * UM_PER_MM:.2f} um are too wide for the light at the rim at "
             f"{wave_mm * UM_PER_MM:.3f} um: at most {wave_mm / 2 / steep * UM_PER_MM:.2f} um"
+        )
+    least = _needed_samples(bench, grid, wave_mm, 1.0)
+    if grid.samples is not None and grid.samples < least:
+        # sums of light over pixels hold with one sample a fringe, and not with fewer
+        raise ContractError(
+            f"{grid.samples} samples per pixel are too few for the finest fringes of the light at "
+            f"{wave_mm * UM_PER_MM:.3f} um: at least {least}"
         )
     half_mm = grid.side_px * grid.pitch_um / 2 / UM_PER_MM
     reach_mm = wave_mm * bench.distance_mm / (2 * cell_mm)

@@ -31,7 +31,10 @@ def design(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Design the relief of a plate by gradients, for masks on the sensor (needs torch)."""
+    """Design the relief of a plate by gradients, for masks on the sensor (needs torch).
+
+    With a table [reader] in the recipe a network that recovers its pictures is fitted along.
+    """
     from camkit.cli.design.design_time import require_torch
 
     require_torch("camkit plate design")
@@ -68,9 +71,12 @@ def _line(moment: "Moment") -> str:
             moment.reached.far_share,
         )
     )
+    found = moment.picture
+    read = "" if found is None else f", read at {found.db:.2f} dB (capture {found.capture_db:.2f})"
     return (
         f"step {moment.step}: loss {moment.loss:.5f} (best {moment.best_loss:.5f}), core {core} % "
-        f"of the bare lens's, written {streak} %, of it far out {far} %, {moment.seconds:.0f} s"
+        f"of the bare lens's, written {streak} %, of it far out {far} %{read}, "
+        f"{moment.seconds:.0f} s"
     )
 
 

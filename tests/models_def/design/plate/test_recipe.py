@@ -1,5 +1,8 @@
 """Recipes of plates: those that are shipped can begin, wrong ones are one error."""
 
+import hashlib
+import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +48,15 @@ def test_choices_replace_what_the_recipe_says() -> None:
     assert plate_recipe_digest(chosen) != plate_recipe_digest(recipe)
 
 
+def test_a_reader_decides_a_run_too_and_none_leaves_older_checkpoints_their_digest() -> None:
+    alone = to_plate_recipe(table())
+    read = to_plate_recipe(table(reader={"recipe": "x.toml", "size": "S"}))
+    assert plate_recipe_digest(read) != plate_recipe_digest(alone)
+    older = {key: value for key, value in asdict(alone).items() if key != "reader"}
+    text = json.dumps(older, sort_keys=True).encode()
+    assert plate_recipe_digest(alone) == hashlib.sha256(text).hexdigest()
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -60,6 +72,9 @@ def test_choices_replace_what_the_recipe_says() -> None:
         ({"schedule": {"etched": True}}, r"needs a table \[etching\]"),
         ({"schedule": {"depth_error": 0.1}}, "needs etched = true"),
         ({"schedule": 3}, "schedule must be a table"),
+        ({"reader": {"recipe": "x.toml"}}, "reader lacks size"),
+        ({"reader": {"recipe": "x.toml", "size": "S", "batch": 0}}, "batch, patch_px, scenes"),
+        ({"reader": {"recipe": "x.toml", "size": "S", "weight": -1.0}}, "weight >= 0"),
         ({"cells": "many"}, "cells must be of type int"),
         ({"etching": {"range_um": 0.3, "levels": 1}}, "levels are 2, 4, 8"),
     ],

@@ -8,6 +8,8 @@ import pytest
 from camkit.cli.app import run
 from camkit.cli.exit_code import ExitCode
 from camkit.models_def.optics.diffraction.plate import read_plate
+from camkit.models_def.training.first_weights import read_first_weights
+from tests.models_def.design.plate.joint_recipe import READER, write_camera
 
 RECIPE = """
 name = "small"
@@ -95,6 +97,42 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_plate(
     assert "belongs to another recipe" in capsys.readouterr().err
     parts.with_suffix(".pt").write_bytes(b"none")
     assert run([*words, "--resume"]) != ExitCode.DONE
+
+
+def test_a_joint_design_tells_how_it_is_read_and_another_begins_at_its_end(
+    recipe: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = recipe.parent
+    write_camera(folder)
+    lines = [f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v}" for k, v in READER.items()]
+    text = RECIPE.replace("[0.55]", "[0.46, 0.54, 0.61]") + "\n[reader]\n" + "\n".join(lines)
+    recipe.write_text(text, encoding="utf-8")
+    out = folder / "joint.toml"
+    assert run(["plate", "design", str(recipe), "-o", str(out), "--json"]) == ExitCode.DONE
+    told = capsys.readouterr()
+    report = json.loads(told.out)
+    assert report["picture_loss"] < report["begin_picture_loss"]
+    assert {"picture_db", "picture_capture_db", "begin_picture_db"} <= report.keys()
+    assert all("read at " in line for line in told.err.strip().splitlines())
+    logged = [json.loads(line) for line in out.with_suffix(".jsonl").read_text().splitlines()]
+    assert [entry["step"] for entry in logged] == [0, 2, 4]
+    best = min(logged, key=lambda entry: entry["loss"])
+    assert best["picture_loss"] == pytest.approx(report["picture_loss"], abs=2e-6)
+    words = ["plate", "design", str(recipe), "-o", str(out)]
+    assert run([*words, "--resume"]) == ExitCode.DONE
+    first = read_first_weights(out.with_suffix(".pt"), "small", "whole")
+    assert first.whose == "the joint design joint"
+    # plate and network go on together from where they were
+    begin = 'kind = "rank"\nbegin = "joint.toml"'
+    later = text.replace('kind = "rank"', begin) + '\nbegin = "joint.pt"\n'
+    recipe.write_text(later, encoding="utf-8")
+    on = folder / "later.toml"
+    assert run(["plate", "design", str(recipe), "-o", str(on), "--json"]) == ExitCode.DONE
+    report_on = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert report_on["begin_picture_loss"] == pytest.approx(report["picture_loss"], abs=2e-6)
+    (folder / "camera.toml").write_text("# another\n" + (folder / "camera.toml").read_text())
+    assert run(["plate", "design", str(recipe), "-o", str(on), "--resume"]) == ExitCode.USAGE
+    assert "belongs to another recipe" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,250 @@
+"""The network of a joint design: it learns to read a plate, and tells the plate where to go.
+
+    PSFs -- kernels -- captures of nights -- network -- picture's loss, eq. (5.11)
+      '------------------ slope of the loss to the PSFs ------------'
+
+The network takes and gives roots of linear light, as those of the role `whole` do. Heights are not
+known here: the loop carries the slope from the PSFs to them.
+"""
+
+import hashlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from camkit.errors import ContractError
+from camkit.models_def.design.plate.nights import TRAIN_SEED, VALID_SEED, Nights, Patches
+from camkit.models_def.design.plate.reader_recipe import ReaderRecipe
+from camkit.models_def.design.plate.recording import recorded, whole_kernels
+from camkit.models_def.kinds.hdr.recipe import HdrRecipe
+from camkit.models_def.kinds.hdr.thesis.losses import EPSILON, GAMMA, HUBER
+from camkit.models_def.kinds.hdr.thesis.networks import THESIS_NAMES
+from camkit.models_def.kinds.hdr.thesis.samples import layout_of
+from camkit.models_def.kinds.hdr.validation import MOST_DB
+from camkit.models_def.networks.catalog import build_network, check_patch
+from camkit.models_def.sensors.forward import blur
+from camkit.models_def.training.first_weights import FirstWeights, read_first_weights
+from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.kind import read_recipe
+from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.trainer import check_layout
+from camkit.scenes.saturation import CEILING
+
+ROLE: Final = "whole"
+COLOURS: Final = 3
+_FLOOR: Final = 1e-5
+"""The root of zero has no slope."""
+
+State = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """How fixed patches are read.
+
+    Attributes:
+        loss: Eq. (5.11).
+        db: Mean PSNR of linear light, peak 2^8.
+        capture_db: The same of the captures themselves.
+    """
+
+    loss: float
+    db: float
+    capture_db: float
+
+
+class PlateReader:
+    """A network, its captures, its fitter."""
+
+    def __init__(
+        self,
+        chosen: ReaderRecipe,
+        camera: HdrRecipe,
+        *,
+        psf_px: int,
+        seed: int,
+        first: FirstWeights | None = None,
+    ) -> None:
+        """Make ready.
+
+        Args:
+            chosen: Of the recipe of the plate.
+            camera: The one that `chosen` names.
+            psf_px: Odd side of the PSFs.
+            seed: Of weights and draws.
+            first: First weights; None for random ones.
+
+        Raises:
+            ContractError: If there is no such network, or it does not take the patches.
+        """
+        self.chosen, self._seed = chosen, seed
+        self._entry = _entry(chosen, camera, seed)
+        data = replace(camera.data, sample_px=chosen.patch_px, capture_px=chosen.patch_px)
+        camera = replace(camera, data=data)
+
+        def nights(first_seed: int, count: int) -> Nights:
+            return Nights(
+                camera,
+                first_seed=first_seed,
+                count=count,
+                scene_px=chosen.scene_px,
+                psf_px=psf_px,
+            )
+
+        self._nights = nights(TRAIN_SEED, chosen.scenes)
+        self._valid_nights = nights(VALID_SEED, chosen.valid_patches)
+        self._valid: Patches | None = None
+        self.fitter = Fitter(self._entry, build_network, "cpu", first)
+
+    def follow(self, light: Tensor, step: int, progress: float) -> tuple[Tensor, float]:
+        """Take the network's steps behind the present plate.
+
+        Args:
+            light: (3, n, n) PSFs, shares of the light.
+            step: Of the plate, done before.
+            progress: How much of the schedule lies behind, 0..1.
+
+        Returns:
+            Slope of the picture's loss to the PSFs, its mean over the steps, and the mean loss.
+        """
+        leaf = light.detach().requires_grad_()
+        losses = []
+        for k in range(self.chosen.network_steps):
+            number = step * self.chosen.network_steps + k
+            patches = self._nights.draw(
+                np.random.default_rng((self._seed, number)), self.chosen.batch
+            )
+            given, truth = self._exposures(leaf, patches)
+            loss = picture_loss(self.fitter.run(given, progress), truth)
+            self.fitter.descend(loss, number, progress)
+            losses.append(float(loss.detach()))
+        return torch.as_tensor(leaf.grad) / len(losses), float(np.mean(losses))
+
+    def judge(self, light: Tensor) -> Picture:
+        """Read fixed patches behind PSFs (3, n, n), by the averaged network."""
+        if self._valid is None:
+            rng = np.random.default_rng((VALID_SEED, self.chosen.patch_px))
+            self._valid = self._valid_nights.draw(rng, self.chosen.valid_patches)
+        with torch.no_grad():
+            given, truth = self._exposures(light, self._valid)
+            found = self.fitter.restore(given)
+            return Picture(
+                loss=float(picture_loss(found, truth)),
+                db=_psnr_db(found, truth),
+                capture_db=_psnr_db(given, truth),
+            )
+
+    def _exposures(self, light: Tensor, patches: Patches) -> tuple[Tensor, Tensor]:
+        """Give roots of captures (b, 3, p, p) and the true light there."""
+        spread = blur(patches.sharp, whole_kernels(light)[None]).clamp(min=0)
+        captured = recorded(
+            spread,
+            self._nights.pixels,
+            shot=patches.shot,
+            read_variance=patches.read_variance,
+            normal=patches.normal,
+        )
+        edge = light.shape[-1] // 2
+        inner = slice(edge, patches.sharp.shape[-1] - edge)
+        return (captured.clamp(min=0) + _FLOOR).sqrt(), patches.sharp[..., inner, inner]
+
+    def average(self) -> State:
+        """Give the averaged weights."""
+        return self.fitter.average()
+
+    def take_average(self, state: State) -> None:
+        """Put averaged weights in place."""
+        self.fitter.averaged.load_state_dict(state)
+
+    def state(self) -> State:
+        """Give all that a resumed run needs."""
+        return {
+            "weights": self.fitter.weights(),
+            "average": self.fitter.average(),
+            "optimizer": self.fitter.optimizer_state(),
+        }
+
+    def load(self, state: State) -> None:
+        """Go on from a state."""
+        self.fitter.load(state["weights"], state["average"], state["optimizer"])
+
+
+def open_reader(
+    chosen: ReaderRecipe, *, psf_px: int, colours: int, seed: int, folder: Path | None = None
+) -> PlateReader:
+    """Open the reader of a recipe.
+
+    Args:
+        chosen: The table [reader].
+        psf_px: Odd side of the PSFs.
+        colours: Of the plate's recipe.
+        seed: Of weights and draws.
+        folder: For relative paths.
+
+    Raises:
+        ContractError: If the camera's recipe or the first weights cannot be read or do not fit.
+    """
+    camera = read_recipe(_beside(chosen.recipe, folder))
+    if not isinstance(camera, HdrRecipe):
+        raise ContractError(
+            f'reader.recipe must be that of a camera of the kind "hdr"; {chosen.recipe} is of the '
+            f"kind {camera.kind!r}"
+        )
+    if colours != COLOURS:
+        raise ContractError(
+            f"a reader wants pixels.wavelengths_um for R, G and B, {COLOURS} of them; got {colours}"
+        )
+    first = None
+    if chosen.begin:
+        first = read_first_weights(_beside(chosen.begin, folder), chosen.size, ROLE)
+    return PlateReader(chosen, camera, psf_px=psf_px, seed=seed, first=first)
+
+
+def reader_digest(chosen: ReaderRecipe, folder: Path | None) -> str:
+    """Give a hash of the camera's recipe and the first weights, which the table only names."""
+    found = hashlib.sha256()
+    for name in filter(None, (chosen.recipe, chosen.begin)):
+        path = _beside(name, folder)
+        found.update(path.read_bytes() if path.is_file() else name.encode())
+    return found.hexdigest()
+
+
+def picture_loss(roots: Tensor, light: Tensor) -> Tensor:
+    """Give the Huber loss of roots, eq. (5.11).
+
+    Args:
+        roots: (b, 3, h, w) of a network: what it takes for the root of light.
+        light: (b, 3, h, w) linear, the truth.
+    """
+    return torch.nn.functional.huber_loss(roots, (light + EPSILON) ** GAMMA, delta=HUBER)
+
+
+def _psnr_db(roots: Tensor, light: Tensor) -> float:
+    gap = roots.clamp(min=0).square().clamp(max=CEILING) - light.clamp(max=CEILING)
+    mean = gap.double().square().mean((1, 2, 3)).clamp(min=1e-30)
+    db = (10 * torch.log10(CEILING**2 / mean)).clamp(max=MOST_DB)
+    return float(db.mean())
+
+
+def _entry(chosen: ReaderRecipe, camera: HdrRecipe, seed: int) -> NetworkRecipe:
+    entry = camera.network(chosen.size, ROLE)
+    if entry.network in THESIS_NAMES:
+        raise ContractError(
+            f"reader.size {chosen.size}: {entry.network} is trained by losses of its own through "
+            "VGG-19; take a network from the capture to the picture, lean_s say"
+        )
+    # slopes of a plate are small differences
+    schedule = replace(entry.schedule, precision="float32", seed=seed)
+    network = build_network(entry.network, **entry.config)
+    check_patch(entry.network, network, chosen.patch_px)
+    check_layout(entry.network, network, layout_of(camera, ROLE))
+    return replace(entry, schedule=schedule)
+
+
+def _beside(name: str, folder: Path | None) -> Path:
+    beside = Path(name) if folder is None else folder / name
+    return beside if beside.is_file() else Path(name)
