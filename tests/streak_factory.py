@@ -1,15 +1,18 @@
 """Optics with streaks, and captures behind them, for the tests of `camkit.streaks`."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, FloatArray, cfa_channels
-from camkit.streaks.cells import Cells, cells_of, sample_sites
+from camkit.streaks.cells import COLOURS, Cells, cells_of, sample_sites
 from camkit.streaks.kernels import StreakKernels, streak_kernels
 from camkit.streaks.optics import StreakOptics
+from camkit.streaks.recovery import Recovery, Region
+from camkit.streaks.regions import Window
 from tests.hdr_bundle import LAST_PX, four_lines
 
 Mask = NDArray[np.bool_]
@@ -101,3 +104,37 @@ def with_lamps(
     for at_y, at_x, radius, light in lamps:
         lit[:, np.hypot(y - at_y, x - at_x) <= radius] = np.array(light, np.float32)[:, None]
     return lit
+
+
+def one_light(
+    clipped: FloatArray, offset_px: tuple[float, float], pixels: NDArray[np.uint8] | None = None
+) -> Recovery:
+    """Give a recovery of one window with a light of 9 in every clipped cell, and no streaks.
+
+    Args:
+        clipped: (3, h, w) share of the samples.
+        offset_px: Of the cells, for every colour.
+        pixels: As in `Cells`; else all samples of every cell with a clipped one.
+    """
+    every = np.where(clipped > 0, 15, 0).astype(np.uint8)
+    cells = Cells(
+        light=np.zeros_like(clipped),
+        clipped=clipped,
+        pitch_px=2,
+        offset_px=(offset_px,) * COLOURS,
+        pixels=every if pixels is None else pixels,
+    )
+    _, height, width = clipped.shape
+    region = Region(
+        window=Window(top=0, bottom=height, left=0, right=width),
+        light=9 * (clipped > 0).astype(np.float32),
+        streaks=np.zeros_like(clipped),
+        thrown=(0, 0, 0),
+    )
+    return Recovery(
+        fine=cells,
+        coarse=replace(cells, pitch_px=4),
+        veil=np.zeros((COLOURS, height // 2, width // 2), np.float32),
+        core=(1.0,) * COLOURS,
+        regions=(region,),
+    )

@@ -199,8 +199,9 @@ def _scores(result: FloatArray, reference: Reference) -> dict[str, float]:
         "pu21_psnr_db": psnr_db(pu21_mean_square(result, truth, nits)),
         "pu21_ssim": pu21_ssim(result, truth, nits),
     }
-    if reference.clipped is not None and not reference.clipped.all():
-        kept = ~reference.clipped
+    if reference.clipped is not None and not reference.clipped.any(axis=0).all():
+        # colours of the output are mixed of those of the camera
+        kept = np.broadcast_to(~reference.clipped.any(axis=0), truth.shape)
         found["unclipped_psnr_db"] = psnr_db(_mean_square(result[kept], truth[kept]))
     for ev in EXPOSURES_EV:
         found[f"ev{ev}_psnr_db"] = psnr_db(_mean_square(exposed(result, ev), exposed(truth, ev)))

@@ -20,6 +20,8 @@ from camkit.errors import ContractError
 from camkit.streaks.shapes import pooled
 
 COLOURS: Final = 3
+PITCH_PX: Final = 2
+"""Of the cells of a capture."""
 Sites = tuple[tuple[int, int], ...]
 """(y, x) of a colour's samples in a cell of 2 x 2."""
 
@@ -33,12 +35,15 @@ class Cells:
         clipped: (3, h, w) float32: share of the samples that clipped.
         pitch_px: Side of a cell.
         offset_px: (y, x) of the middle of the first cell, for every colour.
+        pixels: (1, h, w) of a mosaic or (3, h, w) of planes, uint8: which samples of cells of 2 px
+            clipped, the one at (y, x) of a cell as bit 2 y + x. Of coarser cells (0, h, w).
     """
 
     light: FloatArray
     clipped: FloatArray
     pitch_px: int
     offset_px: tuple[tuple[float, float], ...]
+    pixels: NDArray[np.uint8]
 
     @property
     def known(self) -> FloatArray:
@@ -87,8 +92,9 @@ def cells_of(samples: FloatArray, clipped: NDArray[np.bool_], sites: Sequence[Si
     return Cells(
         light=_among_known(light, share),
         clipped=share,
-        pitch_px=2,
+        pitch_px=PITCH_PX,
         offset_px=tuple(_middle(places) for places in sites),
+        pixels=_pixels(clipped[:, : 2 * height, : 2 * width]),
     )
 
 
@@ -107,6 +113,7 @@ def coarser(cells: Cells) -> Cells:
         clipped=share,
         pitch_px=2 * cells.pitch_px,
         offset_px=tuple((y + half, x + half) for y, x in cells.offset_px),
+        pixels=np.zeros((0, *share.shape[1:]), np.uint8),
     )
 
 
@@ -135,6 +142,15 @@ def coarser_kernel(kernel: FloatArray) -> FloatArray:
     """Give the kernel of cells of twice the pitch."""
     hat = np.array([0.5, 1, 0.5])
     return _every_second(_spread(kernel, np.outer(hat, hat)))
+
+
+def _pixels(clipped: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Give the samples of every cell of 2 x 2 as bits."""
+    code = np.zeros((clipped.shape[0], clipped.shape[1] // 2, clipped.shape[2] // 2), np.uint8)
+    for bit in range(PITCH_PX**2):
+        y, x = divmod(bit, PITCH_PX)
+        code |= clipped[:, y::2, x::2].astype(np.uint8) << np.uint8(bit)
+    return code
 
 
 def _middle(sites: Sites) -> tuple[float, float]:

@@ -1,102 +1,39 @@
 """What was found in cells, laid over pixels: lights put in, their streaks taken out.
 
     veil and streaks of cells -> rows of pixels, linear between the middles of cells
-    lights of cells           -> spots: domes over the pixels of every clipped place
+    lights of pixels          -> put there, in colours that the output has
 
-A cell at the rim of a light holds pixels that did not clip: those keep what the sensor saw.
 Every pixel follows from the cells and its own place alone: bands of any height have the same bits.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy.ndimage
-from numpy.typing import NDArray
 
+from camkit.colorimetry import Matrix
 from camkit.contracts import FloatArray
-from camkit.streaks.cells import COLOURS, Cells
-from camkit.streaks.recovery import Recovery, Region
-from camkit.streaks.shapes import dome, rim_distance_px, with_means
+from camkit.streaks.recovery import Recovery
+from camkit.streaks.spots import lit_pixels
 
-SEEN: Final = 0.98
-"""Of where samples clip: a pixel of a rim that is darker did not, it was seen."""
-_EIGHT: Final = np.ones((3, 3), np.int8)
-Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spot:
-    """The lights of one clipped place in one colour.
-
-    Attributes:
-        colour: Of the picture.
-        top: First row of pixels.
-        left: First column.
-        light: (h, w) float32; 1.0 = where samples clip.
-        mask: (h, w): pixels of cells in which a sample clipped.
-        certain: (h, w): those away from its rim, which clipped whatever a demosaic made of them.
-    """
-
-    colour: int
-    top: int
-    left: int
-    light: FloatArray
-    mask: Mask
-    certain: Mask
-
-
-def spots_of(recovery: Recovery) -> tuple[Spot, ...]:
-    """Give the spots of all regions, by their first row."""
-    found = [
-        spot
-        for region in recovery.regions
-        for colour in range(COLOURS)
-        for spot in _region_spots(region, colour, recovery.fine)
-    ]
-    return tuple(sorted(found, key=lambda s: (s.top, s.left, s.colour)))
-
-
-def _region_spots(region: Region, colour: int, cells: Cells) -> Iterator[Spot]:
-    share = cells.clipped[(colour, *region.window.at)]
-    labels, _ = scipy.ndimage.label(share > 0, structure=_EIGHT)
-    offset = cells.offset_px[colour]
-    # a cell stands for two rows of pixels: its own and the next, or, about a sample, the last
-    shift_y, shift_x = (-1 if side < 0.5 else 0 for side in offset)
-    for number, (rows, columns) in enumerate(scipy.ndimage.find_objects(labels), start=1):
-        top, left = max(rows.start - 1, 0), max(columns.start - 1, 0)
-        part = (slice(top, rows.stop + 1), slice(left, columns.stop + 1))
-        mine = labels[part] == number
-        full = mine & (share[part] == 1)
-        yield Spot(
-            colour=colour,
-            top=2 * (region.window.top + top) + shift_y,
-            left=2 * (region.window.left + left) + shift_x,
-            light=_domed(mine, region.light[(colour, *part)], full),
-            mask=_doubled(mine),
-            certain=_doubled(scipy.ndimage.binary_erosion(full, _EIGHT, border_value=1)),
-        )
-
-
-def _domed(mask: Mask, means: FloatArray, full: Mask) -> FloatArray:
-    """Give the light of pixels; no less than the sensor saw where all of a cell clipped."""
-    light = with_means(
-        dome(rim_distance_px(_doubled(mask), 1.0)), np.where(mask, means, 0).astype(np.float32)
-    )
-    return np.maximum(light, _doubled(full))
-
-
-def _doubled(mask: Mask) -> Mask:
-    return mask.repeat(2, axis=0).repeat(2, axis=1)
+DIMMEST: Final = 0.1
+"""Of its strongest colour: lights have no less of any in the colours of the output."""
+_NO_CHANGE: Final = np.eye(3)
 
 
 class Painter:
     """Lays a recovery over the rows of a picture."""
 
-    def __init__(self, recovery: Recovery) -> None:
+    def __init__(self, recovery: Recovery, to_output: Matrix = _NO_CHANGE) -> None:
+        """Lay out the lights.
+
+        Args:
+            recovery: Of the capture.
+            to_output: (3, 3) from colours multiplied by the gains to linear Rec.709, in which no
+                light is negative.
+        """
         self._recovery = recovery
-        self._spots = spots_of(recovery)
+        self._lit = lit_pixels(recovery)
+        self._to_output = to_output
 
     def paint(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:
         """Change rows of a picture in place.
@@ -108,7 +45,6 @@ class Painter:
         """
         found = self._recovery
         rows, width = planes.shape[1:]
-        lights = list(self._lights(planes, top, gains))
         for colour, gain in enumerate(gains):
             under = _rows_of_cells(
                 found.veil[colour],
@@ -122,8 +58,7 @@ class Painter:
             under *= np.float32(gain)
             planes[colour] -= under
             planes[colour] *= np.float32(1 / found.core[colour])
-        for target, light, where in lights:
-            np.copyto(target, light, where=where)
+        self._put_lights(planes, top, gains)
 
     def _add_streaks(self, under: FloatArray, colour: int, top: int) -> None:
         cells = self._recovery.fine
@@ -140,25 +75,33 @@ class Painter:
                 region.streaks[colour], 2, moved, top + first, last - first, right - left
             )
 
-    def _lights(
-        self, planes: FloatArray, top: int, gains: tuple[float, ...]
-    ) -> Iterator[tuple[FloatArray, FloatArray, Mask]]:
-        """Yield views of the rows, the lights to put there, and the pixels that they are for."""
-        rows, width = planes.shape[1:]
-        for spot in self._spots:
-            height, breadth = spot.light.shape
-            first, last = max(spot.top, top), min(spot.top + height, top + rows)
-            left, right = max(spot.left, 0), min(spot.left + breadth, width)
-            if first >= last or left >= right:
-                continue
-            part = (
-                slice(first - spot.top, last - spot.top),
-                slice(left - spot.left, right - spot.left),
-            )
-            gain = np.float32(gains[spot.colour])
-            target = planes[spot.colour, first - top : last - top, left:right]
-            where = spot.mask[part] & (spot.certain[part] | (target >= SEEN * gain))
-            yield target, spot.light[part] * gain, where
+    def _put_lights(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:
+        lit, rows = self._lit, planes.shape[1]
+        first, last = np.searchsorted(lit.rows, [top, top + rows])
+        if first == last:
+            return
+        at = lit.rows[first:last] - top, lit.columns[first:last]
+        levels = np.array(gains, np.float32)[:, None]
+        light = lit.light[:, first:last] * levels
+        there = np.where(light > 0, light, planes[:, *at])
+        planes[:, *at] = _visible(there, self._to_output)
+
+
+def _visible(light: FloatArray, to_output: Matrix) -> FloatArray:
+    """Raise colours that were sought apart to where the output has them; (3, n) light."""
+    seen = _turned(light, to_output)
+    least = np.float32(DIMMEST) * seen.max(axis=0)
+    short = (seen < least).any(axis=0) & (seen > 1).any(axis=0)
+    raised = np.maximum(seen[:, short], least[short])
+    out = light.copy()
+    out[:, short] = _turned(raised, np.asarray(np.linalg.inv(to_output), np.float64))
+    return out
+
+
+def _turned(light: FloatArray, matrix: Matrix) -> FloatArray:
+    """Multiply (3, n) light; a product of matrices may differ in a last bit with n."""
+    rows = matrix.astype(np.float32)
+    return np.stack([sum(a * plane for a, plane in zip(row, light, strict=True)) for row in rows])
 
 
 def _rows_of_cells(

@@ -9,9 +9,12 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from camkit.bundle.plane import Plane
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor
+from camkit.colorimetry import Matrix
 from camkit.contracts import CfaPattern, NoiseModel, shifted_cfa
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
@@ -97,6 +100,16 @@ class Job:
     def known_bundle(self) -> Bundle:
         """Give the camera, which a stage that needs one always has."""
         return self.setup.known_bundle
+
+    @property
+    def color_matrix(self) -> Matrix | None:
+        """Give XYZ (D65) to camera, of the file before that of the bundle; None if not known."""
+        sensor = None if self.bundle is None else self.bundle.manifest.sensor
+        if self.capture.color_matrix is not None or self.capture.cfa is None:
+            return self.capture.color_matrix
+        if sensor is None or sensor.type != "bayer":
+            return None
+        return np.array(sensor.color_matrix)
 
     @property
     def options(self) -> Options:

@@ -8,7 +8,6 @@ import numpy as np
 
 from camkit.bundle.sensor import RGB
 from camkit.bundle.stages import Color
-from camkit.colorimetry import Matrix
 from camkit.contracts import FloatArray
 from camkit.runtime.color import ColorStage, color_stage, to_output
 from camkit.runtime.job.job import Job
@@ -28,9 +27,10 @@ REST_SHARE: Final = 0.06
 def prepare(_entry: Color, job: Job) -> StageWork:
     """Choose the colour matrix."""
     options = job.options
-    job.color = color = color_stage(
-        _color_matrix(job), options.color, exposure_ev=options.exposure_ev
-    )
+    matrix = job.color_matrix
+    if matrix is None and job.capture.cfa is not None:
+        job.notes.append("the file states no colour matrix: camera RGB is taken as Rec.709")
+    job.color = color = color_stage(matrix, options.color, exposure_ev=options.exposure_ev)
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken
@@ -52,15 +52,3 @@ def _converted(bands: Iterator[Rows], color: ColorStage) -> Iterator[FloatArray]
 def seconds(_entry: Color, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
-
-
-def _color_matrix(job: Job) -> Matrix | None:
-    if job.capture.color_matrix is not None:
-        return job.capture.color_matrix
-    if job.capture.cfa is None:
-        return None
-    sensor = None if job.bundle is None else job.bundle.manifest.sensor
-    if sensor is not None and sensor.type == "bayer":
-        return np.array(sensor.color_matrix)
-    job.notes.append("the file states no colour matrix: camera RGB is taken as Rec.709")
-    return None

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.stages import Highlights, Stage
+from camkit.colorimetry import Matrix, rec709_from_camera
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.cancel import check_cancelled
@@ -91,11 +92,17 @@ def _painted(
     recovery = recover(cells, kernels, lambda: check_cancelled(job.cancel))
     found[:] = [recovery]
     job.sections["hdr"] = recovery.to_json()
-    painter, top = Painter(recovery), 0
+    painter, top = Painter(recovery, _to_output(job)), 0
     for band in picture.bands():
         painter.paint(band, top, picture.gains)
         top += band.shape[1]
         yield band
+
+
+def _to_output(job: Job) -> Matrix:
+    """Give the matrix from balanced planes to Rec.709."""
+    matrix = job.color_matrix
+    return np.eye(COLOURS) if matrix is None else rec709_from_camera(matrix)
 
 
 def _kernels(job: Job) -> StreakKernels:
@@ -115,12 +122,14 @@ def _cells(job: Job, light: str, mask: str) -> Cells:
     height = samples.shape[1] // 2 * 2
     shape = COLOURS, height // 2, samples.shape[2] // 2
     whole = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    pixels = np.empty((samples.shape[0], *shape[1:]), np.uint8)
     for top in range(0, height, BAND_ROWS):
         bottom = min(top + BAND_ROWS, height)
         part = cells_of(samples.read(top, bottom), clipped.read(top, bottom), sites)
         for plane, made in zip(whole, (part.light, part.clipped), strict=True):
             plane[:, top // 2 : bottom // 2] = made
-    return replace(part, light=whole[0], clipped=whole[1])
+        pixels[:, top // 2 : bottom // 2] = part.pixels
+    return replace(part, light=whole[0], clipped=whole[1], pixels=pixels)
 
 
 def _warnings(found: Sequence[Recovery]) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """What the samples of a snapshot HDR camera are made with: the streaks of its plate."""
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +12,7 @@ from camkit.bundle.frozen_optics import psf_of_streaks
 from camkit.bundle.streak_file import read_streaks, streaks_to_bytes, write_streaks
 from camkit.contracts import FloatArray
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
-from camkit.models_def.optics.diffraction.plate import read_plate
+from camkit.models_def.optics.diffraction.plate import plate_members, read_plate
 from camkit.models_def.optics.diffraction.plate_streaks import plate_streaks
 from camkit.models_def.sensors.psf import wavelength_weights
 from camkit.streaks.optics import StreakOptics
@@ -21,15 +22,15 @@ FILE: Final = "streaks.safetensors"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HdrMaterial:
-    """Streak optics; there is no prescription.
+    """Streak optics, and the plate that they were computed of.
 
     Attributes:
         streaks: Of the plate.
-        lens_toml: Empty.
+        designed: The plate as a bundle holds it; empty for streaks that are of none.
     """
 
     streaks: StreakOptics
-    lens_toml: str = ""
+    designed: Mapping[str, bytes] = field(default_factory=dict)
 
     def digest(self) -> str:
         """Give the sha256 of the optics."""
@@ -48,7 +49,7 @@ class HdrMaterial:
 
 
 def read_material(folder: Path) -> HdrMaterial:
-    """Read what `HdrMaterial.write` wrote."""
+    """Read what `HdrMaterial.write` wrote: samples need no more than the streaks."""
     return HdrMaterial(streaks=read_streaks(folder / FILE))
 
 
@@ -61,4 +62,5 @@ def compute_material(recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path)
     del cache_folder
     beside = recipe_folder / recipe.plate.file
     plate = read_plate(beside if beside.is_file() else Path(recipe.plate.file))
-    return HdrMaterial(streaks=plate_streaks(plate, recipe.sensor, side_px=recipe.plate.side_px))
+    streaks = plate_streaks(plate, recipe.sensor, side_px=recipe.plate.side_px)
+    return HdrMaterial(streaks=streaks, designed=plate_members(plate))

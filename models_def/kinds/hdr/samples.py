@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.bundle.facts import Port
-from camkit.colorimetry import camera_from_rec709
+from camkit.colorimetry import camera_from_rec709, rec709_from_camera
 from camkit.contracts import CfaPattern, FloatArray, NoiseModel
 from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
@@ -78,6 +78,7 @@ class HdrCamera:
         self.recipe = recipe
         sensor = recipe.sensor
         self.matrix, self.gains = camera_from_rec709(np.array(sensor.color_matrix))
+        self._to_rec709 = rec709_from_camera(np.array(sensor.color_matrix))
         self._dense = material.color_kernels(recipe)
         self._kernels: StreakKernels = streak_kernels(
             self._dense, sample_sites(sensor.cfa), material.streaks.reach_px
@@ -102,7 +103,7 @@ class HdrCamera:
         rgb = develop(raw, self.gains, sensor.cfa)
         lit = rgb.copy()
         cells = cells_of(raw[None], clipped[None], self._kernels.sites)
-        Painter(recover(cells, self._kernels)).paint(lit, 0, self.gains)
+        Painter(recover(cells, self._kernels), self._to_rec709).paint(lit, 0, self.gains)
         return Shot(
             rgb=rgb,
             lit=lit,

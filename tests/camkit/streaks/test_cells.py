@@ -211,6 +211,12 @@ def test_what_is_no_capture_is_refused(
 
 def test_cells_that_no_coarser_one_holds_are_refused() -> None:
     light = np.zeros((3, 1, 5), np.float32)
-    cells = Cells(light=light, clipped=light, pitch_px=2, offset_px=((0.5, 0.5),) * 3)
+    cells = Cells(
+        light=light,
+        clipped=light,
+        pitch_px=2,
+        offset_px=((0.5, 0.5),) * 3,
+        pixels=np.zeros((0, *light.shape[1:]), np.uint8),
+    )
     with pytest.raises(ContractError, match="need two on each side"):
         coarser(cells)

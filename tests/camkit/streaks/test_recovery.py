@@ -191,6 +191,7 @@ def test_the_same_capture_gives_the_same_bits(lit: tuple[FloatArray, Cells, Reco
         clipped=np.concatenate([p.clipped for p in parts], axis=1),
         pitch_px=2,
         offset_px=cells.offset_px,
+        pixels=np.concatenate([p.pixels for p in parts], axis=1),
     )
     again = recover(pieced, star_kernels())
     np.testing.assert_array_equal(again.veil, found.veil)

@@ -34,6 +34,7 @@ from camkit.bundle.stages import (
     Wiener,
 )
 from camkit.bundle.writer import write_bundle
+from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
@@ -248,7 +249,8 @@ def _lit(
     )
     light, clipped = (plane[None] for plane in seen)
     lit = planes.copy()
-    Painter(recover(cells_of(light, clipped, sites), kernels)).paint(lit, 0, gain)
+    to_rec709 = rec709_from_camera(np.array(sensor.color_matrix))
+    Painter(recover(cells_of(light, clipped, sites), kernels), to_rec709).paint(lit, 0, gain)
     return lit
 
 

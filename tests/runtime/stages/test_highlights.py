@@ -20,6 +20,7 @@ from camkit.bundle.stages import (
     WhiteBalance,
     Wiener,
 )
+from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
@@ -93,7 +94,8 @@ def _slowly(capture: Capture, camera: Bundle, planes: FloatArray) -> tuple[Float
         cells_of(light, over, sites), streak_kernels(dense, sites, camera.streaks.reach_px)
     )
     lit = planes.copy()
-    Painter(found).paint(lit, 0, GAINS)
+    matrix = np.eye(3) if capture.cfa is None else rec709_from_camera(np.array(sensor.color_matrix))
+    Painter(found, matrix).paint(lit, 0, GAINS)
     return lit, found
 
 

@@ -221,9 +221,10 @@ class _Comparison:
         self._truth = shot.truth
         border = shot.coded.border_px
         self._inside = np.s_[:, border : -border or None, border : -border or None]
-        masks = (clipped_planes(capture) for capture in (shot.coded.capture, shot.bare))
+        captures = (shot.coded.capture, shot.bare)
+        masks = [np.asarray(clipped_planes(capture).any(axis=0)) for capture in captures]
         scale = shot.coded.scene.scale
-        self._clipped = np.logical_or(*masks).repeat(scale, axis=1).repeat(scale, axis=2)
+        self._clipped = np.logical_or(*masks).repeat(scale, axis=0).repeat(scale, axis=1)
 
     def errors(self, picture: FloatArray) -> NDArray[np.float64]:
         """Give (h, w) squared errors, the mean over the colours; 0 in the border."""
@@ -238,8 +239,10 @@ class _Comparison:
             return Outcome(psnr_db=None, fault="NaN or inf in the picture")
         got, truth = picture[self._inside], self._truth[self._inside]
         squared = np.square(got.astype(np.float64) - truth)
-        kept = ~self._clipped[self._inside]
-        extra = {"unclipped_psnr_db": psnr_db(float(squared[kept].mean()))} if kept.any() else {}
+        kept = ~self._clipped[self._inside[1:]]
+        extra = {}
+        if kept.any():
+            extra["unclipped_psnr_db"] = psnr_db(float(squared[:, kept].mean()))
         stops = stops_rmse(got, truth)
         return Outcome(
             psnr_db=psnr_db(float(squared.mean()), CEILING),
