@@ -4,8 +4,8 @@
 - `leave_one_out`: merging of brackets beside OpenCV's, frame by frame predicted from the others
 - `gallery`: a night photographed through a plate and read back, as pictures
 - `coded_captures`: real captures through a plate read back, beside their bracket; with
-  `coded_scene` (codes to light), `coded_registration` (bracket laid on capture), `coded_optics` (the
-  measured PSF) and `coded_judge` (solved, simulated, scored)
+  `coded_scene` (codes to light), `coded_registration` (bracket laid on capture), `coded_optics`
+  (the measured PSF) and `coded_judge` (solved, simulated, scored)
 - `glare_twin`, `glare_bundle`, `glare_table`: streaks of a windshield, the bundle that removes
   them, and what that gains
 """
