@@ -1,5 +1,6 @@
-"""Checkpoints, frozen PSF and prescription -> one bundle, proved before it is written.
+"""Checkpoints, frozen PSF, lens or plate -> one bundle, proved before it is written.
 
+a lens, a plate   -> held against the PSF                           (designed_optics)
 checkpoints       -> networks -> ONNX, with what their graphs say   (network_facts)
 a first bundle    -> golden captures, and what its networks are given for them
 networks, inputs  -> measured facts                                 (network_facts)
@@ -24,13 +25,14 @@ from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
 from camkit.bundle.manifest import Manifest, Threshold, planes_of
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
-from camkit.bundle.reader import CARD, GOLDEN, PRESCRIPTION, PREVIEW, STRESS_PSF, Bundle
+from camkit.bundle.reader import CARD, GOLDEN, PREVIEW, STRESS_PSF, Bundle
 from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.stages import Stage, Wiener
 from camkit.bundle.writer import write_bundle
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError
 from camkit.export.card import card_text, preview_png
+from camkit.export.designed_optics import designed_members
 from camkit.export.golden_cases import (
     CaseRecipe,
     Cases,
@@ -39,9 +41,7 @@ from camkit.export.golden_cases import (
     photograph_all,
 )
 from camkit.export.network_facts import ExportedNetwork, draft_network, measure_network
-from camkit.models_def.optics.distortion import trace_distortion
-from camkit.models_def.optics.lens_file.lens_file import read_lens
-from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
+from camkit.export.parts import Parts
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
     load_network,
@@ -50,11 +50,9 @@ from camkit.models_def.training.checkpoint import (
 )
 from camkit.models_def.training.kind import Design, TrainingKind, training_kind
 from camkit.models_def.training.recipe import Recipe, differing_part
-from camkit.runtime.geometry.distortion import distort_points
 from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.units import UM_PER_MM
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -62,35 +60,10 @@ PROBE: Final = "probe"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
 SIZES: Final = ("S", "M", "L")
 DEFAULT_SIZE: Final = "M"
-SAME_LENS_PX: Final = 0.01
 
 Found = dict[str, dict[str, Checkpoint]]
 """Role -> size -> checkpoint."""
 Networks = dict[str, dict[str, ExportedNetwork]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parts:
-    """What goes into a bundle.
-
-    Attributes:
-        checkpoints: One per role and size, of one camera.
-        psf: Frozen PSF of `camkit freeze`.
-        stress_psf: Kernels off the design point.
-        prescription: The lens as designed; None for that of the checkpoints.
-        freeze: Report of `camkit freeze` (JSON), for the manifest.
-        plan: Calibration of `tools/plan_report.py` (JSON), for the manifest; measured with an
-            earlier export of the same networks.
-        version: Semantic version of the bundle.
-    """
-
-    checkpoints: tuple[Path, ...]
-    psf: Path
-    stress_psf: Path | None = None
-    prescription: Path | None = None
-    freeze: Path | None = None
-    plan: Path | None = None
-    version: str = "0.1.0"
 
 
 def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
@@ -106,7 +79,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         BundleError: If the parts contradict each other.
     """
     camera = _camera(parts)
-    members = _members(parts, camera, _lens_of(parts, camera.checkpoints))
+    members = _members(parts, camera)
     with tempfile.TemporaryDirectory() as folder:
         torch_networks = {
             (role, size): load_network(checkpoint)
@@ -245,41 +218,12 @@ def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatAr
     return windows
 
 
-def _lens_of(parts: Parts, checkpoints: Found) -> Lens | None:
-    """Give the lens of the camera; None where it has none, or a checkpoint does not carry it."""
-    texts = {c.lens_toml for sizes in checkpoints.values() for c in sizes.values() if c.lens_toml}
-    if len(texts) > 1:
-        raise ContractError(
-            "the checkpoints were trained with different lenses; train them for one"
-        )
-    if parts.prescription is not None:
-        return read_lens(parts.prescription)
-    return parse_prescription(texts.pop()) if texts else None
-
-
-def _check_lens(lens: Lens, psf: FrozenPsf, path: Path) -> None:
-    """Refuse a PSF that was frozen from another lens: no two have the same distortion."""
-    frozen = psf.distortion
-    own = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
-    along = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
-    off_mm = np.abs(distort_points(along, own) - distort_points(along, frozen)).max()
-    off_px = off_mm * UM_PER_MM / psf.pixel_pitch_um
-    if off_px > SAME_LENS_PX:
-        raise ContractError(
-            f"{path} was not frozen from the lens {lens.name}: their distortion differs by "
-            f"{off_px:.2g} px; freeze, train and export the same lens"
-        )
-
-
-def _members(parts: Parts, camera: _Camera, lens: Lens | None) -> dict[str, bytes]:
+def _members(parts: Parts, camera: _Camera) -> dict[str, bytes]:
     members = dict([camera.optics.member])
     if parts.stress_psf is not None:
         members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
-    if lens is not None:
-        _check_lens(lens, camera.optics.psf, parts.psf)
-        # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
-        members[PRESCRIPTION] = format_prescription(lens).encode()
-    return members
+    checkpoints = [c for sizes in camera.checkpoints.values() for c in sizes.values()]
+    return members | designed_members(parts, checkpoints, camera.optics.psf)
 
 
 def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:

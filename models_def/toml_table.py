@@ -23,11 +23,26 @@ def read_table(path: Path, what: str) -> dict[str, Any]:
         ContractError: If it is missing or no TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        data = path.read_bytes()
     except OSError as error:
         raise ContractError(f"cannot read {what} {path}: {error.strerror}") from error
+    return parse_table(data, f"{what} {path}")
+
+
+def parse_table(data: bytes, what: str) -> dict[str, Any]:
+    """Parse TOML.
+
+    Args:
+        data: UTF-8.
+        what: What it is, for errors.
+
+    Raises:
+        ContractError: If it is no TOML.
+    """
+    try:
+        return tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ContractError(f"{what} {path} is not valid TOML: {error}") from error
+        raise ContractError(f"{what} is not valid TOML: {error}") from error
 
 
 def section(where: str, kind: type[T], table: Any) -> T:

@@ -35,6 +35,8 @@ MANIFEST: Final = "manifest.json"
 STRESS_PSF: Final = "stress_psf.safetensors"
 GOLDEN: Final = "golden.safetensors"
 PRESCRIPTION: Final = "prescription.toml"
+PLATE: Final = "plate.toml"
+PLATE_HEIGHTS: Final = "plate.safetensors"
 CARD: Final = "card.md"
 PREVIEW: Final = "preview.png"
 
@@ -228,6 +230,8 @@ def _check_references(manifest: Manifest) -> None:
         needed[manifest.optics.member] = "the optics"
     if manifest.golden:
         needed[GOLDEN] = "the golden cases"
+    if PLATE_HEIGHTS in manifest.members:
+        needed[PLATE] = f"what {PLATE_HEIGHTS} holds"
     for name, user in needed.items():
         if name not in manifest.members:
             raise BundleError(f"{user} needs the member {name}, which the bundle does not have")

@@ -16,10 +16,10 @@ MEASURED: Final = ".safetensors"
 def read_optics(path: Path) -> Optics:
     """Read optics: .safetensors as a measured PSF, TOML with a table [bench] as a plate.
 
-    Anything else is a lens (`read_lens`).
+    A bundle is read for its plate; anything else is a lens (`read_lens`).
 
     Raises:
-        BundleError: If a PSF is missing or damaged.
+        BundleError: If a PSF is missing or damaged, or a bundle is.
         CamkitError: If a lens is wrong, see `read_lens`, or a plate, see `read_plate`.
     """
     if path.suffix.lower() == MEASURED:

@@ -6,13 +6,15 @@ is complete or absent (written beside, then renamed).
 
 import pickle
 import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
+from camkit.bundle.reader import PRESCRIPTION
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import ContractError
 from camkit.models_def.training.kind import to_recipe, training_kind
@@ -29,7 +31,8 @@ class Checkpoint:
 
     Attributes:
         recipe_toml: The recipe as text.
-        lens_toml: Its lens as text; empty where there is none, and in checkpoints of before.
+        designed: Its optics as designed, as a bundle holds them: name of a member -> content; empty
+            where there are none, and in checkpoints of before.
         role: Which of its networks.
         size: In which size.
         network: Name by which its kind builds it.
@@ -58,7 +61,7 @@ class Checkpoint:
     weights: State
     average: State
     optimizer: dict[str, Any]
-    lens_toml: str = ""
+    designed: dict[str, bytes] = field(default_factory=dict)
     role: str = DEFAULT_ROLE
 
 
@@ -66,6 +69,11 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint; an interrupted write leaves the old file."""
     part = path.with_name(path.name + ".part")
     table = {f.name: getattr(checkpoint, f.name) for f in fields(checkpoint)}
+    # the reader of weights alone takes text and tensors, no bytes
+    table["designed"] = {
+        name: torch.from_numpy(np.frombuffer(data, np.uint8).copy())
+        for name, data in checkpoint.designed.items()
+    }
     torch.save({"format": FORMAT} | table, part)
     part.replace(path)
 
@@ -102,13 +110,31 @@ def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
     Raises:
         ContractError: If it is of another format.
     """
-    entries = {"lens_toml": "", "role": DEFAULT_ROLE} | table
+    entries = {"designed": {}, "role": DEFAULT_ROLE} | table
     if entries.pop("format", None) != FORMAT:
         raise ContractError(f"{path} is no checkpoint of format {FORMAT}; train again")
+    lens_toml = entries.pop("lens_toml", "")  # what older ones have in place of `designed`
     missing = {f.name for f in fields(Checkpoint)} ^ set(entries)
     if missing:
         raise ContractError(f"checkpoint {path} has wrong entries: {', '.join(sorted(missing))}")
-    return Checkpoint(**entries)
+    designed = _designed(path, entries.pop("designed"))
+    if lens_toml:
+        designed = {PRESCRIPTION: lens_toml.encode()}
+    return Checkpoint(**entries, designed=designed)
+
+
+def _designed(path: Path, found: Any) -> dict[str, bytes]:
+    """Give the bytes of what was written as tensors.
+
+    Raises:
+        ContractError: If it was not.
+    """
+    known = isinstance(found, dict) and all(
+        isinstance(data, Tensor) and data.dtype == torch.uint8 for data in found.values()
+    )
+    if not known:
+        raise ContractError(f"checkpoint {path} has wrong entries: designed")
+    return {name: data.numpy().tobytes() for name, data in found.items()}
 
 
 def recipe_of(checkpoint: Checkpoint) -> Recipe:

@@ -36,8 +36,11 @@ class Material(Protocol):
     """What samples are made with, prepared once: the kernels of a lens, say."""
 
     @property
-    def lens_toml(self) -> str:
-        """Give the lens as text; empty where there is none."""
+    def designed(self) -> Mapping[str, bytes]:
+        """Give its optics as designed, as a bundle holds them: name of a member -> content.
+
+        A lens is `prescription.toml`, a plate `plate.toml`; empty where there is neither.
+        """
         ...
 
     def digest(self) -> str:

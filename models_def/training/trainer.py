@@ -261,7 +261,7 @@ class _Run:
     ) -> None:
         self.options, self.material_digest = options, material.digest()
         self.toml = recipe_path.read_text(encoding="utf-8")
-        self.lens_toml = material.lens_toml
+        self.designed = dict(material.designed)
         self.recipe: Recipe = read_recipe(recipe_path)
         self.role = self.recipe.role(options.role)
         self.entry = self.recipe.network(options.size, self.role)
@@ -365,7 +365,7 @@ class _Run:
     def _save(self, pool: SamplePool) -> None:
         saved = Checkpoint(
             recipe_toml=self.toml,
-            lens_toml=self.lens_toml,
+            designed=self.designed,
             role=self.role,
             size=self.options.size,
             network=self.entry.network,

@@ -16,8 +16,9 @@ from camkit.bundle.reader import GOLDEN, Bundle, open_bundle
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, ParityError
 from camkit.export import assemble
-from camkit.export.assemble import Parts, export_bundle
+from camkit.export.assemble import export_bundle
 from camkit.export.network_facts import ExportedNetwork
+from camkit.export.parts import Parts
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
 from camkit.runtime.plan.loss import plan_entries

@@ -8,7 +8,7 @@ upscale   linear, with a little noise  -> the scene
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -53,7 +53,7 @@ class ToyMaterial:
     """The frozen PSF; there is no lens."""
 
     psf: FrozenPsf
-    lens_toml: str = ""
+    designed: Mapping[str, bytes] = field(default_factory=dict)
 
     def digest(self) -> str:
         """Hash the kernels."""

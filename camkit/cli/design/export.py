@@ -1,4 +1,4 @@
-"""`camkit export`: checkpoints, frozen PSF and prescription to one proved bundle."""
+"""`camkit export`: checkpoints, frozen PSF, lens or plate to one proved bundle."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +11,7 @@ PSF_NAME = "psf.safetensors"
 STRESS_NAME = "stress_psf.safetensors"
 REPORT_NAME = "freeze.json"
 PLAN_NAME = "plan.json"
+NO_PLATE = "none"
 
 
 def export(
@@ -38,12 +39,18 @@ def export(
         Path | None,
         typer.Option(help="The lens (.toml or .zmx); default: the one of the checkpoint."),
     ] = None,
+    plate: Annotated[
+        str | None,
+        typer.Option(
+            help="The plate (.toml, or a name), or 'none'; default: the one of the checkpoint."
+        ),
+    ] = None,
     version: Annotated[str, typer.Option(help="Semantic version of the bundle.")] = "0.1.0",
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Pack checkpoints, PSF and prescription, and prove the result (needs torch)."""
+    """Pack checkpoints, PSF, lens or plate, and prove the result (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
     from camkit.errors import ContractError
 
@@ -55,7 +62,8 @@ def export(
         raise ContractError(
             f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or say --psf"
         )
-    from camkit.export.assemble import Parts, export_bundle
+    from camkit.export.assemble import export_bundle
+    from camkit.export.parts import Parts
 
     report = export_bundle(
         Parts(
@@ -63,6 +71,8 @@ def export(
             psf=frozen,
             stress_psf=stress_psf or _beside(folder, STRESS_NAME),
             prescription=prescription,
+            plate=None if plate in (None, NO_PLATE) else Path(plate),
+            without_plate=plate == NO_PLATE,
             freeze=freeze or _beside(folder, REPORT_NAME),
             plan=plan or _beside(folder, PLAN_NAME),
             version=version,

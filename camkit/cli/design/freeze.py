@@ -20,7 +20,8 @@ def freeze(
     optics: Annotated[
         Path,
         typer.Argument(
-            help="A lens (.toml or .zmx), a plate (.toml), or a measured PSF (.safetensors).",
+            help="A lens (.toml or .zmx), a plate (.toml, a name, or a bundle with one), or a "
+            "measured PSF (.safetensors).",
             metavar="OPTICS",
         ),
     ],

@@ -1,9 +1,11 @@
 """What the samples of a camera behind a mosaic are made with: the kernels of its lens."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from camkit.bundle.reader import PRESCRIPTION
 from camkit.models_def.kinds.bayer.lens_bank import build_lens_bank
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
@@ -19,11 +21,11 @@ class BayerMaterial:
 
     Attributes:
         bank: Of fabricated copies, the frozen PSF beside them.
-        lens_toml: The lens as text; empty for kernels that are of none.
+        designed: The lens as a bundle holds it; empty for kernels that are of none.
     """
 
     bank: PsfBank
-    lens_toml: str = ""
+    designed: Mapping[str, bytes] = field(default_factory=dict)
 
     def digest(self) -> str:
         """Give the sha256 of the kernels."""
@@ -47,4 +49,4 @@ def trace_material(recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path)
     """
     lens = find_lens(recipe.lens.prescription, recipe_folder)
     bank = build_lens_bank(recipe, lens, cache_folder)
-    return BayerMaterial(bank=bank, lens_toml=format_prescription(lens))
+    return BayerMaterial(bank=bank, designed={PRESCRIPTION: format_prescription(lens).encode()})

@@ -40,6 +40,7 @@ class PlateReport:
     """What freezing a plate kept.
 
     Attributes:
+        plate: Name of the plate.
         form: streaks (core, arms and haze) or kernels.
         wavelengths: Kept.
         side_px: Of the kernels.
@@ -50,6 +51,7 @@ class PlateReport:
         of_optics: What else the optics say of themselves.
     """
 
+    plate: str
     form: Literal["streaks", "kernels"]
     wavelengths: int
     side_px: int
@@ -61,6 +63,7 @@ class PlateReport:
     def to_json(self) -> dict[str, int | float | str]:
         """Give the report as a flat mapping."""
         return {
+            "plate": self.plate,
             "form": self.form,
             "fields": 1,
             "wavelengths": self.wavelengths,
@@ -128,6 +131,7 @@ def _freeze_streaks(
         )
     write_streaks(path, streaks)
     return PlateReport(
+        plate=optics.name,
         form="streaks",
         wavelengths=streaks.wavelengths_um.size,
         side_px=light.shape[-1],
@@ -156,6 +160,7 @@ def _freeze_kernels(
         )
     write_psf(path, psf)
     return PlateReport(
+        plate=optics.name,
         form="kernels",
         wavelengths=count,
         side_px=psf.kernels.shape[-1],

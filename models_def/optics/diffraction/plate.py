@@ -26,7 +26,7 @@ share = 0.06
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -36,6 +36,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
+from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, SUFFIX, open_bundle
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.fabrication import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
@@ -44,7 +45,7 @@ from camkit.models_def.optics.diffraction.patterns import PATTERNS, Pattern
 from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
-from camkit.models_def.toml_table import key_line, read_table, section
+from camkit.models_def.toml_table import key_line, parse_table, read_table, section
 from camkit.units import UM_PER_MM
 
 PLATES: Final = Path(__file__).resolve().parents[2] / "plates"
@@ -181,7 +182,9 @@ def _built_in(path: Path) -> Path:
 
 
 def is_plate(path: Path) -> bool:
-    """Tell whether a file is that of a plate, TOML that speaks of a bench, or a plate's name."""
+    """Tell whether optics are a plate: TOML that speaks of a bench, a plate's name, or a bundle."""
+    if path.suffix == SUFFIX:
+        return True
     path = _built_in(path)
     if path.suffix.lower() != ".toml" or not path.is_file():
         return False
@@ -192,27 +195,91 @@ def read_plate(path: Path) -> Plate:
     """Read a plate.
 
     Args:
-        path: Its file, or the name of a built-in one.
+        path: Its file, the name of a built-in one, or a bundle (.camkit) that holds it.
 
     Raises:
-        ContractError: If the file, or that of its heights, is missing, damaged or no plate.
+        ContractError: If the file, or that of its heights, is missing, damaged or no plate, or the
+            bundle holds none.
+        BundleError: If a bundle is refused.
     """
+    if path.suffix == SUFFIX:
+        return _bundled(path)
     path = _built_in(path)
     if not path.suffix and not path.exists():
         raise ContractError(
             f"no plate {path}: name a file, or one of {', '.join(built_in_plates())}"
         )
-    table = read_table(path, "plate")
+
+    def beside(name: str) -> bytes:
+        if Path(name).name != name:
+            raise ContractError(f"plate {path}: heights lie beside it, not at {name!r}")
+        try:
+            return path.with_name(name).read_bytes()
+        except OSError as error:
+            raise ContractError(
+                f"cannot read the heights {path.with_name(name)}: {error.strerror}"
+            ) from error
+
+    return to_plate(read_table(path, "plate"), beside, what=str(path))
+
+
+def _bundled(path: Path) -> Plate:
+    bundle = open_bundle(path)
+    if PLATE not in bundle.names:
+        raise ContractError(f"{path} holds no {PLATE}; name a plate, or a bundle with one")
+    own = (PLATE, PLATE_HEIGHTS)
+    members = {name: bundle.member(name) for name in bundle.names if name in own}
+    return plate_of_members(members, str(path))
+
+
+def plate_members(plate: Plate) -> dict[str, bytes]:
+    """Give a plate as members of a bundle: name -> content."""
+    text, heights = plate_to_bytes(plate, PLATE_HEIGHTS)
+    return {PLATE: text} if heights is None else {PLATE: text, PLATE_HEIGHTS: heights}
+
+
+def plate_of_members(members: Mapping[str, bytes], what: str) -> Plate:
+    """Give the plate of members of a bundle.
+
+    Args:
+        members: With `plate.toml`.
+        what: What holds them, for errors.
+
+    Raises:
+        ContractError: If they are no plate.
+    """
+
+    def member(name: str) -> bytes:
+        if name not in members:
+            raise ContractError(f"the plate of {what} lacks its heights, {name}")
+        return members[name]
+
+    table = parse_table(members[PLATE], f"{PLATE} of {what}")
+    return to_plate(table, member, what=f"of {what}")
+
+
+def to_plate(table: Mapping[str, Any], heights_of: Callable[[str], bytes], *, what: str) -> Plate:
+    """Make the plate of a parsed file.
+
+    Args:
+        table: What the TOML file holds.
+        heights_of: Name of the file of its heights, if it names one -> what that holds.
+        what: Its name in error messages.
+
+    Raises:
+        ContractError: If it is no plate.
+    """
+    table = dict(table)
     parts = {key: table.pop(key, None) for key in ("bench", "etching", "pattern")}
-    head = section(f"plate {path}", _Head, table)
+    head = section(f"plate {what}", _Head, table)
     if parts["bench"] is None:
-        raise ContractError(f"plate {path} lacks the table [bench]")
+        raise ContractError(f"plate {what} lacks the table [bench]")
     bench = section("bench", Bench, parts["bench"])
     etching = None if parts["etching"] is None else section("etching", Etching, parts["etching"])
     if bool(head.heights) == (parts["pattern"] is not None):
-        raise ContractError(f"plate {path} needs heights or a table [pattern], one of them")
+        raise ContractError(f"plate {what} needs heights or a table [pattern], one of them")
     if head.heights and head.cells:
-        raise ContractError(f"plate {path}: its heights know their cells; leave out cells")
+        raise ContractError(f"plate {what}: its heights know their cells; leave out cells")
     if parts["pattern"] is not None:
         return pattern_plate(
             head.name,
@@ -223,7 +290,7 @@ def read_plate(path: Path) -> Plate:
             etching=etching,
             note=head.note,
         )
-    numbers = _read_numbers(path, head.heights)
+    numbers = _numbers_of(heights_of(head.heights), head.heights)
     with torch.no_grad():
         height_um = map_of(numbers)().detach()
     return Plate(
@@ -249,21 +316,16 @@ def _read_pattern(table: Any) -> Pattern:
     return section("pattern", PATTERNS[kind], {k: v for k, v in table.items() if k != "kind"})
 
 
-def _read_numbers(plate: Path, name: str) -> dict[str, Tensor]:
-    """Read what lies beside a plate.
+def _numbers_of(data: bytes, name: str) -> dict[str, Tensor]:
+    """Decode the heights of a plate.
 
     Raises:
-        ContractError: If it cannot be.
+        ContractError: If they are none.
     """
-    if Path(name).name != name:
-        raise ContractError(f"plate {plate}: heights lie beside it, not at {name!r}")
-    path = plate.with_name(name)
     try:
-        return load(path.read_bytes())
-    except OSError as error:
-        raise ContractError(f"cannot read the heights {path}: {error.strerror}") from error
+        return load(data)
     except (SafetensorError, ValueError) as error:
-        raise ContractError(f"{path} is no safetensors file: {error}") from error
+        raise ContractError(f"{name} is no safetensors file: {error}") from error
 
 
 def write_plate(plate: Plate, path: Path) -> None:
@@ -275,9 +337,22 @@ def write_plate(plate: Plate, path: Path) -> None:
         OSError: If it cannot be written.
     """
     heights = path.with_suffix(".safetensors")
+    text, numbers = plate_to_bytes(plate, heights.name)
+    if numbers is not None:
+        _replace(heights, numbers)
+    _replace(path, text)
+
+
+def plate_to_bytes(plate: Plate, heights: str) -> tuple[bytes, bytes | None]:
+    """Give the TOML of a plate, and its heights; None for a plate of a pattern.
+
+    Args:
+        plate: The plate.
+        heights: Name of the file that the heights will lie in, beside the TOML.
+    """
     head: dict[str, str | int] = {"name": plate.name, "note": plate.note, "glass": plate.glass}
     if plate.pattern is None:
-        head["heights"] = heights.name
+        head["heights"] = heights
     else:
         head["cells"] = plate.height_um.shape[0]
     lines = [key_line(k, v) for k, v in head.items()]
@@ -287,10 +362,11 @@ def write_plate(plate: Plate, path: Path) -> None:
     if plate.pattern is not None:
         kind = next(k for k, made in PATTERNS.items() if isinstance(plate.pattern, made))
         lines += ["", "[pattern]", key_line("kind", kind), *_entries(plate.pattern)]
-    else:
-        numbers = plate.numbers or {HEIGHTS: plate.height_um}
-        _replace(heights, save({k: v.detach().contiguous() for k, v in numbers.items()}))
-    _replace(path, ("\n".join(lines) + "\n").encode())
+    text = ("\n".join(lines) + "\n").encode()
+    if plate.pattern is not None:
+        return text, None
+    numbers = plate.numbers or {HEIGHTS: plate.height_um}
+    return text, save({k: v.detach().contiguous() for k, v in numbers.items()})
 
 
 def _entries(table: Any) -> list[str]:

@@ -289,6 +289,14 @@ def test_manifest_that_lists_itself_is_refused() -> None:
     _refuse(_with_manifest(lambda d: d["members"].update({"manifest.json": fact})), "lists itself")
 
 
+def test_heights_of_a_plate_that_is_not_there_are_refused() -> None:
+    members = tiny_members() | {"plate.safetensors": b"heights"}
+    data = bundle_to_bytes(tiny_manifest(), members)
+    _refuse(data, r"plate\.safetensors holds needs the member plate\.toml")
+    whole = bundle_to_bytes(tiny_manifest(), members | {"plate.toml": b"a plate"})
+    assert bundle_from_bytes(whole, path=Path("x.camkit")).member("plate.toml") == b"a plate"
+
+
 @pytest.mark.parametrize(
     ("absent", "user"),
     [

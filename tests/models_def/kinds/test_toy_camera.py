@@ -86,7 +86,7 @@ def test_each_of_its_networks_learns(role, recipe_path, tmp_path):
     losses = [entry["loss"] for entry in read_log(result.log) if "loss" in entry]
     assert result.valid_db > result.baselines["input"] + 0.5
     saved = read_checkpoint(result.checkpoint)
-    assert (saved.role, saved.lens_toml) == (role, "")
+    assert (saved.role, saved.designed) == (role, {})
     assert recipe_of(saved).kind == "toy"
     shape = load_network(saved)(torch.rand(1, 1, 16, 24)).shape
     assert shape == ((1, 1, 16, 24) if role == "denoise" else (1, 1, 32, 48))

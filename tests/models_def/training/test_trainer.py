@@ -146,13 +146,36 @@ def test_damaged_checkpoints_are_refused(tmp_path, whole):
 def test_checkpoints_of_before_are_read_with_their_camera_and_without_a_role(tmp_path, whole):
     """They carry their recipe as text, with the names of their day."""
     table = torch.load(whole.checkpoint, weights_only=True)
-    del table["role"], table["lens_toml"]
+    del table["role"], table["designed"]
     table["recipe_toml"] = table["recipe_toml"].replace("[sensor", "[camera")
     torch.save(table, tmp_path / "old.pt")
     old, saved = read_checkpoint(tmp_path / "old.pt"), read_checkpoint(whole.checkpoint)
-    assert (old.role, old.lens_toml) == ("restore", "")
+    assert (old.role, old.designed) == ("restore", {})
     assert recipe_of(old) == recipe_of(saved)
     assert load_network(old).state_dict().keys() == saved.average.keys()
+
+
+def test_the_lens_of_older_checkpoints_is_read_as_that_of_new_ones(tmp_path, whole):
+    table = torch.load(whole.checkpoint, weights_only=True)
+    del table["designed"]
+    torch.save(table | {"lens_toml": "name = 'é'"}, tmp_path / "old.pt")
+    old = read_checkpoint(tmp_path / "old.pt")
+    assert old.designed == {"prescription.toml": "name = 'é'".encode()}
+
+
+def test_optics_as_designed_go_with_a_checkpoint_byte_by_byte(tmp_path, whole):
+    designed = {"plate.toml": b"", "plate.safetensors": bytes(range(256))}
+    saved = replace(read_checkpoint(whole.checkpoint), designed=designed)
+    write_checkpoint(tmp_path / "plate.pt", saved)
+    assert read_checkpoint(tmp_path / "plate.pt").designed == designed
+
+
+@pytest.mark.parametrize("damaged", [3, {"plate.toml": "text"}, {"plate.toml": torch.zeros(4)}])
+def test_optics_that_are_no_bytes_are_refused(damaged, tmp_path, whole):
+    table = torch.load(whole.checkpoint, weights_only=True)
+    torch.save(table | {"designed": damaged}, tmp_path / "damaged.pt")
+    with pytest.raises(ContractError, match="wrong entries: designed"):
+        read_checkpoint(tmp_path / "damaged.pt")
 
 
 def test_interrupted_write_keeps_the_old_checkpoint(tmp_path, whole, monkeypatch):

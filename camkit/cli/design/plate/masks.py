@@ -12,7 +12,10 @@ from camkit.errors import ContractError
 
 
 def masks(
-    plate: Annotated[Path, typer.Argument(help="The plate (.toml), or a name.", metavar="PLATE")],
+    plate: Annotated[
+        Path,
+        typer.Argument(help="The plate (.toml), a name, or a bundle with one.", metavar="PLATE"),
+    ],
     out_dir: Annotated[Path, typer.Option("-o", "--out-dir", help="Folder for the images.")],
     format_: Annotated[str, typer.Option("--format", help="png (one bit) or tiff.")] = "png",
     overwrite: Overwrite = False,

@@ -15,7 +15,10 @@ from camkit.units import MM_PER_M
 
 
 def show(
-    plate: Annotated[Path, typer.Argument(help="The plate (.toml), or a name.", metavar="PLATE")],
+    plate: Annotated[
+        Path,
+        typer.Argument(help="The plate (.toml), a name, or a bundle with one.", metavar="PLATE"),
+    ],
     recipe: Annotated[
         Path | None, typer.Option(help="Recipe (TOML) with the sensor; default: duet's.")
     ] = None,

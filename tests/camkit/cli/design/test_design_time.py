@@ -167,6 +167,7 @@ def test_export_finds_what_lies_beside_the_checkpoint(
     camkit_command, tmp_path, monkeypatch
 ) -> None:
     from camkit.export import assemble
+    from camkit.export.parts import Parts
     from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
 
     checkpoint = Checkpoint(
@@ -189,20 +190,24 @@ def test_export_finds_what_lies_beside_the_checkpoint(
         (tmp_path / name).write_bytes(b"{}")
     seen = []
 
-    def fake(parts: assemble.Parts, out: Path) -> dict[str, str]:
+    def fake(parts: Parts, out: Path) -> dict[str, str]:
         seen.append(parts)
         return {"bundle": str(out)}
 
     monkeypatch.setattr(assemble, "export_bundle", fake)
     call = ("export", tmp_path / "one.pt", "-o", tmp_path / "one.camkit")
-    for chosen in ((), ("--plan", tmp_path / "other.json")):
+    plates = (("--plate", "streak-4"), ("--plate", "none"))
+    for chosen in ((), ("--plan", tmp_path / "other.json"), *plates):
         outcome = camkit_command(*call, *chosen)
         assert outcome.code == 0, outcome.err
-    parts, other = seen
+    parts, other, named, without = seen
     assert (parts.psf, parts.freeze) == (tmp_path / "psf.safetensors", tmp_path / "freeze.json")
     assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
     assert parts.stress_psf is None
     assert parts.prescription is None, "the lens of the checkpoint"
+    assert (parts.plate, parts.without_plate) == (None, False), "its plate"
+    assert (named.plate, named.without_plate) == (Path("streak-4"), False)
+    assert (without.plate, without.without_plate) == (None, True)
 
 
 def test_files_of_fine_tuning_need_a_checkpoint_to_start_from(camkit_command) -> None:

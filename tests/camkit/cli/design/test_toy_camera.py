@@ -16,7 +16,8 @@ from camkit.bundle.golden import IMAGE, golden_from_bytes
 from camkit.bundle.reader import GOLDEN, open_bundle
 from camkit.cli.app import run
 from camkit.errors import ContractError
-from camkit.export.assemble import Parts, export_bundle
+from camkit.export.assemble import export_bundle
+from camkit.export.parts import Parts
 from camkit.models_def.training.checkpoint import read_checkpoint, write_checkpoint
 from camkit.models_def.training.trainer import TrainOptions, train
 from tests.toy_camera.install import toy_installed  # noqa: F401

@@ -10,6 +10,9 @@ from camkit.errors import BundleError, ContractError
 from camkit.models_def.kinds.hdr import material as module
 from camkit.models_def.kinds.hdr.material import HdrMaterial, compute_material, read_material
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe, PlateRecipe
+from camkit.models_def.optics.diffraction.geometry import Bench
+from camkit.models_def.optics.diffraction.patterns import StarPattern
+from camkit.models_def.optics.diffraction.plate import pattern_plate
 from tests.hdr_bundle import four_lines
 
 
@@ -18,7 +21,7 @@ def test_material_survives_the_disk(lines: HdrMaterial, tmp_path: Path) -> None:
     back = read_material(tmp_path)
     assert back.digest() == lines.digest()
     np.testing.assert_array_equal(back.streaks.dense(), lines.streaks.dense())
-    assert back.lens_toml == ""
+    assert back.designed == {}
     with pytest.raises(BundleError, match="cannot read"):
         read_material(tmp_path / "none")
 
@@ -43,10 +46,15 @@ def test_a_plate_is_that_beside_the_recipe_or_built_in(
     tiny: HdrRecipe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read = []
-    monkeypatch.setattr(module, "read_plate", read.append)
+    plate = StarPattern(angles_deg=(0,), near_um=50.0, far_um=300.0, share=0.06)
+    made_of = pattern_plate(
+        "mine", plate, cells=64, bench=Bench(diameter_mm=1.0, focal_length_mm=50.0)
+    )
+    monkeypatch.setattr(module, "read_plate", lambda path: read.append(path) or made_of)
     monkeypatch.setattr(module, "plate_streaks", lambda *_, **settings: settings["side_px"])
     made = compute_material(tiny, tmp_path, tmp_path)
     assert made.streaks == tiny.plate.side_px  # type: ignore[comparison-overlap]
+    assert b'name = "mine"' in made.designed["plate.toml"], "it goes with the checkpoint"
     (tmp_path / "streak-4").write_text("")
     compute_material(tiny, tmp_path, tmp_path)
     assert read == [Path("streak-4"), tmp_path / "streak-4"]

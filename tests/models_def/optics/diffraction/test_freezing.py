@@ -108,6 +108,7 @@ def test_streaks_are_frozen_by_their_parts_and_what_that_costs_is_told(
     report = freeze_plate(optics, out, sensor=sensor, grid=replace(SMALL, max_side_px=81))
     streaks = read_streaks(out)
     assert report.form == "streaks"
+    assert report.to_json()["plate"] == "cross"
     assert sorted(np.degrees(streaks.angles_rad).round() % 360) == [0, 90, 180, 270]
     assert report.misplaced <= STREAKS_LIMIT
     light = streaks.dense()[0]

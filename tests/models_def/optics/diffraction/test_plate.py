@@ -6,11 +6,23 @@ import pytest
 import torch
 from safetensors.torch import save
 
+from camkit.bundle.reader import PLATE, PLATE_HEIGHTS
+from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.fabrication import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
-from camkit.models_def.optics.diffraction.plate import Plate, read_plate, write_plate
+from camkit.models_def.optics.diffraction.plate import (
+    PLATES,
+    Plate,
+    built_in_plates,
+    plate_members,
+    read_plate,
+    write_plate,
+)
+from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
 from camkit.models_def.optics.diffraction.wave import PixelGrid
+from camkit.models_def.optics.optics_file import read_optics
+from tests.hdr_bundle import write_hdr_bundle
 
 
 def _plate(**changes: Any) -> Plate:
@@ -90,6 +102,44 @@ def test_a_plate_without_a_bench_is_refused(tmp_path: Path) -> None:
     (tmp_path / "plate.toml").write_text(text[: text.index("[bench]")], encoding="utf-8")
     with pytest.raises(ContractError, match=r"lacks the table \[bench\]"):
         read_plate(tmp_path / "plate.toml")
+
+
+@pytest.mark.parametrize("name", built_in_plates())
+def test_a_bundle_holds_a_built_in_plate_word_for_word(name: str) -> None:
+    """But for the name of its heights, which is that of the member."""
+    members = plate_members(read_plate(Path(name)))
+    text = (PLATES / f"{name}.toml").read_text(encoding="utf-8")
+    heights = PLATES / f"{name}.safetensors"
+    assert members[PLATE].decode() == text.replace(heights.name, PLATE_HEIGHTS)
+    assert (PLATE_HEIGHTS in members) == heights.is_file()
+
+
+def _with_plate(folder: Path, members: dict[str, bytes]) -> Path:
+    bundle = write_hdr_bundle(folder)
+    kept = {name: bundle.member(name) for name in bundle.names}
+    return write_bundle(folder / "plated.camkit", bundle.manifest, kept | members).path
+
+
+def test_the_plate_of_a_bundle_is_read_from_it(tmp_path: Path) -> None:
+    plate = _plate()
+    path = _with_plate(tmp_path, plate_members(plate))
+    again = read_plate(path)
+    assert (again.name, again.note, again.bench) == (plate.name, plate.note, plate.bench)
+    assert torch.equal(again.height_um, plate.height_um)
+    optics = read_optics(path)
+    assert isinstance(optics, PlateOptics)
+    assert torch.equal(optics.plate.height_um, plate.height_um)
+
+
+def test_a_bundle_without_a_plate_or_with_a_damaged_one_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ContractError, match=r"streaks\.camkit holds no plate\.toml"):
+        read_plate(write_hdr_bundle(tmp_path).path)
+    with pytest.raises(ContractError, match=r"plate\.toml of .*plated\.camkit is not valid TOML"):
+        read_plate(_with_plate(tmp_path, {PLATE: b"\xff"}))
+    with pytest.raises(
+        ContractError, match=r"plated\.camkit lacks its heights, plate\.safetensors"
+    ):
+        read_plate(_with_plate(tmp_path, {PLATE: plate_members(_plate())[PLATE]}))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,121 @@
+"""What a bundle says of how its optics were designed: a lens, a plate, or nothing.
+
+checkpoints, or a file of the user -> held against the frozen PSF -> members of the bundle
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+
+from camkit.bundle.reader import PLATE, PRESCRIPTION
+from camkit.contracts import FrozenPsf
+from camkit.errors import ContractError
+from camkit.export.parts import Parts
+from camkit.models_def.optics.diffraction.plate import (
+    Plate,
+    plate_members,
+    plate_of_members,
+    read_plate,
+)
+from camkit.models_def.optics.diffraction.wave import PixelGrid
+from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.prescription import Lens, format_prescription, parse_prescription
+from camkit.models_def.training.checkpoint import Checkpoint
+from camkit.runtime.geometry.distortion import distort_points
+from camkit.units import UM_PER_MM
+
+SAME_LENS_PX: Final = 0.01
+SAME_PLATE_SHARE: Final = 0.015
+"""Of the light of the middle wavelength. Built-in plates frozen for one sensor differ by 0.029 and
+more from each other, and by 0.008 at most from what was computed of them."""
+
+
+def designed_members(
+    parts: Parts, checkpoints: Iterable[Checkpoint], psf: FrozenPsf
+) -> dict[str, bytes]:
+    """Give the lens or the plate of a camera as members of its bundle: name -> content.
+
+    None where the camera has neither, or a checkpoint does not carry it.
+
+    Raises:
+        ContractError: If the checkpoints are of different optics, there are a lens and a plate, or
+            the PSF was not frozen from them.
+        CamkitError: If a lens is wrong, see `read_lens`.
+    """
+    carried = _carried(checkpoints)
+    lens, plate = _lens_of(parts, carried), _plate_of(parts, carried)
+    if lens is not None and plate is not None:
+        raise ContractError(
+            f"a bundle holds a lens or a plate; here are the lens {lens.name} and the plate "
+            f"{plate.name}"
+        )
+    # written afresh: the bundle carries the user's glasses and is TOML, whatever came in
+    if lens is not None:
+        _check_lens(lens, psf, parts.psf)
+        return {PRESCRIPTION: format_prescription(lens).encode()}
+    if plate is not None:
+        _check_plate(plate, psf, parts.psf)
+        return plate_members(plate)
+    return {}
+
+
+def _carried(checkpoints: Iterable[Checkpoint]) -> Mapping[str, bytes]:
+    """Give the optics that checkpoints carry; those of before carry none."""
+    found: list[Mapping[str, bytes]] = []
+    for checkpoint in checkpoints:
+        if checkpoint.designed and checkpoint.designed not in found:
+            found.append(checkpoint.designed)
+    if len(found) > 1:
+        raise ContractError(
+            "the checkpoints were trained with different optics; train them for one lens or plate"
+        )
+    return found[0] if found else {}
+
+
+def _lens_of(parts: Parts, carried: Mapping[str, bytes]) -> Lens | None:
+    if parts.prescription is not None:
+        return read_lens(parts.prescription)
+    return parse_prescription(carried[PRESCRIPTION].decode()) if PRESCRIPTION in carried else None
+
+
+def _plate_of(parts: Parts, carried: Mapping[str, bytes]) -> Plate | None:
+    if parts.plate is not None:
+        return read_plate(parts.plate)
+    if PLATE not in carried or parts.without_plate:
+        return None
+    return plate_of_members(carried, "the checkpoints")
+
+
+def _check_lens(lens: Lens, psf: FrozenPsf, path: Path) -> None:
+    """Refuse a PSF that was frozen from another lens: no two have the same distortion."""
+    frozen = psf.distortion
+    own = trace_distortion(lens, frozen.radius_mm, channels=len(frozen.coefficients))
+    along = np.stack([np.linspace(0.0, frozen.radius_mm, 33), np.zeros(33)], axis=1)
+    off_mm = np.abs(distort_points(along, own) - distort_points(along, frozen)).max()
+    off_px = off_mm * UM_PER_MM / psf.pixel_pitch_um
+    if off_px > SAME_LENS_PX:
+        raise ContractError(
+            f"{path} was not frozen from the lens {lens.name}: their distortion differs by "
+            f"{off_px:.2g} px; freeze, train and export the same lens"
+        )
+
+
+def _check_plate(plate: Plate, psf: FrozenPsf, path: Path) -> None:
+    """Refuse a PSF that was frozen from another plate: no two send light to the same places."""
+    middle = psf.wavelengths_um.size // 2
+    frozen = psf.kernels[0, 0, middle].astype(np.float64)
+    grid = PixelGrid(side_px=frozen.shape[-1], pitch_um=psf.pixel_pitch_um)
+    with torch.no_grad():
+        light = plate.psf(float(psf.wavelengths_um[middle]), grid, float(psf.depths_mm[0]))
+    own = light.to(torch.float64).numpy()
+    elsewhere = float(np.abs(own / own.sum() - frozen / frozen.sum()).sum() / 2)
+    if elsewhere > SAME_PLATE_SHARE:
+        raise ContractError(
+            f"{path} was not frozen from the plate {plate.name}: {elsewhere:.1%} of the light lies "
+            "elsewhere; freeze, train and export the same plate. A PSF that was measured has none: "
+            "say --plate none"
+        )

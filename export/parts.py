@@ -1,0 +1,32 @@
+"""What goes into a bundle."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """What goes into a bundle.
+
+    Attributes:
+        checkpoints: One per role and size, of one camera.
+        psf: Frozen PSF of `camkit freeze`.
+        stress_psf: Kernels off the design point.
+        prescription: The lens as designed; None for that of the checkpoints.
+        plate: The plate as designed, a file or a name; None for that of the checkpoints.
+        without_plate: Leave that of the checkpoints out: the PSF is of none.
+        freeze: Report of `camkit freeze` (JSON), for the manifest.
+        plan: Calibration of `tools/plan_report.py` (JSON), for the manifest; measured with an
+            earlier export of the same networks.
+        version: Semantic version of the bundle.
+    """
+
+    checkpoints: tuple[Path, ...]
+    psf: Path
+    stress_psf: Path | None = None
+    prescription: Path | None = None
+    plate: Path | None = None
+    without_plate: bool = False
+    freeze: Path | None = None
+    plan: Path | None = None
+    version: str = "0.1.0"
