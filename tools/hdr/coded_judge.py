@@ -90,18 +90,18 @@ class Judge:
         return recovery
 
 
-def solved(seen: Seen, psf: FloatArray) -> tuple[FloatArray, Recovery]:
+def solved(seen: Seen, psf: FloatArray, arms_px: int | None = None) -> tuple[FloatArray, Recovery]:
     """Give a capture with its lights, >= 0, and what was found.
 
     Args:
         seen: The capture, in full planes.
         psf: (3, n, n).
+        arms_px: How far its arms reach; None for `reach_px`.
     """
     sites = sample_sites(None)
     light = (seen.light / seen.scale).astype(np.float32)
-    recovery = recover(
-        cells_of(light, seen.clipped, sites), streak_kernels(psf, sites, reach_px(psf))
-    )
+    kernels = streak_kernels(psf, sites, reach_px(psf) if arms_px is None else arms_px)
+    recovery = recover(cells_of(light, seen.clipped, sites), kernels)
     Painter(recovery).paint(light, 0, (1.0, 1.0, 1.0))
     return np.asarray(np.maximum(light, 0) * seen.scale, np.float32), recovery
 
