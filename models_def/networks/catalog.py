@@ -10,12 +10,25 @@ from torch import nn
 from camkit.errors import ContractError
 from camkit.models_def.networks.constant_unet import ConstantConfig, ConstantUnet
 from camkit.models_def.networks.full_unet import FullConfig, FullUnet
-from camkit.models_def.networks.lean_unet import LEAN_L, LEAN_M, LEAN_S, LeanConfig, LeanUnet
+from camkit.models_def.networks.lean_unet import (
+    LEAN_L,
+    LEAN_M,
+    LEAN_S,
+    LIGHTS_M,
+    LIGHTS_S,
+    LeanConfig,
+    LeanUnet,
+)
+from camkit.models_def.networks.near_lights import NearLights
 from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
 
 
-def _lean(base: LeanConfig, **config: Any) -> nn.Module:
+def _lean(base: LeanConfig, **config: Any) -> LeanUnet:
     return LeanUnet(replace(base, **config))
+
+
+def _near_lights(base: LeanConfig, **config: Any) -> nn.Module:
+    return NearLights(_lean(base, **config))
 
 
 def _trimmed(**config: Any) -> nn.Module:
@@ -34,6 +47,8 @@ _BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
     "lean_s": partial(_lean, LEAN_S),
     "lean_m": partial(_lean, LEAN_M),
     "lean_l": partial(_lean, LEAN_L),
+    "lights_s": partial(_near_lights, LIGHTS_S),
+    "lights_m": partial(_near_lights, LIGHTS_M),
     "trimmed_unet": _trimmed,
     "full_unet": _full,
     "constant_unet": _constant,

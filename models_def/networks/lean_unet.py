@@ -15,7 +15,7 @@ the strided head and every upsampling is a 1x1 convolution with a pixel-shuffle,
 pixel is computed by the same sums wherever its window lies.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import torch
@@ -69,8 +69,10 @@ class LeanConfig:
 LEAN_S = LeanConfig(
     widths=(16, 32, 32), encoder_blocks=(0, 1), decoder_blocks=(1, 0), middle_blocks=2
 )
+LIGHTS_S = replace(LEAN_S, encoder_blocks=(0, 0), middle_blocks=3)
 LEAN_M = LeanConfig(widths=(32, 32, 48, 64), encoder_blocks=(1, 1, 1), decoder_blocks=(1, 1, 1))
 LEAN_L = LeanConfig(widths=(48, 48, 64, 96), encoder_blocks=(1, 1, 1), decoder_blocks=(1, 1, 1))
+LIGHTS_M = replace(LEAN_M, encoder_blocks=(1, 0, 0))
 
 
 def _conv(inputs: int, outputs: int, size: int, stride: int, *, bias: bool) -> nn.Conv2d:
