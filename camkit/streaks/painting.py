@@ -12,6 +12,7 @@ import numpy as np
 
 from camkit.colorimetry import Matrix
 from camkit.contracts import FloatArray
+from camkit.streaks.cells import PITCH_PX
 from camkit.streaks.recovery import Recovery
 from camkit.streaks.spots import lit_pixels
 
@@ -21,7 +22,7 @@ _NO_CHANGE: Final = np.eye(3)
 
 
 class Painter:
-    """Lays a recovery over the rows of a picture."""
+    """Lays a recovery over the rows of a picture; keeps no more of it than that needs."""
 
     def __init__(self, recovery: Recovery, to_output: Matrix = _NO_CHANGE) -> None:
         """Lay out the lights.
@@ -31,9 +32,13 @@ class Painter:
             to_output: (3, 3) from colours multiplied by the gains to linear Rec.709, in which no
                 light is negative.
         """
-        self._recovery = recovery
         self._lit = lit_pixels(recovery)
         self._to_output = to_output
+        self._veil = recovery.veil
+        self._veil_grid = recovery.coarse.pitch_px, recovery.coarse.offset_px
+        self._streaks = [(region.window, region.streaks) for region in recovery.regions]
+        self._offset_px = recovery.fine.offset_px
+        self._core = recovery.core
 
     def paint(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:
         """Change rows of a picture in place.
@@ -43,36 +48,28 @@ class Painter:
             top: Number of the first row.
             gains: Of the colours.
         """
-        found = self._recovery
+        pitch_px, offset_px = self._veil_grid
         rows, width = planes.shape[1:]
         for colour, gain in enumerate(gains):
-            under = _rows_of_cells(
-                found.veil[colour],
-                found.coarse.pitch_px,
-                found.coarse.offset_px[colour],
-                top,
-                rows,
-                width,
-            )
+            veil = self._veil[colour]
+            under = _rows_of_cells(veil, pitch_px, offset_px[colour], top, rows, width)
             self._add_streaks(under, colour, top)
             under *= np.float32(gain)
             planes[colour] -= under
-            planes[colour] *= np.float32(1 / found.core[colour])
+            planes[colour] *= np.float32(1 / self._core[colour])
         self._put_lights(planes, top, gains)
 
     def _add_streaks(self, under: FloatArray, colour: int, top: int) -> None:
-        cells = self._recovery.fine
-        offset = cells.offset_px[colour]
-        for region in self._recovery.regions:
-            window = region.window
+        offset = self._offset_px[colour]
+        for window, streaks in self._streaks:
             first = max(2 * window.top - 1 - top, 0)
             last = min(2 * window.bottom + 1 - top, under.shape[0])
-            if first >= last or not region.streaks[colour].any():
+            if first >= last or not streaks[colour].any():
                 continue
             left, right = max(2 * window.left - 1, 0), min(2 * window.right + 1, under.shape[1])
             moved = (offset[0] + 2 * window.top, offset[1] + 2 * window.left - left)
             under[first:last, left:right] += _rows_of_cells(
-                region.streaks[colour], 2, moved, top + first, last - first, right - left
+                streaks[colour], PITCH_PX, moved, top + first, last - first, right - left
             )
 
     def _put_lights(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:

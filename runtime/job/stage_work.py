@@ -18,6 +18,8 @@ class StageWork:
         run: Gives the streams of the planes that the stage gives, from those that it takes. The
             rows are made when they are read.
         held_bytes: Memory of the rows and whatever else it keeps, apart from what `fit` plans.
+        first_bytes: Memory that it takes at most before it gives a row, while no window of a
+            network is in memory; counts where it is more than what it holds and they plan.
         fit: Plans within a cap of which others take a share, both in bytes; None for a stage whose
             memory is fixed.
         planned_bytes: Memory of that plan.
@@ -26,6 +28,7 @@ class StageWork:
 
     run: Callable[[Sequence[Stream]], tuple[Stream, ...]]
     held_bytes: int = 0
+    first_bytes: int = 0
     fit: Callable[[int, int], None] | None = None
     planned_bytes: Callable[[], int] = int
     warnings: Callable[[], tuple[str, ...]] = _nothing

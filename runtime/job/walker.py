@@ -74,11 +74,11 @@ class Walk:
         running = [work for work, way in zip(self._works, self.ways, strict=True) if way]
         flexible = [work for work in running if work.fit is not None]
         cap = job.options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES
-        spent = self._fixed_bytes(running)
-        if spent > cap and not flexible:
+        spent, first = self._fixed_bytes(running), self._first_bytes(running)
+        if first > cap or (spent > cap and not flexible):
             raise ContractError(
-                f"this takes about {spent // 10**6} MB, the cap is {cap // 10**6} MB; "
-                "raise --max-mem"
+                f"this takes about {max(spent, first) // 10**6} MB, the cap is "
+                f"{cap // 10**6} MB; raise --max-mem"
             )
         for number, work in enumerate(flexible):
             assert work.fit is not None
@@ -89,7 +89,13 @@ class Walk:
     def needed_bytes(self) -> int:
         """Give the memory of the whole walk."""
         running = [work for work, way in zip(self._works, self.ways, strict=True) if way]
-        return self._fixed_bytes(running) + sum(work.planned_bytes() for work in running)
+        planned = self._fixed_bytes(running) + sum(work.planned_bytes() for work in running)
+        return max(planned, self._first_bytes(running))
+
+    def _first_bytes(self, running: list[StageWork]) -> int:
+        """Give the memory at the time when stages look at the capture before any row."""
+        more = max((work.first_bytes - work.held_bytes for work in running), default=0)
+        return self._fixed_bytes(running) + max(more, 0)
 
     def _fixed_bytes(self, running: list[StageWork]) -> int:
         held = sum(work.held_bytes for work in running)

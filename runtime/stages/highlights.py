@@ -21,7 +21,7 @@ from camkit.runtime.rows import Rows
 from camkit.streaks.cells import COLOURS, Cells, cells_of, sample_sites
 from camkit.streaks.kernels import StreakKernels, streak_kernels
 from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import FINE_CELLS, Recovery, recover
+from camkit.streaks.recovery import FINE_CELLS, recover
 
 METHODS: Final = ("physics",)
 OPTIONS: Final = ("depth_m",)
@@ -29,6 +29,8 @@ BYTES_PER_PX: Final = 22
 """Cells, veil, lights and streaks of a picture that is one window (measured)."""
 FINE_BYTES_PER_PX: Final = 47
 """The same of one so small that its lights are sought in cells of 2 px too (measured)."""
+KEPT_BYTES_PER_PX: Final = 10
+"""Veil, streaks and the pixels of lights, of a picture of which nearly too much clipped."""
 BAND_ROWS: Final = 256
 REST_SHARE: Final = 0.4
 FRONT: Final = ("linearise", "repair")
@@ -50,14 +52,19 @@ def prepare(entry: Highlights, job: Job) -> StageWork:
             f"{width} x {height}. Leave the stage out with another bundle, or --bundle none"
         )
     light, mask = _looked_at(entry, job.setup.stages)
-    found: list[Recovery] = []
+    notes: list[str] = []
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (picture,) = taken
-        return (picture.with_bands(_painted(picture, job, (light, mask), found)),)
+        return (picture.with_bands(_painted(picture, job, (light, mask), notes)),)
 
-    held = held_bytes(height * width)
-    return StageWork(run=run, held_bytes=held, warnings=lambda: _warnings(found))
+    pixels = height * width
+    return StageWork(
+        run=run,
+        held_bytes=KEPT_BYTES_PER_PX * pixels,
+        first_bytes=first_bytes(pixels),
+        warnings=lambda: tuple(notes),
+    )
 
 
 def seconds(_entry: Highlights, subject: Subject, _work: Work, speed: Speed) -> float:
@@ -65,8 +72,8 @@ def seconds(_entry: Highlights, subject: Subject, _work: Work, speed: Speed) -> 
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
-def held_bytes(pixels: int) -> int:
-    """Give the memory that a picture takes at most."""
+def first_bytes(pixels: int) -> int:
+    """Give the memory that a picture takes at most while its lights are sought."""
     fine_px = min(pixels, FINE_CELLS * FINE_PITCH_PX**2)
     return max(BYTES_PER_PX * pixels, FINE_BYTES_PER_PX * fine_px)
 
@@ -85,18 +92,23 @@ def _looked_at(entry: Highlights, stages: Sequence[Stage]) -> tuple[str, str]:
 
 
 def _painted(
-    picture: Stream, job: Job, looked_at: tuple[str, str], found: list[Recovery]
+    picture: Stream, job: Job, looked_at: tuple[str, str], notes: list[str]
 ) -> Iterator[Rows]:
     """Yield the bands of a picture with its lights; finds them when the first is asked for."""
-    cells, kernels = _cells(job, *looked_at), _kernels(job)
-    recovery = recover(cells, kernels, lambda: check_cancelled(job.cancel))
-    found[:] = [recovery]
-    job.sections["hdr"] = recovery.to_json()
-    painter, top = Painter(recovery, _to_output(job)), 0
+    painter, top = _painter(job, looked_at, notes), 0
     for band in picture.bands():
         painter.paint(band, top, picture.gains)
         top += band.shape[1]
         yield band
+
+
+def _painter(job: Job, looked_at: tuple[str, str], notes: list[str]) -> Painter:
+    """Find the lights; what only the search needs is let go."""
+    cells, kernels = _cells(job, *looked_at), _kernels(job)
+    recovery = recover(cells, kernels, lambda: check_cancelled(job.cancel))
+    notes[:] = recovery.notes
+    job.sections["hdr"] = recovery.to_json()
+    return Painter(recovery, _to_output(job))
 
 
 def _to_output(job: Job) -> Matrix:
@@ -130,7 +142,3 @@ def _cells(job: Job, light: str, mask: str) -> Cells:
             plane[:, top // 2 : bottom // 2] = made
         pixels[:, top // 2 : bottom // 2] = part.pixels
     return replace(part, light=whole[0], clipped=whole[1], pixels=pixels)
-
-
-def _warnings(found: Sequence[Recovery]) -> tuple[str, ...]:
-    return tuple(note for recovery in found for note in recovery.notes)

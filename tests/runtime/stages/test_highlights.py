@@ -232,7 +232,7 @@ def test_a_capture_of_other_pixels_has_kernels_of_its_scale(
 
 def test_it_says_what_it_holds(camera: Bundle, light: FloatArray) -> None:
     work = highlights.prepare(_entry(camera), made_job(_mosaic(light), camera))
-    assert work.held_bytes == highlights.held_bytes(HEIGHT * WIDTH)
+    assert work.first_bytes == highlights.first_bytes(HEIGHT * WIDTH)
     assert work.fit is None
     assert work.warnings() == ()
 
@@ -246,14 +246,19 @@ def test_a_picture_that_is_one_window_holds_what_is_stated() -> None:
     planes = np.zeros((3, side, side), np.float32)
     tracemalloc.start()
     found = recover(cells_of(samples, over, sites), kernels)
-    Painter(found).paint(planes, 0, GAINS)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
     assert found.to_json()["window_fraction"] == 1
-    held = highlights.held_bytes(side * side)
+    painter = Painter(found)
+    _, peak = tracemalloc.get_traced_memory()
+    del found
+    painter.paint(planes, 0, GAINS)
+    painter.paint(planes[:, :1], 0, GAINS)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert 0.25 < kept / (highlights.KEPT_BYTES_PER_PX * side * side) < 1
+    held = highlights.first_bytes(side * side)
     assert 0.7 * held < peak < 1.1 * held
     large = 24_000_000
-    assert highlights.held_bytes(large) == highlights.BYTES_PER_PX * large
+    assert highlights.first_bytes(large) == highlights.BYTES_PER_PX * large
 
 
 def _entry(camera: Bundle) -> Highlights:
