@@ -29,6 +29,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.design.plate.goal import Masks, masks_of
+from camkit.models_def.design.plate.maps import begin_map
 from camkit.models_def.design.plate.recipe import PlateRecipe, to_plate_recipe
 from camkit.models_def.design.plate.run import PlateRun, PlateRunOptions
 from camkit.models_def.optics.diffraction.shares import find_streaks, with_reach
@@ -41,9 +42,9 @@ CAMERA: Final = Path(str(resources.files("camkit.models_def.recipes"))) / "strea
 RANK: Final = {"kind": "rank", "rank": 3, "offset": 1.0, "start": 0.1}
 RANK_RATE: Final = 0.05
 FULL_RATE: Final = 0.002
-LATER: Final = 0.6
+LATER: Final = 0.5
 """Of the steps, for the runs that begin where `rank` ended."""
-READER: Final[dict[str, Any]] = {"size": "lean_s", "scenes": 64, "valid_patches": 32}
+READER: Final[dict[str, Any]] = {"size": "lean_s", "scenes": 256, "valid_patches": 48}
 LOG_STEPS: Final = 25
 
 
@@ -135,7 +136,8 @@ def run_one(recipe: PlateRecipe, out_dir: Path, minutes: float) -> dict[str, Any
         resume=True,
     )
     run = PlateRun(recipe, options)
-    first = run.begun
+    with torch.no_grad():
+        first = begin_map(recipe, out_dir)().clone()
     for moment in run.go():
         picture = moment.picture
         print(f"  step {moment.step}: {moment.loss:.5f}", picture, moment.reached, flush=True)
@@ -172,7 +174,7 @@ def main(arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out-dir", type=Path, required=True)
     parser.add_argument("--minutes", type=float, default=math.inf, help="of each run, at most")
-    parser.add_argument("--steps", type=int, default=400, help="of the plate, for a map of rank")
+    parser.add_argument("--steps", type=int, default=300, help="of the plate, for a map of rank")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--runs", nargs="+", help="some of them alone; default: all")
     chosen = parser.parse_args(arguments)

@@ -33,7 +33,7 @@ class ReaderRecipe:
     hold_steps: int = 0
     batch: int = 4
     patch_px: int = 96
-    scenes: int = 96
+    scenes: int = 256
     scene_px: int = 384
     valid_patches: int = 16
 

@@ -68,7 +68,6 @@ class PlateRun:
         torch.set_num_threads(options.threads)
         self.digest = plate_recipe_digest(recipe)
         made = begin_map(recipe, options.recipe_folder)
-        self.begun = made().detach().clone()
         self.loop = PlateLoop(recipe, made, self._reader())
         self._spent_s = self._spent_cpu_s = 0.0
         if options.resume:

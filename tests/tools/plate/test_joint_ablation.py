@@ -41,7 +41,7 @@ def test_runs_differ_in_what_they_are_named_by() -> None:
     assert blind is not None
     assert blind.begin == ""
     assert held is not None
-    assert held.hold_steps == runs["full-hold"].schedule.steps == 6
+    assert held.hold_steps == runs["full-hold"].schedule.steps == 5
     assert bare is not None
     assert bare.hold_steps == runs["bare"].schedule.steps == 10
     assert not begin_map(runs["bare"])().any()
