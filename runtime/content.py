@@ -170,7 +170,7 @@ def measure_content(
         noise=noise_steps,
         clipped=clipped,
         field=_field(window, capture.height, capture.width),
-        lights=_lights(capture),
+        lights=light_squares(capture),
     )
 
 
@@ -204,8 +204,8 @@ def _clipped_bins(capture: Capture, top: int) -> NDArray[np.float32]:
     )
 
 
-def _lights(capture: Capture) -> NDArray[np.bool_]:
-    """Give the squares of LIGHT_PX that hold a clipped sample."""
+def light_squares(capture: Capture) -> NDArray[np.bool_]:
+    """Give (row, column) of the squares of LIGHT_PX, true where any sample is clipped."""
     height, width = capture.height, capture.width
     lefts = np.arange(0, width, LIGHT_PX)
     found = np.zeros((-(-height // LIGHT_PX), lefts.size), dtype=np.bool_)

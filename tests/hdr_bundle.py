@@ -5,6 +5,7 @@ so that shares are known by construction. There is no network: what comes out is
 """
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -94,14 +95,26 @@ def write_hdr_bundle(
     *,
     size_px: tuple[int, int] = SIZE_PX,
     depths_mm: tuple[float, ...] = (5000.0,),
+    members: Mapping[str, bytes] | None = None,
     **changes: Any,
 ) -> Bundle:
-    """Write and open a camera of four lines; changes are fields of its manifest."""
+    """Write and open a camera of four lines; changes are fields of its manifest.
+
+    Args:
+        folder: For the file.
+        name: Of the file.
+        size_px: Of the sensor.
+        depths_mm: Of the optics.
+        members: Networks, by name.
+        changes: Fields of the manifest.
+    """
     streaks = four_lines(depths_mm=depths_mm)
     optics = FrozenOptics(psf=psf_of_streaks(streaks, 3), streaks=streaks)
     member, data = optics.member
     sensor = make_sensor(*size_px)
-    parts = Parts(sensor=sensor, optics=optics.entry(depths_mm[-1]), networks={})
+    parts = Parts(
+        sensor=sensor, optics=optics.entry(depths_mm[-1]), networks=changes.get("networks", {})
+    )
     stages = changes.pop("stages", hdr_stages())
     fields: dict[str, Any] = {
         "name": "streaks",
@@ -117,7 +130,7 @@ def write_hdr_bundle(
         "exported_with": {"camkit": "0.1.0"},
     }
     path = folder / name
-    write_bundle(path, Manifest(**(fields | changes)), {member: data})
+    write_bundle(path, Manifest(**(fields | changes)), {member: data, **(members or {})})
     return open_bundle(path)
 
 

@@ -19,7 +19,7 @@ from camkit.models_def.networks.lean_unet import (
     LeanConfig,
     LeanUnet,
 )
-from camkit.models_def.networks.near_lights import NearLights
+from camkit.models_def.networks.near_lights import REACH_PX, NearLights
 from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
 
 
@@ -55,6 +55,11 @@ _BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
 }
 
 NETWORK_NAMES: Final = tuple(_BUILDERS)
+
+
+def lights_px(name: str) -> int | None:
+    """Give how far from lights a network acts; None for one that acts everywhere."""
+    return REACH_PX if name.startswith("lights_") else None
 
 
 def check_patch(name: str, network: nn.Module, patch_px: int) -> None:

@@ -19,7 +19,7 @@ from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
-from camkit.runtime.content import Content, measure_content
+from camkit.runtime.content import Content, light_squares, measure_content
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.setup import DEVELOPMENT, Setup
 from camkit.runtime.job.stream import Stream
@@ -30,6 +30,7 @@ from camkit.runtime.output.origin import Origin
 from camkit.runtime.plan.decision import DEVELOP, Labels, Subject, Work
 from camkit.runtime.plan.estimate import Estimate, estimate_seconds, stage_seconds
 from camkit.runtime.plan.planner import Plan, make_plan, needs_content
+from camkit.runtime.plan.rules.lights import needs_lights
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import without_networks
 from camkit.runtime.rows import Rows, RowSource
@@ -301,6 +302,7 @@ class Reconstruction:
             width_px=self.capture.width,
             placement=job.placement,
             content=self._measure_content() if needs_content(options) else None,
+            lights=light_squares(self.capture) if needs_lights(bundle) else None,
         )
         plan = make_plan(subject, lambda: self._setup.speed(bundle.manifest.sizes))
         if plan.note:

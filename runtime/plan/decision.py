@@ -38,6 +38,8 @@ class Subject:
         width_px: Columns of the capture.
         placement: Where the capture lies on the sensor.
         content: What was measured; None where nothing may be skipped.
+        lights: (row, column) of squares of `LIGHT_PX`, true where any sample is clipped; None where
+            no rule asks.
         loss_db: Predicted loss that the rules may spend, in dB against `exact`.
     """
 
@@ -47,6 +49,7 @@ class Subject:
     width_px: int
     placement: Placement
     content: Content | None = None
+    lights: NDArray[np.bool_] | None = None
     loss_db: float = 0.0
 
     @property

@@ -1,7 +1,9 @@
 """A network on planes."""
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
 
 from camkit.bundle.entry import Positive, Word
 from camkit.bundle.facts import NetworkFacts, Port
@@ -26,6 +28,8 @@ class Network(StageEntry):
         scale: Divisor behind the square root; the noise there is 0.5 / scale at any ISO.
         most_light: How many times the largest light of its tile an output may have; what exceeds
             it is not believed.
+        lights_px: Farther than this from clipped samples its output is its last plane, bit for bit,
+            so it need not run there (format 2.2); None for one that acts everywhere.
     """
 
     stands_in: ClassVar[int] = -1
@@ -36,6 +40,7 @@ class Network(StageEntry):
     transform: Literal["stabilise", "none"] = "stabilise"
     scale: Positive = 64.0
     most_light: Positive = 16.0
+    lights_px: Annotated[int, Field(ge=1, le=1024)] | None = None
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the outputs of the network, on a finer grid where it says so."""

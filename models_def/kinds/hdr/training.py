@@ -35,7 +35,7 @@ from camkit.models_def.kinds.hdr.thesis.networks import THESIS_NAMES, build_thes
 from camkit.models_def.kinds.hdr.thesis.samples import CodedCamera, CodedMaker, layout_of
 from camkit.models_def.kinds.hdr.thesis.validation import CodedJudge, make_coded_judge
 from camkit.models_def.kinds.hdr.validation import HdrJudge, make_shots
-from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.catalog import build_network, lights_px
 from camkit.models_def.training.kind import Design
 from camkit.models_def.training.sample import Sample, SampleLayout
 
@@ -95,7 +95,12 @@ class HdrTraining:
                 WhiteBalance(),
                 Demosaic(method="fast"),
                 Highlights(),
-                Network(role=ROLES[0], takes=("rgb", "lit"), scale=recipe.scale),
+                Network(
+                    role=ROLES[0],
+                    takes=("rgb", "lit"),
+                    scale=recipe.scale,
+                    lights_px=_lights_px(recipe),
+                ),
                 Illumination(takes=("clean",)),
                 Undistort(),
                 Color(),
@@ -151,6 +156,13 @@ class HdrTraining:
             return make_coded_judge(recipe, role, CodedCamera(recipe, material), source)
         shots = make_shots(recipe, HdrCamera(recipe, material), pictures)
         return HdrJudge(shots=shots, recipe=recipe)
+
+
+def _lights_px(recipe: HdrRecipe) -> int | None:
+    """Give how far from lights the networks act; None if any acts everywhere."""
+    sizes = recipe.networks.get(ROLES[0], {}).values()
+    reaches_px = [px for size in sizes if (px := lights_px(size.network)) is not None]
+    return max(reaches_px) if reaches_px and len(reaches_px) == len(sizes) else None
 
 
 def _open_lights(recipe: HdrRecipe, pictures: Path | None) -> LightSource:

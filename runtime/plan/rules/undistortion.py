@@ -19,10 +19,10 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     stage = subject.bundle.manifest.stage(Undistort)
     if stage is None or stage.type in work.left_out:
         return work, None
-    if subject.content is None:
+    shift_px = largest_shift_px(subject)
+    if subject.content is None and shift_px > 0:
         reason = f"quality {subject.options.quality} skips nothing"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
-    shift_px = largest_shift_px(subject)
     if shift_px >= LEAST_SHIFT_PX:
         reason = f"pixels move by up to {shift_px:.1f} px"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
