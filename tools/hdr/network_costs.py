@@ -61,8 +61,8 @@ def all_costs() -> dict[str, dict[str, float]]:
             "fusion": cost(FusionNetwork(), picture, picture),
             "all three": cost(ThesisChain(), picture),
             "constant_unet": cost(build_network("constant_unet", in_channels=3), picture),
-            "lean_s": cost(build_network("lean_s"), torch.cat([picture, picture], dim=1)),
-            "lean_m": cost(build_network("lean_m"), torch.cat([picture, picture], dim=1)),
+            "lights_s": cost(build_network("lights_s"), torch.cat([picture, picture], dim=1)),
+            "lights_m": cost(build_network("lights_m"), torch.cat([picture, picture], dim=1)),
         }
 
 

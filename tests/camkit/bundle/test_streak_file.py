@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from safetensors.numpy import load, save
@@ -162,8 +162,7 @@ GOOD = streaks_to_bytes(small_streaks())
 @settings(max_examples=100, deadline=None)
 @given(cut=st.integers(0, len(GOOD) - 1), junk=st.binary(max_size=40))
 def test_truncated_or_padded_file_is_refused(cut: int, junk: bytes) -> None:
-    if GOOD[cut:] == junk:
-        return
+    assume(len(junk) != len(GOOD) - cut)  # else bytes are changed, see below
     with pytest.raises(BundleError):
         streaks_from_bytes(GOOD[:cut] + junk)
 
