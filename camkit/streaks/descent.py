@@ -27,15 +27,18 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.streaks.convolution import Convolution
 
-COARSE: Final = ((1.0, 8), (0.3, 8), (0.1, 8), (0.03, 8), (0.012, 8), (0.006, 8))
-"""(scale of the penalty, conjugate gradients), from the first step to the last."""
-FINE: Final = ((0.012, 6), (0.006, 6))
+COARSE: Final = (1.0, 0.3, 0.1, 0.03, 0.012, 0.006)
+"""Scales of the penalty, from the first step to the last."""
+FINE: Final = (0.012, 0.012, 0.006, 0.006)
 FAINTEST: Final = 1e-2
 DIMMEST: Final = 0.05
 """Fainter lights cost no more."""
 BRIGHTEST: Final = 600.0
-EXCESS: Final = 0.3
+EXCESS: Final = 1.0
 """What a light pays where its streaks outshine what is seen, beside the gradients."""
+MOST_BEYOND: Final = 0.2
+"""Share of its streaks by which a first guess may outshine what is seen."""
+_HALVINGS: Final = 12
 _TINY: Final = 1e-30
 Mask = NDArray[np.bool_]
 
@@ -45,18 +48,20 @@ class Steps:
     """How lights are sought at one pitch of cells.
 
     Attributes:
-        scales: (scale of the penalty, conjugate gradients) of every step.
+        scales: Of the penalty, one for every step.
+        rounds: Conjugate gradients of a step; weights and the scale of the lights go stale.
         root: Lights are sought on a scale of their own to this power.
         price: Per light, of those that it would cost by itself.
     """
 
-    scales: tuple[tuple[float, int], ...]
+    scales: tuple[float, ...]
+    rounds: int
     root: float
     price: float
 
 
-COARSE_STEPS: Final = Steps(scales=COARSE, root=0.25, price=0.005)
-FINE_STEPS: Final = Steps(scales=FINE, root=0.5, price=0.00125)
+COARSE_STEPS: Final = Steps(scales=COARSE, rounds=8, root=0.25, price=0.005)
+FINE_STEPS: Final = Steps(scales=FINE, rounds=3, root=0.5, price=0.00125)
 
 
 def seek_lights(
@@ -79,7 +84,7 @@ def seek_lights(
     down, across = usable[1:] & usable[:-1], usable[:, 1:] & usable[:, :-1]
     slope_y, slope_x = _gradient(seen)
     light = np.where(clipped, np.maximum(first, FAINTEST), 0).astype(np.float32)
-    for scale, rounds in steps.scales:
+    for scale in steps.scales:
         thrown = spread.spread(light)
         rest_y, rest_x = _gradient(seen - thrown)
         weights = _Weights(
@@ -92,9 +97,42 @@ def seek_lights(
         system = _System(spread=spread, weights=weights, unit=unit, price=price)
         wanted = unit * system.gathered(slope_y, slope_x, seen)
         start = np.divide(light, unit, out=np.zeros_like(light), where=unit > 0)
-        found = unit * _conjugate_gradients(system, wanted, start, rounds)
+        found = unit * _conjugate_gradients(system, wanted, start, steps.rounds)
         light = np.where(clipped, np.clip(found, FAINTEST, BRIGHTEST), 0).astype(np.float32)
     return light
+
+
+def not_outshining(
+    guess: FloatArray, seen: FloatArray, clipped: Mask, spread: Convolution
+) -> FloatArray:
+    """Give a guess, less bright where its streaks would be brighter than what is seen.
+
+    A start far too bright is not always left again: where streaks lie on clipped cells mostly,
+    little speaks against it.
+
+    Args:
+        guess: (h, w) float32: light of the clipped cells.
+        seen: (h, w) float32, as in `seek_lights`.
+        clipped: (h, w).
+        spread: What a cell's light becomes.
+    """
+    thrown, there = spread.spread(guess)[~clipped], seen[~clipped]
+    low, high = 0.0, 1.0
+    if _beyond(thrown, there) <= MOST_BEYOND:
+        return guess
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        if _beyond(np.float32(middle) * thrown, there) > MOST_BEYOND:
+            high = middle
+        else:
+            low = middle
+    return guess * np.float32(low)
+
+
+def _beyond(thrown: FloatArray, seen: FloatArray) -> float:
+    """Give the share of streaks that is brighter than what is seen."""
+    whole = float(thrown.sum(dtype=np.float64))
+    return float(np.maximum(thrown - seen, 0).sum(dtype=np.float64)) / max(whole, _TINY)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

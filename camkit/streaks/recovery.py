@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.streaks.cells import COLOURS, Cells, coarser
 from camkit.streaks.convolution import Convolution
-from camkit.streaks.descent import COARSE_STEPS, FINE_STEPS, seek_lights
+from camkit.streaks.descent import COARSE_STEPS, FINE_STEPS, not_outshining, seek_lights
 from camkit.streaks.kernels import StreakKernels
 from camkit.streaks.regions import Window, windows_of
 from camkit.streaks.shapes import dome, pooled, rim_distance_px, upsampled, with_means
@@ -195,13 +195,10 @@ def _sought(
     at, shape = (colour, *window.at), clipped.shape
     distance_px = rim_distance_px(clipped, fine.pitch_px)
     guess = np.where(clipped, 1 + GUESS * distance_px**2, 0).astype(np.float32)
-    means = seek_lights(
-        coarse.light[at] - veil[at],
-        coarse.clipped[at] > 0,
-        Convolution(kernels.coarse.whole[colour], window.shape),
-        pooled(guess),
-        COARSE_STEPS,
-    )
+    seen, hidden = coarse.light[at] - veil[at], coarse.clipped[at] > 0
+    spread = Convolution(kernels.coarse.whole[colour], window.shape)
+    first = not_outshining(pooled(guess), seen, hidden, spread)
+    means = seek_lights(seen, hidden, spread, first, COARSE_STEPS)
     light = with_means(dome(distance_px), means)
     if clipped.size > FINE_CELLS:
         return light

@@ -10,6 +10,8 @@ from camkit.streaks.descent import (
     COARSE_STEPS,
     FAINTEST,
     FINE_STEPS,
+    MOST_BEYOND,
+    Mask,
     Steps,
     _conjugate_gradients,
     _divergence,
@@ -18,6 +20,7 @@ from camkit.streaks.descent import (
     _System,
     _weight,
     _Weights,
+    not_outshining,
     seek_lights,
 )
 from tests.streak_factory import star_kernels, street
@@ -125,8 +128,35 @@ def test_finer_steps_bring_a_light_nearer_to_what_it_is(start: float) -> None:
 
 def test_no_steps_leave_the_light_as_it_was() -> None:
     lights = _disc(20, 30, 1.0, 50)
-    still = Steps(scales=(), root=0.5, price=0.0)
+    still = Steps(scales=(), rounds=3, root=0.5, price=0.0)
     found = seek_lights(_scene(), lights > 0, _spread(), lights, still)
+    np.testing.assert_array_equal(found, lights)
+
+
+# --------------------------------------------------------------------------- where it starts
+
+
+def _beyond(guess: FloatArray, seen: FloatArray, clipped: Mask) -> float:
+    thrown = _spread().spread(guess)[~clipped]
+    return float(np.maximum(thrown - seen[~clipped], 0).sum() / thrown.sum())
+
+
+def test_a_first_guess_whose_streaks_outshine_the_picture_is_lowered() -> None:
+    clipped = _disc(24, 32, 9, 1) > 0
+    seen = np.full(SHAPE, 0.05, np.float32)
+    guess = np.where(clipped, 300, 0).astype(np.float32)
+    found = not_outshining(guess, seen, clipped, _spread())
+    assert _beyond(guess, seen, clipped) > 2 * MOST_BEYOND
+    assert _beyond(found, seen, clipped) == pytest.approx(MOST_BEYOND, abs=2e-3)
+    ratio = found[clipped] / guess[clipped]
+    assert np.ptp(ratio) < 1e-6
+    assert 0 < ratio[0] < 1
+
+
+def test_a_guess_that_the_picture_allows_stays() -> None:
+    lights = _disc(24, 32, 2, 5)
+    seen = _seen(2 * lights, _scene())
+    found = not_outshining(lights, seen, lights > 0, _spread())
     np.testing.assert_array_equal(found, lights)
 
 

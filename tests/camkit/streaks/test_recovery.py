@@ -61,7 +61,7 @@ def test_every_lamp_has_its_light_in_every_colour(
         lamp = np.hypot(rows - y, columns - x) <= radius
         for colour in range(3):
             wanted = float(scene[colour][lamp].sum())
-            assert _flux(found, colour, y, x, radius + 6) == pytest.approx(wanted, rel=0.25)
+            assert _flux(found, colour, y, x, radius + 6) == pytest.approx(wanted, rel=0.28)
 
 
 def test_light_lies_in_clipped_cells_alone_and_streaks_reach_from_them(
