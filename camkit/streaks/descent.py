@@ -38,6 +38,7 @@ EXCESS: Final = 1.0
 """What a light pays where its streaks outshine what is seen, beside the gradients."""
 MOST_BEYOND: Final = 0.2
 """Share of its streaks by which a first guess may outshine what is seen."""
+_DIMMEST_START: Final = 2.0**-20
 _HALVINGS: Final = 12
 _TINY: Final = 1e-30
 Mask = NDArray[np.bool_]
@@ -117,11 +118,11 @@ def not_outshining(
         spread: What a cell's light becomes.
     """
     thrown, there = spread.spread(guess)[~clipped], seen[~clipped]
-    low, high = 0.0, 1.0
+    low, high = _DIMMEST_START, 1.0
     if _beyond(thrown, there) <= MOST_BEYOND:
         return guess
     for _ in range(_HALVINGS):
-        middle = (low + high) / 2
+        middle = (low * high) ** 0.5
         if _beyond(np.float32(middle) * thrown, there) > MOST_BEYOND:
             high = middle
         else:
