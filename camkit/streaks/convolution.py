@@ -1,4 +1,10 @@
-"""Light spread by a kernel over a window, and the transpose of that."""
+"""Light spread by a kernel over a window, and the transpose of that.
+
+many lights -> `Convolution`, by Fourier transforms: what it costs hangs on the window
+few lights  -> `FewLights`, the kernel laid about each: what it costs hangs on their number
+"""
+
+from typing import Final, Protocol
 
 import numpy as np
 import scipy.fft
@@ -6,6 +12,77 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+
+Mask = NDArray[np.bool_]
+MOST_LIGHTS: Final = 128
+"""More are spread by transforms, which cost as much as this many (measured)."""
+MOST_VALUES: Final = 2**22
+"""Kernels laid about lights, in values of 4 bytes."""
+
+
+class Spread(Protocol):
+    """What becomes of the light of a window."""
+
+    def spread(self, light: FloatArray) -> FloatArray:
+        """Give what light (h, w) becomes."""
+        ...
+
+    def gathered(self, image: FloatArray) -> FloatArray:
+        """Give the transpose: for every place, what its light would meet in an image (h, w)."""
+        ...
+
+
+def spreading(kernel: FloatArray, lit: Mask) -> Spread:
+    """Give the cheaper way to spread light that lies on some cells of a window alone.
+
+    Args:
+        kernel: (n, n) float32, n odd.
+        lit: (h, w): where light may be; elsewhere `gathered` need not be right.
+    """
+    count = int(lit.sum())
+    if count <= MOST_LIGHTS and count * lit.size <= MOST_VALUES:
+        return FewLights(kernel, lit)
+    return Convolution(kernel, lit.shape)
+
+
+class FewLights:
+    """A kernel laid about each of a few lights; what leaves the window is lost."""
+
+    def __init__(self, kernel: FloatArray, lit: Mask) -> None:
+        """Make ready.
+
+        Args:
+            kernel: (n, n) float32, n odd.
+            lit: (h, w): where light may be.
+
+        Raises:
+            ContractError: If the kernel has no middle.
+        """
+        _check_kernel(kernel)
+        self._at = np.nonzero(lit)
+        height, width = self._shape = lit.shape
+        half = max(height, width) - 1
+        middle = kernel.shape[0] // 2
+        reach = min(half, middle)
+        wide = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
+        wide[half - reach : half + reach + 1, half - reach : half + reach + 1] = kernel[
+            middle - reach : middle + reach + 1, middle - reach : middle + reach + 1
+        ]
+        # a sum over rows of fixed order: products of matrices hang on threads and processors
+        self._laid = np.empty((len(self._at[0]), height * width), np.float32)
+        for row, y, x in zip(self._laid, *self._at, strict=True):
+            row[:] = wide[half - y : half - y + height, half - x : half - x + width].ravel()
+
+    def spread(self, light: FloatArray) -> FloatArray:
+        """Give what light (h, w) becomes; counts where it may be alone."""
+        whole = np.einsum("ji,j->i", self._laid, light[self._at])
+        return np.asarray(whole, np.float32).reshape(self._shape)
+
+    def gathered(self, image: FloatArray) -> FloatArray:
+        """Give the transpose at the places of lights; 0 elsewhere."""
+        out = np.zeros(self._shape, np.float32)
+        out[self._at] = np.einsum("ji,i->j", self._laid, image.ravel())
+        return out
 
 
 class Convolution:
@@ -21,8 +98,7 @@ class Convolution:
         Raises:
             ContractError: If the kernel has no middle.
         """
-        if kernel.ndim != 2 or kernel.shape[0] != kernel.shape[1] or kernel.shape[0] % 2 == 0:
-            raise ContractError(f"a kernel is square with an odd side; got {kernel.shape}")
+        _check_kernel(kernel)
         self._shape = shape
         # farther than a window is wide nothing in it is lit
         half = min(kernel.shape[0] // 2, max(shape) - 1)
@@ -51,3 +127,8 @@ class Convolution:
         whole = scipy.fft.irfft2(scipy.fft.rfft2(image, self._size) * transform, self._size)
         height, width = self._shape
         return np.asarray(whole[:height, :width], np.float32)
+
+
+def _check_kernel(kernel: FloatArray) -> None:
+    if kernel.ndim != 2 or kernel.shape[0] != kernel.shape[1] or kernel.shape[0] % 2 == 0:
+        raise ContractError(f"a kernel is square with an odd side; got {kernel.shape}")

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.streaks.convolution import Convolution
+from camkit.streaks.convolution import Spread
 
 COARSE: Final = (1.0, 0.3, 0.1, 0.03, 0.012, 0.006)
 """Scales of the penalty, from the first step to the last."""
@@ -66,7 +66,7 @@ FINE_STEPS: Final = Steps(scales=FINE, rounds=3, root=0.5, price=0.00125)
 
 
 def seek_lights(
-    seen: FloatArray, clipped: Mask, spread: Convolution, first: FloatArray, steps: Steps
+    seen: FloatArray, clipped: Mask, spread: Spread, first: FloatArray, steps: Steps
 ) -> FloatArray:
     """Give the light of clipped cells.
 
@@ -104,7 +104,7 @@ def seek_lights(
 
 
 def not_outshining(
-    guess: FloatArray, seen: FloatArray, clipped: Mask, spread: Convolution
+    guess: FloatArray, seen: FloatArray, clipped: Mask, spread: Spread
 ) -> FloatArray:
     """Give a guess, less bright where its streaks would be brighter than what is seen.
 
@@ -149,7 +149,7 @@ class _Weights:
 class _System:
     """The normal equations of one step, in units of the lights."""
 
-    spread: Convolution
+    spread: Spread
     weights: _Weights
     unit: FloatArray
     price: FloatArray

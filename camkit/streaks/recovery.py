@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.streaks.cells import COLOURS, Cells, coarser
-from camkit.streaks.convolution import Convolution
+from camkit.streaks.convolution import Convolution, spreading
 from camkit.streaks.descent import COARSE_STEPS, FINE_STEPS, not_outshining, seek_lights
 from camkit.streaks.kernels import StreakKernels
 from camkit.streaks.regions import Window, windows_of
@@ -162,7 +162,8 @@ def _region(
         if not clipped.any():
             continue
         light[colour] = _sought(colour, window, clipped, cells, veil, kernels)
-        streaks[colour] = Convolution(kernels.fine.veil[colour], place.shape).spread(light[colour])
+        spread = spreading(kernels.fine.veil[colour], clipped)
+        streaks[colour] = spread.spread(light[colour])
     return Region(window=place, light=light, streaks=streaks, thrown=_thrown(streaks, fine, place))
 
 
@@ -196,7 +197,7 @@ def _sought(
     distance_px = rim_distance_px(clipped, fine.pitch_px)
     guess = np.where(clipped, 1 + GUESS * distance_px**2, 0).astype(np.float32)
     seen, hidden = coarse.light[at] - veil[at], coarse.clipped[at] > 0
-    spread = Convolution(kernels.coarse.whole[colour], window.shape)
+    spread = spreading(kernels.coarse.whole[colour], hidden)
     first = not_outshining(pooled(guess), seen, hidden, spread)
     means = seek_lights(seen, hidden, spread, first, COARSE_STEPS)
     light = with_means(dome(distance_px), means)
@@ -206,7 +207,7 @@ def _sought(
     return seek_lights(
         fine.light[(colour, *place.at)] - upsampled(veil[at], shape),
         clipped,
-        Convolution(kernels.fine.whole[colour], shape),
+        spreading(kernels.fine.whole[colour], clipped),
         light,
         FINE_STEPS,
     )

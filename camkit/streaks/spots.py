@@ -109,7 +109,7 @@ def _lit(numbers: Index, cells: Cells, region: Region) -> Mask:
     lit = np.zeros((COLOURS, height + 2, width + 2), np.bool_)
     at = (slice(None), *region.window.at)
     clipped, pixels = cells.clipped[at], cells.pixels[at]
-    level = cells.known[at] + clipped
+    level = cells.light[at] * (1 - clipped) + clipped
     for rows, columns in _pixels_of(numbers):
         for colour in range(COLOURS):
             offset = cells.offset_px[colour]

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.signal import convolve2d
 
 from camkit.errors import ContractError
-from camkit.streaks.convolution import Convolution
+from camkit.streaks import convolution
+from camkit.streaks.convolution import MOST_LIGHTS, Convolution, FewLights, spreading
 
 FLOAT32 = 2e-6
 SHAPES = st.tuples(st.integers(1, 12), st.integers(1, 12))
@@ -43,6 +44,39 @@ def test_what_is_gathered_is_the_transpose_of_what_is_spread(
     other = np.vdot(light.astype(np.float64), both.gathered(image))
     scale = np.abs(kernel).sum() * np.abs(light).sum()
     assert abs(one - other) < 1e-5 * scale
+
+
+@settings(max_examples=60, deadline=None)
+@given(half=st.integers(0, 15), shape=SHAPES, seed=st.integers(0, 99))
+def test_kernels_laid_about_few_lights_do_as_transforms_do(
+    half: int, shape: tuple[int, int], seed: int
+) -> None:
+    """Where lights may be; transposed they say nothing of other places."""
+    rng = np.random.default_rng(seed)
+    kernel = rng.normal(size=(2 * half + 1,) * 2).astype(np.float32)
+    lit = rng.uniform(size=shape) < 0.3
+    light, image = rng.normal(size=(2, *shape)).astype(np.float32)
+    few, every = FewLights(kernel, lit), Convolution(kernel, shape)
+    size = np.abs(kernel).sum() * 4
+    there = np.where(lit, light, 0).astype(np.float32)
+    np.testing.assert_allclose(few.spread(light), every.spread(there), atol=FLOAT32 * size)
+    got = few.gathered(image)
+    np.testing.assert_allclose(got[lit], every.gathered(image)[lit], atol=FLOAT32 * size)
+    assert (got[~lit] == 0).all()
+
+
+def test_few_lights_are_spread_one_by_one_and_many_by_transforms(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kernel = np.ones((5, 5), np.float32)
+    lit = np.zeros((40, 40), np.bool_)
+    lit.ravel()[:MOST_LIGHTS] = True
+    assert isinstance(spreading(kernel, lit), FewLights)
+    lit[39, 39] = True
+    assert isinstance(spreading(kernel, lit), Convolution)
+    lit[39, 39] = False
+    monkeypatch.setattr(convolution, "MOST_VALUES", MOST_LIGHTS * lit.size - 1)
+    assert isinstance(spreading(kernel, lit), Convolution)
 
 
 def test_a_lone_light_becomes_the_kernel_as_it_lies() -> None:
