@@ -61,6 +61,7 @@ class TrainOptions:
         valid_folder: Pictures to choose by; None for procedural scenes.
         steps: Steps of the whole schedule; None for the recipe's.
         max_minutes: Wall time after which the schedule, decay included, ends; None for its steps.
+        max_cpu_minutes: The same of CPU time, that of the workers included.
         start: Checkpoint or bundle with the same network, of another camera say, whose weights
             are the first ones; None for random weights.
         stop_at_step: Stop there though the schedule goes on, as an interruption would.
@@ -81,6 +82,7 @@ class TrainOptions:
     valid_folder: Path | None = None
     steps: int | None = None
     max_minutes: float | None = None
+    max_cpu_minutes: float | None = None
     start: Path | None = None
     stop_at_step: int | None = None
     resume: bool = False
@@ -93,8 +95,10 @@ class TrainOptions:
     validate_s: float = 180.0
 
     def __post_init__(self) -> None:
-        if self.max_minutes is not None and self.max_minutes <= 0:
-            raise ContractError(f"max_minutes must be > 0; got {self.max_minutes}")
+        for name in ("max_minutes", "max_cpu_minutes"):
+            minutes = getattr(self, name)
+            if minutes is not None and minutes <= 0:
+                raise ContractError(f"{name} must be > 0; got {minutes}")
         if self.steps is not None and self.steps < 1:
             raise ContractError(f"steps must be >= 1; got {self.steps}")
         if self.start is not None and self.resume:
@@ -311,7 +315,6 @@ class _Run:
     def loop(self, pool: SamplePool, bar: TrainingBar) -> None:
         """Fit until the schedule, the time or the asked step ends; checkpoint and validate."""
         schedule, options = self.entry.schedule, self.options
-        budget_s = None if options.max_minutes is None else 60 * options.max_minutes
         pool.draw_batch(self.step, 1, schedule.patch_px)
         self.log.write(
             {"step": self.step, "seconds": self.elapsed_s(), "cpu_s": self.cpu_s(pool)}
@@ -319,7 +322,7 @@ class _Run:
         )
         saved_s = validated_s = self.elapsed_s()
         losses: list[float] = []
-        while not self._is_over(progress := self._progress(budget_s)):
+        while not self._is_over(progress := self._progress(pool)):
             batch = pool.draw_batch(self.step, schedule.batch, schedule.patch_px)
             losses.append(self.fitter.fit(batch, self.step, progress))
             self.step += 1
@@ -335,8 +338,16 @@ class _Run:
         self._validate(pool)
         self._save(pool)
 
-    def _progress(self, budget_s: float | None) -> float:
-        return progress_of(self.step, self.steps, self.elapsed_s(), budget_s)
+    def _progress(self, pool: SamplePool) -> float:
+        options = self.options
+        spent = (
+            (self.elapsed_s(), options.max_minutes),
+            (self.cpu_s(pool), options.max_cpu_minutes),
+        )
+        return max(
+            progress_of(self.step, self.steps, seconds, None if most is None else 60 * most)
+            for seconds, most in spent
+        )
 
     def _is_over(self, progress: float) -> bool:
         return progress >= 1 or self.step == self.options.stop_at_step

@@ -36,6 +36,10 @@ def train(
         float | None,
         typer.Option(help="Wall time, decay included; default: until the steps are done."),
     ] = None,
+    max_cpu_minutes: Annotated[
+        float | None,
+        typer.Option(help="CPU time, processes that make samples included; likewise."),
+    ] = None,
     out_dir: Annotated[Path, typer.Option(help="Folder for checkpoint, log and samples.")] = Path(
         "runs"
     ),
@@ -84,6 +88,7 @@ def train(
             valid_folder=valid,
             steps=steps,
             max_minutes=max_minutes,
+            max_cpu_minutes=max_cpu_minutes,
             start=start,
             resume=resume,
             overwrite=overwrite,

@@ -54,9 +54,17 @@ def test_loss_falls_on_a_tiny_run_without_any_picture(tmp_path, recipe_path, mat
     assert "no photographs" in read_checkpoint(result.checkpoint).training_data
 
 
-def test_the_time_budget_ends_a_run_with_its_decay(tmp_path, recipe_path, material):
-    result = train(recipe_path, options(tmp_path, size="M", max_minutes=1e-4), material=material)
-    assert result.steps < 60
+@pytest.mark.parametrize("budget", ["max_minutes", "max_cpu_minutes"])
+def test_a_budget_of_time_ends_a_run_with_its_decay(tmp_path, recipe_path, material, budget):
+    given = options(tmp_path, size="M", **{budget: 1e-4})
+    assert train(recipe_path, given, material=material).steps < 60
+
+
+def test_the_cpu_time_of_an_earlier_run_counts(tmp_path, recipe_path, material):
+    first = train(recipe_path, options(tmp_path, size="M", stop_at_step=5), material=material)
+    spent = first.cpu_s / 60
+    given = options(tmp_path, size="M", max_cpu_minutes=spent, resume=True)
+    assert train(recipe_path, given, material=material).steps == 5
 
 
 def test_log_tells_steps_seconds_and_quality_and_can_be_drawn(whole, tmp_path):
@@ -212,7 +220,9 @@ def test_patches_that_the_network_cannot_take_are_refused_before_any_tracing(tmp
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("changes", [{"max_minutes": 0.0}, {"threads": 0}, {"workers": -1}])
+@pytest.mark.parametrize(
+    "changes", [{"max_minutes": 0.0}, {"max_cpu_minutes": -1.0}, {"threads": 0}, {"workers": -1}]
+)
 def test_impossible_options_are_refused(tmp_path, changes):
     with pytest.raises(ContractError, match=r"must be"):
         options(tmp_path, **changes)

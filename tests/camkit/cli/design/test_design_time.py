@@ -85,7 +85,18 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
             "few",
             "--resume",
         ),
-        *("--max-minutes", "2.5", "--out-dir", tmp_path, "--threads", "2", "--workers", "0"),
+        *(
+            "--max-minutes",
+            "2.5",
+            "--max-cpu-minutes",
+            "3",
+            "--out-dir",
+            tmp_path,
+            "--threads",
+            "2",
+            "--workers",
+            "0",
+        ),
         "--json",
     )
     assert outcome.code == 0, outcome.err
@@ -101,6 +112,7 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
                 data_folder=Path("pictures"),
                 valid_folder=Path("few"),
                 max_minutes=2.5,
+                max_cpu_minutes=3.0,
                 resume=True,
                 threads=2,
                 workers=0,
