@@ -8,4 +8,5 @@
   (the measured PSF) and `coded_judge` (solved, simulated, scored)
 - `glare_twin`, `glare_bundle`, `glare_table`: streaks of a windshield, the bundle that removes
   them, and what that gains
+- `tables`: optics and networks beside each other, tables 5.4 and 5.5 of the thesis; with `table`
 """

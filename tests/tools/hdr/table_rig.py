@@ -1,0 +1,110 @@
+"""The tables of snapshot HDR made so small that all of them take seconds."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from camkit.models_def.kinds.hdr import validation
+from camkit.models_def.kinds.hdr.material import HdrMaterial
+from camkit.models_def.kinds.hdr.thesis import validation as thesis_validation
+from camkit.report.bench import known_captures
+from tests.hdr_bundle import four_lines
+from tools.hdr import tables
+from tools.hdr.table import cameras, training
+
+SIDE_PX = 128
+TABLES = """
+[data]
+procedural_scenes = 1
+scene_px = 192
+sample_px = 64
+capture_px = 128
+surround_px = 16
+pool_samples = 40
+first_samples = 2
+steps_per_sample = 4
+saturated_min = 0.01
+saturated_max = 0.03
+
+[thesis]
+optics = "{optics}"
+
+[schedule]
+steps = 2
+batch = 2
+patch_px = 32
+warmup_steps = 1
+
+[networks.{role}.{size}]
+network = "lean_s"
+config = {{ widths = [16, 16], encoder_blocks = [0], decoder_blocks = [0], {more} }}
+"""
+TINY = {
+    "streak_hdr.toml": {"optics": "plate", "role": "highlights", "size": "S", "more": "bias=true"},
+    "bare_lens.toml": {"optics": "bare", "role": "whole", "size": "M", "more": "in_channels=3"},
+}
+Rig = Callable[..., str]
+
+
+@pytest.fixture
+def rig(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Rig]:
+    """Give the command, with small recipes, scenes and optics; its answer is what it prints."""
+    recipes = tmp_path / "recipes"
+    recipes.mkdir()
+    for name, words in TINY.items():
+        text = (cameras.RECIPES / name).read_text(encoding="utf-8")
+        small = text[: text.index("[data]")] + TABLES.format(**words)
+        (recipes / name).write_text(small, encoding="utf-8")
+    for module in (cameras, training):
+        monkeypatch.setattr(module, "RECIPES", recipes)
+    monkeypatch.setattr(cameras, "compute_material", small_material)
+    monkeypatch.setattr(known_captures, "SCENE_PX", SIDE_PX)
+    monkeypatch.setattr(validation, "CAPTURES", 1)
+    monkeypatch.setattr(thesis_validation, "SAMPLES", 1)
+    before = torch.get_num_threads()
+    forget()
+
+    def command(*words: Any) -> str:
+        tables.main([str(word) for word in words])
+        return capsys.readouterr().out
+
+    yield command
+    forget()
+    torch.set_num_threads(before)
+
+
+def forget() -> None:
+    """Let what was computed of other recipes go."""
+    cameras.material_of.cache_clear()
+    cameras.shipped_recipe.cache_clear()
+
+
+def small_material(recipe: Any, *_folders: Path) -> HdrMaterial:
+    """Give four short lines, whatever the plate; their angles tell plates apart."""
+    lines = four_lines()
+    turn = len(recipe.plate.file) / 100
+    return HdrMaterial(
+        streaks=replace(
+            lines,
+            angles_rad=lines.angles_rad + turn,
+            pixel_pitch_um=recipe.sensor.pixel_pitch_um,
+        )
+    )
+
+
+def write_pictures(folder: Path) -> Path:
+    """Write one HDR picture with lamps and one file that is none."""
+    folder.mkdir()
+    light = np.random.default_rng(0).random((SIDE_PX, SIDE_PX, 3), np.float32) ** 8
+    light[60:66, 60:66] = 40.0
+    cv2.imwrite(str(folder / "esplanade.hdr"), light)
+    (folder / "torn.exr").write_bytes(b"no picture")
+    return folder
