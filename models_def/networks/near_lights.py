@@ -1,18 +1,17 @@
-"""A network that acts near lights alone; elsewhere its last three planes come out as they are.
+"""A network that acts on lights alone; elsewhere its last three planes come out as they are.
 
-    capture, lit --+-- network ------------------------- (-) -- (x) -- (+) -- output
-                   |-- lit ------------------------------'------ | -----'
-                   '-- raised? -- max, /8 -- wider -- softer -- x8'
+    capture, lit --+-- network ------------------- (-) -- (x) -- (+) -- output
+                   |-- lit ------------------------'------ | -----'
+                   '-- raised? -- one pixel wider ---------'
 
 `lit` is brighter than the capture where a light was put in, and nowhere else by more than what an
-evenly lit plane gains when streaks are taken away. Around such pixels the network counts fully,
-farther off less and less, and from `REACH_PX` on not at all: there the output is `lit` bit for bit,
-so windows without lights need not be computed.
+evenly lit plane gains when streaks are taken away. The network acts on such pixels and on those
+beside them. What did not clip was seen, and physics has taken the streaks from it: a network that
+is fitted to lights of hundreds of times white only makes it worse.
 """
 
 from typing import Final
 
-import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
@@ -23,15 +22,13 @@ RATIO: Final = 1.1
 """Of stabilised values: 1.21 of the light; a core of 83 % of the light would raise by as much."""
 FLOOR: Final = 0.05
 """Stabilised; several standard deviations of the noise."""
-CELL_PX: Final = 8
-WIDE_CELLS: Final = 4
-SOFT_CELLS: Final = 2
-REACH_PX: Final = CELL_PX * (WIDE_CELLS + SOFT_CELLS + 2)
-"""From a light; the last two cells are its own and that of the interpolation."""
+BESIDE_PX: Final = 1
+REACH_PX: Final = 4
+"""From a clipped sample: a demosaic and the pixels of a light reach two pixels, this one more."""
 
 
 class NearLights(nn.Module):
-    """Lets a network act near lights.
+    """Lets a network act on lights.
 
     Attributes:
         inner: From (b, 6, h, w) to (b, 3, h, w), stabilised.
@@ -64,12 +61,7 @@ class NearLights(nn.Module):
 
 
 def nearness(planes: Tensor) -> Tensor:
-    """Give (b, 1, h, w), 1 near lights and 0 from `REACH_PX` on; planes as `NearLights` has."""
+    """Give (b, 1, h, w), 1 on lights and beside them, 0 elsewhere; planes as `NearLights` has."""
     raised = planes[:, COLOURS:] - RATIO * planes[:, :COLOURS] - FLOOR
     there = (raised / FLOOR).clamp(0, 1).amax(dim=1, keepdim=True)
-    cells = nn.functional.max_pool2d(there, CELL_PX)
-    wide = nn.functional.max_pool2d(cells, 2 * WIDE_CELLS + 1, 1, WIDE_CELLS)
-    soft = nn.functional.avg_pool2d(wide, 2 * SOFT_CELLS + 1, 1, SOFT_CELLS)
-    return nn.functional.interpolate(
-        torch.as_tensor(soft), scale_factor=CELL_PX, mode="bilinear", align_corners=False
-    )
+    return nn.functional.max_pool2d(there, 2 * BESIDE_PX + 1, 1, BESIDE_PX)
