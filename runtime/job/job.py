@@ -85,7 +85,7 @@ class Job:
         self.work = Work()
         self.subject: Subject | None = None
         self.windows: dict[str, NetworkWindows] = {}
-        self.prober: Callable[[Job, str], RowSource] | None = None
+        self.prober: Callable[[Job, tuple[str, ...]], tuple[RowSource, ...]] | None = None
         self.known = dict(known or {})
         self.reserved_bytes = reserved_bytes
         self.clipped_fraction = 0.0
@@ -121,20 +121,23 @@ class Job:
         """Give the threads to compute with."""
         return self.setup.threads
 
-    def probe(self, plane: str) -> RowSource:
-        """Give rows of a plane that are made for the asking stage alone, before its first row.
+    def probe(self, *planes: str) -> tuple[RowSource, ...]:
+        """Give rows of planes that are made for the asking stage alone, before its first row.
 
         They equal those that it will be given. To be called when the first row is asked for.
+        Several planes are made by one walk: read the same rows of each before the next ones, from
+        top to bottom.
 
         Raises:
-            ContractError: If it is called earlier, or the plane does not lie before that stage.
+            ContractError: If it is called earlier, or a plane does not lie before that stage.
         """
         if self.prober is None:
+            named = ", ".join(map(repr, planes))
             raise ContractError(
-                f"the plane {plane!r} is asked for too early: stages look at planes when their "
+                f"the plane {named} is asked for too early: stages look at planes when their "
                 "first row is asked for, not while they are made ready"
             )
-        return self.prober(self, plane)
+        return self.prober(self, planes)
 
     def unheard(self) -> "Job":
         """Give the same job for a walk whose counts and notes nobody hears."""

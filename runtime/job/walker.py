@@ -115,10 +115,23 @@ class Walk:
         Raises:
             ContractError: If no stage gives it.
         """
-        _giver_of(wanted, self.stages)
-        job, last = self._job, self._instead.get(wanted, wanted)
-        needed = self._needed(last)
-        takers = Counter([last, *(name for number in needed for name in self._taken(number))])
+        (made,) = self.streams(wanted)
+        return made
+
+    def streams(self, *wanted: str) -> tuple[Stream, ...]:
+        """Give the rows of several planes by one walk, to be read band by band in turns.
+
+        Args:
+            wanted: Names of planes, no two alike.
+
+        Raises:
+            ContractError: If no stage gives one of them.
+        """
+        for name in wanted:
+            _giver_of(name, self.stages)
+        job, lasts = self._job, [self._instead.get(name, name) for name in wanted]
+        needed = self._needed(lasts)
+        takers = Counter([*lasts, *(name for number in needed for name in self._taken(number))])
         there = {CAPTURE: _capture_stream(job, self._planes[CAPTURE]), **job.known}
         ready = {name: stream.shared(takers[name]) for name, stream in there.items()}
         job.meter.expect([name for number in needed for name in self.stages[number].gives])
@@ -129,7 +142,7 @@ class Walk:
                 if name not in job.known:
                     counted = given.timed(job.clock, self.keys[number]).metered(job.meter, name)
                     ready[name] = counted.shared(takers[name])
-        return ready[last].pop()
+        return tuple(ready[last].pop() for last in lasts)
 
     def keep(self, wanted: str) -> Stream:
         """Read a plane whole; from now on it is known, and what gives it does not run again."""
@@ -144,9 +157,9 @@ class Walk:
         """Give the streams that a stage takes; every call walks anew."""
         return [self.stream(name) for name in self.stages[number].takes]
 
-    def _needed(self, wanted: str) -> list[int]:
-        """Give the stages, in order, whose planes the wanted one is made of and are not known."""
-        planes, needed, known = {wanted}, [], self._job.known.keys()
+    def _needed(self, wanted: Sequence[str]) -> list[int]:
+        """Give the stages, in order, whose planes the wanted are made of and are not known."""
+        planes, needed, known = set(wanted), [], self._job.known.keys()
         for number in range(len(self.stages) - 1, -1, -1):
             made = planes.intersection(self.stages[number].gives) - known
             if made and self.ways[number] != LEFT_OUT:
@@ -174,18 +187,19 @@ def _giver_of(plane: str, stages: Sequence[Stage]) -> int:
     raise ContractError(f"no stage gives the plane {plane!r}; there are {there}")
 
 
-def _probed(job: Job, plane: str, *, before: int) -> RowSource:
+def _probed(job: Job, planes: Sequence[str], *, before: int) -> tuple[RowSource, ...]:
     """Give what `Job.probe` gives.
 
     Raises:
-        ContractError: If the plane is made by a stage that asks, or behind it.
+        ContractError: If a plane is made by a stage that asks, or behind it.
     """
-    number = _giver_of(plane, job.setup.stages)
-    if number >= before:
-        raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
-    walk = Walk(job.unheard(), before=number)
+    numbers = [_giver_of(plane, job.setup.stages) for plane in planes]
+    for plane, number in zip(planes, numbers, strict=True):
+        if number >= before:
+            raise ContractError(f"the plane {plane!r} is asked for by a stage that it is made from")
+    walk = Walk(job.unheard(), before=max(numbers))
     walk.settle()
-    return walk.stream(plane).rows()
+    return tuple(stream.rows() for stream in walk.streams(*planes))
 
 
 def _planes_of(job: Job) -> dict[str, Plane]:

@@ -95,6 +95,11 @@ def repair_planes(planes: FloatArray) -> tuple[FloatArray, BoolArray]:
     return (np.stack([p for p, _ in pairs]) if mask.any() else planes), mask
 
 
+def places_of(mask: BoolArray) -> tuple[NDArray[np.intp], ...]:
+    """Give what `np.nonzero` gives, in a fraction of its time where few of a mask are true."""
+    return np.unravel_index(np.flatnonzero(mask), mask.shape)
+
+
 def _repair(plane: FloatArray, step: int) -> tuple[FloatArray, BoolArray]:
     broken = ~np.isfinite(plane)
     if broken.any():
@@ -103,7 +108,7 @@ def _repair(plane: FloatArray, step: int) -> tuple[FloatArray, BoolArray]:
     broken |= _outliers(plane, padded, step)
     if not broken.any():
         return plane, broken
-    rows, cols = np.nonzero(broken)
+    rows, cols = places_of(broken)
     around = neighbours(padded, rows, cols, step)
     repaired = plane.copy()
     repaired[rows, cols] = _median(around)
@@ -123,7 +128,7 @@ def _outliers(plane: FloatArray, padded: FloatArray, step: int) -> BoolArray:
         bottom = min(top + _CACHED_ROWS, len(plane))
         alone[top:bottom] = _apart(plane[top:bottom], padded[top : bottom + 4], step)
     if step == 2 and alone.any():
-        rows, cols = np.nonzero(alone)
+        rows, cols = places_of(alone)
         alone[rows, cols] = ~glows(padded, rows, cols)
     return alone
 

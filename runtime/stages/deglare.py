@@ -91,7 +91,7 @@ def _cleared(
 
 def _opened(job: Job, plane: str, gains: Gains) -> Read:
     """Begin to read a plane; every colour clips at 1, what is no number is dark."""
-    rows = job.probe(plane)
+    (rows,) = job.probe(plane)
     gain = np.array(gains, np.float32)[:, None, None]
 
     def read(top: int, bottom: int) -> FloatArray:

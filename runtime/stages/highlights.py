@@ -129,7 +129,7 @@ def _kernels(job: Job) -> StreakKernels:
 
 def _cells(job: Job, light: str, mask: str) -> Cells:
     """Read the whole capture in cells."""
-    samples, clipped = job.probe(light), job.probe(mask)
+    samples, clipped = job.probe(light, mask)
     sites = sample_sites(job.capture.cfa)
     height = samples.shape[1] // 2 * 2
     shape = COLOURS, height // 2, samples.shape[2] // 2

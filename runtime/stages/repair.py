@@ -15,7 +15,12 @@ from camkit.runtime.machine.slices import run_slices
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows, RowSource
-from camkit.runtime.signal.noise import REPAIR_MARGIN_PX, repair_mosaic, repair_planes
+from camkit.runtime.signal.noise import (
+    REPAIR_MARGIN_PX,
+    places_of,
+    repair_mosaic,
+    repair_planes,
+)
 
 METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final[tuple[str, ...]] = ()
@@ -114,7 +119,7 @@ class SoundRows:
             else:
                 part, mask = repair_planes(part)
             sound[:, first:last] = part[:, inside]
-            channel, row, column = np.nonzero(mask[:, inside])
+            channel, row, column = places_of(mask[:, inside])
             found[first] = channel, row + top + first, column
 
         run_slices(fill, bottom - top, threads=self._threads)

@@ -396,7 +396,7 @@ class _Probed:
 
                 def bands() -> Iterator[Rows]:
                     for plane in planes:
-                        self.seen[plane] = read_all(job.probe(plane), step)
+                        self.seen[plane] = read_all(*job.probe(plane), step)
                     for band in first.bands():
                         self.given.append(band.copy())
                         yield band
@@ -448,7 +448,7 @@ def test_a_probe_may_begin_anywhere_in_planes_that_are_sources(
 
     def change(_entry: Any, job: Job, run: Callable[..., Any]) -> Callable[..., Any]:
         def changed(taken: list[Stream]) -> tuple[Stream, ...]:
-            window["rgb"] = job.probe("rgb").read(37, 50)
+            window["rgb"] = job.probe("rgb")[0].read(37, 50)
             made: tuple[Stream, ...] = run(taken)
             return made
 
@@ -458,6 +458,41 @@ def test_a_probe_may_begin_anywhere_in_planes_that_are_sources(
     made = start(bundle, _broken())
     made.fill()
     np.testing.assert_array_equal(window["rgb"], read_all(made.rows_of("rgb"))[:, 37:50])
+
+
+def test_planes_probed_together_are_made_by_one_walk(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together: dict[str, Rows] = {}
+    mended: list[int] = []
+
+    def counted(mosaic: Rows) -> tuple[Rows, Rows]:
+        mended.append(mosaic.shape[0])
+        return repair_mosaic(mosaic)
+
+    def change(_entry: Any, job: Job, run: Callable[..., Any]) -> Callable[..., Any]:
+        def changed(taken: list[Stream]) -> tuple[Stream, ...]:
+            sources = job.probe("sound", "unknown")
+            height = sources[0].shape[1]
+            parts = [
+                [source.read(top, min(top + 32, height)).copy() for source in sources]
+                for top in range(0, height, 32)
+            ]
+            for plane, rows in zip(("sound", "unknown"), zip(*parts, strict=True), strict=True):
+                together[plane] = np.concatenate(rows, axis=1)
+            mended.append(0)
+            made: tuple[Stream, ...] = run(taken)
+            return made
+
+        return changed
+
+    monkeypatch.setattr("camkit.runtime.stages.repair.repair_mosaic", counted)
+    _change(monkeypatch, "wiener", change)
+    made = start(bundle, _broken(), threads=1)
+    made.fill()
+    for plane, rows in together.items():
+        np.testing.assert_array_equal(rows, read_all(made.rows_of(plane)))
+    assert mended.index(0) == -(-made.capture.height // 32), "each band is mended once"
 
 
 def test_a_probe_sees_the_plan_of_the_capture(
