@@ -1,6 +1,6 @@
 """Profile `camkit process`: where the time, the threads and the memory of one photograph go.
 
-python -m tools.stage_profile stages CAPTURE.dng [--size M] [--format exr] [--runs 3]
+python -m tools.stage_profile stages CAPTURE.dng [--size M] [--method physics] [--runs 3]
 python -m tools.stage_profile layers [--bundle duet] [--size M] [--threads 2]
 python -m tools.stage_profile jobs CAPTURE.dng [--files 20] [--jobs 2] [--size M]
 python -m tools.stage_profile sizes [--megapixels 24,100,400] [--max-mem 2G] [--size M]
@@ -57,6 +57,7 @@ def main() -> None:
     stages.add_argument("capture", type=Path)
     stages.add_argument("--format", default="exr", choices=("exr", "tiff", "png"))
     stages.add_argument("--runs", type=int, default=3)
+    stages.add_argument("--method", help="way of a stage, as of camkit process")
     layers = commands.add_parser("layers")
     jobs = commands.add_parser("jobs")
     jobs.add_argument("capture", type=Path)
@@ -67,7 +68,7 @@ def main() -> None:
     sizes.add_argument("--max-mem", default="2G")
     for command in (stages, layers, jobs, sizes):
         command.add_argument("--bundle", default="duet")
-        command.add_argument("--size", default="M")
+        command.add_argument("--size", default=None if command is stages else "M")
         command.add_argument("--threads", type=int, default=None)
     arguments = parser.parse_args()
     {
@@ -119,8 +120,9 @@ class ThreadWatch:
 def run_again(arguments: argparse.Namespace) -> str:
     """Develop the capture once in a process of its own; give what it prints."""
     script = [sys.executable, "-m", "tools.stage_profile", "stages", str(arguments.capture)]
-    script += ["--runs", "0", "--size", arguments.size, "--bundle", arguments.bundle]
-    script += ["--format", arguments.format]
+    script += ["--runs", "0", "--bundle", arguments.bundle, "--format", arguments.format]
+    script += [] if arguments.size is None else ["--size", arguments.size]
+    script += [] if arguments.method is None else ["--method", arguments.method]
     script += [] if arguments.threads is None else ["--threads", str(arguments.threads)]
     return subprocess.run(script, capture_output=True, text=True, check=True).stdout
 
@@ -141,7 +143,7 @@ def profile_stages(arguments: argparse.Namespace) -> None:
         ratio = f"{cpu / wall:.2f}" if wall > 0.005 else ""
         memory = f"{rss:.0f}" if rss else ""  # shorter than the sampling: not seen
         print(f"| {stage} | {wall:.2f} | {cpu:.2f} | {ratio} | {memory} |")
-    for key in ("all", "neither network nor FFT", "start", "peak MB"):
+    for key in ("all", "neither network nor FFT", "start", "peak MB", "process CPU"):
         print(f"| {key} | {statistics.median(run['total'][key] for run in runs):.2f} | | | |")
     print("\n| thread | CPU s |\n|---|---|")
     for name in sorted({k for run in runs for k in run["threads"]}):
@@ -150,7 +152,8 @@ def profile_stages(arguments: argparse.Namespace) -> None:
 
 def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     began = time.perf_counter()
-    pipeline = load(arguments.bundle, size=arguments.size, threads=arguments.threads)
+    choices = {"size": arguments.size, "method": arguments.method}
+    pipeline = load(arguments.bundle, **choices, threads=arguments.threads)
     start_s = time.perf_counter() - began
     wall, cpu = {}, {}
     began, began_cpu = time.perf_counter(), _cpu_s()
@@ -165,6 +168,7 @@ def _profile_once(arguments: argparse.Namespace) -> dict[str, Any]:
     rest = all_s - sum(spent for name, spent in wall.items() if name.split()[0] in TRANSFORMS)
     total = {"all": all_s, "neither network nor FFT": rest, "start": start_s}
     total["peak MB"] = max(peak_rss_mb(), capture.decoder_peak_mb)
+    total["process CPU"] = _cpu_s()
     return {
         "wall": wall,
         "cpu": cpu,
