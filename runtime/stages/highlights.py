@@ -40,18 +40,19 @@ LEAST_PX: Final = 4
 
 
 def prepare(entry: Highlights, job: Job) -> StageWork:
-    """Say which planes are looked at.
+    """Say which planes are looked at; a capture smaller than a cell is left as it is.
 
     Raises:
-        ContractError: If no stage gives them, or the capture is smaller than a cell.
+        ContractError: If no stage gives them.
     """
     height, width = job.capture.height, job.capture.width
-    if min(height, width) < LEAST_PX:
-        raise ContractError(
-            f"lights are sought in pictures of {LEAST_PX} px and more on each side; this one has "
-            f"{width} x {height}. Leave the stage out with another bundle, or --bundle none"
-        )
     light, mask = _looked_at(entry, job.setup.stages)
+    if min(height, width) < LEAST_PX:
+        note = (
+            f"lights are sought in pictures of {LEAST_PX} px and more on each side; this one has "
+            f"{width} x {height}: it was left as the sensor saw it"
+        )
+        return StageWork(run=lambda taken: (taken[0],), warnings=lambda: (note,))
     notes: list[str] = []
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:

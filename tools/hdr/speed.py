@@ -33,6 +33,7 @@ NET: Final = "net"
 MOST_PEAK_MB: Final = 1000.0
 OVER: Final = "over_development_s"
 ALL: Final = "cpu_s"
+CROPS: Final = tuple(subject.name for subject in SUBJECTS if subject.side_px is not None)
 GOALS: Final = {
     "nothing": (OVER, 1.5),
     "50 lamps": ("over_nothing_s", 2.0),
@@ -123,7 +124,7 @@ def _beside_nothing(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Add what a whole capture takes beyond one of which nothing clipped, by the same method."""
     least = {row["method"]: row[OVER] for row in rows if row["subject"] == "nothing"}
     for row in rows:
-        if row["method"] in least:
+        if row["method"] in least and row["subject"] not in CROPS:
             row["over_nothing_s"] = round(row[OVER] - least[row["method"]], 3)
     return rows
 
@@ -149,7 +150,8 @@ def draw(rows: Sequence[Mapping[str, Any]]) -> "Figure":
     """Draw seconds over development against the share of the scene above white."""
     figure = new_figure(6, 3.7)
     panel = figure.subplots()
-    whole = [row for row in rows if "px" not in row["subject"] and "lamps" not in row["subject"]]
+    shown = [subject.name for subject in SUBJECTS if not (subject.lamps or subject.side_px)]
+    whole = [row for row in rows if row["subject"] in shown]
     methods = [m for m in dict.fromkeys(row["method"] for row in whole) if m != DEVELOP]
     for number, method in enumerate(methods):
         own = [row for row in whole if row["method"] == method]

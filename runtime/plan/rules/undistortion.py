@@ -11,6 +11,8 @@ from camkit.runtime.plan.decision import Decision, Subject, Work
 
 ORDER: Final = 60
 LEAST_SHIFT_PX: Final = 0.5
+NOTHING_PX: Final = 1e-3
+"""What rounding leaves of no distortion at all; the warp itself knows steps of 1/32 px."""
 _NODES: Final = 33
 
 
@@ -20,7 +22,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     if stage is None or stage.type in work.left_out:
         return work, None
     shift_px = largest_shift_px(subject)
-    if subject.content is None and shift_px > 0:
+    if subject.content is None and shift_px > NOTHING_PX:
         reason = f"quality {subject.options.quality} skips nothing"
         return work, Decision(what="undistortion", choice="yes", reason=reason)
     if shift_px >= LEAST_SHIFT_PX:

@@ -267,14 +267,16 @@ def _entry(camera: Bundle) -> Highlights:
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 40), (40, 3)])
-def test_a_capture_smaller_than_a_cell_is_refused_before_any_row(
+def test_a_capture_smaller_than_a_cell_is_left_as_it_is(
     camera: Bundle, size: tuple[int, int]
 ) -> None:
     capture = _mosaic(np.full((3, *size), 0.3, np.float32))
-    with pytest.raises(
-        ContractError, match=rf"4 px and more .* this one has {size[1]} x {size[0]}"
-    ):
-        start(camera, capture, assume="centre")
+    work = start(camera, capture, assume="centre")
+    developed = start(camera, capture, assume="centre", method="develop").fill()
+    np.testing.assert_array_equal(work.fill(), developed)
+    (note,) = [note for note in work.warnings if "lights" in note]
+    assert f"this one has {size[1]} x {size[0]}: it was left as the sensor saw it" in note
+    assert "hdr" not in work.sections
 
 
 @pytest.mark.parametrize("size", [(4, 4), (5, 7), (4, 61)])
