@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle
+from camkit.contracts import RadialDistortion
 from camkit.runtime.geometry.placement import place
+from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.geometry.warp import Warp
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import Subject, Work
-from camkit.runtime.plan.rules.undistortion import decide, largest_shift_px
+from camkit.runtime.plan.rules import undistortion
+from camkit.runtime.plan.rules.undistortion import NOTHING_PX, decide, largest_shift_px
 from tests.plan_factory import RADIUS_MM, made_content, write_planned_bundle
 
 
@@ -59,3 +63,27 @@ def test_exact_skips_nothing_and_no_undistortion_stays_none(bundle: Bundle) -> N
     small = _subject(bundle, 256)
     assert not decide(replace(small, content=None), Work())[0].left_out
     assert decide(small, Work(left_out=frozenset({"undistort"})))[1] is None
+
+
+@pytest.mark.parametrize(("shift_px", "left_out"), [(1e-9, {"undistort"}), (2e-3, set())])
+def test_exact_leaves_out_what_only_rounding_would_move(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch, shift_px: float, left_out: set[str]
+) -> None:
+    monkeypatch.setattr(undistortion, "largest_shift_px", lambda _: shift_px)
+    work, decision = decide(replace(_subject(bundle, 768), content=None), Work())
+    assert work.left_out == left_out
+    assert decision is not None
+
+
+def test_a_warp_without_distortion_moves_a_whole_sensor_by_less_than_that(bundle: Bundle) -> None:
+    straight = RadialDistortion(coefficients=np.tile([[1.0, 0, 0, 0]], (3, 1)), radius_mm=1.0)
+    window = SensorWindow(
+        size_px=(6000, 4000), origin_px=(0, 0), sensor_size_px=(6000, 4000), pitch_um=5.96
+    )
+    warp = Warp(straight, window, to_sensor=False)
+    x, y = np.meshgrid(np.linspace(0, 5999, 33), np.linspace(0, 3999, 33))
+    moved = np.abs(warp.positions(0, x, y) - np.stack([x, y], -1)).max()
+    assert 0 < moved < NOTHING_PX
+    whole, fraction = warp.maps(0, 0, 16)
+    np.testing.assert_array_equal(whole[..., 0], np.tile(np.arange(6000), (16, 1)))
+    assert not np.any(fraction)
