@@ -2,6 +2,7 @@
 
     cells and which of their samples clipped -> pixels of each colour that are lit
     lights of cells, smoothed, lower at rims  -> shape of every place, in each colour and in all
+    colours that were seen beside those lit   -> bound them
     light of a place                          -> is shared out by the shape: none is lost or made
 
 A mosaic samples red and blue at every fourth pixel. A pixel between them is lit if both sides
@@ -29,6 +30,8 @@ DEEPEST: Final = 2.0
 """A light rises from its rim to this many times as much."""
 ALIKE: Final = 0.7
 """Share of a light whose shape is that of all colours together."""
+COLOUR_SPAN: Final = 2.0
+"""How many times as bright a colour may be beside one that was seen, against its whole place."""
 STRIP_CELLS: Final = 2**18
 """Cells about lights that are looked at at once."""
 _EIGHT: Final = np.ones((3, 3), np.int8)
@@ -79,16 +82,34 @@ class _Places:
     light: FloatArray
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Shaped:
+    """Lit pixels of a window before their lights have their sums.
+
+    Attributes:
+        rows: (n,).
+        columns: (n,).
+        numbers: (n,) of their places.
+        shapes: (3, n) of the lights; 0 where a colour is not lit.
+        seen: (3, n): what samples say of the light, 1 at most.
+    """
+
+    rows: Index
+    columns: Index
+    numbers: Index
+    shapes: FloatArray
+    seen: FloatArray
+
+
 def _region_pixels(region: Region, cells: Cells) -> LitPixels:
     clipped = cells.clipped[(slice(None), *region.window.at)]
     places = _places(clipped, region.light)
     lit = _lit(places.numbers, cells, region)
-    rows, columns, numbers, shapes = _shaped(places.numbers, lit, cells, region)
-    light = _shared_out(shapes, numbers, places.light)
+    shaped = _shaped(places.numbers, lit, cells, region)
     return LitPixels(
-        rows=rows + np.int32(PITCH_PX * region.window.top),
-        columns=columns + np.int32(PITCH_PX * region.window.left),
-        light=light,
+        rows=shaped.rows + np.int32(PITCH_PX * region.window.top),
+        columns=shaped.columns + np.int32(PITCH_PX * region.window.left),
+        light=_shared_out(shaped, places.light),
     )
 
 
@@ -120,42 +141,62 @@ def _lit(numbers: Index, cells: Cells, region: Region) -> Mask:
     return lit
 
 
-def _shaped(
-    numbers: Index, lit: Mask, cells: Cells, region: Region
-) -> tuple[Index, Index, Index, FloatArray]:
-    """Give rows, columns and places (n,) of lit pixels, and the shapes (3, n) of their lights."""
-    clipped = cells.clipped[(slice(None), *region.window.at)]
+def _shaped(numbers: Index, lit: Mask, cells: Cells, region: Region) -> _Shaped:
+    """Give the lit pixels of a window."""
+    at = (slice(None), *region.window.at)
+    clipped = cells.clipped[at]
+    level = cells.light[at] * (1 - clipped) + clipped
     fields = [_smoothed(*planes) for planes in zip(region.light, clipped, strict=True)]
     none = np.zeros(0, np.int32)
-    found = [(none, none, none, np.zeros((COLOURS, 0), np.float32))]
+    found = [(none, none, none)]
+    values = [np.zeros((2, COLOURS, 0), np.float32)]
     for rows, columns in _pixels_of(numbers):
         some = lit[:, rows + 1, columns + 1].any(axis=0)
         y, x = rows[some], columns[some]
-        shape = np.empty((COLOURS, y.size), np.float32)
+        made = np.empty((2, COLOURS, y.size), np.float32)
         for colour, field in enumerate(fields):
-            shape[colour] = _between(field, y, x, cells.offset_px[colour])
-            shape[colour] *= _depth(lit[colour], y, x)
-        found.append((y, x, numbers[y // PITCH_PX, x // PITCH_PX], shape))
-    rows, columns, of_place = (np.concatenate([part[i] for part in found]) for i in range(3))
-    return rows, columns, of_place, np.concatenate([part[3] for part in found], axis=1)
+            offset = cells.offset_px[colour]
+            made[0, colour] = _between(field, y, x, offset) * _depth(lit[colour], y, x)
+            made[1, colour] = _between(level[colour], y, x, offset)
+        found.append((y, x, numbers[y // PITCH_PX, x // PITCH_PX]))
+        values.append(made)
+    rows, columns, of_place = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    shapes, seen = np.concatenate(values, axis=2)
+    return _Shaped(rows=rows, columns=columns, numbers=of_place, shapes=shapes, seen=seen)
 
 
-def _shared_out(shapes: FloatArray, numbers: Index, light: FloatArray) -> FloatArray:
-    """Give lights (3, n) of these shapes (3, n) whose sums in each place are as stated.
+def _shared_out(shaped: _Shaped, light: FloatArray) -> FloatArray:
+    """Give lights (3, n) of these shapes whose sums in each place are as stated.
 
     Args:
-        shapes: 0 where a colour is not lit.
-        numbers: (n,) of the places.
+        shaped: The pixels.
         light: (3, places + 1).
     """
-    own = np.stack([_summing_to(s, numbers, f) for s, f in zip(shapes, light, strict=True)])
+    shapes, numbers = shaped.shapes, shaped.numbers
+    own = _all_summing_to(shapes, numbers, light)
+    own = _all_summing_to(np.minimum(own, _most(shaped, light)), numbers, light)
     every, whole = own.sum(axis=0), np.maximum(light.sum(axis=0), _TINY)
-    out = np.empty_like(own)
-    for colour, wanted in enumerate(light):
-        alike = np.where(shapes[colour] > 0, every * (wanted / whole)[numbers], 0)
-        mixed = (1 - ALIKE) * own[colour] + ALIKE * _summing_to(alike, numbers, wanted)
-        out[colour] = np.where(shapes[colour] > 0, np.maximum(mixed, 1), 0)
-    return out
+    alike = np.where(shapes > 0, every * (light / whole)[:, numbers], 0)
+    mixed = (1 - ALIKE) * own + ALIKE * _all_summing_to(alike, numbers, light)
+    return np.asarray(np.where(shapes > 0, np.maximum(mixed, 1), 0), np.float32)
+
+
+def _most(shaped: _Shaped, light: FloatArray) -> FloatArray:
+    """Give how bright colours may be (3, n) beside one that was seen, as the place is coloured.
+
+    Where green clipped and red was seen to be dim, the light ends: its green is not bright either.
+    """
+    most = np.full(shaped.shapes.shape, np.inf, np.float32)
+    for dim in range(COLOURS):
+        seen = (shaped.shapes[dim] == 0) & (light[dim] > 0)[shaped.numbers]
+        ratios = light / np.maximum(light[dim], _TINY)
+        bound = COLOUR_SPAN * shaped.seen[dim] * ratios[:, shaped.numbers]
+        most = np.where(seen, np.minimum(most, np.maximum(bound, 1)), most)
+    return np.asarray(most, np.float32)
+
+
+def _all_summing_to(shapes: FloatArray, numbers: Index, light: FloatArray) -> FloatArray:
+    return np.stack([_summing_to(s, numbers, f) for s, f in zip(shapes, light, strict=True)])
 
 
 def _summing_to(shape: FloatArray, numbers: Index, wanted: FloatArray) -> FloatArray:

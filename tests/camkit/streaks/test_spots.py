@@ -154,6 +154,19 @@ def test_colours_of_a_place_share_their_shape() -> None:
     assert planes[0].sum() == pytest.approx(4 * light[0].sum(), rel=0.02)
 
 
+def test_a_colour_beside_one_that_was_seen_is_bound_by_it() -> None:
+    """Green clipped in one more row of cells than red, which was seen there at a tenth of white."""
+    clipped = np.zeros((COLOURS, 8, 12), np.float32)
+    clipped[1, 2:6, 3:9] = clipped[0, 3:6, 3:9] = 1
+    found = one_light(clipped, HALF)
+    seen = np.zeros_like(clipped)
+    seen[0, :3] = 0.1
+    planes = _laid_out(lit_pixels(replace(found, fine=replace(found.fine, light=seen))), (16, 24))
+    outside, inside = planes[1, 4], planes[1, 8]
+    assert outside[8:16].max() < 0.4 * inside[8:16].min()
+    assert planes[1].sum() == pytest.approx(4 * 9 * clipped[1].sum(), rel=0.03)
+
+
 def test_places_are_looked_at_in_parts_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
     _, _, found = _lamps("RGGB")
     whole = lit_pixels(found)
