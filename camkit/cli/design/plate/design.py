@@ -33,7 +33,7 @@ def design(
 ) -> None:
     """Design the relief of a plate by gradients, for masks on the sensor (needs torch).
 
-    With a table \\[reader] in the recipe a network that recovers its pictures is fitted along.
+    With a table reader in its recipe, a network that recovers its pictures is fitted along.
     """
     from camkit.cli.design.design_time import require_torch
 
