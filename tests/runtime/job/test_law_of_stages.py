@@ -297,13 +297,16 @@ def test_the_listed_stages_run_in_their_order_and_nothing_else_does(
             pipeline.capture_of(mosaic, iso=ISO, white_balance=GAINS, origin_px=None)
         )
         got = work.fill()
-    assert ran[: len(stages)] == [stage.type for stage in stages]
+    # optics of streaks distort nothing, and a warp that moves nothing is left out
+    idle = Undistort if optics.streaks is not None else ()
+    wanted = [stage.type for stage in stages if not isinstance(stage, idle)]
+    assert ran[: len(wanted)] == wanted
     # highlights and deglare look at what lies before them
     looked_at: set[str] = set()
     for number, stage in enumerate(stages):
         if isinstance(stage, Highlights | Deglare):
             looked_at |= {before.type for before in stages[:number]}
-    assert set(ran[len(stages) :]) <= looked_at
+    assert set(ran[len(wanted) :]) <= looked_at
     expected = _slowly(stages, bundle, work.capture)
     np.testing.assert_array_equal(got, expected)
 

@@ -132,7 +132,8 @@ def test_a_scheduler_without_workers_is_refused(captures: Path, tmp_path: Path) 
 def test_an_interrupt_ends_it_in_seconds_and_leaves_nothing_half_done(
     tmp_path: Path, when: str
 ) -> None:
-    write_tiny_captures(tmp_path, [f"shot{n:02}" for n in range(12)])
+    # so many that they are not done before the signal comes on a busy machine
+    write_tiny_captures(tmp_path, [f"shot{n:02}" for n in range(60)])
     out = tmp_path / "out"
     process = subprocess.Popen(
         _process(tmp_path, "--workers", "2"),
@@ -148,7 +149,7 @@ def test_an_interrupt_ends_it_in_seconds_and_leaves_nothing_half_done(
     began = time.monotonic()
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process
     _, told = process.communicate(timeout=60)
-    assert time.monotonic() - began < 20
+    assert time.monotonic() - began < 40
     assert process.returncode == 130
     assert told.splitlines()[-1] == "camkit: interrupted"
     assert "Traceback" not in told
