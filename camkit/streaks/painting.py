@@ -34,6 +34,7 @@ class Painter:
         """
         self._lit = lit_pixels(recovery)
         self._to_output = to_output
+        self._from_output = np.asarray(np.linalg.inv(to_output), np.float64)
         self._veil = recovery.veil
         self._veil_grid = recovery.coarse.pitch_px, recovery.coarse.offset_px
         self._streaks = [(region.window, region.streaks) for region in recovery.regions]
@@ -62,12 +63,15 @@ class Painter:
     def _add_streaks(self, under: FloatArray, colour: int, top: int) -> None:
         offset = self._offset_px[colour]
         for window, streaks in self._streaks:
-            first = max(2 * window.top - 1 - top, 0)
-            last = min(2 * window.bottom + 1 - top, under.shape[0])
+            first = max(PITCH_PX * window.top - 1 - top, 0)
+            last = min(PITCH_PX * window.bottom + 1 - top, under.shape[0])
             if first >= last or not streaks[colour].any():
                 continue
-            left, right = max(2 * window.left - 1, 0), min(2 * window.right + 1, under.shape[1])
-            moved = (offset[0] + 2 * window.top, offset[1] + 2 * window.left - left)
+            left, right = (
+                max(PITCH_PX * window.left - 1, 0),
+                min(PITCH_PX * window.right + 1, under.shape[1]),
+            )
+            moved = (offset[0] + PITCH_PX * window.top, offset[1] + PITCH_PX * window.left - left)
             under[first:last, left:right] += _rows_of_cells(
                 streaks[colour], PITCH_PX, moved, top + first, last - first, right - left
             )
@@ -81,17 +85,17 @@ class Painter:
         levels = np.array(gains, np.float32)[:, None]
         light = lit.light[:, first:last] * levels
         there = np.where(light > 0, light, planes[:, *at])
-        planes[:, *at] = _visible(there, self._to_output)
+        planes[:, *at] = _visible(there, self._to_output, self._from_output)
 
 
-def _visible(light: FloatArray, to_output: Matrix) -> FloatArray:
+def _visible(light: FloatArray, to_output: Matrix, from_output: Matrix) -> FloatArray:
     """Raise colours that were sought apart to where the output has them; (3, n) light."""
     seen = _turned(light, to_output)
     least = np.float32(DIMMEST) * seen.max(axis=0)
     short = (seen < least).any(axis=0) & (seen > 1).any(axis=0)
     raised = np.maximum(seen[:, short], least[short])
     out = light.copy()
-    out[:, short] = _turned(raised, np.asarray(np.linalg.inv(to_output), np.float64))
+    out[:, short] = _turned(raised, from_output)
     return out
 
 

@@ -130,7 +130,7 @@ def _lit(numbers: Index, cells: Cells, region: Region) -> Mask:
     lit = np.zeros((COLOURS, height + 2, width + 2), np.bool_)
     at = (slice(None), *region.window.at)
     clipped, pixels = cells.clipped[at], cells.pixels[at]
-    level = cells.light[at] * (1 - clipped) + clipped
+    level = _level(cells, region)
     for rows, columns in _pixels_of(numbers):
         for colour in range(COLOURS):
             offset = cells.offset_px[colour]
@@ -145,7 +145,7 @@ def _shaped(numbers: Index, lit: Mask, cells: Cells, region: Region) -> _Shaped:
     """Give the lit pixels of a window."""
     at = (slice(None), *region.window.at)
     clipped = cells.clipped[at]
-    level = cells.light[at] * (1 - clipped) + clipped
+    level = _level(cells, region)
     fields = [_smoothed(*planes) for planes in zip(region.light, clipped, strict=True)]
     none = np.zeros(0, np.int32)
     found = [(none, none, none)]
@@ -163,6 +163,13 @@ def _shaped(numbers: Index, lit: Mask, cells: Cells, region: Region) -> _Shaped:
     rows, columns, of_place = (np.concatenate(parts) for parts in zip(*found, strict=True))
     shapes, seen = np.concatenate(values, axis=2)
     return _Shaped(rows=rows, columns=columns, numbers=of_place, shapes=shapes, seen=seen)
+
+
+def _level(cells: Cells, region: Region) -> FloatArray:
+    """Give what all samples of the cells of a window say: (3, h, w), 1 where they clipped."""
+    at = (slice(None), *region.window.at)
+    clipped = cells.clipped[at]
+    return np.asarray(cells.light[at] * (1 - clipped) + clipped, np.float32)
 
 
 def _shared_out(shaped: _Shaped, light: FloatArray) -> FloatArray:

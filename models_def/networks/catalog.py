@@ -43,12 +43,15 @@ def _constant(**config: Any) -> nn.Module:
     return ConstantUnet(ConstantConfig(**config))
 
 
+_NEAR_LIGHTS: Final[dict[str, Callable[..., nn.Module]]] = {
+    "lights_s": partial(_near_lights, LIGHTS_S),
+    "lights_m": partial(_near_lights, LIGHTS_M),
+}
 _BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
     "lean_s": partial(_lean, LEAN_S),
     "lean_m": partial(_lean, LEAN_M),
     "lean_l": partial(_lean, LEAN_L),
-    "lights_s": partial(_near_lights, LIGHTS_S),
-    "lights_m": partial(_near_lights, LIGHTS_M),
+    **_NEAR_LIGHTS,
     "trimmed_unet": _trimmed,
     "full_unet": _full,
     "constant_unet": _constant,
@@ -59,7 +62,7 @@ NETWORK_NAMES: Final = tuple(_BUILDERS)
 
 def lights_px(name: str) -> int | None:
     """Give how far from lights a network acts; None for one that acts everywhere."""
-    return REACH_PX if name.startswith("lights_") else None
+    return REACH_PX if name in _NEAR_LIGHTS else None
 
 
 def check_patch(name: str, network: nn.Module, patch_px: int) -> None:

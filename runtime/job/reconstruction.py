@@ -295,14 +295,18 @@ class Reconstruction:
                     "cannot be left out; say --on-unsafe warn"
                 )
             options = replace(options, method=below.method)
+        content = self._measure_content() if needs_content(options) else None
+        lights = None
+        if needs_lights(bundle):
+            lights = light_squares(self.capture) if content is None else content.lights
         subject = Subject(
             bundle=bundle,
             options=options,
             height_px=self.capture.height,
             width_px=self.capture.width,
             placement=job.placement,
-            content=self._measure_content() if needs_content(options) else None,
-            lights=light_squares(self.capture) if needs_lights(bundle) else None,
+            content=content,
+            lights=lights,
         )
         plan = make_plan(subject, lambda: self._setup.speed(bundle.manifest.sizes))
         if plan.note:

@@ -18,7 +18,7 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows
-from camkit.streaks.cells import COLOURS, Cells, cells_of, sample_sites
+from camkit.streaks.cells import COLOURS, PITCH_PX, Cells, cells_of, sample_sites
 from camkit.streaks.kernels import StreakKernels, streak_kernels
 from camkit.streaks.painting import Painter
 from camkit.streaks.recovery import FINE_CELLS, recover
@@ -34,7 +34,6 @@ KEPT_BYTES_PER_PX: Final = 10
 BAND_ROWS: Final = 256
 REST_SHARE: Final = 0.4
 FRONT: Final = ("linearise", "repair")
-FINE_PITCH_PX: Final = 2
 LEAST_PX: Final = 4
 """Side of the coarser cells."""
 
@@ -75,7 +74,7 @@ def seconds(_entry: Highlights, subject: Subject, _work: Work, speed: Speed) -> 
 
 def first_bytes(pixels: int) -> int:
     """Give the memory that a picture takes at most while its lights are sought."""
-    fine_px = min(pixels, FINE_CELLS * FINE_PITCH_PX**2)
+    fine_px = min(pixels, FINE_CELLS * PITCH_PX**2)
     return max(BYTES_PER_PX * pixels, FINE_BYTES_PER_PX * fine_px)
 
 

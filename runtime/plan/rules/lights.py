@@ -22,7 +22,11 @@ def needs_lights(bundle: Bundle) -> bool:
 
 
 def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
-    """Leave the network out of cells that no light reaches; no bit depends on it."""
+    """Leave the network out of cells that no light reaches.
+
+    Where it runs in some cells no bit depends on it; a picture without lights is spared the way to
+    equal noise and back as well, which rounds.
+    """
     reaches_px = [stage.lights_px for stage in subject.bundle.manifest.stages_of(Network)]
     if not work.networks or subject.lights is None or len(reaches_px) != 1 or not reaches_px[0]:
         return work, None
