@@ -34,6 +34,8 @@ FAINTEST: Final = 1e-2
 DIMMEST: Final = 0.05
 """Fainter lights cost no more."""
 BRIGHTEST: Final = 600.0
+DIM: Final = 10.0
+"""From here on a light costs less of `dim_price`: lights are as often ten as a hundred."""
 EXCESS: Final = 1.0
 """What a light pays where its streaks outshine what is seen, beside the gradients."""
 MOST_BEYOND: Final = 0.2
@@ -53,16 +55,18 @@ class Steps:
         rounds: Conjugate gradients of a step; weights and the scale of the lights go stale.
         root: Lights are sought on a scale of their own to this power.
         price: Per light, of those that it would cost by itself.
+        dim_price: Beside it, of a light that is not bright; less and less from `DIM` on.
     """
 
     scales: tuple[float, ...]
     rounds: int
     root: float
     price: float
+    dim_price: float
 
 
-COARSE_STEPS: Final = Steps(scales=COARSE, rounds=8, root=0.25, price=0.005)
-FINE_STEPS: Final = Steps(scales=FINE, rounds=3, root=0.5, price=0.00125)
+COARSE_STEPS: Final = Steps(scales=COARSE, rounds=8, root=0.25, price=0.005, dim_price=0.0)
+FINE_STEPS: Final = Steps(scales=FINE, rounds=3, root=0.5, price=0.00125, dim_price=0.08)
 
 
 def seek_lights(
@@ -81,20 +85,20 @@ def seek_lights(
     Returns:
         (h, w) float32, 0 outside the clipped cells.
     """
-    usable = ~_grown(clipped)
+    usable = usable_cells(clipped)
     down, across = usable[1:] & usable[:-1], usable[:, 1:] & usable[:, :-1]
-    slope_y, slope_x = _gradient(seen)
+    slope_y, slope_x = gradient(seen)
     light = np.where(clipped, np.maximum(first, FAINTEST), 0).astype(np.float32)
     for scale in steps.scales:
         thrown = spread.spread(light)
-        rest_y, rest_x = _gradient(seen - thrown)
+        rest_y, rest_x = gradient(seen - thrown)
         weights = _Weights(
             y=np.where(down, _weight(rest_y, scale), 0).astype(np.float32),
             x=np.where(across, _weight(rest_x, scale), 0).astype(np.float32),
             excess=np.where(usable & (thrown > seen), EXCESS / scale**2, 0).astype(np.float32),
         )
         unit = np.where(clipped, light**steps.root, 0).astype(np.float32)
-        price = (steps.price * unit**2 / np.maximum(light, DIMMEST)).astype(np.float32)
+        price = (_price(light, steps) * unit**2 / np.maximum(light, DIMMEST)).astype(np.float32)
         system = _System(spread=spread, weights=weights, unit=unit, price=price)
         wanted = unit * system.gathered(slope_y, slope_x, seen)
         start = np.divide(light, unit, out=np.zeros_like(light), where=unit > 0)
@@ -163,7 +167,7 @@ class _System:
     def applied(self, light: FloatArray) -> FloatArray:
         """Give the matrix times lights in their units."""
         thrown = self.spread.spread(self.unit * light)
-        return self.unit * self.gathered(*_gradient(thrown), thrown) + self.price * light
+        return self.unit * self.gathered(*gradient(thrown), thrown) + self.price * light
 
 
 def _conjugate_gradients(
@@ -185,12 +189,18 @@ def _conjugate_gradients(
     return found
 
 
+def _price(light: FloatArray, steps: Steps) -> FloatArray:
+    """Give what more light costs, falling as the logarithm of a light rises."""
+    return np.asarray(steps.price + steps.dim_price * DIM / (DIM + light), np.float32)
+
+
 def _weight(rest: FloatArray, scale: float) -> FloatArray:
     """Give the weights of Geman and McClure."""
     return np.asarray(scale**-2 / (1 + (rest / scale) ** 2) ** 2, np.float32)
 
 
-def _gradient(image: FloatArray) -> tuple[FloatArray, FloatArray]:
+def gradient(image: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give the differences of cells (h, w) down, (h - 1, w), and across, (h, w - 1)."""
     return np.diff(image, axis=0), np.diff(image, axis=1)
 
 
@@ -204,12 +214,12 @@ def _divergence(y: FloatArray, x: FloatArray) -> FloatArray:
     return out
 
 
-def _grown(mask: Mask) -> Mask:
-    """Give a mask and the eight cells beside each of its own."""
-    rows = mask.copy()
-    rows[1:] |= mask[:-1]
-    rows[:-1] |= mask[1:]
+def usable_cells(clipped: Mask) -> Mask:
+    """Tell which cells (h, w) are neither clipped nor beside one that is, corners included."""
+    rows = clipped.copy()
+    rows[1:] |= clipped[:-1]
+    rows[:-1] |= clipped[1:]
     grown = rows.copy()
     grown[:, 1:] |= rows[:, :-1]
     grown[:, :-1] |= rows[:, 1:]
-    return grown
+    return ~grown

@@ -1,7 +1,8 @@
 """The lights of a capture, found from their streaks; and what every light throws beside itself.
 
     cells -> veil of what did not clip, taken away everywhere
-          -> windows -> lights in cells of 4 px -> (small windows) in cells of 2 px -> streaks
+          -> windows -> lights in cells of 4 px -> (small windows) in cells of 2 px
+                     -> lowered to what is proven -> streaks
 
 "Model no more than a scene needs": nothing clipped, and only the veil is computed; the finer
 pitch is for windows in which it costs little.
@@ -18,6 +19,7 @@ from camkit.contracts import FloatArray
 from camkit.streaks.cells import COLOURS, Cells, coarser
 from camkit.streaks.convolution import Convolution, spreading
 from camkit.streaks.descent import COARSE_STEPS, FINE_STEPS, not_outshining, seek_lights
+from camkit.streaks.evidence import Judge, proven
 from camkit.streaks.kernels import StreakKernels
 from camkit.streaks.regions import Window, windows_of
 from camkit.streaks.shapes import dome, pooled, rim_distance_px, upsampled, with_means
@@ -26,6 +28,7 @@ FINE_CELLS: Final = 2**20
 """Windows of more cells of 2 px are sought in cells of 4 px alone."""
 MOST_CLIPPED: Final = 0.3
 """Share of a picture; where more clipped, streaks of different lights cannot be told apart."""
+Mask = NDArray[np.bool_]
 GUESS: Final = 0.6
 """Light of a clipped place that nothing was measured of, per squared pixel from its rim."""
 
@@ -39,12 +42,14 @@ class Region:
         light: (3, h, w) float32: light of clipped cells, 0 elsewhere; 1.0 = where samples clip.
         streaks: (3, h, w) float32: what they throw beside themselves.
         thrown: (on clipped cells, beyond what is seen elsewhere, in all): light of the streaks.
+        given_up: Places of whose lights the picture proves nothing.
     """
 
     window: Window
     light: FloatArray
     streaks: FloatArray
     thrown: tuple[float, float, float]
+    given_up: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +63,8 @@ class Recovery:
         core: (3,): share of the light that stays where it is.
         regions: From top to bottom; none where so much clipped that nothing can be told.
         notes: What the user should know.
-        fallbacks: Places whose lights were left as the sensor saw them; the notes say why.
+        fallbacks: Places whose lights were left as the sensor saw them; 1 for a whole picture, and
+            the notes say why.
     """
 
     fine: Cells
@@ -125,11 +131,11 @@ def recover(
         core=kernels.coarse.core,
         regions=tuple(regions),
         notes=tuple(notes),
-        fallbacks=int(blind),
+        fallbacks=int(blind) + sum(region.given_up for region in regions),
     )
 
 
-def _at_border(mask: NDArray[np.bool_]) -> bool:
+def _at_border(mask: Mask) -> bool:
     return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
 
 
@@ -155,16 +161,23 @@ def _region(
     """Find the lights of a window."""
     fine = cells[0]
     place = window.finer(fine.light.shape[-2:])
+    found = [_sought(colour, window, cells, veil, kernels) for colour in range(COLOURS)]
+    kept = proven(np.stack([one.light for one in found]), [one.judge for one in found])
     light = np.zeros((COLOURS, *place.shape), np.float32)
     streaks = np.zeros_like(light)
-    for colour in range(COLOURS):
-        clipped = fine.clipped[(colour, *place.at)] > 0
-        if not clipped.any():
-            continue
-        light[colour] = _sought(colour, window, clipped, cells, veil, kernels)
-        spread = spreading(kernels.fine.veil[colour], clipped)
-        streaks[colour] = spread.spread(light[colour])
-    return Region(window=place, light=light, streaks=streaks, thrown=_thrown(streaks, fine, place))
+    for colour, one in enumerate(found):
+        if one.judge is not None:
+            clipped = fine.clipped[(colour, *place.at)] > 0
+            light[colour] = one.finer(kept.light[colour], clipped)
+            spread = spreading(kernels.fine.veil[colour], clipped)
+            streaks[colour] = spread.spread(light[colour])
+    return Region(
+        window=place,
+        light=light,
+        streaks=streaks,
+        thrown=_thrown(streaks, fine, place),
+        given_up=kept.given_up,
+    )
 
 
 def _thrown(streaks: FloatArray, fine: Cells, place: Window) -> tuple[float, float, float]:
@@ -183,31 +196,58 @@ def _sum(light: FloatArray) -> float:
     return float(light.sum(dtype=np.float64))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sought:
+    """Lights of one colour in a window.
+
+    Attributes:
+        light: (h, w) float32, in cells of 2 px or of 4 px.
+        judge: Of these cells; None where nothing clipped.
+        shape: (n,) what lights are like in clipped cells of 2 px, where `light` is of 4 px.
+    """
+
+    light: FloatArray
+    judge: Judge | None
+    shape: FloatArray | None = None
+
+    def finer(self, light: FloatArray, clipped: Mask) -> FloatArray:
+        """Give lights of these cells in cells of 2 px, in which some clipped."""
+        if self.shape is None:
+            return light
+        base = np.zeros(clipped.shape, np.float32)
+        base[clipped] = self.shape
+        return with_means(base, light)
+
+
 def _sought(
     colour: int,
     window: Window,
-    clipped: NDArray[np.bool_],
     cells: tuple[Cells, Cells],
     veil: FloatArray,
     kernels: StreakKernels,
-) -> FloatArray:
-    """Find the lights of one colour in a window, in cells of 2 px."""
+) -> _Sought:
+    """Find the lights of one colour in a window, in cells of 2 px unless they are too many."""
     fine, coarse = cells
-    at, shape = (colour, *window.at), clipped.shape
+    at, place = (colour, *window.at), window.finer(fine.light.shape[-2:])
+    clipped = fine.clipped[(colour, *place.at)] > 0
+    large = clipped.size > FINE_CELLS
+    if not clipped.any():
+        shape = window.shape if large else clipped.shape
+        return _Sought(light=np.zeros(shape, np.float32), judge=None)
     distance_px = rim_distance_px(clipped, fine.pitch_px)
     guess = np.where(clipped, 1 + GUESS * distance_px**2, 0).astype(np.float32)
     seen, hidden = coarse.light[at] - veil[at], coarse.clipped[at] > 0
-    spread = spreading(kernels.coarse.whole[colour], hidden)
+    kernel = kernels.coarse.whole[colour]
+    spread = spreading(kernel, hidden)
     first = not_outshining(pooled(guess), seen, hidden, spread)
-    means = seek_lights(seen, hidden, spread, first, COARSE_STEPS)
-    light = with_means(dome(distance_px), means)
-    if clipped.size > FINE_CELLS:
-        return light
-    place = window.finer(fine.light.shape[-2:])
-    return seek_lights(
-        fine.light[(colour, *place.at)] - upsampled(veil[at], shape),
-        clipped,
-        spreading(kernels.fine.whole[colour], clipped),
-        light,
-        FINE_STEPS,
-    )
+    light = seek_lights(seen, hidden, spread, first, COARSE_STEPS)
+    shape_of_lights = dome(distance_px)
+    if large:
+        judge = Judge(light, seen, kernel, spread)
+        return _Sought(light=light, judge=judge, shape=shape_of_lights[clipped])
+    first = with_means(shape_of_lights, light)
+    seen = fine.light[(colour, *place.at)] - upsampled(veil[at], clipped.shape)
+    kernel = kernels.fine.whole[colour]
+    spread = spreading(kernel, clipped)
+    light = seek_lights(seen, clipped, spread, first, FINE_STEPS)
+    return _Sought(light=light, judge=Judge(light, seen, kernel, spread))

@@ -1,12 +1,16 @@
 """A night photographed through a plate, its lights read back: a sheet of exposures and the PSF.
 
-    python -m tools.hdr.gallery --out-dir out --bundle streak-hdr.camkit
+    python -m tools.hdr.gallery --out-dir out [--bundle streak-hdr]
 
 Leaves night.dng and night.exr with its sidecar; night.png, rows as developed, by physics, with the
-network and as it was, columns at 0, -4 and -8 EV; streaks.png, the PSF of red, green and blue.
+network and as it was, columns at 0, -4 and -8 EV; streaks.png, the PSF of red, green and blue; and,
+where torch is installed, the plate with its masks in a folder `plate`.
 """
 
 import argparse
+import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
@@ -37,7 +41,7 @@ def main() -> None:
     """Photograph, process and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out-dir", type=Path, default=Path("out"))
-    parser.add_argument("--bundle", required=True)
+    parser.add_argument("--bundle", default="streak-hdr")
     arguments = parser.parse_args()
     show_gallery(arguments.bundle, arguments.out_dir)
 
@@ -73,6 +77,19 @@ def show_gallery(name: str, out_dir: Path) -> None:
     _write(out_dir / "night.png", _sheet(list(pictures.values())))
     _write(out_dir / "streaks.png", _psf_sheet(bundle))
     print(f"{out_dir / 'night.png'}: rows {', '.join(pictures)}; columns {STOPS} EV")
+    if "plate.toml" in bundle.names:
+        _draw_plate(name, out_dir / "plate")
+
+
+def _draw_plate(bundle: str, out_dir: Path) -> None:
+    """Draw the plate of a bundle, its masks too, where the design side is installed."""
+    show = ("show", bundle, "-o", str(out_dir), "--overwrite")
+    masks = ("masks", bundle, "-o", str(out_dir), "--overwrite")
+    if find_spec("torch") is None:
+        print(f"with torch: camkit plate {' '.join(show)}; camkit plate {' '.join(masks)}")
+        return
+    for words in (show, masks):
+        subprocess.run([sys.executable, "-m", "camkit", "plate", *words], check=True)
 
 
 def _psnr_db(picture: FloatArray, truth: FloatArray) -> float:

@@ -36,7 +36,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, SUFFIX, open_bundle
+from camkit.bundle.reader import PLATE, PLATE_HEIGHTS, SUFFIX, built_in_bundles, open_bundle
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.fabrication import Etching
 from camkit.models_def.optics.diffraction.geometry import Bench
@@ -177,15 +177,19 @@ def built_in_plates() -> tuple[str, ...]:
 
 
 def _built_in(path: Path) -> Path:
-    named = not path.is_file() and str(path) in built_in_plates()
-    return PLATES / f"{path}.toml" if named else path
+    """Give the file of a plate or bundle that is built in, or the path as it is."""
+    if path.is_file():
+        return path
+    if str(path) in built_in_plates():
+        return PLATES / f"{path}.toml"
+    return built_in_bundles().get(str(path), path)
 
 
 def is_plate(path: Path) -> bool:
     """Tell whether optics are a plate: TOML that speaks of a bench, a plate's name, or a bundle."""
+    path = _built_in(path)
     if path.suffix == SUFFIX:
         return True
-    path = _built_in(path)
     if path.suffix.lower() != ".toml" or not path.is_file():
         return False
     return "bench" in read_table(path, "optics")
@@ -195,16 +199,16 @@ def read_plate(path: Path) -> Plate:
     """Read a plate.
 
     Args:
-        path: Its file, the name of a built-in one, or a bundle (.camkit) that holds it.
+        path: Its file, a bundle (.camkit) that holds it, or the name of a built-in one of either.
 
     Raises:
         ContractError: If the file, or that of its heights, is missing, damaged or no plate, or the
             bundle holds none.
         BundleError: If a bundle is refused.
     """
+    path = _built_in(path)
     if path.suffix == SUFFIX:
         return _bundled(path)
-    path = _built_in(path)
     if not path.suffix and not path.exists():
         raise ContractError(
             f"no plate {path}: name a file, or one of {', '.join(built_in_plates())}"

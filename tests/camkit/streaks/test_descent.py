@@ -15,13 +15,13 @@ from camkit.streaks.descent import (
     Steps,
     _conjugate_gradients,
     _divergence,
-    _gradient,
-    _grown,
     _System,
     _weight,
     _Weights,
+    gradient,
     not_outshining,
     seek_lights,
+    usable_cells,
 )
 from tests.streak_factory import star_kernels, street
 
@@ -128,7 +128,7 @@ def test_finer_steps_bring_a_light_nearer_to_what_it_is(start: float) -> None:
 
 def test_no_steps_leave_the_light_as_it_was() -> None:
     lights = _disc(20, 30, 1.0, 50)
-    still = Steps(scales=(), rounds=3, root=0.5, price=0.0)
+    still = Steps(scales=(), rounds=3, root=0.5, price=0.0, dim_price=0.0)
     found = seek_lights(_scene(), lights > 0, _spread(), lights, still)
     np.testing.assert_array_equal(found, lights)
 
@@ -200,10 +200,10 @@ def test_conjugate_gradients_solve_it() -> None:
     assert (_conjugate_gradients(system, wanted, start, 0) == start).all()
 
 
-def test_the_divergence_is_the_transpose_of_the_gradient() -> None:
+def test_the_divergence_is_the_transpose_of_thegradient() -> None:
     rng = np.random.default_rng(0)
     image, y, x = (rng.normal(size=shape).astype(np.float32) for shape in ((7, 9), (6, 9), (7, 8)))
-    down, across = _gradient(image)
+    down, across = gradient(image)
     one = np.vdot(down, y) + np.vdot(across, x)
     assert one == pytest.approx(np.vdot(image, _divergence(y, x)), rel=1e-4)
 
@@ -227,7 +227,7 @@ def test_a_mask_grows_by_the_eight_cells_around_each_of_its_own() -> None:
     wanted = np.zeros_like(mask)
     for y, x in np.argwhere(mask):
         wanted[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2] = True
-    grown = _grown(mask)
+    grown = ~usable_cells(mask)
     np.testing.assert_array_equal(grown, wanted)
     assert mask.any()
     assert not grown.all()

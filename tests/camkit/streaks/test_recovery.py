@@ -148,13 +148,22 @@ def test_too_much_clipped_is_left_as_the_sensor_saw_it_and_that_is_said() -> Non
 
 @pytest.mark.parametrize(("y", "x"), [(1, 100), (158, 100), (80, 1), (80, 206)])
 def test_a_lamp_at_the_border_is_sought_and_what_lies_beyond_is_warned_of(y: int, x: int) -> None:
-    _, light = _night([(y, x, 3.0, (50.0, 50.0, 50.0))])
+    _, light = _night([(y, x, 3.0, (200.0, 200.0, 200.0))])
     found = recover(captured_cells(light), star_kernels())
     assert len(found.regions) == 1
     assert found.notes == (
         "lights reach the border of the picture: those outside it were not sought",
     )
-    assert 10 < found.to_json()["peak"] < 600
+    assert 20 < found.to_json()["peak"] < 600
+
+
+def test_faint_lights_that_nothing_proves_are_counted_and_a_lamp_beside_them_is_found() -> None:
+    faint = [(y, x, 4.0, (1.4, 1.4, 1.4)) for y in (30, 80) for x in (30, 75, 165)]
+    _, light = _night([*faint, (80, 120, 2.0, (120.0, 120.0, 120.0))])
+    found = recover(captured_cells(light), star_kernels())
+    assert found.to_json()["fallbacks"] == found.fallbacks >= len(faint) // 2
+    assert found.notes == ()
+    assert _flux(found, 1, 80, 120, 6) == pytest.approx(120 * 13, rel=0.28)
 
 
 @pytest.mark.parametrize("size", [(101, 131), (102, 133), (99, 130), (98, 129)])
