@@ -1,17 +1,21 @@
 """A network that acts on lights alone; elsewhere its last three planes come out as they are.
 
-    capture, lit --+-- network ------------------- (-) -- (x) -- (+) -- output
-                   |-- lit ------------------------'------ | -----'
-                   '-- raised? -- one pixel wider ---------'
+    capture, lit --+-- network ------------------- (-) -- (x) -- (+) -- at least -- output
+                   |-- lit ------------------------'------ | -----'        |
+                   |-- raised? -- one pixel wider ---------'               |
+                   '-- the darker of both, less beside lights -------------'
 
 `lit` is brighter than the capture where a light was put in, and nowhere else by more than what an
 evenly lit plane gains when streaks are taken away. The network acts on such pixels and on those
-beside them. What did not clip was seen, and physics has taken the streaks from it: a network that
+beside them. A light is at least as bright as the capture says, since it clipped there: no ring of
+dark pixels about a lamp, though it would cost little beside what the lamp does. What did not clip
+was seen, and physics has taken the streaks from it: a network that
 is fitted to lights of hundreds of times white only makes it worse.
 """
 
 from typing import Final
 
+import torch
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
@@ -23,6 +27,8 @@ RATIO: Final = 1.1
 FLOOR: Final = 0.05
 """Stabilised; several standard deviations of the noise."""
 BESIDE_PX: Final = 1
+LEAST: Final = 0.5
+"""Stabilised, of what was seen beside lights: a demosaic may have made it four times too bright."""
 REACH_PX: Final = 4
 """From a clipped sample: a demosaic and the pixels of a light reach two pixels, this one more."""
 
@@ -57,11 +63,22 @@ class NearLights(nn.Module):
         """
         lit = planes[:, COLOURS:]
         change: Tensor = self.inner(planes) - lit
-        return lit + nearness(planes) * change
+        return torch.maximum(lit + nearness(planes) * change, least(planes))
 
 
 def nearness(planes: Tensor) -> Tensor:
     """Give (b, 1, h, w), 1 on lights and beside them, 0 elsewhere; planes as `NearLights` has."""
-    raised = planes[:, COLOURS:] - RATIO * planes[:, :COLOURS] - FLOOR
-    there = (raised / FLOOR).clamp(0, 1).amax(dim=1, keepdim=True)
+    there = raised(planes).amax(dim=1, keepdim=True)
     return nn.functional.max_pool2d(there, 2 * BESIDE_PX + 1, 1, BESIDE_PX)
+
+
+def least(planes: Tensor) -> Tensor:
+    """Give (b, 3, h, w): what the output is at least; never more than `lit`."""
+    darker = torch.minimum(planes[:, :COLOURS], planes[:, COLOURS:])
+    return darker * (LEAST + (1 - LEAST) * raised(planes))
+
+
+def raised(planes: Tensor) -> Tensor:
+    """Give (b, 3, h, w): 1 where a light was put into a colour, 0 elsewhere."""
+    more = planes[:, COLOURS:] - RATIO * planes[:, :COLOURS] - FLOOR
+    return (more / FLOOR).clamp(0, 1)

@@ -8,11 +8,15 @@ from torch import Tensor, nn
 from camkit.errors import ContractError
 from camkit.export.onnx_graph import to_onnx
 from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.networks.lean_unet import LeanUnet
 from camkit.models_def.networks.near_lights import (
     BESIDE_PX,
     FLOOR,
+    LEAST,
     RATIO,
     REACH_PX,
+    NearLights,
+    least,
     nearness,
 )
 from camkit.runtime.network.engine import NetworkEngine
@@ -84,3 +88,22 @@ def test_windows_have_the_bits_of_the_whole() -> None:
 def test_one_picture_is_not_enough() -> None:
     with pytest.raises(ContractError, match="takes capture and lit, 6 channels; got 3"):
         build_network("lights_s", in_channels=3)
+
+
+def test_no_light_is_darker_than_it_was_captured_and_nothing_beside_it_goes_out() -> None:
+    """However dark the network inside would make them."""
+
+    class Dark(LeanUnet):
+        def forward(self, x: Tensor) -> Tensor:
+            return torch.full_like(x[:, 3:], -100)
+
+    awake = _awake("lights_s")
+    assert isinstance(awake, NearLights)
+    network = NearLights(Dark(awake.inner.config))
+    planes = _lit()
+    rgb, lit = planes[:, :3], planes[:, 3:]
+    out = network(planes)
+    torch.testing.assert_close(out[LIGHT], rgb[LIGHT])
+    ring = np.s_[..., 99, 119:125]
+    torch.testing.assert_close(out[ring], LEAST * rgb[ring])
+    assert (least(planes) <= lit).all()
