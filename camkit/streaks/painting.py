@@ -9,10 +9,11 @@ Every pixel follows from the cells and its own place alone: bands of any height 
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.colorimetry import Matrix
 from camkit.contracts import FloatArray
-from camkit.streaks.cells import PITCH_PX
+from camkit.streaks.cells import COLOURS, PITCH_PX
 from camkit.streaks.recovery import Recovery
 from camkit.streaks.spots import lit_pixels
 
@@ -84,8 +85,26 @@ class Painter:
         at = lit.rows[first:last] - top, lit.columns[first:last]
         levels = np.array(gains, np.float32)[:, None]
         light = lit.light[:, first:last] * levels
-        there = np.where(light > 0, light, planes[:, *at])
+        there = _untinted(np.where(light > 0, light, planes[:, *at]), light > 0)
         planes[:, *at] = _visible(there, self._to_output, self._from_output)
+
+
+def _untinted(light: FloatArray, lit: NDArray[np.bool_]) -> FloatArray:
+    """Raise what clipped to the darker of the other colours where one of these was seen.
+
+    Which colours clip changes from pixel to pixel at the rim of a lamp: whatever is raised from
+    white by too little there is tinted, green that clipped first makes it purple.
+
+    Args:
+        light: (3, n), multiplied by the gains.
+        lit: (3, n): which colours clipped.
+    """
+    seen = ~lit.all(axis=0)
+    out = light.copy()
+    for colour in range(COLOURS):
+        others = np.delete(light, colour, axis=0).min(axis=0)
+        out[colour] = np.where(lit[colour] & seen, np.maximum(light[colour], others), light[colour])
+    return out
 
 
 def _visible(light: FloatArray, to_output: Matrix, from_output: Matrix) -> FloatArray:

@@ -8,7 +8,7 @@ import pytest
 from camkit.contracts import CfaPattern, FloatArray
 from camkit.scenes.saturation import CEILING
 from camkit.streaks.cells import COLOURS
-from camkit.streaks.painting import DIMMEST, Painter, _rows_of_cells
+from camkit.streaks.painting import DIMMEST, Painter, _rows_of_cells, _untinted
 from camkit.streaks.recovery import Recovery, recover
 from camkit.streaks.regions import Window
 from tests.streak_factory import (
@@ -199,3 +199,12 @@ def test_streaks_of_a_window_end_with_it() -> None:
     unlit = got[:, ~inside]
     np.testing.assert_array_equal(unlit, np.full_like(unlit, 0.5))
     assert (got[:, 14:17, 16:19] == 0.375).all()
+
+
+def test_what_clipped_is_no_darker_than_both_others_where_one_of_them_was_seen() -> None:
+    """Purple rims: green clipped at white, red and blue beside it were seen to be brighter."""
+    light = np.array([[1.8, 1.8, 3.0, 1.8], [1.0, 1.0, 1.0, 2.5], [1.5, 0.4, 2.0, 1.5]], np.float32)
+    lit = np.array([[0, 0, 1, 0], [1, 1, 1, 1], [0, 0, 1, 0]], np.bool_)
+    wanted = light.copy()
+    wanted[1, 0] = 1.5
+    np.testing.assert_array_equal(_untinted(light, lit), wanted)
