@@ -136,5 +136,6 @@ def one_light(
         coarse=replace(cells, pitch_px=4),
         veil=np.zeros((COLOURS, height // 2, width // 2), np.float32),
         core=(1.0,) * COLOURS,
+        kernels=(np.zeros((1, 1), np.float32),) * COLOURS,
         regions=(region,),
     )

@@ -9,7 +9,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.streaks.cells import COLOURS, Sites, cell_kernel, coarser_kernel
 
-CORE_CELLS: Final = {2: 2.0, 4: 1.0}
+CORE_CELLS: Final = {1: 4.0, 2: 2.0, 4: 1.0}
 """Pitch in pixels -> what lies this far from the middle, in cells, is no veil but blur."""
 
 
@@ -36,12 +36,14 @@ class StreakKernels:
 
     Attributes:
         sites: Where each colour has its samples.
+        pixel: Of pixels.
         fine: Of cells of 2 px.
         coarse: Of cells of 4 px.
         reach_px: How far arms reach.
     """
 
     sites: tuple[Sites, ...]
+    pixel: CellKernels
     fine: CellKernels
     coarse: CellKernels
     reach_px: int
@@ -63,7 +65,11 @@ def streak_kernels(kernels: FloatArray, sites: tuple[Sites, ...], reach_px: int)
     fine = [cell_kernel(k, places) for k, places in zip(kernels, sites, strict=True)]
     coarse = [coarser_kernel(k) for k in fine]
     return StreakKernels(
-        sites=sites, fine=_split(fine, 2), coarse=_split(coarse, 4), reach_px=reach_px
+        sites=sites,
+        pixel=_split(list(kernels), 1),
+        fine=_split(fine, 2),
+        coarse=_split(coarse, 4),
+        reach_px=reach_px,
     )
 
 

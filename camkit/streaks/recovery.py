@@ -61,6 +61,7 @@ class Recovery:
         coarse: Its cells of 4 px.
         veil: (3, h, w) float32, in cells of 4 px: what unclipped light throws beside itself.
         core: (3,): share of the light that stays where it is.
+        kernels: (n, n) of every colour, in pixels: what a light throws beside itself.
         regions: From top to bottom; none where so much clipped that nothing can be told.
         notes: What the user should know.
         fallbacks: Places whose lights were left as the sensor saw them; 1 for a whole picture, and
@@ -71,6 +72,7 @@ class Recovery:
     coarse: Cells
     veil: FloatArray
     core: tuple[float, ...]
+    kernels: tuple[FloatArray, ...]
     regions: tuple[Region, ...]
     notes: tuple[str, ...] = ()
     fallbacks: int = 0
@@ -129,6 +131,7 @@ def recover(
         coarse=coarse,
         veil=veil,
         core=kernels.coarse.core,
+        kernels=kernels.pixel.veil,
         regions=tuple(regions),
         notes=tuple(notes),
         fallbacks=int(blind) + sum(region.given_up for region in regions),

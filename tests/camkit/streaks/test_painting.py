@@ -8,9 +8,8 @@ import pytest
 from camkit.contracts import CfaPattern, FloatArray
 from camkit.scenes.saturation import CEILING
 from camkit.streaks.cells import COLOURS
-from camkit.streaks.painting import DIMMEST, Painter, _rows_of_cells, _untinted
+from camkit.streaks.painting import DIMMEST, Painter, _untinted
 from camkit.streaks.recovery import Recovery, recover
-from camkit.streaks.regions import Window
 from tests.streak_factory import (
     blurred,
     captured_cells,
@@ -130,8 +129,8 @@ def test_lights_are_put_where_samples_clipped_and_nowhere_else(
 ) -> None:
     seen = np.minimum(night[1], 1)
     bare = _painted(replace(found, regions=()), seen, ONES)
-    dark = tuple(replace(r, streaks=np.zeros_like(r.streaks)) for r in found.regions)
-    got = _painted(replace(found, regions=dark), seen, ONES)
+    dark = tuple(np.zeros_like(kernel) for kernel in found.kernels)
+    got = _painted(replace(found, kernels=dark), seen, ONES)
     changed = got != bare
     clipped = night[1] >= 1
     assert changed[clipped].mean() > 0.7  # samples of a mosaic miss some pixels of a rim
@@ -162,43 +161,6 @@ def test_no_colour_of_a_light_is_far_below_its_strongest_in_the_output() -> None
 
 
 # ------------------------------------------------------------------------ between cells
-
-
-@pytest.mark.parametrize("pitch", [2, 4])
-@pytest.mark.parametrize("offset", [(0.0, 0.5), (1.5, 1.0), (2.5, 0.0)])
-def test_rows_lie_on_the_lines_between_the_middles_of_cells(
-    pitch: int, offset: tuple[float, float]
-) -> None:
-    """Beyond the outermost middles the light is even."""
-    field = np.random.default_rng(0).uniform(0, 9, (6, 7)).astype(np.float32)
-    top, rows, width = 3, 4 * pitch, 7 * pitch + 3
-    at_y = (np.arange(top, top + rows) - offset[0]) / pitch
-    at_x = (np.arange(width) - offset[1]) / pitch
-    lines = np.stack([np.interp(at_y, np.arange(6), column) for column in field.T], axis=1)
-    wanted = np.stack([np.interp(at_x, np.arange(7), line) for line in lines])
-    got = _rows_of_cells(field, pitch, offset, top, rows, width)
-    assert got.shape == (rows, width)
-    np.testing.assert_allclose(got, wanted, atol=1e-5)
-
-
-def test_streaks_of_a_window_end_with_it() -> None:
-    clipped = np.zeros((COLOURS, 20, 24), np.float32)
-    clipped[:, 9, 11] = 1
-    whole = one_light(clipped, (0.5, 0.5))
-    window = Window(top=6, bottom=13, left=7, right=16)
-    part = replace(
-        whole.regions[0],
-        window=window,
-        light=np.zeros((COLOURS, *window.shape), np.float32),
-        streaks=np.full((COLOURS, *window.shape), 0.125, np.float32),
-    )
-    bright = np.full((COLOURS, 40, 48), 0.5, np.float32)
-    got = _painted(replace(whole, regions=(part,)), bright, ONES)
-    inside = np.zeros((40, 48), bool)
-    inside[2 * 6 - 1 : 2 * 13 + 1, 2 * 7 - 1 : 2 * 16 + 1] = True
-    unlit = got[:, ~inside]
-    np.testing.assert_array_equal(unlit, np.full_like(unlit, 0.5))
-    assert (got[:, 14:17, 16:19] == 0.375).all()
 
 
 def test_what_clipped_is_no_darker_than_both_others_where_one_of_them_was_seen() -> None:

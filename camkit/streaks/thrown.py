@@ -1,0 +1,122 @@
+"""What lights throw beside themselves, over the rows of a picture.
+
+    small windows whose streaks show -> lights of pixels, spread by kernels of pixels
+    others                           -> streaks of cells, linear between their middles
+
+An arm is three pixels wide: in cells of two it is wider and dimmer, and leaves two dark lines and
+a coloured one where it is taken away. In large windows that is the price of their size.
+"""
+
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.streaks.cell_rows import rows_of_cells
+from camkit.streaks.cells import COLOURS, PITCH_PX
+from camkit.streaks.convolution import spreading
+from camkit.streaks.recovery import FINE_CELLS, Recovery, Region
+from camkit.streaks.regions import Window
+from camkit.streaks.spots import LitPixels
+
+FAINT: Final = 0.005
+"""Of white: about three standard deviations of the noise of a dark wall at ISO 100."""
+BRIGHTEST: Final = 6e4
+"""Streaks of pixels are kept in half precision, which ends there: a part in 2,000."""
+Half = NDArray[np.float16]
+
+
+class Streaks(Protocol):
+    """What the lights of a window throw beside themselves."""
+
+    def add(self, under: FloatArray, colour: int, top: int) -> None:
+        """Add it to rows (rows, w) of a picture, of which the first has the number `top`."""
+        ...
+
+
+def streaks_of(recovery: Recovery, lit: LitPixels) -> list[Streaks]:
+    """Give the streaks of all windows.
+
+    Args:
+        recovery: Of the capture.
+        lit: Its lights.
+    """
+    return [
+        PixelStreaks(region.window, lit, recovery.kernels)
+        if region.light[0].size <= FINE_CELLS and _shows(region)
+        else CellStreaks(region, recovery.fine.offset_px)
+        for region in recovery.regions
+    ]
+
+
+class PixelStreaks:
+    """Streaks of a small window, pixel by pixel."""
+
+    def __init__(self, window: Window, lit: LitPixels, kernels: tuple[FloatArray, ...]) -> None:
+        """Spread the lights of a window.
+
+        Args:
+            window: In cells of 2 px.
+            lit: Lights of the picture.
+            kernels: (n, n) of every colour, in pixels: what a light throws beside itself.
+        """
+        self._top, self._left = PITCH_PX * window.top, PITCH_PX * window.left
+        # beside the last cell lies a last odd row or column
+        height, width = (PITCH_PX * side + 1 for side in window.shape)
+        rows, columns = lit.rows - self._top, lit.columns - self._left
+        own = (rows >= 0) & (rows < height - 1) & (columns >= 0) & (columns < width - 1)
+        self._planes: list[Half | None] = []
+        for light, kernel in zip(lit.light[:, own], kernels, strict=True):
+            plane = np.zeros((height, width), np.float32)
+            plane[rows[own], columns[own]] = light
+            there = plane > 0
+            spread = spreading(kernel, there).spread(plane) if there.any() else None
+            self._planes.append(None if spread is None else _half(spread))
+
+    def add(self, under: FloatArray, colour: int, top: int) -> None:
+        """Add them to rows of a picture."""
+        plane = self._planes[colour]
+        if plane is None:
+            return
+        first, last = max(self._top - top, 0), min(self._top + plane.shape[0] - top, len(under))
+        if first < last:
+            part = under[first:last, self._left : self._left + plane.shape[1]]
+            part += plane[first + top - self._top : last + top - self._top, : part.shape[1]]
+
+
+class CellStreaks:
+    """Streaks of a large window, in cells."""
+
+    def __init__(self, region: Region, offset_px: tuple[tuple[float, float], ...]) -> None:
+        """Take them as they were found.
+
+        Args:
+            region: The window.
+            offset_px: Of the cells of every colour.
+        """
+        self._window, self._planes, self._offset_px = region.window, region.streaks, offset_px
+        self._there = [bool(self._planes[colour].any()) for colour in range(COLOURS)]
+
+    def add(self, under: FloatArray, colour: int, top: int) -> None:
+        """Add them to rows of a picture."""
+        window, offset = self._window, self._offset_px[colour]
+        first = max(PITCH_PX * window.top - 1 - top, 0)
+        last = min(PITCH_PX * window.bottom + 1 - top, under.shape[0])
+        if first >= last or not self._there[colour]:
+            return
+        left = max(PITCH_PX * window.left - 1, 0)
+        right = min(PITCH_PX * window.right + 1, under.shape[1])
+        moved = offset[0] + PITCH_PX * window.top, offset[1] + PITCH_PX * window.left - left
+        under[first:last, left:right] += rows_of_cells(
+            self._planes[colour], PITCH_PX, moved, top + first, last - first, right - left
+        )
+
+
+def _shows(region: Region) -> bool:
+    """Tell whether streaks are bright enough, beside what clipped, for their pixels to matter."""
+    return bool((region.streaks[region.light == 0] > FAINT).any())
+
+
+def _half(plane: FloatArray) -> Half:
+    return np.clip(plane, -BRIGHTEST, BRIGHTEST).astype(np.float16)
