@@ -177,12 +177,13 @@ def built_in_plates() -> tuple[str, ...]:
 
 
 def _built_in(path: Path) -> Path:
-    """Give the file of a plate or bundle that is built in, or the path as it is."""
+    """Give the file of a built-in plate, or bundle that holds one, or the path as it is."""
     if path.is_file():
         return path
     if str(path) in built_in_plates():
         return PLATES / f"{path}.toml"
-    return built_in_bundles().get(str(path), path)
+    bundle = built_in_bundles().get(str(path))
+    return bundle if bundle is not None and PLATE in open_bundle(bundle).names else path
 
 
 def is_plate(path: Path) -> bool:

@@ -15,39 +15,14 @@ from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.thesis import validation as thesis_validation
 from camkit.report.bench import known_captures
 from tests.hdr_bundle import four_lines
+from tests.hdr_recipe import small_recipe
 from tools.hdr import tables
 from tools.hdr.table import cameras, training
 
 SIDE_PX = 128
-TABLES = """
-[data]
-procedural_scenes = 1
-scene_px = 192
-sample_px = 64
-capture_px = 128
-surround_px = 16
-pool_samples = 40
-first_samples = 2
-steps_per_sample = 4
-saturated_min = 0.01
-saturated_max = 0.03
-
-[thesis]
-optics = "{optics}"
-
-[schedule]
-steps = 2
-batch = 2
-patch_px = 32
-warmup_steps = 1
-
-[networks.{role}.{size}]
-network = "lean_s"
-config = {{ widths = [16, 16], encoder_blocks = [0], decoder_blocks = [0], {more} }}
-"""
 TINY = {
-    "streak_hdr.toml": {"optics": "plate", "role": "highlights", "size": "S", "more": "bias=true"},
-    "bare_lens.toml": {"optics": "bare", "role": "whole", "size": "M", "more": "in_channels=3"},
+    "streak_hdr.toml": ("highlights.S", "bias = true", "plate"),
+    "bare_lens.toml": ("whole.M", "in_channels = 3", "bare"),
 }
 Rig = Callable[..., str]
 
@@ -59,9 +34,9 @@ def rig(
     """Give the command, with small recipes, scenes and optics; its answer is what it prints."""
     recipes = tmp_path / "recipes"
     recipes.mkdir()
-    for name, words in TINY.items():
-        text = (cameras.RECIPES / name).read_text(encoding="utf-8")
-        small = text[: text.index("[data]")] + TABLES.format(**words)
+    for name, (network, config, optics) in TINY.items():
+        thesis = f'\n[thesis]\noptics = "{optics}"\n'
+        small = small_recipe(cameras.RECIPES / name, network, config, thesis)
         (recipes / name).write_text(small, encoding="utf-8")
     for module in (cameras, training):
         monkeypatch.setattr(module, "RECIPES", recipes)

@@ -12,31 +12,9 @@ from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe, to_hdr_recipe
 from camkit.models_def.kinds.hdr.samples import HdrCamera
 from tests.hdr_bundle import four_lines
+from tests.hdr_recipe import small_recipe
 
 SHIPPED = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "streak_hdr.toml"
-TABLES = """
-[data]
-procedural_scenes = 1
-scene_px = 192
-sample_px = 64
-capture_px = 128
-surround_px = 16
-pool_samples = 40
-first_samples = 2
-steps_per_sample = 4
-saturated_min = 0.01
-saturated_max = 0.03
-
-[schedule]
-steps = 2
-batch = 2
-patch_px = 32
-warmup_steps = 1
-
-[networks.S]
-network = "lean_s"
-config = { widths = [16, 16], encoder_blocks = [0], decoder_blocks = [0], bias = true }
-"""
 
 Table = dict[str, Any]
 
@@ -52,8 +30,7 @@ def one_thread() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def tiny_text() -> str:
     """The shipped camera with small samples and a small network."""
-    text = SHIPPED.read_text(encoding="utf-8")
-    return text[: text.index("[data]")] + TABLES
+    return small_recipe(SHIPPED, "S", "bias = true")
 
 
 @pytest.fixture
