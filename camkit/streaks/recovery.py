@@ -29,6 +29,8 @@ FINE_CELLS: Final = 2**20
 MOST_CLIPPED: Final = 0.3
 """Share of a picture; where more clipped, streaks of different lights cannot be told apart."""
 Mask = NDArray[np.bool_]
+MANY_SAMPLES: Final = 2
+"""Of four in a cell: a colour with fewer sees no more of an arm than its cells."""
 GUESS: Final = 0.6
 """Light of a clipped place that nothing was measured of, per squared pixel from its rim."""
 
@@ -61,7 +63,8 @@ class Recovery:
         coarse: Its cells of 4 px.
         veil: (3, h, w) float32, in cells of 4 px: what unclipped light throws beside itself.
         core: (3,): share of the light that stays where it is.
-        kernels: (n, n) of every colour, in pixels: what a light throws beside itself.
+        kernels: (n, n) of every colour, in pixels: what a light throws beside itself; None for
+            colours with fewer than `MANY_SAMPLES` in a cell.
         regions: From top to bottom; none where so much clipped that nothing can be told.
         notes: What the user should know.
         fallbacks: Places whose lights were left as the sensor saw them; 1 for a whole picture, and
@@ -72,7 +75,7 @@ class Recovery:
     coarse: Cells
     veil: FloatArray
     core: tuple[float, ...]
-    kernels: tuple[FloatArray, ...]
+    kernels: tuple[FloatArray | None, ...]
     regions: tuple[Region, ...]
     notes: tuple[str, ...] = ()
     fallbacks: int = 0
@@ -131,7 +134,10 @@ def recover(
         coarse=coarse,
         veil=veil,
         core=kernels.coarse.core,
-        kernels=kernels.pixel.veil,
+        kernels=tuple(
+            veil if len(sites) >= MANY_SAMPLES else None
+            for veil, sites in zip(kernels.pixel.veil, kernels.sites, strict=True)
+        ),
         regions=tuple(regions),
         notes=tuple(notes),
         fallbacks=int(blind) + sum(region.given_up for region in regions),

@@ -1,10 +1,12 @@
 """What lights throw beside themselves, over the rows of a picture.
 
-    small windows whose streaks show -> lights of pixels, spread by kernels of pixels
-    others                           -> streaks of cells, linear between their middles
+    small windows whose streaks show, colours with many samples
+           -> lights of pixels, spread by kernels of pixels
+    others -> streaks of cells, linear between their middles
 
 An arm is three pixels wide: in cells of two it is wider and dimmer, and leaves two dark lines and
-a coloured one where it is taken away. In large windows that is the price of their size.
+a bright one where it is taken away. In large windows that is the price of their size. Red and blue
+of a mosaic have one sample in such a cell and see no more of an arm than it.
 """
 
 from typing import Final, Protocol
@@ -42,24 +44,32 @@ def streaks_of(recovery: Recovery, lit: LitPixels) -> list[Streaks]:
         recovery: Of the capture.
         lit: Its lights.
     """
-    return [
-        PixelStreaks(region.window, lit, recovery.kernels)
-        if region.light[0].size <= FINE_CELLS and _shows(region)
-        else CellStreaks(region, recovery.fine.offset_px)
-        for region in recovery.regions
-    ]
+    fine: list[Streaks] = []
+    rough: list[Streaks] = []
+    for region in recovery.regions:
+        small = region.light[0].size <= FINE_CELLS and _shows(region)
+        kernels = recovery.kernels if small else (None,) * COLOURS
+        if small:
+            fine.append(PixelStreaks(region.window, lit, kernels))
+        left = tuple(colour for colour, kernel in enumerate(kernels) if kernel is None)
+        if left:
+            rough.append(CellStreaks(region, recovery.fine.offset_px, left))
+    return fine + rough
 
 
 class PixelStreaks:
     """Streaks of a small window, pixel by pixel."""
 
-    def __init__(self, window: Window, lit: LitPixels, kernels: tuple[FloatArray, ...]) -> None:
+    def __init__(
+        self, window: Window, lit: LitPixels, kernels: tuple[FloatArray | None, ...]
+    ) -> None:
         """Spread the lights of a window.
 
         Args:
             window: In cells of 2 px.
             lit: Lights of the picture.
-            kernels: (n, n) of every colour, in pixels: what a light throws beside itself.
+            kernels: (n, n) of every colour, in pixels: what a light throws beside itself; None
+                leaves a colour out.
         """
         self._top, self._left = PITCH_PX * window.top, PITCH_PX * window.left
         # beside the last cell lies a last odd row or column
@@ -71,8 +81,10 @@ class PixelStreaks:
             plane = np.zeros((height, width), np.float32)
             plane[rows[own], columns[own]] = light
             there = plane > 0
-            spread = spreading(kernel, there).spread(plane) if there.any() else None
-            self._planes.append(None if spread is None else _half(spread))
+            if kernel is None or not there.any():
+                self._planes.append(None)
+            else:
+                self._planes.append(_half(spreading(kernel, there).spread(plane)))
 
     def add(self, under: FloatArray, colour: int, top: int) -> None:
         """Add them to rows of a picture."""
@@ -86,24 +98,30 @@ class PixelStreaks:
 
 
 class CellStreaks:
-    """Streaks of a large window, in cells."""
+    """Streaks of a window, in cells."""
 
-    def __init__(self, region: Region, offset_px: tuple[tuple[float, float], ...]) -> None:
+    def __init__(
+        self,
+        region: Region,
+        offset_px: tuple[tuple[float, float], ...],
+        colours: tuple[int, ...] = tuple(range(COLOURS)),
+    ) -> None:
         """Take them as they were found.
 
         Args:
             region: The window.
             offset_px: Of the cells of every colour.
+            colours: To add.
         """
-        self._window, self._planes, self._offset_px = region.window, region.streaks, offset_px
-        self._there = [bool(self._planes[colour].any()) for colour in range(COLOURS)]
+        self._window, self._offset_px = region.window, offset_px
+        self._planes = {c: region.streaks[c] for c in colours if region.streaks[c].any()}
 
     def add(self, under: FloatArray, colour: int, top: int) -> None:
         """Add them to rows of a picture."""
         window, offset = self._window, self._offset_px[colour]
         first = max(PITCH_PX * window.top - 1 - top, 0)
         last = min(PITCH_PX * window.bottom + 1 - top, under.shape[0])
-        if first >= last or not self._there[colour]:
+        if first >= last or colour not in self._planes:
             return
         left = max(PITCH_PX * window.left - 1, 0)
         right = min(PITCH_PX * window.right + 1, under.shape[1])

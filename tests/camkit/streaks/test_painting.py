@@ -129,8 +129,8 @@ def test_lights_are_put_where_samples_clipped_and_nowhere_else(
 ) -> None:
     seen = np.minimum(night[1], 1)
     bare = _painted(replace(found, regions=()), seen, ONES)
-    dark = tuple(np.zeros_like(kernel) for kernel in found.kernels)
-    got = _painted(replace(found, kernels=dark), seen, ONES)
+    dark = tuple(replace(r, streaks=np.zeros_like(r.streaks)) for r in found.regions)
+    got = _painted(replace(found, regions=dark), seen, ONES)
     changed = got != bare
     clipped = night[1] >= 1
     assert changed[clipped].mean() > 0.7  # samples of a mosaic miss some pixels of a rim

@@ -30,7 +30,8 @@ LAMPS = [(60, 70, 2.0, (200.0, 150.0, 90.0)), (120, 160, 3.0, (60.0, 60.0, 60.0)
 @pytest.fixture(scope="module")
 def found() -> Recovery:
     scene = with_lamps(street(*SIZE), LAMPS)
-    return recover(captured_cells(blurred(scene, star())), star_kernels())
+    light = blurred(scene, star())
+    return recover(captured_cells(light, None), star_kernels(None))
 
 
 def _under(streaks: list[Streaks], size: tuple[int, int] = SIZE, rows: int = 1000) -> FloatArray:
@@ -48,6 +49,7 @@ def test_streaks_of_pixels_are_those_of_a_slow_sum(found: Recovery) -> None:
     lit = lit_pixels(found)
     got = _under(streaks_of(found, lit))
     for colour, kernel in enumerate(found.kernels):
+        assert kernel is not None  # full planes
         light = np.zeros(SIZE)
         light[lit.rows, lit.columns] = lit.light[colour]
         half = kernel.shape[0] // 2
@@ -61,6 +63,18 @@ def test_streaks_of_pixels_are_those_of_a_slow_sum(found: Recovery) -> None:
 def test_bands_of_any_height_have_the_same_bits(found: Recovery, rows: int) -> None:
     streaks = streaks_of(found, lit_pixels(found))
     np.testing.assert_array_equal(_under(streaks, rows=rows), _under(streaks))
+
+
+def test_of_a_mosaic_green_alone_has_samples_enough(found: Recovery) -> None:
+    scene = with_lamps(street(*SIZE), LAMPS)
+    mosaic = recover(captured_cells(blurred(scene, star())), star_kernels())
+    assert [kernel is None for kernel in mosaic.kernels] == [True, False, True]
+    lit = lit_pixels(mosaic)
+    streaks = streaks_of(mosaic, lit)
+    assert [type(one) for one in streaks] == [PixelStreaks, CellStreaks]
+    got, cells = _under(streaks), _under([CellStreaks(mosaic.regions[0], mosaic.fine.offset_px)])
+    np.testing.assert_array_equal(got[[0, 2]], cells[[0, 2]])
+    assert (got[1] != cells[1]).any()
 
 
 def test_streaks_too_faint_to_show_keep_their_cells(found: Recovery) -> None:
