@@ -25,13 +25,16 @@ def rows_of_cells(
 def _columns_of_cells(lines: FloatArray, pitch_px: int, offset_px: float, width: int) -> FloatArray:
     """Give columns of pixels: those of one phase lie between their cells alike."""
     out = np.empty((lines.shape[0], width), np.float32)
+    before = max(-int(np.floor(-offset_px / pitch_px)), 0)
+    last = int(np.floor((width - 1 - offset_px) / pitch_px)) + 1
+    after = max(last + 1 - lines.shape[1], 0)
+    even = np.pad(lines, ((0, 0), (before, after)), mode="edge")
     for phase in range(pitch_px):
         columns = out[:, phase::pitch_px]
         place = (phase - offset_px) / pitch_px
         first = int(np.floor(place))
         share = np.float32(place - first)
-        index = first + np.arange(columns.shape[1])
-        low = np.clip(index, 0, lines.shape[1] - 1)
-        high = np.clip(index + 1, 0, lines.shape[1] - 1)
-        columns[...] = lines[:, low] * (1 - share) + lines[:, high] * share
+        low, high = (even[:, k : k + columns.shape[1]] for k in (before + first, before + first + 1))
+        np.multiply(low, 1 - share, out=columns)
+        columns += high * share
     return out

@@ -80,17 +80,20 @@ def cells_of(samples: FloatArray, clipped: NDArray[np.bool_], sites: Sequence[Si
         raise ContractError(f"a capture needs 2 px on each side; got {samples.shape[1:]}")
     light = np.zeros((COLOURS, height, width), np.float32)
     share = np.zeros_like(light)
+    any_clipped = bool(clipped.any())
     for colour, places in enumerate(sites):
         plane = min(colour, samples.shape[0] - 1)
         for y, x in places:
             at = (plane, slice(y, 2 * height, 2), slice(x, 2 * width, 2))
-            over = clipped[at]
-            light[colour] += np.where(over, 0, samples[at])
-            share[colour] += over
+            if any_clipped:
+                light[colour] += np.where(clipped[at], 0, samples[at])
+                share[colour] += clipped[at]
+            else:
+                light[colour] += samples[at]
         share[colour] /= len(places)
         light[colour] /= len(places)
     return Cells(
-        light=_among_known(light, share),
+        light=_among_known(light, share) if any_clipped else light,
         clipped=share,
         pitch_px=PITCH_PX,
         offset_px=tuple(_middle(places) for places in sites),
@@ -106,10 +109,15 @@ def coarser(cells: Cells) -> Cells:
     """
     if min(cells.light.shape[1:]) < 2:
         raise ContractError(f"cells need two on each side; got {cells.light.shape[1:]}")
-    share = pooled(cells.clipped)
+    if cells.clipped.any():
+        share = pooled(cells.clipped)
+        light = _among_known(pooled(cells.known), share)
+    else:
+        light = pooled(cells.light)
+        share = np.zeros_like(light)
     half = cells.pitch_px / 2
     return Cells(
-        light=_among_known(pooled(cells.known), share),
+        light=light,
         clipped=share,
         pitch_px=2 * cells.pitch_px,
         offset_px=tuple((y + half, x + half) for y, x in cells.offset_px),

@@ -44,10 +44,14 @@ def dome(distance_px: FloatArray) -> FloatArray:
 def pooled(fine: FloatArray) -> FloatArray:
     """Give the means of 2 x 2 cells of (..., h, w); a last odd row or column is left out."""
     height, width = fine.shape[-2] // 2, fine.shape[-1] // 2
-    cut = fine[..., : 2 * height, : 2 * width]
-    upper = cut[..., 0::2, 0::2] + cut[..., 0::2, 1::2]
-    lower = cut[..., 1::2, 0::2] + cut[..., 1::2, 1::2]
-    return np.asarray(0.25 * (upper + lower), np.float32)
+    means = np.empty((*fine.shape[:-2], height, width), np.float32)
+    for top in range(0, height, STRIP_ROWS):
+        into = means[..., top : top + STRIP_ROWS, :]
+        strip = fine[..., 2 * top : 2 * (top + into.shape[-2]), : 2 * width]
+        np.add(strip[..., 0::2, 0::2], strip[..., 0::2, 1::2], out=into)
+        into += strip[..., 1::2, 0::2] + strip[..., 1::2, 1::2]
+        into *= np.float32(0.25)
+    return means
 
 
 def upsampled(coarse: FloatArray, shape: tuple[int, int]) -> FloatArray:

@@ -5,7 +5,7 @@
 Stages read it and add to it; each fact is found once, whoever asks first.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -57,6 +57,8 @@ class Job:
         windows: Role -> the windows of its network, once they are planned.
         prober: What `probe` asks; set by the walker.
         known: Planes of this capture that were made before; what gives them does not run.
+        kept: What stages found of the capture and need not seek again in another walk over it, by
+            a key of theirs; shared with `unheard` ones.
         reserved_bytes: Of the memory cap, what somebody else needs for what becomes of the bands.
         clipped_fraction: Share of clipped samples in the rows read so far.
     """
@@ -87,6 +89,7 @@ class Job:
         self.windows: dict[str, NetworkWindows] = {}
         self.prober: Callable[[Job, tuple[str, ...]], tuple[RowSource, ...]] | None = None
         self.known = dict(known or {})
+        self.kept: dict[Hashable, Any] = {}
         self.reserved_bytes = reserved_bytes
         self.clipped_fraction = 0.0
         self._check_input()
@@ -142,7 +145,7 @@ class Job:
     def unheard(self) -> "Job":
         """Give the same job for a walk whose counts and notes nobody hears."""
         other = Job(self.setup, self.capture, cancel=self.cancel, known=self.known)
-        other.record = dict(self.record)
+        other.record, other.kept = dict(self.record), self.kept
         other.work, other.subject, other.falls_back = self.work, self.subject, self.falls_back
         for name in ("placement", "noise"):
             if name in self.__dict__:

@@ -127,18 +127,21 @@ def _kernels(job: Job) -> StreakKernels:
     return streak_kernels(scaled.at(0.0, 0.0), sample_sites(job.capture.cfa), reach_px)
 
 
-def _cells(job: Job, light: str, mask: str) -> Cells:
+def _cells(job: Job, light_plane: str, mask_plane: str) -> Cells:
     """Read the whole capture in cells."""
-    samples, clipped = job.probe(light, mask)
+    samples, mask = job.probe(light_plane, mask_plane)
     sites = sample_sites(job.capture.cfa)
     height = samples.shape[1] // 2 * 2
     shape = COLOURS, height // 2, samples.shape[2] // 2
-    whole = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    pixels = np.empty((samples.shape[0], *shape[1:]), np.uint8)
+    # zeros that nothing is written to take no memory
+    light, over = np.empty(shape, np.float32), np.zeros(shape, np.float32)
+    pixels = np.zeros((samples.shape[0], *shape[1:]), np.uint8)
     for top in range(0, height, BAND_ROWS):
         bottom = min(top + BAND_ROWS, height)
-        part = cells_of(samples.read(top, bottom), clipped.read(top, bottom), sites)
-        for plane, made in zip(whole, (part.light, part.clipped), strict=True):
-            plane[:, top // 2 : bottom // 2] = made
-        pixels[:, top // 2 : bottom // 2] = part.pixels
-    return replace(part, light=whole[0], clipped=whole[1], pixels=pixels)
+        part = cells_of(samples.read(top, bottom), mask.read(top, bottom), sites)
+        rows = slice(top // 2, bottom // 2)
+        light[:, rows] = part.light
+        if part.pixels.any():
+            over[:, rows] = part.clipped
+            pixels[:, rows] = part.pixels
+    return replace(part, light=light, clipped=over, pixels=pixels)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.stages import Repair
+from camkit.contracts import FloatArray
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
@@ -28,6 +29,8 @@ BYTES_PER_COLUMN: Final = 1_000
 """Of rows on their way (measured, see docs/performance.md)."""
 REST_SHARE: Final = 0.2
 
+MOST_KEPT: Final = 2**18
+"""Samples whose place and value are kept for whoever reads them again: 7 MB."""
 Places = tuple[NDArray[np.intp], ...]
 """Indices of samples as `np.nonzero` gives them: channel, row, column."""
 
@@ -35,10 +38,12 @@ Places = tuple[NDArray[np.intp], ...]
 def prepare(entry: Repair, job: Job) -> StageWork:
     """Make ready; nothing is decided here."""
     made: list[SoundRows] = []
+    mended = job.kept.setdefault(("repair", entry.takes), Mended())
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         light, mask = taken[0], taken[1] if len(taken) > 1 else None
-        sound = SoundRows(light.rows(), mosaic=job.capture.cfa is not None, threads=job.threads)
+        mosaic = job.capture.cfa is not None
+        sound = SoundRows(light.rows(), mosaic=mosaic, threads=job.threads, mended=mended)
         made.append(sound)
         given = [light.with_source(sound)]
         if mask is not None:
@@ -58,19 +63,61 @@ def seconds(_entry: Repair, subject: Subject, _work: Work, speed: Speed) -> floa
     return REST_SHARE * speed.rest_s_per_mp * subject.megapixels
 
 
+class Mended:
+    """The samples that were replaced in rows without a gap, for whoever reads these rows again."""
+
+    def __init__(self) -> None:
+        self._span = (0, 0)
+        self._places: list[Places] = []
+        self._values: list[FloatArray] = []
+        self._count = 0
+
+    def hold(self, top: int, bottom: int) -> bool:
+        """Tell whether rows top..bottom were looked at."""
+        return self._span[0] <= top <= bottom <= self._span[1] and bottom > self._span[0]
+
+    def add(self, top: int, bottom: int, places: Places, values: FloatArray) -> None:
+        """Take up what was replaced in rows top..bottom; more than `MOST_KEPT` are not kept."""
+        begin, end = self._span
+        if begin == end:
+            begin = end = top
+        if not top <= end < bottom or self._count > MOST_KEPT:
+            return
+        new = places[1] >= end
+        self._places.append(tuple(index[new] for index in places))
+        self._values.append(values[new])
+        self._span = begin, bottom
+        self._count += int(np.count_nonzero(new))
+        if self._count > MOST_KEPT:
+            self._span, self._places, self._values = (0, 0), [], []
+
+    def within(self, top: int, bottom: int) -> tuple[Places, FloatArray]:
+        """Give places and values in rows top..bottom, which it must hold."""
+        if len(self._places) > 1:
+            self._places = [_joined(self._places)]
+            self._values = [np.concatenate(self._values)]
+        places, values = self._places[0], self._values[0]
+        inside = (places[1] >= top) & (places[1] < bottom)
+        return tuple(index[inside] for index in places), values[inside]
+
+
 class SoundRows:
     """Rows with broken samples replaced, equal to the whole in bits wherever reading begins.
+
+    What another walk over the same capture has replaced is not sought again.
 
     Attributes:
         repaired: Samples replaced in the rows read so far, each row counted once.
     """
 
-    def __init__(self, source: RowSource, *, mosaic: bool, threads: int) -> None:
+    def __init__(
+        self, source: RowSource, *, mosaic: bool, threads: int, mended: Mended | None = None
+    ) -> None:
         self._source = source
         self._mosaic = mosaic
         self._threads = threads
-        self._span = (0, 0)
-        self._mended: list[Places] = []
+        self._mended = Mended() if mended is None else mended
+        self._end = 0
         self.repaired = 0
 
     @property
@@ -80,31 +127,33 @@ class SoundRows:
 
     def read(self, top: int, bottom: int) -> Rows:
         """Give rows top..bottom as (channel, rows, w) float32, a new array."""
-        sound, mended = self._mend(top, bottom)
-        begin, end = self._span
-        if begin == end:
-            self._span = (top, top)
-            end = top
-        if top <= end < bottom:
-            new = mended[1] >= end
-            self._mended.append(tuple(index[new] for index in mended))
-            self.repaired += int(np.count_nonzero(new))
-            self._span = (self._span[0], bottom)
+        sound, places = self._mend(top, bottom)
+        self.repaired += int(np.count_nonzero(places[1] >= self._end))
+        self._end = max(self._end, bottom)
         return sound
 
     def places(self, top: int, bottom: int) -> Places:
         """Give which samples of rows top..bottom were replaced."""
-        if not self._span[0] <= top <= bottom <= self._span[1]:
-            return self._mend(top, bottom)[1]
-        known = self._mended or [(np.zeros(0, np.intp),) * 3]
-        found = tuple(np.concatenate(parts) for parts in zip(*known, strict=True))
-        inside = (found[1] >= top) & (found[1] < bottom)
-        return tuple(index[inside] for index in found)
+        if self._mended.hold(top, bottom):
+            return self._mended.within(top, bottom)[0]
+        return self._mend(top, bottom)[1]
 
     def _mend(self, top: int, bottom: int) -> tuple[Rows, Places]:
-        margin, (channels, height, width) = REPAIR_MARGIN_PX, self.shape
+        margin, height = REPAIR_MARGIN_PX, self.shape[1]
         above, below = max(top - margin, 0), min(bottom + margin, height)
         light = self._source.read(above, below)
+        if self._mended.hold(top, bottom):
+            sound = light[:, top - above : bottom - above].copy()
+            places, values = self._mended.within(top, bottom)
+            sound[places[0], places[1] - top, places[2]] = values
+            return sound, places
+        sound, places = self._sought(light, above, top, bottom)
+        self._mended.add(top, bottom, places, sound[places[0], places[1] - top, places[2]])
+        return sound, places
+
+    def _sought(self, light: Rows, above: int, top: int, bottom: int) -> tuple[Rows, Places]:
+        """Replace what is broken in rows top..bottom of light, whose first row is `above`."""
+        margin, (channels, height, width) = REPAIR_MARGIN_PX, self.shape
         sound = np.empty((channels, bottom - top, width), dtype=np.float32)
         found: dict[int, Places] = {}
 
@@ -124,8 +173,11 @@ class SoundRows:
 
         run_slices(fill, bottom - top, threads=self._threads)
         ordered = [found[first] for first in sorted(found)]
-        places = tuple(np.concatenate(parts) for parts in zip(*ordered, strict=True))
-        return sound, places
+        return sound, _joined(ordered)
+
+
+def _joined(places: Sequence[Places]) -> Places:
+    return tuple(np.concatenate(parts) for parts in zip(*places, strict=True))
 
 
 class UnknownRows:

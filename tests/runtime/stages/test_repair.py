@@ -149,3 +149,40 @@ def test_without_a_mask_none_is_given_and_rows_that_roll_may_be_repaired() -> No
     given = run_stage(Repair(takes=("light",), gives=("sound",)), made_job(capture), taken)
     assert len(given) == 1
     np.testing.assert_array_equal(read_all(given[0].rows(), 5), _whole(capture)[0])
+
+
+@pytest.mark.parametrize("capture", CAPTURES.values(), ids=CAPTURES.keys())
+@pytest.mark.parametrize("known", [40, HEIGHT])
+def test_a_second_walk_seeks_only_where_the_first_did_not(
+    capture: Capture, known: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = made_job(capture)
+    wanted, broken = _whole(capture)
+    clipped = np.broadcast_to(capture.saturated_rows(0, HEIGHT), broken.shape)
+    first = run_stage(Repair(), job, *run_stage(Linearise(), job, captured(capture)))[0].rows()
+    for top in range(0, known, 10):
+        first.read(top, top + 10)
+    sought: list[int] = []
+    for name, mend in (("repair_mosaic", repair_mosaic), ("repair_planes", repair_planes)):
+        monkeypatch.setattr(
+            f"camkit.runtime.stages.repair.{name}",
+            lambda light, mend=mend: sought.append(light.shape[-2]) or mend(light),
+        )
+    other = job.unheard()
+    sound, unknown = run_stage(Repair(), other, *run_stage(Linearise(), other, captured(capture)))
+    np.testing.assert_array_equal(read_all(sound.rows(), 7), wanted)
+    np.testing.assert_array_equal(read_all(unknown.rows(), 7), clipped & ~broken)
+    assert isinstance(sound.source, SoundRows)
+    assert sound.source.repaired == np.count_nonzero(broken)
+    assert bool(sought) == (known < HEIGHT)
+
+
+def test_more_than_is_kept_is_sought_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("camkit.runtime.stages.repair.MOST_KEPT", 1)
+    capture = _mosaic()
+    job = made_job(capture)
+    for _ in range(2):
+        sound = run_stage(Repair(), job, *run_stage(Linearise(), job, captured(capture)))[0]
+        np.testing.assert_array_equal(read_all(sound.rows(), 7), _whole(capture)[0])
+        assert isinstance(sound.source, SoundRows)
+        assert sound.source.repaired == np.count_nonzero(_whole(capture)[1])
