@@ -34,7 +34,9 @@ def _columns_of_cells(lines: FloatArray, pitch_px: int, offset_px: float, width:
         place = (phase - offset_px) / pitch_px
         first = int(np.floor(place))
         share = np.float32(place - first)
-        low, high = (even[:, k : k + columns.shape[1]] for k in (before + first, before + first + 1))
+        low, high = (
+            even[:, k : k + columns.shape[1]] for k in (before + first, before + first + 1)
+        )
         np.multiply(low, 1 - share, out=columns)
         columns += high * share
     return out

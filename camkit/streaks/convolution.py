@@ -4,6 +4,7 @@ many lights -> `Convolution`, by Fourier transforms: what it costs hangs on the 
 few lights  -> `FewLights`, the kernel laid about each: what it costs hangs on their number
 """
 
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -64,19 +65,35 @@ class FewLights:
         half = max(height, width) - 1
         middle = kernel.shape[0] // 2
         reach = min(half, middle)
-        wide = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
-        wide[half - reach : half + reach + 1, half - reach : half + reach + 1] = kernel[
+        self._wide = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
+        self._wide[half - reach : half + reach + 1, half - reach : half + reach + 1] = kernel[
             middle - reach : middle + reach + 1, middle - reach : middle + reach + 1
         ]
-        # a sum over rows of fixed order: products of matrices hang on threads and processors
-        self._laid = np.empty((len(self._at[0]), height * width), np.float32)
-        for row, y, x in zip(self._laid, *self._at, strict=True):
-            row[:] = wide[half - y : half - y + height, half - x : half - x + width].ravel()
+
+    @cached_property
+    def _laid(self) -> FloatArray:
+        """Lay the kernel about every light: (lights, h w)."""
+        height, width = self._shape
+        laid = np.empty((len(self._at[0]), height * width), np.float32)
+        for row, y, x in zip(laid, *self._at, strict=True):
+            row[:] = self._about(y, x).ravel()
+        return laid
+
+    def _about(self, y: int, x: int) -> FloatArray:
+        """Give the kernel about a place (h, w)."""
+        half, (height, width) = self._wide.shape[0] // 2, self._shape
+        return self._wide[half - y : half - y + height, half - x : half - x + width]
 
     def spread(self, light: FloatArray) -> FloatArray:
         """Give what light (h, w) becomes; counts where it may be alone."""
-        whole = np.einsum("ji,j->i", self._laid, light[self._at])
-        return np.asarray(whole, np.float32).reshape(self._shape)
+        if "_laid" in self.__dict__:
+            # a sum over rows of fixed order: products of matrices hang on threads and processors
+            whole = np.einsum("ji,j->i", self._laid, light[self._at])
+            return np.asarray(whole, np.float32).reshape(self._shape)
+        once = np.zeros(self._shape, np.float32)
+        for y, x in zip(*self._at, strict=True):
+            once += light[y, x] * self._about(y, x)
+        return once
 
     def gathered(self, image: FloatArray) -> FloatArray:
         """Give the transpose at the places of lights; 0 elsewhere."""

@@ -65,12 +65,17 @@ class Steps:
     dim_price: float
 
 
-COARSE_STEPS: Final = Steps(scales=COARSE, rounds=8, root=0.25, price=0.005, dim_price=0.0)
+COARSE_STEPS: Final = Steps(scales=COARSE, rounds=6, root=0.25, price=0.005, dim_price=0.0)
 FINE_STEPS: Final = Steps(scales=FINE, rounds=3, root=0.5, price=0.00125, dim_price=0.08)
 
 
 def seek_lights(
-    seen: FloatArray, clipped: Mask, spread: Spread, first: FloatArray, steps: Steps
+    seen: FloatArray,
+    clipped: Mask,
+    spread: Spread,
+    first: FloatArray,
+    steps: Steps,
+    hidden: Mask | None = None,
 ) -> FloatArray:
     """Give the light of clipped cells.
 
@@ -81,13 +86,13 @@ def seek_lights(
         spread: What a cell's light becomes.
         first: (h, w) float32: light to start from.
         steps: Scales and prices.
+        hidden: (h, w): cells that are not looked at; the clipped ones unless there are more.
 
     Returns:
         (h, w) float32, 0 outside the clipped cells.
     """
-    usable = usable_cells(clipped)
+    usable = usable_cells(clipped if hidden is None else hidden)
     down, across = usable[1:] & usable[:-1], usable[:, 1:] & usable[:, :-1]
-    slope_y, slope_x = gradient(seen)
     light = np.where(clipped, np.maximum(first, FAINTEST), 0).astype(np.float32)
     for scale in steps.scales:
         thrown = spread.spread(light)
@@ -100,9 +105,9 @@ def seek_lights(
         unit = np.where(clipped, light**steps.root, 0).astype(np.float32)
         price = (_price(light, steps) * unit**2 / np.maximum(light, DIMMEST)).astype(np.float32)
         system = _System(spread=spread, weights=weights, unit=unit, price=price)
-        wanted = unit * system.gathered(slope_y, slope_x, seen)
         start = np.divide(light, unit, out=np.zeros_like(light), where=unit > 0)
-        found = unit * _conjugate_gradients(system, wanted, start, steps.rounds)
+        rest = unit * system.gathered(rest_y, rest_x, seen - thrown) - price * start
+        found = unit * _conjugate_gradients(system, rest, start, steps.rounds)
         light = np.where(clipped, np.clip(found, FAINTEST, BRIGHTEST), 0).astype(np.float32)
     return light
 
@@ -171,10 +176,10 @@ class _System:
 
 
 def _conjugate_gradients(
-    system: _System, wanted: FloatArray, start: FloatArray, rounds: int
+    system: _System, rest: FloatArray, start: FloatArray, rounds: int
 ) -> FloatArray:
+    """Go on from a start that leaves this rest."""
     found = start
-    rest = wanted - system.applied(found)
     way = rest.copy()
     size = float(np.vdot(rest, rest))
     for _ in range(rounds):

@@ -9,7 +9,7 @@ most lights are found far too bright: texture that lies along their arms has no 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -17,8 +17,9 @@ import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.streaks.convolution import Spread, spreading
+from camkit.streaks.convolution import spreading
 from camkit.streaks.descent import gradient, usable_cells
+from camkit.streaks.shapes import repeated
 
 SCALE: Final = 0.006
 """Of the cost: the last and narrowest of the descent."""
@@ -36,18 +37,15 @@ Box = tuple[slice, slice]
 class Judge:
     """Tells what a window of one colour would cost more without a light."""
 
-    def __init__(
-        self, light: FloatArray, seen: FloatArray, kernel: FloatArray, spread: Spread
-    ) -> None:
+    def __init__(self, light: FloatArray, rest: FloatArray, kernel: FloatArray) -> None:
         """Take what was found.
 
         Args:
             light: (h, w) float32, 0 outside the clipped cells.
-            seen: (h, w) float32, as `seek_lights` was given it.
+            rest: (h, w) float32: what is seen, less what known light and this have thrown there.
             kernel: (n, n) float32, n odd: what a cell's light becomes.
-            spread: The same, ready for the window.
         """
-        self._rest = seen - spread.spread(light)
+        self._rest = rest
         self._usable = usable_cells(light > 0)
         self._kernel = kernel
 
@@ -79,16 +77,25 @@ class Proven:
     """Lights of which as much is left as the picture proves.
 
     Attributes:
-        light: (3, h, w) float32, 0 outside the clipped cells.
+        share: (h, w) float32: share of its excess over white that a light keeps, of all colours.
         given_up: Places that were found brighter than white and are left as they were seen.
     """
 
-    light: FloatArray
+    share: FloatArray
     given_up: int
+
+    def left(self, light: FloatArray) -> FloatArray:
+        """Give what is left of light (..., h, w)."""
+        over = np.maximum(light - np.float32(WHITE), 0)
+        return np.asarray(light - (1 - self.share) * over, np.float32)
+
+    def finer(self, shape: tuple[int, int]) -> "Proven":
+        """Give the same in cells of half the pitch; a last odd one goes with its neighbour."""
+        return replace(self, share=repeated(self.share, shape))
 
 
 def proven(light: FloatArray, judges: Sequence[Judge | None]) -> Proven:
-    """Lower lights to what the picture proves of them.
+    """Tell what the picture proves of lights.
 
     A light mostly has all colours: what is proven in one speaks for the others.
 
@@ -97,7 +104,7 @@ def proven(light: FloatArray, judges: Sequence[Judge | None]) -> Proven:
         judges: For every colour that clipped.
     """
     labels, _ = scipy.ndimage.label((light > 0).any(axis=0), structure=_EIGHT)
-    left, given_up = light.copy(), 0
+    shares, given_up = np.ones(labels.shape, np.float32), 0
     for number, (rows, columns) in enumerate(scipy.ndimage.find_objects(labels), 1):
         box = rows, columns
         excess = np.where(labels[box] == number, np.maximum(light[:, *box] - WHITE, 0), 0)
@@ -108,9 +115,9 @@ def proven(light: FloatArray, judges: Sequence[Judge | None]) -> Proven:
         ]
         if evidence:
             share = share_of(sum(evidence))
-            left[:, *box] -= np.float32(1 - share) * excess
+            shares[box][labels[box] == number] = share
             given_up += share == 0
-    return Proven(light=left, given_up=given_up)
+    return Proven(share=shares, given_up=given_up)
 
 
 def share_of(evidence: float) -> float:

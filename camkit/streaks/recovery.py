@@ -1,16 +1,15 @@
 """The lights of a capture, found from their streaks; and what every light throws beside itself.
 
     cells -> veil of what did not clip, taken away everywhere
-          -> windows -> lights in cells of 4 px -> (small windows) in cells of 2 px
+          -> windows -> lights in cells of 4 px -> in cells of 2 px, each group near itself
                      -> lowered to what is proven -> streaks
 
-"Model no more than a scene needs": nothing clipped, and only the veil is computed; the finer
-pitch is for windows in which it costs little.
+"Model no more than a scene needs": nothing clipped, and only the veil is computed.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +17,15 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.streaks.cells import COLOURS, Cells, coarser
 from camkit.streaks.convolution import Convolution, spreading
-from camkit.streaks.descent import COARSE_STEPS, FINE_STEPS, not_outshining, seek_lights
+from camkit.streaks.descent import COARSE_STEPS, not_outshining, seek_lights
 from camkit.streaks.evidence import Judge, proven
 from camkit.streaks.kernels import StreakKernels
+from camkit.streaks.refinement import Found, Group, groups_of, refined
 from camkit.streaks.regions import Window, windows_of
-from camkit.streaks.shapes import dome, pooled, rim_distance_px, upsampled, with_means
+from camkit.streaks.shapes import pooled, rim_distance_px, upsampled
 
 FINE_CELLS: Final = 2**20
-"""Windows of more cells of 2 px are sought in cells of 4 px alone."""
+"""Lights of windows of more cells of 2 px are judged in cells of 4 px."""
 MOST_CLIPPED: Final = 0.3
 """Share of a picture; where more clipped, streaks of different lights cannot be told apart."""
 Mask = NDArray[np.bool_]
@@ -170,14 +170,20 @@ def _region(
     """Find the lights of a window."""
     fine = cells[0]
     place = window.finer(fine.light.shape[-2:])
-    found = [_sought(colour, window, cells, veil, kernels) for colour in range(COLOURS)]
-    kept = proven(np.stack([one.light for one in found]), [one.judge for one in found])
-    light = np.zeros((COLOURS, *place.shape), np.float32)
+    hidden = cells[1].clipped[(slice(None), *window.at)] > 0
+    groups = groups_of(np.asarray(hidden.any(axis=0)))
+    found = [_sought(colour, window, groups, cells, veil, kernels) for colour in range(COLOURS)]
+    light = np.stack([one.light for one in found])
+    judges = [one.judge for one in found]
+    if light[0].size > FINE_CELLS:
+        kept = proven(pooled(light), judges).finer(place.shape)
+    else:
+        kept = proven(light, judges)
+    light = kept.left(light)
     streaks = np.zeros_like(light)
-    for colour, one in enumerate(found):
-        if one.judge is not None:
-            clipped = fine.clipped[(colour, *place.at)] > 0
-            light[colour] = one.finer(kept.light[colour], clipped)
+    for colour in range(COLOURS):
+        clipped = fine.clipped[(colour, *place.at)] > 0
+        if clipped.any():
             spread = spreading(kernels.fine.veil[colour], clipped)
             streaks[colour] = spread.spread(light[colour])
     return Region(
@@ -205,58 +211,43 @@ def _sum(light: FloatArray) -> float:
     return float(light.sum(dtype=np.float64))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Sought:
-    """Lights of one colour in a window.
+class _Sought(NamedTuple):
+    """Lights of one colour in a window, in cells of 2 px; their judge, None where nothing clipped.
 
-    Attributes:
-        light: (h, w) float32, in cells of 2 px or of 4 px.
-        judge: Of these cells; None where nothing clipped.
-        shape: (n,) what lights are like in clipped cells of 2 px, where `light` is of 4 px.
+    The judge is of cells of 4 px in a large window.
     """
 
     light: FloatArray
     judge: Judge | None
-    shape: FloatArray | None = None
-
-    def finer(self, light: FloatArray, clipped: Mask) -> FloatArray:
-        """Give lights of these cells in cells of 2 px, in which some clipped."""
-        if self.shape is None:
-            return light
-        base = np.zeros(clipped.shape, np.float32)
-        base[clipped] = self.shape
-        return with_means(base, light)
 
 
 def _sought(
     colour: int,
     window: Window,
+    groups: Sequence[Group],
     cells: tuple[Cells, Cells],
     veil: FloatArray,
     kernels: StreakKernels,
 ) -> _Sought:
-    """Find the lights of one colour in a window, in cells of 2 px unless they are too many."""
+    """Find the lights of one colour in a window; a large one is judged in cells of 4 px."""
     fine, coarse = cells
     at, place = (colour, *window.at), window.finer(fine.light.shape[-2:])
     clipped = fine.clipped[(colour, *place.at)] > 0
-    large = clipped.size > FINE_CELLS
     if not clipped.any():
-        shape = window.shape if large else clipped.shape
-        return _Sought(light=np.zeros(shape, np.float32), judge=None)
-    distance_px = rim_distance_px(clipped, fine.pitch_px)
-    guess = np.where(clipped, 1 + GUESS * distance_px**2, 0).astype(np.float32)
+        return _Sought(light=np.zeros(clipped.shape, np.float32), judge=None)
+    rim_px = rim_distance_px(clipped, fine.pitch_px)
+    guess = np.where(clipped, 1 + GUESS * rim_px**2, 0).astype(np.float32)
     seen, hidden = coarse.light[at] - veil[at], coarse.clipped[at] > 0
     kernel = kernels.coarse.whole[colour]
     spread = spreading(kernel, hidden)
     first = not_outshining(pooled(guess), seen, hidden, spread)
     light = seek_lights(seen, hidden, spread, first, COARSE_STEPS)
-    shape_of_lights = dome(distance_px)
-    if large:
-        judge = Judge(light, seen, kernel, spread)
-        return _Sought(light=light, judge=judge, shape=shape_of_lights[clipped])
-    first = with_means(shape_of_lights, light)
+    thrown = spread.spread(light)
+    found = Found(window=window, light=light, thrown=thrown, veil=veil[at], rim_px=rim_px)
+    finer = refined(colour, found, groups, fine, kernels)
+    if clipped.size > FINE_CELLS:
+        return _Sought(light=finer, judge=Judge(light, seen - thrown, kernel))
     seen = fine.light[(colour, *place.at)] - upsampled(veil[at], clipped.shape)
     kernel = kernels.fine.whole[colour]
-    spread = spreading(kernel, clipped)
-    light = seek_lights(seen, clipped, spread, first, FINE_STEPS)
-    return _Sought(light=light, judge=Judge(light, seen, kernel, spread))
+    thrown = spreading(kernel, clipped).spread(finer)
+    return _Sought(light=finer, judge=Judge(finer, seen - thrown, kernel))

@@ -34,6 +34,15 @@ class Window:
         """Give the place in an array."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
+    def moved(self, rows: int, columns: int) -> "Window":
+        """Give the same, so many cells farther down and to the right."""
+        return Window(
+            top=self.top + rows,
+            bottom=self.bottom + rows,
+            left=self.left + columns,
+            right=self.right + columns,
+        )
+
     def finer(self, shape: tuple[int, int]) -> "Window":
         """Give the same place in cells of half the pitch, of an array of that shape.
 

@@ -4,7 +4,7 @@ Between cells of one pitch and of half of it: a coarse cell covers 2 x 2 fine on
 or column that no coarse one covers goes with its neighbour.
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import scipy.ndimage
@@ -57,6 +57,13 @@ def pooled(fine: FloatArray) -> FloatArray:
 def upsampled(coarse: FloatArray, shape: tuple[int, int]) -> FloatArray:
     """Give fine cells (h, w) of `shape`, linear between the middles of coarse ones."""
     return _doubled(_doubled(coarse, shape[0]).T, shape[1]).T
+
+
+def repeated(coarse: NDArray[Any], shape: tuple[int, int]) -> NDArray[Any]:
+    """Give fine cells (h, w) of `shape`, each as the coarse one that covers it."""
+    fine = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)
+    more = [(0, max(side - have, 0)) for side, have in zip(shape, fine.shape, strict=True)]
+    return np.pad(fine, more, mode="edge")
 
 
 def with_means(base: FloatArray, means: FloatArray) -> FloatArray:

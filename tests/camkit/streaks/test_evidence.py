@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.streaks.convolution import Convolution
-from camkit.streaks.evidence import ENOUGH, NOTHING, SCALE, Judge, proven, share_of
+from camkit.streaks.evidence import ENOUGH, NOTHING, SCALE, Judge, Proven, proven, share_of
 from tests.streak_factory import star_kernels, street
 
 Mask = NDArray[np.bool_]
@@ -35,15 +35,17 @@ def _spread(light: FloatArray) -> FloatArray:
 
 
 def _judge(light: FloatArray, seen: FloatArray) -> Judge:
-    return Judge(light, seen, KERNEL, Convolution(KERNEL, SHAPE))
+    return Judge(light, seen - Convolution(KERNEL, SHAPE).spread(light), KERNEL)
 
 
 def _proven(light: FloatArray, seen: FloatArray) -> tuple[FloatArray, int]:
     """Prove the lights of a picture that clipped in green alone."""
     dark = np.zeros_like(light)
-    found = proven(np.stack([dark, light, dark]), [None, _judge(light, seen), None])
-    assert not found.light[[0, 2]].any()
-    return found.light[1], found.given_up
+    every = np.stack([dark, light, dark])
+    found = proven(every, [None, _judge(light, seen), None])
+    left = found.left(every)
+    assert not left[[0, 2]].any()
+    return left[1], found.given_up
 
 
 def _slow_cost(rest: FloatArray, clipped: Mask) -> float:
@@ -116,9 +118,18 @@ def test_what_one_colour_proves_speaks_for_the_others() -> None:
     lights = [_disc(30, 30, 1.5, size) for size in (80.0, 3.0)]
     judges = [_judge(x, (_scene() + _spread(x)).astype(np.float32)) for x in lights]
     both = np.stack([*lights, np.zeros(SHAPE, np.float32)])
-    np.testing.assert_array_equal(proven(both, [*judges, None]).light, both)
-    alone = proven(np.stack([both[2], lights[1], both[2]]), [None, judges[1], None])
-    assert alone.light.max() < 3
+    np.testing.assert_array_equal(proven(both, [*judges, None]).left(both), both)
+    dim = np.stack([both[2], lights[1], both[2]])
+    assert proven(dim, [None, judges[1], None]).left(dim).max() < 3
+
+
+def test_what_is_proven_in_coarse_cells_holds_for_the_finer_ones_that_they_cover() -> None:
+    coarse = Proven(share=np.array([[1.0, 0.0], [0.5, 1.0]], np.float32), given_up=1)
+    fine = coarse.finer((5, 4))
+    assert fine.given_up == 1
+    wanted = [[1, 1, 0, 0]] * 2 + [[0.5, 0.5, 1, 1]] * 3
+    np.testing.assert_array_equal(fine.share, wanted)
+    np.testing.assert_array_equal(fine.left(np.full((5, 4), 5, np.float32)), 1 + 4 * fine.share)
 
 
 @pytest.mark.parametrize(

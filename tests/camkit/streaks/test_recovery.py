@@ -175,7 +175,7 @@ def test_a_lamp_at_the_lower_right_of_odd_sizes_is_found(size: tuple[int, int]) 
     assert sum((r.light > 0).sum() for r in found.regions) == (cells.clipped > 0).sum()
 
 
-def test_a_window_too_large_for_the_finer_pitch_is_sought_in_coarse_cells(
+def test_lights_of_a_window_that_is_judged_in_coarse_cells_are_much_the_same(
     monkeypatch: pytest.MonkeyPatch, lit: tuple[FloatArray, Cells, Recovery]
 ) -> None:
     _, cells, found = lit
@@ -183,8 +183,8 @@ def test_a_window_too_large_for_the_finer_pitch_is_sought_in_coarse_cells(
     coarse = recover(cells, star_kernels())
     assert [r.window for r in coarse.regions] == [r.window for r in found.regions]
     for one, other in zip(coarse.regions, found.regions, strict=True):
-        assert (one.light != other.light).any()
-        assert one.light.sum() == pytest.approx(other.light.sum(), rel=0.3)
+        assert one.light.sum() == pytest.approx(other.light.sum(), rel=0.1)
+        assert np.abs(one.light - other.light).sum() < 0.1 * other.light.sum()
 
 
 def test_the_same_capture_gives_the_same_bits(lit: tuple[FloatArray, Cells, Recovery]) -> None:

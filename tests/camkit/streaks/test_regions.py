@@ -93,3 +93,9 @@ def test_the_finer_window_at_the_border_takes_the_odd_rest(
     assert window.finer(shape) == Window(top=8, bottom=bottom, left=6, right=right)
     inner = Window(top=4, bottom=9, left=3, right=14)
     assert inner.finer(shape) == Window(top=8, bottom=18, left=6, right=28)
+
+
+def test_a_window_moves_as_a_whole() -> None:
+    window = Window(top=1, bottom=4, left=2, right=9)
+    assert window.moved(3, 5) == Window(top=4, bottom=7, left=7, right=14)
+    assert window.moved(3, 5).shape == window.shape
