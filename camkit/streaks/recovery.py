@@ -172,14 +172,17 @@ def _region(
     place = window.finer(fine.light.shape[-2:])
     hidden = cells[1].clipped[(slice(None), *window.at)] > 0
     groups = groups_of(np.asarray(hidden.any(axis=0)))
-    found = [_sought(colour, window, groups, cells, veil, kernels) for colour in range(COLOURS)]
-    light = np.stack([one.light for one in found])
-    judges = [one.judge for one in found]
+    light = np.empty((COLOURS, *place.shape), np.float32)
+    judges = []
+    for colour in range(COLOURS):
+        light[colour], judge = _sought(colour, window, groups, cells, veil, kernels)
+        judges.append(judge)
     if light[0].size > FINE_CELLS:
         kept = proven(pooled(light), judges).finer(place.shape)
     else:
         kept = proven(light, judges)
-    light = kept.left(light)
+    for plane in light:
+        plane[:] = kept.left(plane)
     streaks = np.zeros_like(light)
     for colour in range(COLOURS):
         clipped = fine.clipped[(colour, *place.at)] > 0
