@@ -27,8 +27,9 @@ RATIO: Final = 1.1
 FLOOR: Final = 0.05
 """Stabilised; several standard deviations of the noise."""
 BESIDE_PX: Final = 1
-LEAST: Final = 0.5
-"""Stabilised, of what was seen beside lights: a demosaic may have made it four times too bright."""
+LEAST: Final = 0.9
+"""Stabilised, of what was seen beside lights: four fifths of the light. A network spends little on
+faint pixels beside what a lamp costs it, and left to itself it colours the rims of lamps."""
 REACH_PX: Final = 4
 """From a clipped sample: a demosaic and the pixels of a light reach two pixels, this one more."""
 

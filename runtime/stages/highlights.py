@@ -28,7 +28,7 @@ OPTIONS: Final = ("depth_m",)
 BYTES_PER_PX: Final = 22
 """Cells, veil, lights and streaks of a picture that is one window (measured)."""
 FINE_BYTES_PER_PX: Final = 47
-"""The same of one so small that its lights are sought in cells of 2 px too (measured)."""
+"""The same of one so small that its lights are judged in cells of 2 px (measured)."""
 KEPT_BYTES_PER_PX: Final = 13
 """Veil, streaks and the pixels of lights, of a picture of which nearly too much clipped."""
 BAND_ROWS: Final = 256

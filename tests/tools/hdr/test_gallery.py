@@ -1,5 +1,6 @@
 """The gallery of a night: files, and what was gained."""
 
+import re
 from pathlib import Path
 
 import cv2
@@ -24,3 +25,19 @@ def test_a_night_is_photographed_read_back_and_drawn(
     told = capsys.readouterr().out
     assert "by physics" in told
     assert "as it was" in told
+
+
+@pytest.mark.parametrize("name", ["streak-hdr", "streak-rank1"])
+def test_built_in_cameras_bring_the_lamps_of_a_night_back(
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(gallery, "SIDES_PX", (320, 480))
+    monkeypatch.setattr(gallery, "find_spec", lambda _: None)  # the plate is drawn elsewhere
+    gallery.show_gallery(name, tmp_path)
+    found = re.findall(r"(\d+\.\d+) dB", capsys.readouterr().out)
+    developed, physics, network = (float(value) for value in found)
+    assert physics > developed + 3
+    assert network > physics
