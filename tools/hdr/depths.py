@@ -1,6 +1,6 @@
 r"""Scenes from 1 m to infinity, the camera refocused on each: what the frozen streaks lose.
 
-    python -m tools.hdr.depths --bundle streak-hdr.camkit -o docs/results/hdr-depths.json
+    python -m tools.hdr.depths --bundle streak-hdr -o docs/results/hdr-depths.json
 
 The dissertation's figure 5.6: the light comes from another depth, and the sensor is moved to where
 it is sharp. The plate stays, so its arms grow with the distance of the sensor: 4.2 % from 5 m to

@@ -1,6 +1,6 @@
 r"""Lamps that move or flash: a bracket of three exposures beside one capture through a plate.
 
-    python -m tools.hdr.moving_lamp --bundle streak-hdr.camkit -o docs/results/hdr-moving-lamp.json
+    python -m tools.hdr.moving_lamp --bundle streak-hdr -o docs/results/hdr-moving-lamp.json
 
 Night streets without their own lights, and lamps of up to 200 times white put into them. The
 bracket (0, -4 and -8 EV, one after the other through the bare lens) is merged by what `camkit

@@ -1,6 +1,6 @@
 r"""CPU-seconds against what clipped: whole captures, restored and only developed, by stage.
 
-    python -m tools.hdr.speed --bundle streak-hdr.camkit -o docs/results/hdr-speed.json
+    python -m tools.hdr.speed --bundle streak-hdr -o docs/results/hdr-speed.json
 
 Captures are made first (`speed_captures`): nothing clipped, 50 lamps of 20 px, shares of the scene
 above white, and a crop of 512 px. Each is processed with one thread in a process of its own, by
