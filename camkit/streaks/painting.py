@@ -25,7 +25,11 @@ _NO_CHANGE: Final = np.eye(3)
 
 
 class Painter:
-    """Lays a recovery over the rows of a picture; keeps no more of it than that needs."""
+    """Lays a recovery over the rows of a picture; keeps no more of it than that needs.
+
+    Attributes:
+        blind: Whether all lights are left as the sensor saw them.
+    """
 
     def __init__(self, recovery: Recovery, to_output: Matrix = _NO_CHANGE) -> None:
         """Lay out the lights.
@@ -42,6 +46,7 @@ class Painter:
         self._veil_grid = recovery.coarse.pitch_px, recovery.coarse.offset_px
         self._streaks = streaks_of(recovery, self._lit)
         self._core = recovery.core
+        self.blind = recovery.blind
 
     def paint(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:
         """Change rows of a picture in place.

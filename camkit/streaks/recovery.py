@@ -69,6 +69,7 @@ class Recovery:
         notes: What the user should know.
         fallbacks: Places whose lights were left as the sensor saw them; 1 for a whole picture, and
             the notes say why.
+        blind: Whether so much clipped that this is so of all lights.
     """
 
     fine: Cells
@@ -79,6 +80,7 @@ class Recovery:
     regions: tuple[Region, ...]
     notes: tuple[str, ...] = ()
     fallbacks: int = 0
+    blind: bool = False
 
     def to_json(self) -> dict[str, int | float]:
         """Give what a sidecar says of it.
@@ -141,6 +143,7 @@ def recover(
         regions=tuple(regions),
         notes=tuple(notes),
         fallbacks=int(blind) + sum(region.given_up for region in regions),
+        blind=blind,
     )
 
 

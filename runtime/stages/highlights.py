@@ -12,6 +12,7 @@ from camkit.colorimetry import Matrix, rec709_from_camera
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.color import recover_highlights
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
@@ -96,7 +97,10 @@ def _painted(
 ) -> Iterator[Rows]:
     """Yield the bands of a picture with its lights; finds them when the first is asked for."""
     painter, top = _painter(job, looked_at, notes), 0
+    red, green, blue = picture.gains
     for band in picture.bands():
+        if painter.blind and job.capture.cfa is not None:
+            recover_highlights(band, (red, green, blue), in_place=True)
         painter.paint(band, top, picture.gains)
         top += band.shape[1]
         yield band

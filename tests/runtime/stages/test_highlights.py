@@ -184,6 +184,18 @@ def test_what_could_not_be_told_is_warned_of_once_the_rows_are_out(camera: Bundl
     assert any("lights reach the border" in note for note in work.warnings)
 
 
+def test_what_burnt_out_is_neutral_where_lights_cannot_be_told(camera: Bundle) -> None:
+    scene = street(HEIGHT, WIDTH)
+    scene[:, :, WIDTH // 2 :] = 6 / np.array(GAINS, np.float32)[:, None, None]
+    capture = _mosaic(blurred(scene, star()))
+    work = start(camera, capture)
+    work.fill()
+    assert any("of the picture clipped" in note for note in work.warnings)
+    burnt = _plane(capture, camera, "lit")[:, 8:-8, WIDTH // 2 + 8 : -8]
+    assert burnt.min() > 1
+    assert np.ptp(burnt, axis=0).max() < 0.1 * burnt.max()
+
+
 def test_nothing_clipped_costs_no_window(camera: Bundle) -> None:
     work = start(camera, _mosaic(blurred(street(HEIGHT, WIDTH), star())))
     work.fill()
