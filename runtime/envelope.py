@@ -131,5 +131,5 @@ def verdict(found: tuple[str, ...], bundle: str, on_unsafe: OnUnsafe) -> str | N
     if on_unsafe == "fail":
         raise ContractError(f"{text}; say --on-unsafe warn or fallback, or another --bundle")
     if on_unsafe == "fallback":
-        return f"{text}; the Wiener result is given instead of the network's"
-    return f"{text}; --on-unsafe fallback gives the Wiener result"
+        return f"{text}; what came before the network is given in its place"
+    return f"{text}; --on-unsafe fallback gives what came before the network"

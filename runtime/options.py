@@ -48,8 +48,8 @@ class Options:
         assume: What the caller vouches for where the capture's size does not match the sensor.
         force_bundle: Take the bundle also for captures that name another one.
         on_unsafe: What becomes of a capture outside the bundle's envelope, and of a tile whose
-            output is not finite or not bounded: warn (a bad tile is an error), fallback (the
-            Wiener result of capture or tile), fail (an error before work).
+            output is not finite or not bounded: warn (a bad tile is an error), fallback (what
+            came before the network, in capture or tile), fail (an error before work).
         max_mem_bytes: Memory the process may take; None for the default of 0.93 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.

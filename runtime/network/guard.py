@@ -19,8 +19,8 @@ Bound = Callable[[float], tuple[float, float]]
 
 _SPARSE: Final = 16
 _HINT: Final = (
-    "; say --on-unsafe fallback for the Wiener result there, or --method wiener for the whole "
-    "picture"
+    "; say --on-unsafe fallback for what came before the network there, or --method for the whole "
+    "picture without it"
 )
 
 
@@ -71,7 +71,7 @@ class TileGuard:
         instead = given[self._stand_in]
         if not is_finite(instead):
             raise ContractError(
-                f"the network gave {trouble} in {tile}, and the Wiener result there is not finite "
+                f"the network gave {trouble} in {tile}, and what came before it is not finite "
                 "either; the capture holds what no repair found"
             )
         self.replaced.append(f"{tile}: {trouble}")

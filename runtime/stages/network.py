@@ -150,7 +150,7 @@ class _NetworkStage:
     def warnings(self) -> tuple[str, ...]:
         """Name the tiles that were not believed."""
         replaced = () if self._guard is None else self._guard.replaced
-        return tuple(f"the Wiener result was taken in {tile}" for tile in replaced)
+        return tuple(f"what came before the network was taken in {tile}" for tile in replaced)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
         """Give the outputs of the network."""
