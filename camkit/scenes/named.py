@@ -1,6 +1,7 @@
 """A scene by its name, `SOURCE:SEED`; a new source of scenes is one line of the register."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Final
 
 from camkit.contracts import FloatArray
@@ -17,9 +18,10 @@ MOST_DIGITS: Final = 18
 
 
 def is_scene_name(text: str) -> bool:
-    """Tell whether a text names a scene of the register, rightly or not, and not a file."""
-    source, colon, _ = text.partition(":")
-    return bool(colon) and source in SOURCES
+    """Tell whether a text names a scene, rightly or not, and not a file."""
+    source, colon, seed = text.partition(":")
+    meant = len(source) > 1 and source.isalpha() and seed.isdigit() and not Path(text).exists()
+    return bool(colon) and (source in SOURCES or meant)
 
 
 def named_scene(name: str, height: int, width: int) -> FloatArray:

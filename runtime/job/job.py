@@ -172,7 +172,9 @@ class Job:
         if isinstance(bundle.manifest.sensor, BayerSensor):
             self._check_cfa(bundle.manifest.sensor.cfa)
         if self.capture.contract != wanted[0]:
-            self.notes.append(f"a linear RGB capture in a {wanted[0]} bundle: not demosaicked")
+            self.notes.append(
+                "the capture holds full colours in place of a mosaic: it is not demosaicked"
+            )
 
     def _check_camera(self, name: str) -> None:
         """Refuse a capture of another camera; warn where that can only be feared.

@@ -24,7 +24,9 @@ def test_every_source_of_the_register_draws_what_is_asked_for(source):
         ("procedural:7", True),
         ("procedural:x", True),
         ("procedural", False),
+        ("nite:7", True),
         ("C:7", False),
+        ("nite:7.exr", False),
         ("room.exr", False),
     ],
 )

@@ -29,7 +29,7 @@ def test_notes_of_the_decode_come_first(bundle: Bundle) -> None:
 
 def test_planes_in_place_of_a_mosaic_are_noted(bundle: Bundle) -> None:
     notes = start(bundle, made_planes()).job.notes
-    assert notes == ["a linear RGB capture in a raw_bayer_v1 bundle: not demosaicked"]
+    assert notes == ["the capture holds full colours in place of a mosaic: it is not demosaicked"]
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
