@@ -48,12 +48,14 @@ class Picture:
         orientation: EXIF orientation (1..8) that a viewer should apply.
         seconds: Seconds per stage.
         warnings: What the user should know.
+        sections: What stages found of the capture, by the names of the sidecar: `hdr`, `glare`.
     """
 
     image: FloatArray
     orientation: int
     seconds: dict[str, float]
     warnings: tuple[str, ...]
+    sections: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,12 +67,14 @@ class Summary:
         orientation: EXIF orientation (1..8) that a viewer should apply.
         seconds: Seconds per stage.
         warnings: What the user should know.
+        sections: What stages found of the capture, by the names of the sidecar: `hdr`, `glare`.
     """
 
     shape: tuple[int, int, int]
     orientation: int
     seconds: dict[str, float]
     warnings: tuple[str, ...]
+    sections: Mapping[str, Any]
 
 
 class Pipeline:
@@ -253,6 +257,7 @@ class Pipeline:
             orientation=work.capture.orientation,
             seconds={"decode": decode_s, **work.seconds},
             warnings=work.warnings,
+            sections=work.sections,
         )
 
     def stream(
@@ -292,6 +297,7 @@ class Pipeline:
             orientation=work.capture.orientation,
             seconds={"decode": decode_s, **work.seconds},
             warnings=work.warnings,
+            sections=work.sections,
         )
 
     def process_array(

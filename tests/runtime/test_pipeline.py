@@ -198,7 +198,7 @@ def test_linear_planes_are_taken_with_a_note(bundle: Path) -> None:
     work = pipeline.start(
         pipeline.capture_of(planes, iso=100.0, white_balance=None, origin_px=None)
     )
-    assert any("linear RGB" in warning for warning in work.warnings)
+    assert any("in place of a mosaic" in warning for warning in work.warnings)
     assert np.isfinite(work.fill()).all()
 
 

@@ -210,3 +210,14 @@ def _subject(bundle: Bundle, side: int) -> Subject:
         placement=job.placement,
         content=None,
     )
+
+
+def test_what_was_found_is_told_in_python_too(
+    bundle: Bundle, seen: FloatArray, tmp_path: Path
+) -> None:
+    file = tmp_path / "windshield.tif"
+    tifffile.imwrite(file, seen.transpose(1, 2, 0), photometric="rgb")
+    pipeline = Pipeline(bundle, Options())
+    picture = pipeline.process(file)
+    assert picture.sections["glare"]["angle_deg"] == pytest.approx(-5, abs=0.2)
+    assert pipeline.stream(file, lambda _top, _band: None).sections == picture.sections
