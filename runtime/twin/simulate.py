@@ -77,6 +77,7 @@ class Simulation:
         iso: Sensitivity.
         depth_mm: Object distance, where the PSF has several; else None.
         levels: Black and white level in DN, where they are not those of the sensor.
+        plate: Whether the camera had its plate, where it has one.
     """
 
     samples: NDArray[Any]
@@ -86,6 +87,7 @@ class Simulation:
     iso: float
     depth_mm: float | None = None
     levels: tuple[float, float] | None = None
+    plate: bool = True
 
 
 def simulate(
@@ -134,6 +136,7 @@ def simulate(
         iso=options.iso,
         depth_mm=options.depth_mm if psf.depths_mm.size > 1 else None,
         levels=None if options.bits is None else levels_of(sensor, setting),
+        plate=options.plate,
     )
 
 
@@ -168,6 +171,8 @@ def bare_psf(bundle: Bundle) -> FrozenPsf:
 def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_name: str) -> None:
     """Write a simulated capture as a DNG that names its bundle and its place on the sensor.
 
+    Without its plate it is another camera and named so: its bundle is not taken unasked.
+
     Raises:
         ContractError: If a side is shorter than RAW developers take.
         UnsupportedError: If the sensor has no Bayer mosaic.
@@ -181,6 +186,8 @@ def write_capture(path: Path, simulation: Simulation, sensor: Sensor, bundle_nam
             f"a DNG needs sides of at least {LEAST_DNG_SIDE_PX} px to be read again; "
             f"got {width}x{height}"
         )
+    if not simulation.plate:
+        bundle_name = f"{bundle_name} without its plate"
     window = simulation.window
     x0, y0 = (int(v) for v in window.origin_px)
     red, green, blue = (1 / gain for gain in simulation.white_balance)

@@ -1,17 +1,24 @@
 """A night scene behind a wiped windshield: a two-point star through every light.
 
+    python -m tools.hdr.glare_twin night:3 -o windshield.exr --truth clean.exr
+
 The star of Sun 2021, section 5.7.1, after Rouf et al. 2011: the light itself stays whole, the
 streaks are added to it. As optics, core 1, two opposite arms, no haze.
 """
 
+import argparse
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
 import scipy.signal
 
 from camkit.contracts import FloatArray
+from camkit.errors import CamkitError, ContractError
+from camkit.runtime.twin.truth import write_truth
 from camkit.scenes import named_scene
 from camkit.scenes.saturation import saturating_exposure, with_exposure
 from camkit.streaks.optics import SECTION_STEP_PX, StreakOptics
@@ -96,3 +103,40 @@ def psnr_db(picture: FloatArray, shot: Shot, level: float) -> float:
     """Give the PSNR of what is no light, linear, peak 1."""
     dim = shot.seen.max(axis=0) < level
     return float(-10 * np.log10(np.mean((picture - shot.wanted)[:, dim] ** 2, dtype=np.float64)))
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Write a photograph, linear, and what it should have been.
+
+    Raises:
+        SystemExit: If something cannot be drawn or written; says what.
+    """
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scene", help="such as night:3")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="photograph (EXR)")
+    parser.add_argument("--truth", type=Path, help="the same without streaks and noise (EXR)")
+    parser.add_argument("--size-px", type=int, nargs=2, default=(512, 384), metavar=("W", "H"))
+    parser.add_argument("--angle", type=float, default=5.0, help="degrees from the vertical")
+    arguments = parser.parse_args(words)
+    try:
+        width, height = arguments.size_px
+        scene = exposed_scene(arguments.scene, height, width)
+        shot = photographed(scene, two_point_star(math.radians(arguments.angle)))
+        wanted = [(arguments.output, shot.seen), (arguments.truth, shot.wanted)]
+        for path, picture in wanted:
+            if path is not None:
+                write_truth(_new_exr(path), picture)
+    except CamkitError as error:
+        raise SystemExit(f"error: {error}") from error
+
+
+def _new_exr(path: Path) -> Path:
+    if path.suffix.lower() != ".exr" or path.exists():
+        raise ContractError(f"pictures are written as new files in .exr; got {path}")
+    return path
+
+
+if __name__ == "__main__":
+    main()

@@ -88,7 +88,8 @@ def bench(
     chosen = [*(bundles or ()), *(_cameras() if all_ else ())]
     axes = Axes(
         sizes=_words(sizes),
-        methods=_words(methods) or (QUICK_METHODS if quick else None),
+        methods=_words(methods),
+        best=QUICK_METHODS if quick else None,
         modes=_words(modes),
         dtypes=_words(dtypes),
         providers=_words(providers),

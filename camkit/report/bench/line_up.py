@@ -1,6 +1,7 @@
 """Who takes part and by what it is judged: common makers and metrics, and those of each kind."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from camkit.bundle.manifest import Manifest
 from camkit.errors import ContractError, UnsupportedError
@@ -10,6 +11,7 @@ from camkit.report.bench.part import BenchPart
 from camkit.report.bench.row_maker import RowMaker, row_makers
 from camkit.report.bench.trial import Axes, Entrant, Ground, Skip, Trial
 from camkit.report.kind_finder import find_part
+from camkit.runtime.plan.ways import offered_methods
 
 
 def makers_of(manifest: Manifest) -> tuple[RowMaker, ...]:
@@ -51,9 +53,19 @@ def make_trials(
     trials: list[Trial] = []
     skips: list[Skip] = []
     for entrant in entrants:
+        own = _axes_of(entrant, axes)
         for maker in makers[entrant.label]:
-            if axes.methods is None or set(axes.methods) & set(maker.methods):
-                made, left = maker.trials(entrant, axes, ground)
+            if own.methods is None or set(own.methods) & set(maker.methods):
+                made, left = maker.trials(entrant, own, ground)
                 trials += made
                 skips += left
     return trials, skips
+
+
+def _axes_of(entrant: Entrant, axes: Axes) -> Axes:
+    """Give the axes of one bundle, its best methods named where that many are wanted."""
+    if axes.methods is not None or axes.best is None:
+        return axes
+    manifest = entrant.bundle.manifest
+    offered = offered_methods(manifest.stages, manifest.all_planes)
+    return replace(axes, methods=offered[: axes.best])

@@ -106,6 +106,7 @@ class Axes:
     Attributes:
         sizes: Such as S, M or L; None for all that the bundle holds.
         methods: None for all that are registered.
+        best: Where no methods are given, this many of every bundle, the best first; None for all.
         modes: exact, fast, whole.
         dtypes: fp32, fp16.
         providers: cpu, cuda, tensorrt, openvino.
@@ -116,6 +117,7 @@ class Axes:
 
     sizes: tuple[str, ...] | None = None
     methods: tuple[str, ...] | None = None
+    best: int | None = None
     modes: tuple[str, ...] | None = None
     dtypes: tuple[str, ...] | None = None
     providers: tuple[str, ...] | None = None

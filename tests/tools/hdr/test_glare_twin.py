@@ -1,11 +1,20 @@
 """The two-point star: its share, its angle, its two arms; the light itself stays whole."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tools.hdr.glare_twin import Fading, exposed_scene, photographed, psnr_db, two_point_star
+from camkit.runtime.raw import read_capture
+from tools.hdr.glare_twin import (
+    Fading,
+    exposed_scene,
+    main,
+    photographed,
+    psnr_db,
+    two_point_star,
+)
 
 
 @pytest.mark.parametrize("fading", ["exponential", "even"])
@@ -29,3 +38,14 @@ def test_clean_optics_leave_noise_alone() -> None:
     shot = photographed(scene, None)
     assert 45 < psnr_db(shot.seen, shot, 0.9) < 56
     assert shot.seen.max() == 1
+
+
+def test_a_photograph_and_its_truth_are_written_and_nothing_is_replaced(tmp_path: Path) -> None:
+    seen, truth = tmp_path / "seen.exr", tmp_path / "truth.exr"
+    words = ["night:6", "-o", str(seen), "--truth", str(truth), "--size-px", "80", "64"]
+    main(words)
+    pictures = [read_capture(path).samples.astype(np.float64) for path in (seen, truth)]
+    assert [picture.shape for picture in pictures] == [(3, 64, 80)] * 2
+    assert pictures[0].mean() > 1.01 * pictures[1].mean()
+    with pytest.raises(SystemExit, match=r"written as new files in \.exr; got .*seen\.exr"):
+        main(words)

@@ -135,6 +135,20 @@ def test_without_its_plate_a_camera_writes_no_streaks(
     assert found["without"] < 0.02 * found["with"]
 
 
+def test_a_capture_without_the_plate_is_not_taken_for_one_with_it(
+    tmp_path, monkeypatch, camkit_command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_hdr_bundle(tmp_path)
+    call = ("simulate", "night:1", "--bundle", "streaks.camkit", "--size-px", "64,64")
+    assert camkit_command(*call, "--no-plate", "-o", "bare.dng").code == 0
+    process = ("process", "bare.dng", "--out-dir", "out")
+    outcome = camkit_command(*process, "--bundle", "streaks.camkit")
+    assert outcome.code == ExitCode.INPUT_FAILED, outcome.err
+    assert "the capture names bundle streaks without its plate, not streaks" in outcome.err
+    assert camkit_command(*process, "--bundle", "none").code == 0
+
+
 def test_a_depth_is_photographed_and_named_and_the_focus_without_one(
     tmp_path, monkeypatch, camkit_command
 ) -> None:

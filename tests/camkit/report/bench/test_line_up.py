@@ -51,6 +51,19 @@ def test_without_a_bank_there_are_the_networks_in_its_own_sizes(tmp_path: Path) 
     assert skips == ["bankless wiener: no stage of the bundle has this method"]
 
 
+def test_the_best_methods_are_those_that_a_bundle_offers(tmp_path: Path) -> None:
+    few = Axes(vary=False, best=1)
+    wide = write_wide_bundle(tmp_path)
+    made, skips = labels(wide, few)
+    assert made == ["M"]
+    assert not skips
+    made, skips = labels(write_networkless_bundle(tmp_path), few)
+    assert made == ["wiener"]
+    assert not skips
+    asked = Axes(vary=False, best=1, methods=("develop",))
+    assert labels(wide, asked)[0] == ["develop"]
+
+
 def test_a_stage_that_knows_physics_gets_a_row_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
