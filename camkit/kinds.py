@@ -13,10 +13,12 @@ A package of somebody else brings its own: its entry point in the group `camkit.
 `Kind` whose `home` is the package that holds the folders `runtime`, `models_def` and `report`.
 """
 
+import contextlib
 import importlib
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata, util
+from pathlib import PurePath
 from types import ModuleType
 from typing import Final, Literal
 
@@ -24,6 +26,34 @@ from camkit.errors import ContractError, UnsupportedError
 
 GROUP: Final = "camkit.kinds"
 Floor = Literal["runtime", "models_def", "report"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KindOption:
+    """What a caller may choose about the captures of some kind, beyond what every camera knows.
+
+    Attributes:
+        name: In Python; on the command line --name.
+        text: For people: what it chooses.
+        choices: What it may be; empty for any text.
+        is_file: Whether it names a file.
+    """
+
+    name: str
+    text: str
+    choices: tuple[str, ...] = ()
+    is_file: bool = False
+
+    def check(self, value: str) -> None:
+        """Refuse a value that this option cannot have.
+
+        Raises:
+            ContractError: Names those it can have.
+        """
+        if self.choices and value not in self.choices:
+            raise ContractError(
+                f"{self.name} must be one of {', '.join(self.choices)}; got {value!r}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +67,9 @@ class Kind:
         stages: Types of its usual stages, in order; see `camkit.bundle.stages`.
         metrics: Names of the metrics by which its results are judged.
         home: Package with its folders; empty for the kinds that come with camkit.
+        file_types: Suffixes of files that only captures of this kind have, with their dots.
+        shared_types: Suffixes of files that captures of this kind have too.
+        options: What a caller may choose for this kind alone.
     """
 
     name: str
@@ -45,6 +78,9 @@ class Kind:
     stages: tuple[str, ...]
     metrics: tuple[str, ...]
     home: str = ""
+    file_types: tuple[str, ...] = ()
+    shared_types: tuple[str, ...] = ()
+    options: tuple[KindOption, ...] = ()
 
     def part(self, floor: Floor) -> ModuleType:
         """Import what one floor knows of this kind.
@@ -84,6 +120,21 @@ HDR: Final = Kind(
 
 KINDS: Final = {kind.name: kind for kind in (BAYER, HDR)}
 """The kinds that come with camkit: one line each."""
+
+
+def all_kinds() -> list[Kind]:
+    """Give every kind that can be used here; a broken package brings none."""
+    kinds = dict(KINDS)
+    for name in sorted(_installed()):
+        with contextlib.suppress(ContractError):
+            kinds.setdefault(name, find_kind(name))
+    return list(kinds.values())
+
+
+def kind_of_file(file: PurePath) -> Kind | None:
+    """Give the kind that alone has files of this type; None if photographs are such files too."""
+    suffix = file.suffix.lower()
+    return next((kind for kind in all_kinds() if suffix in kind.file_types), None)
 
 
 def find_kind(name: str) -> Kind:

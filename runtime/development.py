@@ -33,7 +33,7 @@ class WriteOptions:
     Attributes:
         out_dir: Folder of pictures and sidecars, made if needed.
         keep_folders: Below it, the folders of the captures from what they have in common on.
-        format: exr, tiff, png, jpeg or dng.
+        format: exr, tiff, png, jpeg or dng; None for exr, and for no picture beside products.
         linear: TIFF and PNG without the sRGB curve.
         jpeg_quality: Of JPEG, 1..100; None for 92.
         strip_metadata: Leave out what the capture says of camera, lens, date, exposure and place.
@@ -44,7 +44,7 @@ class WriteOptions:
 
     out_dir: Path = Path()
     keep_folders: bool = False
-    format: FileFormat = "exr"
+    format: FileFormat | None = None
     linear: bool = False
     jpeg_quality: int | None = None
     strip_metadata: bool = False
@@ -53,22 +53,27 @@ class WriteOptions:
     jobs: int = 1
 
     def __post_init__(self) -> None:
-        if self.format not in get_args(FileFormat):
+        if self.picture not in get_args(FileFormat):
             raise ContractError(
                 f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"
             )
-        if self.linear and self.format in LINEAR_FORMATS:
-            raise ContractError(f"{self.format} is always linear; leave --linear out")
+        if self.linear and self.picture in LINEAR_FORMATS:
+            raise ContractError(f"{self.picture} is always linear; leave --linear out")
         if self.format == "jpeg" and self.linear:
             raise ContractError("8 bits hold no linear light; say --format png or tiff")
         if self.jpeg_quality is not None and self.format != "jpeg":
-            raise ContractError(f"a quality is for JPEG; leave it out for {self.format}")
+            raise ContractError(f"a quality is for JPEG; leave it out for {self.picture}")
         if not 1 <= self.quality <= 100:
             raise ContractError(f"JPEG quality must be 1..100; got {self.jpeg_quality}")
         if self.jobs < 1:
             raise ContractError(f"jobs must be >= 1; got {self.jobs}")
         if self.resume and self.overwrite:
             raise ContractError("resume keeps what is done, overwrite redoes it: choose one")
+
+    @property
+    def picture(self) -> FileFormat:
+        """Give the format of pictures."""
+        return "exr" if self.format is None else self.format
 
     @property
     def quality(self) -> int:
@@ -78,7 +83,7 @@ class WriteOptions:
     @property
     def suffix(self) -> str:
         """Give the suffix of the pictures, with its dot."""
-        return "." + SUFFIXES[self.format].lstrip(".")
+        return "." + SUFFIXES[self.picture].lstrip(".")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +92,7 @@ class FileResult:
 
     Attributes:
         input: The capture.
-        output: The picture; None when it failed.
+        output: The picture, or the main file of products; None when it failed.
         status: ok, failed or skipped.
         error: Why it failed.
         bundle: Name of the bundle in use; None when only developed.
@@ -95,6 +100,7 @@ class FileResult:
         seconds: Seconds per stage.
         peak_rss_mb: Peak memory of this process so far, its decoding child included.
         warnings: What the user should know.
+        beside: Further files that were written, the sidecar left out.
     """
 
     input: Path
@@ -106,6 +112,7 @@ class FileResult:
     seconds: dict[str, float]
     peak_rss_mb: float
     warnings: tuple[str, ...] = ()
+    beside: tuple[Path, ...] = ()
 
     @classmethod
     def failure(cls, source: Path, bundle: str | None, error: str) -> Self:
@@ -127,7 +134,7 @@ class FileResult:
             input=source,
             output=target,
             status="skipped",
-            bundle=_bundle_name(pipeline),
+            bundle=bundle_name(pipeline),
             size=pipeline.size,
             seconds={},
             peak_rss_mb=peak_rss_mb(),
@@ -143,6 +150,7 @@ class FileResult:
             "seconds": {name: round(value, 4) for name, value in self.seconds.items()},
             "peak_rss_mb": round(self.peak_rss_mb, 1),
             "warnings": list(self.warnings),
+            "beside": [str(path) for path in self.beside],
         }
 
 
@@ -169,7 +177,7 @@ def develop_file(
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
     pixels, turned = capture.height * capture.width, capture.orientation
-    reserved_bytes = held_bytes(write.format, pixels=pixels, orientation=turned)
+    reserved_bytes = held_bytes(write.picture, pixels=pixels, orientation=turned)
     work = pipeline.start(capture, progress=progress, cancel=cancel, reserved_bytes=reserved_bytes)
     # who asks for a time has had the machine timed; nobody else waits for it
     estimate = None if pipeline.options.max_seconds is None else work.explain()
@@ -181,7 +189,7 @@ def develop_file(
             input=source,
             output=target,
             status="ok",
-            bundle=_bundle_name(pipeline),
+            bundle=bundle_name(pipeline),
             size=work.size,
             seconds=seconds,
             peak_rss_mb=max(peak_rss_mb(), decoded_mb),
@@ -192,7 +200,7 @@ def develop_file(
             work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
         record = {
             **result.to_json(),
-            **_identity(capture.sha256, pipeline, write, mosaic),
+            **identity_of(capture.sha256, pipeline, write, mosaic),
             "output_sha256": output_sha256,
             "plan": work.record,
             "clipped_fraction": work.clipped_fraction,
@@ -217,19 +225,29 @@ def proved_done(
     if not (source.is_file() and target.is_file() and sidecar_path(target).is_file()):
         return False
     record = read_sidecar(target)
-    wanted = _identity(file_sha256(source), pipeline, write, mosaic)
+    wanted = identity_of(file_sha256(source), pipeline, write, mosaic)
     if record is None or any(record.get(key) != value for key, value in wanted.items()):
         return False
-    return record.get("output_sha256") == file_sha256(target)
+    if record.get("output_sha256") != file_sha256(target):
+        return False
+    return _are_whole(target, record.get("beside_sha256", {}))
 
 
-def _identity(
+def _are_whole(target: Path, hashes: Any) -> bool:
+    """Tell whether the files beside a main one are those of its sidecar."""
+    if not isinstance(hashes, dict):
+        return False
+    beside = {target.with_suffix(str(suffix)): sha256 for suffix, sha256 in hashes.items()}
+    return all(path.is_file() and file_sha256(path) == sha for path, sha in beside.items())
+
+
+def identity_of(
     input_sha256: str | None,
     pipeline: Pipeline,
     write: WriteOptions,
     mosaic: MosaicOptions | None,
 ) -> dict[str, Any]:
-    """Give what decides the bytes of a picture, as plain JSON values."""
+    """Give what decides the bytes of a picture or of products, as plain JSON values."""
     from camkit import __version__
 
     free = ("threads", "max_mem_bytes", "tile_px")
@@ -237,10 +255,14 @@ def _identity(
     if chosen["depth_m"] == math.inf:
         chosen["depth_m"] = "inf"  # JSON knows no infinity
     chosen["unit"] = None if pipeline.options.unit is None else asdict(pipeline.options.unit)
-    chosen |= {"format": write.format, "linear": write.linear}
+    chosen["format"] = write.picture if pipeline.maker is None else write.format
+    chosen["linear"] = write.linear
     chosen |= {"jpeg_quality": write.quality if write.format == "jpeg" else None}
     chosen |= {"strip_metadata": write.strip_metadata}
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
+    chosen["of_kind"] = dict(pipeline.options.of_kind)
+    if pipeline.maker is not None:
+        chosen["of_kind"] |= pipeline.maker.identity(pipeline.options)
     identity = {
         "camkit": __version__,
         "input_sha256": input_sha256,
@@ -263,7 +285,7 @@ def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> flo
         origin=work.origin.stripped() if write.strip_metadata else work.origin,
     )
     seconds = 0.0
-    with open_writer(path, write.format, picture) as writer, BandQueue(writer) as queue:
+    with open_writer(path, write.picture, picture) as writer, BandQueue(writer) as queue:
         for band in work.bands():
             began = time.perf_counter()
             queue.write(band)
@@ -272,5 +294,6 @@ def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> flo
     return seconds + time.perf_counter() - began
 
 
-def _bundle_name(pipeline: Pipeline) -> str | None:
+def bundle_name(pipeline: Pipeline) -> str | None:
+    """Name the bundle in use; None without one."""
     return None if pipeline.bundle is None else pipeline.bundle.manifest.name

@@ -7,7 +7,7 @@ defines `PART`, a `RuntimePart`.
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 from numpy.typing import NDArray
 
@@ -15,9 +15,11 @@ from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
-from camkit.kinds import find_kind
+from camkit.kinds import BAYER, Kind, all_kinds, find_kind, kind_of_file
 from camkit.runtime.array_capture import capture_of_array
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.maker import Maker
+from camkit.runtime.options import Options
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph
 
 
@@ -38,9 +40,16 @@ class FromArray(Protocol):
         ...
 
 
+def _no_photograph(*_: object) -> NoReturn:
+    raise UnsupportedError(
+        "captures of this kind are no photographs; camkit.process and Pipeline.make make their "
+        "products"
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuntimePart:
-    """A kind of camera at use time.
+    """A kind of camera at use time: of photographs, or one that has a `maker` of its products.
 
     Attributes:
         read: (file, how to read a headerless mosaic, manifest or None) -> capture.
@@ -48,13 +57,15 @@ class RuntimePart:
         suffix: Of the files that `write` writes, with its dot.
         from_array: An array as a capture.
         simulate: (scene (3, h, w) linear Rec.709, bundle, options) -> what the camera records.
+        maker: What makes its products; None for photographs.
     """
 
-    read: Callable[[Path, MosaicOptions | None, Manifest | None], Capture]
-    write: Callable[[Path, Simulation, Bundle], None]
-    suffix: str
+    read: Callable[[Path, MosaicOptions | None, Manifest | None], Capture] = _no_photograph
+    write: Callable[[Path, Simulation, Bundle], None] = _no_photograph
+    suffix: str = ""
     from_array: FromArray = capture_of_array
     simulate: Callable[[FloatArray, Bundle, SimulationOptions], Simulation] = photograph
+    maker: Maker | None = None
 
 
 def runtime_part(kind: str) -> RuntimePart:
@@ -81,3 +92,23 @@ def part_of(manifest: Manifest) -> RuntimePart:
         return runtime_part(manifest.kind)
     except (UnsupportedError, ContractError) as error:
         raise BundleError(f"bundle {manifest.name} cannot be used here: {error}") from error
+
+
+def kind_without_bundle(file: Path | None, options: Options) -> Kind:
+    """Give the kind of a capture that comes without a bundle.
+
+    It is the one whose options were chosen, else the one that alone has files of that type, else
+    that of colour photographs.
+
+    Raises:
+        ContractError: If options of several kinds were chosen.
+    """
+    if options.of_kind:
+        names = {name for name, _ in options.of_kind}
+        fitting = [k for k in all_kinds() if names <= {option.name for option in k.options}]
+        if not fitting:
+            raise ContractError(
+                f"no kind of camera knows all of {', '.join(sorted(names))}; choose those of one"
+            )
+        return fitting[0]
+    return (None if file is None else kind_of_file(file)) or BAYER

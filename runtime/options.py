@@ -1,10 +1,13 @@
 """What a caller may choose about a reconstruction, checked once."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from operator import index
+from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
 from camkit.errors import ContractError
+from camkit.kinds import Kind, KindOption, all_kinds
 from camkit.runtime.unit import Unit
 from camkit.units import MM_PER_M
 
@@ -57,6 +60,7 @@ class Options:
         dtype: Which graph of the bundle: fp32, or fp16 where it holds one. A CPU computes the
             latter in fp32 too, with weights rounded to fp16.
         provider: What onnxruntime computes the network on.
+        of_kind: What is chosen for one kind of camera alone: (name, value), see `KindOption`.
     """
 
     size: str | None = None
@@ -82,8 +86,10 @@ class Options:
     unit: Unit | None = None
     dtype: Dtype = "fp32"
     provider: Provider = "cpu"
+    of_kind: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
+        _check_of_kind(self.of_kind)
         _check_choice("quality", self.quality, get_args(Quality))
         for name, value in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
             if value is not None and not 0 < value < 1e6:
@@ -115,10 +121,92 @@ class Options:
                 f"got {self.max_mem_bytes // 10**6} MB"
             )
 
+    def chosen(self, name: str) -> str | None:
+        """Give what was chosen for a kind's own option; None if nothing was."""
+        return dict(self.of_kind).get(name)
+
     @property
     def depth_mm(self) -> float | None:
         """Give the object distance as a PSF states it."""
         return None if self.depth_m is None else self.depth_m * MM_PER_M
+
+
+def kind_option(name: str) -> KindOption:
+    """Give the option of a name that some kind of camera brings.
+
+    Raises:
+        ContractError: If no kind does.
+    """
+    for kind in all_kinds():
+        for option in kind.options:
+            if option.name == name:
+                return option
+    raise ContractError(f"no kind of camera has an option {name!r}")
+
+
+def kind_option_names() -> list[str]:
+    """Name the options that kinds of cameras bring."""
+    return sorted({option.name for kind in all_kinds() for option in kind.options})
+
+
+def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
+    """Give options with single ones chosen by name, those that a kind brings among them.
+
+    Raises:
+        ContractError: If one is unknown, or cannot be what it was given.
+    """
+    own = kind_option_names()
+    unknown = set(choices) - set(Options.__dataclass_fields__) - set(own)
+    if unknown:
+        known = sorted({*Options.__dataclass_fields__, *own})
+        raise ContractError(
+            f"unknown option(s) {', '.join(sorted(unknown))}; known are {', '.join(known)}"
+        )
+    plain = {name: value for name, value in choices.items() if name not in own}
+    of_kind = dict(options.of_kind)
+    of_kind |= {k: f"{v}" for k, v in choices.items() if k in own and v is not None}
+    return replace(options, **{"of_kind": tuple(sorted(of_kind.items())), **plain})  # type: ignore[arg-type]
+
+
+def _check_of_kind(of_kind: tuple[tuple[str, str], ...]) -> None:
+    for name, text in of_kind:
+        kind_option(name).check(text)
+
+
+def with_absolute_files(options: Options) -> Options:
+    """Give options whose files bear names that are true in every process."""
+    of_kind = tuple(
+        (name, str(Path(value).absolute()) if kind_option(name).is_file else value)
+        for name, value in options.of_kind
+    )
+    return replace(options, of_kind=of_kind)
+
+
+def given_options(options: Options) -> list[str]:
+    """Name the options that are not as they are by default, those of kinds by their own names."""
+    plain = Options()
+    given = [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]
+    return [name for name in given if name != "of_kind"] + [name for name, _ in options.of_kind]
+
+
+def check_kind_options(options: Options, kind: Kind, where: str) -> None:
+    """Refuse options that another kind of camera brings.
+
+    Args:
+        options: What was chosen.
+        kind: The kind in use.
+        where: For people, such as "to bundle NAME".
+
+    Raises:
+        ContractError: Names them and the kind that they are for.
+    """
+    own = {option.name for option in kind.options}
+    if foreign := [name for name, _ in options.of_kind if name not in own]:
+        makers = [k for k in all_kinds() if any(o.name == foreign[0] for o in k.options)]
+        raise ContractError(
+            f"{', '.join(map(flag_of, foreign))} means nothing {where}: it is for cameras of the "
+            f"kind {makers[0].name}; leave it out"
+        )
 
 
 def _check_depth(depth_m: float | None) -> None:

@@ -2,6 +2,7 @@
 
     load(bundle) -> Pipeline -> process(file) | process_array(array) -> linear Rec.709
                              -> start(capture) -> Reconstruction: bands for a writer
+                             -> make(file) -> Made: products of captures that are no photographs
 
 A `Pipeline` is immutable and may serve many threads at once; each capture gets its own
 `Reconstruction`.
@@ -20,7 +21,7 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
-from camkit.kinds import BAYER
+from camkit.kinds import Kind, find_kind
 from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files.in_memory import Source, stored
@@ -28,11 +29,17 @@ from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction, check_out
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.kind import part_of, runtime_part
+from camkit.runtime.kind import kind_without_bundle, part_of, runtime_part
+from camkit.runtime.maker import Made, Maker, Making
 from camkit.runtime.network.engine import NetworkEngine, available_threads
 from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Progress
-from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options, checked_origin
+from camkit.runtime.options import (
+    DEFAULT_MAX_MEM_BYTES,
+    Options,
+    checked_origin,
+    with_choices,
+)
 from camkit.runtime.plan.planner import asked_work, default_size
 from camkit.runtime.plan.speed import Speed, measure_speed
 from camkit.runtime.stage_finder import check_stages
@@ -83,12 +90,20 @@ class Pipeline:
     Attributes:
         bundle: The camera; None develops only.
         options: What the caller chose.
+        kind: The kind of camera whose captures it takes.
+        maker: What makes products of them; None where they are photographs.
         threads: Threads to compute with.
         size: Size of network that is ready; None where none will run.
     """
 
-    def __init__(self, bundle: Bundle | None, options: Options) -> None:
+    def __init__(self, bundle: Bundle | None, options: Options, kind: Kind | None = None) -> None:
         """Make ready what captures will need.
+
+        Args:
+            bundle: The camera; None develops only.
+            options: What the caller chose.
+            kind: Without a bundle, the kind of camera; None for the one whose options were chosen,
+                else colour photographs.
 
         Raises:
             BundleError: If the bundle is of a kind that is not installed, or asks too much of a
@@ -100,9 +115,16 @@ class Pipeline:
         self.threads = available_threads(options.threads)
         if bundle is not None:
             check_stages(bundle.manifest, options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES)
-        check_choices(bundle, options)
-        # without a bundle captures are read as colour photographs are
-        self._part = runtime_part(BAYER.name) if bundle is None else part_of(bundle.manifest)
+            self._part = part_of(bundle.manifest)
+            self.kind = find_kind(bundle.manifest.kind)
+        else:
+            self.kind = kind or kind_without_bundle(None, options)
+            self._part = runtime_part(self.kind.name)
+        self.maker: Maker | None = self._part.maker
+        if self.maker is None:
+            check_choices(bundle, options)
+        else:
+            self.maker.check(self.kind, bundle, options)
         self._lock = threading.Lock()
         self._engines: dict[tuple[str, str], NetworkEngine] = {}
         self._speeds: dict[tuple[str, str], float] = {}
@@ -117,7 +139,7 @@ class Pipeline:
         """Pickle what the pipeline was made from; the bundle is opened again by its hash."""
         bundle = self.bundle
         known = None if bundle is None else (bundle.path, bundle.manifest.name, bundle.sha256)
-        return _reopened, (known, self.options)
+        return _reopened, (known, self.options, self.kind)
 
     def network(self, role: str, size: str) -> NetworkEngine:
         """Give the network of a role and size, made when first asked for.
@@ -260,6 +282,50 @@ class Pipeline:
             sections=work.sections,
         )
 
+    def make(
+        self,
+        file: Source,
+        *,
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Made:
+        """Read one capture that is no photograph and make its products.
+
+        Args:
+            file: A path, bytes, or a file opened in binary mode.
+            progress: Called with (work done, work in all).
+            cancel: Asked between pieces of work; true raises `Cancelled`.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+            ContractError: If capture, options and bundle do not fit each other.
+            UnsupportedError: If captures of this kind are photographs.
+        """
+        with cancellable(cancel), stored(file) as path:
+            return self._a_maker().make(self._making(path, progress, cancel))
+
+    def plan(self, file: Path) -> Mapping[str, Any]:
+        """Say what `make` would do with a capture; errors as there."""
+        return self._a_maker().plan(self._making(file, None, None))
+
+    def _a_maker(self) -> Maker:
+        if self.maker is None:
+            raise UnsupportedError(
+                f"captures of the kind {self.kind.name} are photographs; Pipeline.process makes "
+                "their pictures"
+            )
+        return self.maker
+
+    def _making(self, path: Path, progress: Progress | None, cancel: Cancel | None) -> Making:
+        return Making(
+            path=path,
+            bundle=self.bundle,
+            options=self.options,
+            threads=self.threads,
+            progress=progress,
+            cancel=cancel,
+        )
+
     def stream(
         self,
         file: Source,
@@ -358,40 +424,44 @@ class Pipeline:
 
 
 def load(
-    bundle: str | Path | None, *, options: Options | None = None, **choices: object
+    bundle: str | Path | None,
+    *,
+    kind: str | None = None,
+    options: Options | None = None,
+    **choices: object,
 ) -> Pipeline:
     """Open a bundle and make it ready.
 
     Args:
         bundle: Name of a built-in bundle, path of a bundle file, or None to develop only.
+        kind: Without a bundle, the kind of camera, such as "spad"; None for the one whose options
+            are chosen, else colour photographs.
         options: What changes the pixels.
-        **choices: Single fields of `Options` by name, such as size="S".
+        **choices: Single fields of `Options` by name, such as size="S", and the options of the
+            kind, such as timing="t.toml".
 
     Raises:
         BundleError: If the bundle is refused.
-        ContractError: If an option is unknown or the bundle lacks the size.
+        ContractError: If an option is unknown or the bundle lacks the size, or a kind is given
+            beside a bundle.
+        UnsupportedError: If there is no such kind.
     """
-    options = options or Options()
-    unknown = set(choices) - set(Options.__dataclass_fields__)
-    if unknown:
-        raise ContractError(
-            f"unknown option(s) {', '.join(sorted(unknown))}; known are "
-            f"{', '.join(sorted(Options.__dataclass_fields__))}"
-        )
-    chosen = replace(options, **choices)  # type: ignore[arg-type]
+    chosen = with_choices(options or Options(), choices)
     if bundle is None or str(bundle).lower() == "none":
-        return Pipeline(None, chosen)
+        return Pipeline(None, chosen, None if kind is None else find_kind(kind))
+    if kind is not None:
+        raise ContractError("a bundle is of a kind of its own; leave kind out")
     return Pipeline(open_bundle(find_bundle(str(bundle))), chosen)
 
 
-def _reopened(known: tuple[Path, str, str] | None, options: Options) -> Pipeline:
+def _reopened(known: tuple[Path, str, str] | None, options: Options, kind: Kind) -> Pipeline:
     """Give the pipeline that was pickled.
 
     Raises:
         BundleError: If neither the path nor the name leads to the same bundle.
     """
     if known is None:
-        return Pipeline(None, options)
+        return Pipeline(None, options, kind)
     path, name, sha256 = known
     bundle = open_bundle(path if path.is_file() else find_bundle(name))
     if bundle.sha256 != sha256:

@@ -9,8 +9,9 @@ Pictures and sidecars are claimed, written to part files and renamed. One file's
 the others; `resume` skips only what a sidecar proves done.
 """
 
-from camkit.runtime.batch.processing import process
+from camkit.runtime.batch.making import Pipelines
+from camkit.runtime.batch.processing import kind_of_run, process
 from camkit.runtime.batch.sources import expand
 from camkit.runtime.batch.tasks import Task, list_tasks
 
-__all__ = ["Task", "expand", "list_tasks", "process"]
+__all__ = ["Pipelines", "Task", "expand", "kind_of_run", "list_tasks", "process"]

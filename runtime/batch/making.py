@@ -13,9 +13,11 @@ from camkit.runtime.cancel import Cancel, Cancelled
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions, develop_file, proved_done
 from camkit.runtime.job.choices import check_idle
+from camkit.runtime.kind import kind_without_bundle
 from camkit.runtime.options import Options
 from camkit.runtime.output.claim import claimed
 from camkit.runtime.pipeline import Pipeline, load
+from camkit.runtime.product_files import make_file
 
 logger = logging.getLogger(__name__)
 
@@ -35,27 +37,34 @@ class Common:
 
 
 class Pipelines:
-    """One pipeline per bundle, made when first needed."""
+    """One pipeline per bundle, and per kind of camera without one, made when first needed."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
-        self._made: dict[str, Pipeline] = {}
+        self._made: dict[tuple[str, str | None], Pipeline] = {}
         self._lock = threading.Lock()
 
-    def get(self, bundle: str) -> Pipeline:
+    def get(self, bundle: str, source: Path | None = None) -> Pipeline:
         """Give the pipeline of a bundle, "none" for one that only develops.
+
+        Args:
+            bundle: Name or path.
+            source: The capture, which without a bundle says what kind of camera took it.
 
         Raises:
             BundleError: If the bundle is refused.
             ContractError: If it cannot do what the options ask.
         """
+        is_bare = bundle.lower() == NO_BUNDLE
+        kind = kind_without_bundle(source, self._options).name if is_bare else None
         with self._lock:
-            if bundle not in self._made:
-                name = None if bundle.lower() == NO_BUNDLE else bundle
-                made = load(name, options=self._options)
-                check_idle(made.bundle, self._options)
-                self._made[bundle] = made
-            return self._made[bundle]
+            if (bundle, kind) not in self._made:
+                name = None if is_bare else bundle
+                made = load(name, kind=kind, options=self._options)
+                if made.maker is None:
+                    check_idle(made.bundle, self._options)
+                self._made[bundle, kind] = made
+            return self._made[bundle, kind]
 
 
 def run_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult:
@@ -66,7 +75,8 @@ def run_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult:
     """
     result = try_task(task, pipelines, common)
     if result is None:
-        return FileResult.skip(task.source, task.target, pipelines.get(task.bundle), ELSEWHERE)
+        pipeline = pipelines.get(task.bundle, task.source)
+        return FileResult.skip(task.source, task.target, pipeline, ELSEWHERE)
     return result
 
 
@@ -80,7 +90,7 @@ def try_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult | N
         return FileResult.failure(task.source, None, task.refusal)
     named = None if task.bundle.lower() == NO_BUNDLE else task.bundle
     try:
-        pipeline = pipelines.get(task.bundle)
+        pipeline = pipelines.get(task.bundle, task.source)
         with claimed(task.target) as ours:
             return _make(task, pipeline, common) if ours else None
     except Cancelled:
@@ -110,6 +120,15 @@ def _make(task: Task, pipeline: Pipeline, common: Common) -> FileResult:
         if appeared and task.target.exists() and not write.overwrite:
             raise ContractError(f"{task.target} appeared since the run began; it is left as it is")
     tick = None if common.progress is None else _tick(common.progress, task.source)
+    if pipeline.maker is not None:
+        return make_file(
+            task.source,
+            task.target,
+            pipeline,
+            write,
+            progress=tick,
+            cancel=common.cancel,
+        )
     return develop_file(
         task.source,
         task.target,

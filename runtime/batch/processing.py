@@ -8,14 +8,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from camkit.errors import ContractError
+from camkit.kinds import Kind
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
 from camkit.runtime.batch.sources import expand
-from camkit.runtime.batch.tasks import Task, list_tasks
+from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions
 from camkit.runtime.files.in_memory import list_paths
-from camkit.runtime.options import LEAST_MAX_MEM_BYTES, Options
+from camkit.runtime.kind import kind_without_bundle
+from camkit.runtime.options import (
+    LEAST_MAX_MEM_BYTES,
+    Options,
+    kind_option_names,
+    with_absolute_files,
+    with_choices,
+)
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -64,8 +72,8 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
         CamkitError: If scheduler or workers of `client` are lost and do not come back.
     """
     options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
-    sources = expand(list_paths(files))
-    tasks = list_tasks(sources, bundle=None if bundle is None else str(bundle), write=write)
+    if client is not None:
+        options = with_absolute_files(options)
     if write.out_dir.exists() and not write.out_dir.is_dir():
         raise ContractError(f"{write.out_dir} is no folder; pictures need one as --out-dir")
     if write.format == "dng":
@@ -74,9 +82,13 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
         options = replace(options, color="camera")
     if client is not None and write.jobs > 1:
         raise ContractError("jobs are those of one process; leave them out with a client")
+    named = None if bundle is None else str(bundle)
     pipelines = Pipelines(_shared(options, write.jobs))
-    if bundle is not None and tasks:
-        pipelines.get(str(bundle))
+    kind = kind_of_run(named, options, pipelines)
+    sources = expand(list_paths(files), kind)
+    if not sources:
+        return []
+    tasks = list_tasks(sources, bundle=named, write=write, options=options, kind=kind)
     write.out_dir.mkdir(parents=True, exist_ok=True)
     for folder in {task.target.parent for task in tasks}:
         folder.mkdir(parents=True, exist_ok=True)
@@ -113,19 +125,31 @@ def _process_here(
 def _with_choices(
     options: Options, write: WriteOptions, choices: dict[str, object]
 ) -> tuple[Options, WriteOptions]:
-    names = set(Options.__dataclass_fields__), set(WriteOptions.__dataclass_fields__)
-    unknown = set(choices) - names[0] - names[1]
-    if unknown:
+    names = set(WriteOptions.__dataclass_fields__)
+    own = {*Options.__dataclass_fields__, *kind_option_names()}
+    if unknown := set(choices) - names - own:
         raise ContractError(
             f"unknown option(s) {', '.join(sorted(unknown))}; known are "
-            f"{', '.join(sorted(names[0] | names[1]))}"
+            f"{', '.join(sorted(names | own))}"
         )
     if "out_dir" in choices:
         choices = {**choices, "out_dir": Path(str(choices["out_dir"]))}
     return (
-        replace(options, **{k: v for k, v in choices.items() if k in names[0]}),  # type: ignore[arg-type]
-        replace(write, **{k: v for k, v in choices.items() if k in names[1]}),  # type: ignore[arg-type]
+        with_choices(options, {k: v for k, v in choices.items() if k not in names}),
+        replace(write, **{k: v for k, v in choices.items() if k in names}),  # type: ignore[arg-type]
     )
+
+
+def kind_of_run(bundle: str | None, options: Options, pipelines: Pipelines) -> Kind | None:
+    """Give the kind of all captures of a run; None where each file says its own.
+
+    Raises:
+        BundleError: If the named bundle is refused.
+        ContractError: If it cannot do what the options ask.
+    """
+    if bundle is not None and bundle.lower() != NO_BUNDLE:
+        return pipelines.get(bundle).kind
+    return kind_without_bundle(None, options) if options.of_kind else None
 
 
 def _shared(options: Options, jobs: int) -> Options:

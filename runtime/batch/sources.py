@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from camkit.errors import DecodeError
+from camkit.kinds import Kind, all_kinds
 from camkit.runtime.files.in_memory import FilePath
 from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.output.sidecar import read_sidecar
@@ -17,20 +18,25 @@ RAW_SUFFIXES: Final = frozenset(
 CAPTURE_SUFFIXES: Final = RAW_SUFFIXES | {".exr", ".tif", ".tiff", ".png"}
 
 
-def expand(files: Sequence[FilePath]) -> list[Path]:
+def expand(files: Sequence[FilePath], kind: Kind | None = None) -> list[Path]:
     """Give the captures named by files, folders and globs, each once, in the order given.
 
     A folder stands for the captures directly in it, by name, without the pictures that a sidecar
     beside them calls its output; a glob that matches nothing and a
     folder without captures stand for nothing; a file that does not exist is kept and fails later.
+
+    Args:
+        files: What was named.
+        kind: Of the captures, where that is known: a folder stands for its types of files alone.
     """
+    suffixes = _suffixes(kind)
     found: dict[Path, None] = {}
     for item in files:
         path = Path(item)
         if _is_unreachable(path):
             found[path] = None
         elif path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in CAPTURE_SUFFIXES)
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
             found.update(dict.fromkeys(p for p in inside if p.is_file() and not _is_result(p)))
         elif not path.exists() and glob.has_magic(str(item)):
             # pathlib has no glob that takes an absolute pattern
@@ -39,6 +45,13 @@ def expand(files: Sequence[FilePath]) -> list[Path]:
         else:
             found[path] = None
     return list(found)
+
+
+def _suffixes(kind: Kind | None) -> frozenset[str]:
+    if kind is None:
+        return CAPTURE_SUFFIXES.union(*(known.file_types for known in all_kinds()))
+    own = frozenset({*kind.file_types, *kind.shared_types})
+    return own or CAPTURE_SUFFIXES
 
 
 def _is_unreachable(path: Path) -> bool:
@@ -54,7 +67,11 @@ def _is_unreachable(path: Path) -> bool:
 
 def _is_result(path: Path) -> bool:
     record = read_sidecar(path)
-    return record is not None and Path(str(record["output"])).name == path.name
+    if record is None:
+        return False
+    beside = record.get("beside", [])
+    names = [record["output"], *(beside if isinstance(beside, list) else [])]
+    return path.name in {Path(str(name)).name for name in names}
 
 
 def refusal_of(source: Path) -> str | None:

@@ -1,14 +1,17 @@
 """What is decided for every input before any work: its bundle, its picture, why it cannot be."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from camkit.errors import ContractError
+from camkit.kinds import Kind
 from camkit.runtime.batch.sources import refusal_of
 from camkit.runtime.development import WriteOptions
+from camkit.runtime.kind import kind_without_bundle, runtime_part
+from camkit.runtime.options import Options
 from camkit.runtime.raw import named_bundle
 
 NO_BUNDLE: Final = "none"
@@ -25,6 +28,7 @@ class Task:
         bundle: Name or path of the bundle; "none" only develops.
         refusal: Why the file cannot be done, when that is known beforehand.
         before: State of the target then; None without one.
+        beside: Further files that may appear.
     """
 
     source: Path
@@ -32,10 +36,30 @@ class Task:
     bundle: str
     refusal: str | None = None
     before: tuple[int, int] | None = None
+    beside: tuple[Path, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Give every file that may appear, the main one first."""
+        return (self.target, *self.beside)
 
 
-def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptions) -> list[Task]:
-    """Decide bundle and output of every input, and refuse what cannot be before any work.
+def list_tasks(
+    sources: Sequence[Path],
+    *,
+    bundle: str | None,
+    write: WriteOptions,
+    options: Options | None = None,
+    kind: Kind | None = None,
+) -> list[Task]:
+    """Decide bundle and outputs of every input, and refuse what cannot be before any work.
+
+    Args:
+        sources: The captures.
+        bundle: Name or path; None takes the bundle each file names; "none" only develops.
+        write: Where and how to write.
+        options: What changes the products, of which those of a kind say what kind a capture is.
+        kind: Of the bundle that is named; None without one.
 
     Raises:
         ContractError: If two inputs would give one output, an output exists (and neither resume
@@ -43,8 +67,13 @@ def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptio
     """
     folders = _folders(sources, write)
     tasks = [
-        _make_task(source, bundle, folder / f"{source.stem}{write.suffix}")
-        for source, folder in zip(sources, folders, strict=True)
+        _make_task(source, bundle, folder, suffixes)
+        for source, folder, suffixes in zip(
+            sources,
+            folders,
+            _suffixes(sources, kind, options or Options(), write),
+            strict=True,
+        )
     ]
     sound = [t for t in tasks if t.refusal is None]
     _refuse_clashes(sound)
@@ -54,7 +83,7 @@ def list_tasks(sources: Sequence[Path], *, bundle: str | None, write: WriteOptio
         raise ContractError(
             f"no file names a bundle ({names}); say --bundle NAME, or --bundle none to develop only"
         )
-    existing = [t.target for t in sound if t.target.exists()]
+    existing = [path for t in sound for path in t.files if path.exists()]
     if existing and not (write.resume or write.overwrite):
         listed = ", ".join(map(str, existing[:5]))
         raise ContractError(
@@ -73,7 +102,18 @@ def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
     return [write.out_dir / parent.relative_to(common) for parent in parents]
 
 
-def _make_task(source: Path, bundle: str | None, target: Path) -> Task:
+def _suffixes(
+    sources: Sequence[Path], kind: Kind | None, options: Options, write: WriteOptions
+) -> Iterator[tuple[str, ...]]:
+    """Give the suffixes of the files of every input, the main one first."""
+    for source in sources:
+        own = kind or kind_without_bundle(source, options)
+        maker = runtime_part(own.name).maker
+        yield (write.suffix,) if maker is None else maker.suffixes(options, write.format)
+
+
+def _make_task(source: Path, bundle: str | None, folder: Path, suffixes: tuple[str, ...]) -> Task:
+    target, *beside = (folder / f"{source.stem}{suffix}" for suffix in suffixes)
     refusal = refusal_of(source)
     chosen = bundle
     if chosen is None and refusal is None:
@@ -86,6 +126,7 @@ def _make_task(source: Path, bundle: str | None, target: Path) -> Task:
         bundle=chosen or NO_BUNDLE,
         refusal=refusal,
         before=state_of(target),
+        beside=tuple(beside),
     )
 
 
@@ -104,12 +145,15 @@ def state_of(path: Path) -> tuple[int, int] | None:
 def _refuse_clashes(tasks: Sequence[Task]) -> None:
     owners: dict[Path, Path] = {}
     for task in tasks:
-        target = task.target.resolve()
-        if target == task.source.resolve():
-            raise ContractError(f"{task.source} would overwrite itself; choose another --out-dir")
-        if target in owners:
-            raise ContractError(
-                f"{owners[target]} and {task.source} would both give {task.target}; "
-                "keep their folders (--keep-folders), or run them into different ones"
-            )
-        owners[target] = task.source
+        for path in task.files:
+            target = path.resolve()
+            if target == task.source.resolve():
+                raise ContractError(
+                    f"{task.source} would overwrite itself; choose another --out-dir"
+                )
+            if target in owners:
+                raise ContractError(
+                    f"{owners[target]} and {task.source} would both give {path}; "
+                    "keep their folders (--keep-folders), or run them into different ones"
+                )
+            owners[target] = task.source

@@ -4,15 +4,15 @@ Every option belongs to a stage, which names it in its OPTIONS, or to every came
 """
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Final
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Stage
 from camkit.contracts import depth_weights
 from camkit.errors import ContractError
+from camkit.kinds import BAYER, find_kind
 from camkit.runtime.job.setup import DEVELOPMENT
-from camkit.runtime.options import Options, flag_of
+from camkit.runtime.options import Options, check_kind_options, flag_of, given_options
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.ways import LEFT_OUT, offered_methods, ways_of
 from camkit.runtime.stage_finder import stage_module
@@ -41,8 +41,12 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
         known |= ON_A_SENSOR
     if bundle is not None:
         known |= WITH_A_BUNDLE
-    given = _given(options)
     where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"
+    if options.of_kind:
+        kind = BAYER if bundle is None else find_kind(bundle.manifest.kind)
+        check_kind_options(options, kind, where)
+    own = {name for name, _ in options.of_kind}
+    given = [name for name in given_options(options) if name not in own]
     if foreign := [name for name in given if name not in known]:
         raise ContractError(
             f"{', '.join(map(flag_of, foreign))} means nothing {where}: "
@@ -86,14 +90,8 @@ def check_idle(bundle: Bundle | None, options: Options) -> None:
     ]
     others = [stage for stage in stages if stage not in left_out]
     idle = known_options(left_out) - known_options(others)
-    if said := [name for name in _given(options) if name in idle]:
+    if said := [name for name in given_options(options) if name in idle]:
         raise ContractError(
             f"{', '.join(map(flag_of, said))} means nothing with --method {options.method}: what "
             "knows of that is left out; leave it out too"
         )
-
-
-def _given(options: Options) -> list[str]:
-    """Name the options that are not as they are by default."""
-    plain = Options()
-    return [f.name for f in fields(Options) if getattr(options, f.name) != getattr(plain, f.name)]

@@ -1,14 +1,13 @@
 """Plans of captures as JSON or as lines for people, for `plan` and `process --dry-run`."""
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from camkit.cli.say import say
 from camkit.errors import BundleError, CamkitError, ContractError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from camkit.runtime.batch import Task
     from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import WriteOptions
@@ -17,34 +16,36 @@ if TYPE_CHECKING:
 
 
 def print_plans(
-    sources: "list[Path]",
+    files: Sequence[str],
     bundle: str | None,
     options: "Options",
     write: "WriteOptions",
     headerless: "MosaicOptions | None",
     *,
     as_json: bool,
-) -> bool:
-    """Say what would be done with every input; give whether all of it could be.
+) -> bool | None:
+    """Say what would be done with every input.
+
+    Returns:
+        Whether all of it could be done; None where nothing matches.
 
     Raises:
         BundleError: If the bundle that was named is refused.
     """
-    from camkit.runtime.batch import list_tasks
-    from camkit.runtime.job.choices import check_idle
-    from camkit.runtime.pipeline import load
+    from camkit.runtime.batch import Pipelines, expand, kind_of_run, list_tasks
 
-    made: dict[str, Pipeline] = {}
+    pipelines = Pipelines(options)
+    kind = kind_of_run(bundle, options, pipelines)
     done = True
-    for task in list_tasks(sources, bundle=bundle, write=write):
+    sources = expand(files, kind)
+    if not sources:
+        return None
+    for task in list_tasks(sources, bundle=bundle, write=write, options=options, kind=kind):
         facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
         try:
             if task.refusal is not None:
                 raise ContractError(task.refusal)
-            if task.bundle not in made:
-                made[task.bundle] = load(task.bundle, options=options)
-                check_idle(made[task.bundle].bundle, options)
-            facts |= _planned(task, made[task.bundle], headerless)
+            facts |= _planned(task, pipelines.get(task.bundle, task.source), headerless)
         except CamkitError as error:
             if bundle is not None and isinstance(error, BundleError):
                 raise
@@ -57,6 +58,8 @@ def print_plans(
 def _planned(
     task: "Task", pipeline: "Pipeline", headerless: "MosaicOptions | None"
 ) -> dict[str, Any]:
+    if pipeline.maker is not None:
+        return {"status": "planned", "bundle": task.bundle, **pipeline.plan(task.source)}
     work = pipeline.start(pipeline.read(task.source, headerless))
     work.explain()
     details = dict(work.record)
@@ -77,7 +80,7 @@ def plan_lines(facts: dict[str, Any]) -> list[str]:
     if facts["status"] == "failed":
         return [*lines, f"  failed: {facts['error']}"]
     lines.append(f"  status: planned, bundle {facts['bundle']}")
-    if "depth" in facts["plan"]:
+    if "depth" in facts.get("plan", {}):
         lines.append(f"  kernels: {facts['plan']['depth']}")
     for decision in facts["decisions"]:
         saving = decision["saving_s"] or 0.0

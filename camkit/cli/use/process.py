@@ -8,11 +8,13 @@ import typer
 from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality, whole_pair
 from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
+from camkit.cli.use.kind_options import with_kind_options
 from camkit.errors import ContractError
 
 Files = Annotated[list[str], typer.Argument(help="Captures, folders or globs.", metavar="FILES...")]
 
 
+@with_kind_options
 def process(
     files: Files,
     bundle: Annotated[
@@ -30,7 +32,10 @@ def process(
     keep_folders: Annotated[
         bool, typer.Option("--keep-folders", help="Pictures in folders as the captures are.")
     ] = False,
-    format_: Annotated[str, typer.Option("--format", help="exr, tiff, png, jpeg or dng.")] = "exr",
+    format_: Annotated[
+        str | None,
+        typer.Option("--format", help="exr, tiff, png, jpeg or dng. Default: exr."),
+    ] = None,
     jpeg_quality: Annotated[
         int | None, typer.Option(help="With --format jpeg: 1..100. Default: 92.")
     ] = None,
@@ -92,18 +97,18 @@ def process(
     json_: Annotated[bool, typer.Option("--json", help="One JSON object per file.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the plan, do nothing.")] = False,
     _debug: Debug = False,
+    **of_kind: str | None,
 ) -> None:
     """Turn captures into pictures through the camera's bundle."""
     from camkit.cli.use.cluster import cluster_client
     from camkit.cli.use.mosaic import mosaic_options
     from camkit.cli.use.progress import TileProgress
-    from camkit.runtime.batch import expand
     from camkit.runtime.batch import process as run
     from camkit.runtime.development import WriteOptions
-    from camkit.runtime.options import Options, parse_memory
+    from camkit.runtime.options import Options, parse_memory, with_choices
     from camkit.runtime.unit import read_unit
 
-    options = Options(
+    plain = Options(
         size=size,
         quality=quality,  # type: ignore[arg-type]
         max_seconds=max_seconds,
@@ -125,6 +130,7 @@ def process(
         threads=threads,
         unit=None if unit is None else read_unit(unit),
     )
+    options = with_choices(plain, of_kind)
     write = WriteOptions(
         out_dir=out_dir,
         keep_folders=keep_folders,
@@ -136,19 +142,15 @@ def process(
         overwrite=overwrite,
         jobs=jobs,
     )
-    sources = expand(files)
-    if not sources:
-        say(f"camkit: no capture matches {', '.join(files)}", err=True)
-        raise typer.Exit(ExitCode.NOTHING_MATCHED)
     headerless = mosaic_options(mosaic, black_level, white_level)
     if dry_run:
         from camkit.cli.use.plan_text import print_plans
 
-        done = print_plans(sources, bundle, options, write, headerless, as_json=json_)
+        done = print_plans(files, bundle, options, write, headerless, as_json=json_)
     else:
         with cluster_client(scheduler, workers, jobs) as client, TileProgress() as progress:
             results = run(
-                sources,
+                files,
                 bundle=bundle,
                 options=options,
                 write=write,
@@ -158,7 +160,10 @@ def process(
                 client=client,
                 on_notice=progress.notice,
             )
-        done = all(result.status != "failed" for result in results)
+        done = all(result.status != "failed" for result in results) if results else None
+    if done is None:
+        say(f"camkit: no capture matches {', '.join(files)}", err=True)
+        raise typer.Exit(ExitCode.NOTHING_MATCHED)
     if not done:
         raise typer.Exit(ExitCode.INPUT_FAILED)
 

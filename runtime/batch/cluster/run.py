@@ -334,7 +334,7 @@ class _Run:
                 "again with --resume",
             )
         else:
-            pipeline = self._wishes.pipelines.get(task.bundle)
+            pipeline = self._wishes.pipelines.get(task.bundle, task.source)
             self._settle(number, FileResult.skip(task.source, task.target, pipeline, ELSEWHERE))
 
     def _after_error(self, number: int, error: BaseException) -> None:
@@ -358,7 +358,8 @@ class _Run:
         if bundle is not None and result.status == "failed":
             bundle = task.bundle
         output = None if result.output is None else task.target
-        result = replace(result, input=task.source, output=output, bundle=bundle)
+        beside = tuple(task.target.with_name(path.name) for path in result.beside)
+        result = replace(result, input=task.source, output=output, beside=beside, bundle=bundle)
         return self._told_late(result) if ELSEWHERE in result.warnings else result
 
     def _told_late(self, result: FileResult) -> FileResult:

@@ -23,6 +23,7 @@ JSON_KEYS = {
     "seconds",
     "peak_rss_mb",
     "warnings",
+    "beside",
 }
 
 
