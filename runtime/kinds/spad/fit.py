@@ -1,0 +1,181 @@
+"""Time of flight, amplitude and background of every pixel: the log-matched bank in passes.
+
+    counts -> coarse bank at one ratio -> background from bins away from the pulse
+           -> bank at the nearest of some ratios, again where the ratio has changed
+           -> parabola through the best three -> time, evidence, sigma
+
+One ratio for all pixels fails below a signal-to-background ratio of 1; a ratio of its own for each
+pixel, kept to `RATIOS`, reaches the Cramer-Rao bound.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.runtime.kinds.spad.bank import Bank, Scorer
+from camkit.runtime.kinds.spad.bound import information
+
+RATIOS: Final = (0.0005, 0.002, 0.008, 0.03, 0.12, 0.5, 2.0, 8.0)
+"""Background of a bin over signal photons, a factor of 4 apart."""
+FIRST_RATIO: Final = 0.03
+FIRST_EVERY: Final = 3
+MOST_PASSES: Final = 3
+LEAST_SIGNAL: Final = 0.1
+"""Photons: fewer are no signal to divide by."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """What was found of some pixels; all arrays (p,).
+
+    Attributes:
+        time_of_flight_ps: mu.
+        amplitude: Signal photons.
+        background: Counts of a bin.
+        sigma_ps: Standard deviation that mu should have, by the Cramer-Rao bound.
+        evidence: Twice the log likelihood over that of background alone.
+        template: Index of the nearest one.
+    """
+
+    time_of_flight_ps: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+    background: NDArray[np.float64]
+    sigma_ps: NDArray[np.float64]
+    evidence: NDArray[np.float64]
+    template: NDArray[np.int64]
+
+
+class Fitter:
+    """A bank with what passes over counts need of it, made when first needed."""
+
+    def __init__(self, bank: Bank) -> None:
+        self.bank = bank
+        self._scorers: dict[int, Scorer] = {}
+
+    @cached_property
+    def _first(self) -> Scorer:
+        return Scorer(self.bank, FIRST_RATIO, FIRST_EVERY)
+
+    @cached_property
+    def _information(self) -> NDArray[np.float64]:
+        """(ratios, m) J of every ratio."""
+        return np.stack([information(self.bank, ratio) for ratio in RATIOS])
+
+    @cached_property
+    def _summed_shares(self) -> NDArray[np.float64]:
+        """(m, b + 1) share of each template before each bin of its band."""
+        shares = self.bank.shares
+        return np.concatenate([np.zeros((len(shares), 1)), np.cumsum(shares, axis=1)], axis=1)
+
+    def _scorer(self, index: int) -> Scorer:
+        if index not in self._scorers:
+            self._scorers[index] = Scorer(self.bank, RATIOS[index])
+        return self._scorers[index]
+
+    def fit(self, counts: FloatArray) -> Fit:
+        """Fit one return to every pixel.
+
+        Args:
+            counts: (p, bins) float32, finite and >= 0.
+
+        Returns:
+            What was found; of a pixel without photons evidence and amplitude are 0.
+        """
+        sums = np.zeros((len(counts), self.bank.axis.bins + 1))
+        np.cumsum(counts, axis=1, out=sums[:, 1:])
+        photons = sums[:, -1].astype(np.float32)
+        template = self._first.score(counts, photons).argmax(axis=1) * FIRST_EVERY
+        amplitude, background = self._split(sums, template)
+        shift, best = np.zeros(len(counts)), np.zeros(len(counts))
+        used = np.full(len(counts), -1)
+        for _ in range(MOST_PASSES):
+            wanted = _nearest_ratio(amplitude, background)
+            for index in np.unique(wanted[wanted != used]):
+                rows = np.flatnonzero((wanted == index) & (used != index))
+                scores = self._scorer(int(index)).score(counts[rows], photons[rows])
+                template[rows], shift[rows], best[rows] = _peak(scores)
+            if (wanted == used).all():
+                break
+            used = wanted
+            amplitude, background = self._split(sums, template)
+        evidence = 2 * (best + photons * np.log(self.bank.axis.bins))
+        return Fit(
+            time_of_flight_ps=self.bank.mu_ps[template] + shift * self.bank.step_ps,
+            amplitude=amplitude,
+            background=background,
+            sigma_ps=self._sigma(amplitude, background, template),
+            evidence=np.maximum(evidence, 0.0),
+            template=template,
+        )
+
+    def _split(
+        self, sums: NDArray[np.float64], template: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Share photons out to signal and background, by those near the pulse and away from it.
+
+        What a template puts outside its near bins is signal there too.
+        """
+        bank, rows = self.bank, np.arange(len(sums))
+        first, end = bank.near[template].T
+        inside = sums[rows, end] - sums[rows, first]
+        whole = sums[:, -1]
+        bins_in = end - first
+        bins_out = bank.axis.bins - bins_in
+        padded = self._summed_shares
+        from_left = np.clip(first - bank.bins[template, 0], 0, bank.bins.shape[1])
+        to_right = np.clip(end - bank.bins[template, 0], 0, bank.bins.shape[1])
+        share_in = padded[template, to_right] - padded[template, from_left]
+        share_out = bank.totals[template] - share_in
+        det = bins_out * share_in - bins_in * share_out
+        known = (bins_out > 0) & (det > 0)
+        solved = ((whole - inside) * share_in - inside * share_out) / np.where(known, det, 1.0)
+        background = np.where(known, np.maximum(solved, 0.0), 0.0)
+        signal = (whole - background * bank.axis.bins) / np.maximum(bank.totals[template], 1e-6)
+        return np.maximum(signal, 0.0), background
+
+    def _sigma(
+        self,
+        amplitude: NDArray[np.float64],
+        background: NDArray[np.float64],
+        template: NDArray[np.int64],
+    ) -> NDArray[np.float64]:
+        """Give the bound, between the ratios of the table by the logarithm of the ratio."""
+        ratio = np.log(background / np.maximum(amplitude, LEAST_SIGNAL) + 1e-9)
+        known = np.log(np.array(RATIOS))
+        place = np.interp(ratio, known, np.arange(len(known), dtype=np.float64))
+        low = np.minimum(place.astype(np.int64), len(known) - 2)
+        part = place - low
+        table = np.log(self._information + 1e-30)
+        logs = table[low, template] * (1 - part) + table[low + 1, template] * part
+        # beyond the table background rules, and information falls as 1 / ratio
+        beyond = np.maximum(ratio - known[-1], 0.0)
+        bound = np.exp(-0.5 * (logs - beyond)) / np.sqrt(np.maximum(amplitude, LEAST_SIGNAL))
+        return np.asarray(np.hypot(bound, self.bank.resolved_ps / np.sqrt(12)))
+
+
+def _nearest_ratio(
+    amplitude: NDArray[np.float64], background: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    logs = np.log(np.array(RATIOS))
+    ratio = np.log(background / np.maximum(amplitude, LEAST_SIGNAL) + 1e-9)
+    return np.searchsorted((logs[1:] + logs[:-1]) / 2, ratio)
+
+
+def _peak(
+    scores: FloatArray,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Give the best template, how far beside it the parabola has its top, and how high it is."""
+    rows, most = np.arange(len(scores)), scores.shape[1]
+    best = scores.argmax(axis=1)
+    middle = np.clip(best, 1, most - 2)
+    left, top, right = (scores[rows, middle + d].astype(np.float64) for d in (-1, 0, 1))
+    bend = left - 2 * top + right
+    is_inner = (best == middle) & (bend < 0)
+    shift = np.where(is_inner, (left - right) / (2 * np.where(is_inner, bend, 1.0)), 0.0)
+    shift = np.clip(shift, -0.5, 0.5)
+    height = np.where(is_inner, top - (left - right) * shift / 4, scores[rows, best])
+    return best, shift, height
