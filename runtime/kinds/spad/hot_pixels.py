@@ -1,0 +1,75 @@
+"""Hot pixels: they count without light, far more than those around them.
+
+A pixel is hot if its background is well above that of its neighbours, by more than chance explains,
+and makes up most of what it counts: a bright surface raises the background too, by the tail of its
+pulse, but never above its own signal.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+
+TIMES: Final = 5.0
+"""Above the neighbours' background."""
+SIGMAS: Final = 6.0
+SHARE: Final = 0.5
+"""Of a pixel's counts that are background."""
+AROUND: Final = 5
+MOST_DEAD: Final = 0.5
+
+
+def find_hot(
+    background: NDArray[np.float64], photons: NDArray[np.float64], bins: int
+) -> NDArray[np.bool_]:
+    """Find hot pixels.
+
+    Args:
+        background: (h, w) counts of a bin.
+        photons: (h, w) all counts of a pixel.
+        bins: How many bins they lie in.
+
+    Returns:
+        (h, w).
+    """
+    usual = median_filter(background, size=AROUND, mode="mirror")
+    dark, expected = background * bins, usual * bins
+    excess = dark - expected > SIGMAS * np.sqrt(np.maximum(expected, 1.0))
+    return np.asarray(excess & (dark > TIMES * expected) & (dark > SHARE * photons))
+
+
+def painted_over(cube: FloatArray, hot: NDArray[np.bool_]) -> FloatArray:
+    """Give a cube whose hot pixels are the means of those around them that are not.
+
+    Args:
+        cube: (h, w, bins) or (h, w) counts.
+        hot: (h, w).
+
+    Raises:
+        ContractError: If more than half of all pixels are hot: that is a map of something else.
+    """
+    if hot.shape != cube.shape[:2]:
+        raise ContractError(
+            f"the map of hot pixels is {hot.shape[1]}x{hot.shape[0]}, the picture "
+            f"{cube.shape[1]}x{cube.shape[0]}"
+        )
+    if hot.mean() > MOST_DEAD:
+        raise ContractError(
+            f"{hot.mean():.0%} of the pixels are hot: more than half cannot be painted over"
+        )
+    found = cube.copy()
+    for y, x in np.argwhere(hot):
+        reach = 1
+        while True:
+            rows = slice(max(0, y - reach), y + reach + 1)
+            columns = slice(max(0, x - reach), x + reach + 1)
+            sound = ~hot[rows, columns]
+            if sound.any():
+                break
+            reach += 1
+        found[y, x] = cube[rows, columns][sound].mean(axis=0)
+    return found

@@ -1,0 +1,72 @@
+"""Pile-up: a detector that fired is blind, so late photons and bright gates are seen too rarely.
+
+Gate scan: every step opens the gate in `cycles` cycles, each of which sees one photon at most. The
+rate of a cycle is -log(1 - n / cycles), whatever came before.
+
+Histogram, free running: the first photon of a cycle stops it, so bin k had only those cycles left
+that no earlier bin took: rate_k = -log(1 - n_k / (cycles - sum_{j<k} n_j)).
+
+References: P. B. Coates, "The correction for photon 'pile-up' in the measurement of radiative
+lifetimes", J. Phys. E 1 (1968).
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.kinds.spad.time_axis import Orientation
+
+LEAST_LEFT: Final = 0.02
+"""Of the cycles: with fewer left a bin tells nothing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PileUp:
+    """Counts as a detector that is never blind would have given them.
+
+    Attributes:
+        counts: (p, bins) float32, photons that came in all cycles.
+        blind: (p,) whether some bins told nothing; they hold 0.
+        worst: (p,) the largest share of cycles that a bin lost, or a gate used.
+    """
+
+    counts: FloatArray
+    blind: NDArray[np.bool_]
+    worst: NDArray[np.float64]
+
+
+def without_pile_up(counts: FloatArray, cycles: int, orientation: Orientation) -> PileUp:
+    """Undo pile-up.
+
+    Args:
+        counts: (p, bins) >= 0.
+        cycles: Laser cycles, of each step for a gate, in all for a histogram.
+        orientation: Of the time axis.
+
+    Raises:
+        ContractError: If there are more counts than cycles.
+    """
+    if cycles < 1:
+        raise ContractError(f"cycles must be >= 1; got {cycles}")
+    seen = counts.astype(np.float64)
+    before = np.zeros_like(seen)
+    if orientation == "histogram":
+        np.cumsum(seen[:, :-1], axis=1, out=before[:, 1:])
+    left = cycles - before
+    most = float((before + seen).max(initial=0.0))
+    if most > cycles:
+        raise ContractError(
+            f"counts go up to {most:.0f}, above the {cycles} cycles in which they can have come; "
+            "correct cycles, or say 0 where they are not known"
+        )
+    told = left - seen >= LEAST_LEFT * cycles
+    chance = np.where(told, seen / np.maximum(left, 1.0), 0.0)
+    return PileUp(
+        counts=(-cycles * np.log1p(-chance)).astype(np.float32),
+        blind=np.asarray(~told.all(axis=1)),
+        worst=np.asarray(1 - (left - seen).min(axis=1) / cycles),
+    )

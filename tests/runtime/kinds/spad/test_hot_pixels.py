@@ -1,0 +1,61 @@
+"""Hot pixels are found and painted over; bright and dark ones are left alone."""
+
+import numpy as np
+import pytest
+
+from camkit.errors import ContractError
+from camkit.runtime.kinds.spad.bank import make_bank
+from camkit.runtime.kinds.spad.fit import Fitter
+from camkit.runtime.kinds.spad.hot_pixels import find_hot, painted_over
+from camkit.runtime.kinds.spad.pulse import GatedPulse
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
+
+SIDE = 16
+
+
+def test_hot_pixels_are_found_beside_bright_ones(  # type: ignore[no-untyped-def]
+    axis: TimeAxis, pulse: GatedPulse, draw
+) -> None:
+    counts = draw(axis, np.full(SIDE * SIDE, 1200.0), 40, 0.2)
+    bright, hot = SIDE * 5 + 5, [SIDE * 9 + 3, SIDE * 15 + 15, 0]
+    counts[bright] = draw(axis, np.array([1200.0]), 30_000, 0.2)[0]
+    counts[hot] += np.random.default_rng(1).poisson(4.0, (3, axis.bins))
+    fit = Fitter(make_bank(axis, pulse)).fit(counts)
+    shape = (SIDE, SIDE)
+    found = find_hot(
+        fit.background.reshape(shape), counts.sum(1, dtype=float).reshape(shape), axis.bins
+    )
+    assert np.flatnonzero(found).tolist() == sorted(hot)
+
+
+def test_a_few_counts_in_the_dark_are_no_hot_pixel() -> None:
+    photons = np.random.default_rng(0).poisson(0.5, (200, 200)).astype(float)
+    assert find_hot(photons / 125, photons, 125).sum() == 0
+
+
+def test_what_is_painted_is_the_mean_of_sound_neighbours() -> None:
+    cube = np.random.default_rng(0).poisson(5, (6, 6, 9)).astype(np.float32)
+    hot = np.zeros((6, 6), bool)
+    hot[0, 0] = hot[2, 2] = hot[2, 3] = True
+    found = painted_over(cube, hot)
+    np.testing.assert_allclose(found[0, 0], (cube[0, 1] + cube[1, 0] + cube[1, 1]) / 3)
+    around = [cube[y, x] for y in (1, 2, 3) for x in (1, 2, 3) if not hot[y, x]]
+    np.testing.assert_allclose(found[2, 2], np.mean(around, axis=0), rtol=1e-6)
+    np.testing.assert_array_equal(found[~hot], cube[~hot])
+    assert painted_over(cube[..., 0], hot).shape == (6, 6)
+
+
+def test_a_block_of_hot_pixels_is_painted_from_its_rim() -> None:
+    cube = np.full((9, 9), 3, np.float32)
+    hot = np.zeros((9, 9), bool)
+    hot[2:7, 2:7] = True
+    cube[hot] = 1000
+    np.testing.assert_array_equal(painted_over(cube, hot), 3)
+
+
+def test_maps_that_cannot_be_are_refused() -> None:
+    cube = np.zeros((4, 4), np.float32)
+    with pytest.raises(ContractError, match="is 3x4, the picture 4x4"):
+        painted_over(cube, np.zeros((4, 3), bool))
+    with pytest.raises(ContractError, match="100% of the pixels are hot"):
+        painted_over(cube, np.ones((4, 4), bool))
