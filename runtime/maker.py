@@ -21,7 +21,7 @@ from camkit.runtime.network.tiling import Progress
 from camkit.runtime.options import Options, check_kind_options, flag_of, given_options
 
 Write = Callable[[Path], None]
-GENERAL: Final = frozenset({"max_mem_bytes", "threads"})
+GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method"})
 """Options that mean something to every maker."""
 
 
@@ -117,7 +117,7 @@ class Maker:
         """
         where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"
         check_kind_options(options, kind, where)
-        known = GENERAL | {"method"} | {option.name for option in kind.options}
+        known = GENERAL | {option.name for option in kind.options}
         if foreign := [name for name in given_options(options) if name not in known]:
             raise ContractError(
                 f"{', '.join(map(flag_of, foreign))} means nothing to captures of the kind "

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.bank import Bank, Scorer
 from camkit.runtime.kinds.spad.bound import information
+from camkit.runtime.kinds.spad.evidence import search_length
 
 RATIOS: Final = (0.0005, 0.002, 0.008, 0.03, 0.12, 0.5, 2.0, 8.0)
 """Background of a bin over signal photons, a factor of 4 apart."""
@@ -55,6 +56,11 @@ class Fitter:
     def __init__(self, bank: Bank) -> None:
         self.bank = bank
         self._scorers: dict[int, Scorer] = {}
+
+    @cached_property
+    def search_length(self) -> float:
+        """Give how much there is to search, see `camkit.runtime.kinds.spad.evidence`."""
+        return search_length(self.bank)
 
     @cached_property
     def _first(self) -> Scorer:
@@ -144,7 +150,7 @@ class Fitter:
         template: NDArray[np.int64],
     ) -> NDArray[np.float64]:
         """Give the bound, between the ratios of the table by the logarithm of the ratio."""
-        ratio = np.log(background / np.maximum(amplitude, LEAST_SIGNAL) + 1e-9)
+        ratio = _log_ratio(amplitude, background)
         known = np.log(np.array(RATIOS))
         place = np.interp(ratio, known, np.arange(len(known), dtype=np.float64))
         low = np.minimum(place.astype(np.int64), len(known) - 2)
@@ -157,11 +163,17 @@ class Fitter:
         return np.asarray(np.hypot(bound, self.bank.resolved_ps / np.sqrt(12)))
 
 
+def _log_ratio(
+    amplitude: NDArray[np.float64], background: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return np.asarray(np.log(background / np.maximum(amplitude, LEAST_SIGNAL) + 1e-9))
+
+
 def _nearest_ratio(
     amplitude: NDArray[np.float64], background: NDArray[np.float64]
 ) -> NDArray[np.int64]:
     logs = np.log(np.array(RATIOS))
-    ratio = np.log(background / np.maximum(amplitude, LEAST_SIGNAL) + 1e-9)
+    ratio = _log_ratio(amplitude, background)
     return np.searchsorted((logs[1:] + logs[:-1]) / 2, ratio)
 
 

@@ -8,7 +8,7 @@ pixel of the square would have on average, a s_k, over its background b, the sum
 log(1 + a s_k / b) must exceed a S. Otherwise surfaces would grow over their edges.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.kinds.spad.evidence import search_length, threshold_for
+from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
 
 Pool = Literal["auto", "1", "3", "5"]
@@ -65,7 +65,7 @@ def fit_pooled(
     if not 0 < false_alarms < 0.5:
         raise ContractError(f"a rate of false alarms must lie in 0..0.5; got {false_alarms}")
     sides = SIDES[pool]
-    threshold = threshold_for(false_alarms / len(sides), search_length(fitter.bank))
+    threshold = threshold_for(false_alarms / len(sides), fitter.search_length)
     height, width, bins = cube.shape
     alone = cube.reshape(-1, bins)
     found: Fit | None = None
@@ -102,14 +102,7 @@ def _summed(cube: FloatArray, side: int) -> FloatArray:
 
 
 def _per_pixel(fit: Fit, members: NDArray[np.float64]) -> Fit:
-    return Fit(
-        time_of_flight_ps=fit.time_of_flight_ps,
-        amplitude=fit.amplitude / members,
-        background=fit.background / members,
-        sigma_ps=fit.sigma_ps,
-        evidence=fit.evidence,
-        template=fit.template,
-    )
+    return replace(fit, amplitude=fit.amplitude / members, background=fit.background / members)
 
 
 def _speak_for(fitter: Fitter, own: FloatArray, fit: Fit) -> NDArray[np.bool_]:
@@ -124,17 +117,9 @@ def _speak_for(fitter: Fitter, own: FloatArray, fit: Fit) -> NDArray[np.bool_]:
 
 def _merged(old: Fit, new: Fit, rows: NDArray[np.int64]) -> Fit:
     """Give the old fit with new ones in some rows."""
-
-    def put(name: str) -> NDArray[np.float64]:
-        values = getattr(old, name).copy()
-        values[rows] = getattr(new, name)
-        return np.asarray(values)
-
-    return Fit(
-        time_of_flight_ps=put("time_of_flight_ps"),
-        amplitude=put("amplitude"),
-        background=put("background"),
-        sigma_ps=put("sigma_ps"),
-        evidence=put("evidence"),
-        template=put("template").astype(np.int64),
-    )
+    whole = {}
+    for field in fields(Fit):
+        values = getattr(old, field.name).copy()
+        values[rows] = getattr(new, field.name)
+        whole[field.name] = values
+    return Fit(**whole)

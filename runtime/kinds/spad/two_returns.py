@@ -98,7 +98,6 @@ def _asked_for(bank: Bank, counts: Floats, alone: Floats) -> tuple[Floats, Float
     """Give where the residual of one return asks most for another, and how many photons of it."""
     mean, _ = _model(bank, alone)
     whole = np.zeros((len(bank.mu_ps), bank.axis.bins))
-    np.put_along_axis(whole, bank.bins, 0.0, 1)
     rows = np.repeat(np.arange(len(whole)), bank.bins.shape[1])
     np.add.at(whole, (rows, bank.bins.ravel()), bank.shares.ravel())
     wish = (counts / mean) @ whole.T - bank.totals
