@@ -118,7 +118,33 @@ HDR: Final = Kind(
     metrics=("picture", "hdr"),
 )
 
-KINDS: Final = {kind.name: kind for kind in (BAYER, HDR)}
+SPAD: Final = Kind(
+    name="spad",
+    title="single photons: counts, histograms and time stamps",
+    sensor="planes",
+    stages=(),
+    metrics=(),
+    file_types=(".npz", ".h5", ".hdf5", ".mat", ".ptu", ".sdt", ".zip", ".spc"),
+    shared_types=(".tif", ".tiff"),
+    options=(
+        KindOption(name="timing", text="TOML that says what time each bin is.", is_file=True),
+        KindOption(
+            name="product",
+            text="What to make; default: depth of histograms, intensity of counts.",
+            choices=("depth", "intensity", "transient"),
+        ),
+        KindOption(
+            name="pool",
+            text="Side of the squares whose photons are put together; default auto, as needed.",
+            choices=("auto", "1", "3", "5"),
+        ),
+        KindOption(
+            name="returns", text="Surfaces that a pixel may show; default 1.", choices=("1", "2")
+        ),
+    ),
+)
+
+KINDS: Final = {kind.name: kind for kind in (BAYER, HDR, SPAD)}
 """The kinds that come with camkit: one line each."""
 
 

@@ -86,6 +86,10 @@ class Made:
         return found
 
 
+def _stem(path: Path) -> str:
+    return path.stem
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Maker:
     """How a kind of camera makes its products.
@@ -99,6 +103,7 @@ class Maker:
         methods: What --method may say.
         identity: Options -> what decides the products beyond the options themselves, such as the
             content of a file that they name; plain JSON values.
+        stem: A capture's file -> the name of its products, without suffix.
     """
 
     make: Callable[[Making], Made]
@@ -108,6 +113,7 @@ class Maker:
     formats: Mapping[str, str]
     methods: tuple[str, ...]
     identity: Callable[[Options], Mapping[str, Any]]
+    stem: Callable[[Path], str] = _stem
 
     def check(self, kind: Kind, bundle: Bundle | None, options: Options) -> None:
         """Refuse options before any work.
@@ -129,8 +135,8 @@ class Maker:
                 f"{kind.name}; got {options.method!r}"
             )
 
-    def suffixes(self, options: Options, format_: str | None) -> tuple[str, ...]:
-        """Name the suffixes of all files that may appear, the main one first.
+    def names(self, source: Path, options: Options, format_: str | None) -> tuple[str, ...]:
+        """Name all files that may appear of a capture, the main one first.
 
         Raises:
             ContractError: If the format is none of this kind.
@@ -141,4 +147,5 @@ class Maker:
                 f"got {format_}"
             )
         picture = () if format_ is None else (self.formats[format_],)
-        return (self.suffix, *self.beside(options), *picture)
+        stem = self.stem(source)
+        return tuple(stem + end for end in (self.suffix, *self.beside(options), *picture))

@@ -67,11 +67,11 @@ def list_tasks(
     """
     folders = _folders(sources, write)
     tasks = [
-        _make_task(source, bundle, folder, suffixes)
-        for source, folder, suffixes in zip(
+        _make_task(source, bundle, folder, names)
+        for source, folder, names in zip(
             sources,
             folders,
-            _suffixes(sources, kind, options or Options(), write),
+            _names(sources, kind, options or Options(), write),
             strict=True,
         )
     ]
@@ -102,18 +102,21 @@ def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
     return [write.out_dir / parent.relative_to(common) for parent in parents]
 
 
-def _suffixes(
+def _names(
     sources: Sequence[Path], kind: Kind | None, options: Options, write: WriteOptions
 ) -> Iterator[tuple[str, ...]]:
-    """Give the suffixes of the files of every input, the main one first."""
+    """Name the files of every input, the main one first."""
     for source in sources:
         own = kind or kind_without_bundle(source, options)
         maker = runtime_part(own.name).maker
-        yield (write.suffix,) if maker is None else maker.suffixes(options, write.format)
+        if maker is None:
+            yield (f"{source.stem}{write.suffix}",)
+        else:
+            yield maker.names(source, options, write.format)
 
 
-def _make_task(source: Path, bundle: str | None, folder: Path, suffixes: tuple[str, ...]) -> Task:
-    target, *beside = (folder / f"{source.stem}{suffix}" for suffix in suffixes)
+def _make_task(source: Path, bundle: str | None, folder: Path, names: tuple[str, ...]) -> Task:
+    target, *beside = (folder / name for name in names)
     refusal = refusal_of(source)
     chosen = bundle
     if chosen is None and refusal is None:

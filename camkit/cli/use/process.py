@@ -62,7 +62,9 @@ def process(
     depth_m: DepthM = None,
     method: Annotated[
         str | None,
-        typer.Option(help="Way of a stage: net, wiener, rl, admm-tv, develop. Default: the best."),
+        typer.Option(
+            help="Way of a stage: net, wiener, rl, admm-tv, develop; of photons log, lsq."
+        ),
     ] = None,
     mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",
     unit: Annotated[

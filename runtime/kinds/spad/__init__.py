@@ -1,13 +1,28 @@
-"""What counts of single photons tell: pulses, banks of them, fits and their bounds.
+"""What counts of single photons tell: pulses, banks of them, fits and their bounds; products.
 
-pulse        the time of one photon, in closed form
-time_axis    bins of a histogram or delays of a gate: what each sees of a pulse
-pile_up      counts as a detector that is never blind would have given them
-bank         templates at many times of flight, scored against counts
-bound        the Cramer-Rao bound of a time of flight
-fit          time, amplitude, background and sigma of every pixel
-two_returns  two surfaces in one pixel, fitted together
-pooling      photons shared with neighbours where a pixel alone has too few
-hot_pixels   pixels that count without light: found and painted over
-evidence     from when on a return is believed
+files          readers of captures
+timing         what is known of their times
+stored_array   small arrays that a timing file names
+pulse          the time of one photon, in closed form
+time_axis      bins of a histogram or delays of a gate: what each sees of a pulse
+corrected      rows of a capture, pile-up undone
+pile_up        counts as a detector that is never blind would have given them
+guess_pulse    a pulse where none is stated
+bank           templates at many times of flight, scored against counts
+bound          the Cramer-Rao bound of a time of flight
+fit            time, amplitude, background and sigma of every pixel
+least_squares  the same by least squares, as the dissertation does
+two_returns    two surfaces in one pixel, fitted together
+evidence       from when on a return is believed
+pooling        photons shared with neighbours where a pixel alone has too few
+hot_pixels     pixels that count without light: found and painted over
+sharpen        all of it for the rows of a capture
+products       depth, intensity, light in flight, and their files
 """
+
+from typing import Final
+
+from camkit.runtime.kind import RuntimePart
+from camkit.runtime.kinds.spad.products.maker import MAKER
+
+PART: Final = RuntimePart(maker=MAKER)

@@ -113,6 +113,37 @@ def make_bank(axis: TimeAxis, pulse: Pulse) -> Bank:
     )
 
 
+class Banded:
+    """Values of templates in their bands of bins, made ready for products with counts."""
+
+    def __init__(self, bank: Bank, rows: NDArray[np.int64], values: NDArray[np.float64]) -> None:
+        """Make the narrow matrices.
+
+        Args:
+            bank: The templates.
+            rows: (n,) which of them.
+            values: (n, b) of each in its band; what lies beyond the axis is left out.
+        """
+        self._count = len(rows)
+        self._parts: list[tuple[slice, slice, FloatArray]] = []
+        for start in range(0, len(rows), GROUP):
+            group = slice(start, min(start + GROUP, len(rows)))
+            own, held = bank.bins[rows[group]], bank.shares[rows[group]] > 0
+            left = int(np.where(held, own, bank.axis.bins).min())
+            right = int(np.where(held, own, 0).max()) + 1
+            matrix = np.zeros((max(right - left, 1), group.stop - start), np.float32)
+            at, bin_at = np.nonzero(held)
+            matrix[own[at, bin_at] - left, at] = values[group][at, bin_at]
+            self._parts.append((slice(left, max(right, left + 1)), group, matrix))
+
+    def product(self, counts: FloatArray) -> FloatArray:
+        """Give the sum over bins of counts (p, bins) times values: (p, n) float32."""
+        found = np.empty((len(counts), self._count), np.float32)
+        for columns, group, matrix in self._parts:
+            np.matmul(counts[:, columns], matrix, out=found[:, group])
+        return found
+
+
 class Scorer:
     """A bank at one ratio of background to signal, made ready for products with counts."""
 
@@ -125,20 +156,10 @@ class Scorer:
             every: Take each template of so many.
         """
         rows = np.arange(0, len(bank.mu_ps), every)
-        logs = np.log1p(bank.shares[rows] / ratio)
         self._offset = (np.log(ratio) - np.log(bank.totals[rows] + ratio * bank.axis.bins)).astype(
             np.float32
         )
-        self._parts: list[tuple[slice, slice, FloatArray]] = []
-        for start in range(0, len(rows), GROUP):
-            group = slice(start, min(start + GROUP, len(rows)))
-            own, held = bank.bins[rows[group]], bank.shares[rows[group]] > 0
-            left = int(np.where(held, own, bank.axis.bins).min())
-            right = int(np.where(held, own, 0).max()) + 1
-            matrix = np.zeros((max(right - left, 1), group.stop - start), np.float32)
-            at, bin_at = np.nonzero(held)
-            matrix[own[at, bin_at] - left, at] = logs[group][at, bin_at]
-            self._parts.append((slice(left, max(right, left + 1)), group, matrix))
+        self._logs = Banded(bank, rows, np.log1p(bank.shares[rows] / ratio))
 
     def score(self, counts: FloatArray, photons: FloatArray) -> FloatArray:
         """Give the log likelihood of every template.
@@ -150,7 +171,6 @@ class Scorer:
         Returns:
             (p, m) float32; those of an empty pixel are 0.
         """
-        found = photons[:, None] * self._offset
-        for columns, group, matrix in self._parts:
-            found[:, group] += counts[:, columns] @ matrix
-        return np.asarray(found, dtype=np.float32)
+        found = self._logs.product(counts)
+        found += photons[:, None] * self._offset
+        return found

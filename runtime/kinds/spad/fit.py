@@ -8,7 +8,8 @@ One ratio for all pixels fails below a signal-to-background ratio of 1; a ratio 
 pixel, kept to `RATIOS`, reaches the Cramer-Rao bound.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Final
 
@@ -25,6 +26,9 @@ RATIOS: Final = (0.0005, 0.002, 0.008, 0.03, 0.12, 0.5, 2.0, 8.0)
 FIRST_RATIO: Final = 0.03
 FIRST_EVERY: Final = 3
 MOST_PASSES: Final = 3
+MOST_AT_ONCE: Final = 4096
+BLOCK_BYTES: Final = 48_000_000
+"""What pixels that are fitted at once may need in between."""
 LEAST_SIGNAL: Final = 0.1
 """Photons: fewer are no signal to divide by."""
 
@@ -91,11 +95,13 @@ class Fitter:
         Returns:
             What was found; of a pixel without photons evidence and amplitude are 0.
         """
-        sums = np.zeros((len(counts), self.bank.axis.bins + 1))
-        np.cumsum(counts, axis=1, out=sums[:, 1:])
+        return in_blocks(self._fit_block, counts, self.bank)
+
+    def _fit_block(self, counts: FloatArray) -> Fit:
+        sums = summed_from_left(counts)
         photons = sums[:, -1].astype(np.float32)
         template = self._first.score(counts, photons).argmax(axis=1) * FIRST_EVERY
-        amplitude, background = self._split(sums, template)
+        amplitude, background = self.split(sums, template)
         shift, best = np.zeros(len(counts)), np.zeros(len(counts))
         used = np.full(len(counts), -1)
         for _ in range(MOST_PASSES):
@@ -103,11 +109,11 @@ class Fitter:
             for index in np.unique(wanted[wanted != used]):
                 rows = np.flatnonzero((wanted == index) & (used != index))
                 scores = self._scorer(int(index)).score(counts[rows], photons[rows])
-                template[rows], shift[rows], best[rows] = _peak(scores)
+                template[rows], shift[rows], best[rows] = peak(scores)
             if (wanted == used).all():
                 break
             used = wanted
-            amplitude, background = self._split(sums, template)
+            amplitude, background = self.split(sums, template)
         evidence = 2 * (best + photons * np.log(self.bank.axis.bins))
         return Fit(
             time_of_flight_ps=self.bank.mu_ps[template] + shift * self.bank.step_ps,
@@ -118,12 +124,19 @@ class Fitter:
             template=template,
         )
 
-    def _split(
+    def split(
         self, sums: NDArray[np.float64], template: NDArray[np.int64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Share photons out to signal and background, by those near the pulse and away from it.
 
         What a template puts outside its near bins is signal there too.
+
+        Args:
+            sums: (p, bins + 1) counts before each bin, see `summed_from_left`.
+            template: (p,) the template of every pixel.
+
+        Returns:
+            Signal photons and counts of a bin, (p,) each.
         """
         bank, rows = self.bank, np.arange(len(sums))
         first, end = bank.near[template].T
@@ -163,6 +176,29 @@ class Fitter:
         return np.asarray(np.hypot(bound, self.bank.resolved_ps / np.sqrt(12)))
 
 
+def in_blocks(fit: Callable[[FloatArray], Fit], counts: FloatArray, bank: Bank) -> Fit:
+    """Fit some pixels after the other, so that little memory is needed in between."""
+    of_pixel = 16 * bank.axis.bins + 12 * len(bank.mu_ps)
+    size = max(1, min(MOST_AT_ONCE, BLOCK_BYTES // of_pixel))
+    starts = range(0, max(len(counts), 1), size)
+    return joined([fit(counts[start : start + size]) for start in starts])
+
+
+def joined(parts: Sequence[Fit]) -> Fit:
+    """Give the fits of several lots of pixels as one."""
+    if len(parts) == 1:
+        return parts[0]
+    names = [field.name for field in fields(Fit)]
+    return Fit(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+
+
+def summed_from_left(counts: FloatArray) -> NDArray[np.float64]:
+    """Give the counts before each bin, and all: (p, bins + 1)."""
+    sums = np.zeros((len(counts), counts.shape[1] + 1))
+    np.cumsum(counts, axis=1, out=sums[:, 1:])
+    return sums
+
+
 def _log_ratio(
     amplitude: NDArray[np.float64], background: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -177,7 +213,7 @@ def _nearest_ratio(
     return np.searchsorted((logs[1:] + logs[:-1]) / 2, ratio)
 
 
-def _peak(
+def peak(
     scores: FloatArray,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Give the best template, how far beside it the parabola has its top, and how high it is."""

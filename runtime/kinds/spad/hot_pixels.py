@@ -2,7 +2,8 @@
 
 A pixel is hot if its background is well above that of its neighbours, by more than chance explains,
 and makes up most of what it counts: a bright surface raises the background too, by the tail of its
-pulse, but never above its own signal.
+pulse, but never above its own signal. And it counts at all times: a second surface, which one
+return takes for background, counts at its own time alone.
 """
 
 from typing import Final
@@ -20,24 +21,27 @@ SIGMAS: Final = 6.0
 SHARE: Final = 0.5
 """Of a pixel's counts that are background."""
 AROUND: Final = 5
+SPANS: Final = 8
+"""Into which time is cut: a pixel that counts in less than half of them sees surfaces."""
 MOST_DEAD: Final = 0.5
 
 
-def find_hot(
-    background: NDArray[np.float64], photons: NDArray[np.float64], bins: int
-) -> NDArray[np.bool_]:
+def find_hot(background: NDArray[np.float64], cube: FloatArray) -> NDArray[np.bool_]:
     """Find hot pixels.
 
     Args:
         background: (h, w) counts of a bin.
-        photons: (h, w) all counts of a pixel.
-        bins: How many bins they lie in.
+        cube: (h, w, bins) counts.
 
     Returns:
         (h, w).
     """
+    bins = cube.shape[2]
+    photons = cube.sum(axis=2, dtype=np.float64)
     usual = median_filter(background, size=AROUND, mode="mirror")
-    dark, expected = background * bins, usual * bins
+    cuts = np.linspace(0, bins, SPANS, endpoint=False).astype(int)
+    at_all_times = np.median(np.add.reduceat(cube, cuts, axis=2), axis=2) * SPANS
+    dark, expected = np.minimum(background * bins, at_all_times), usual * bins
     excess = dark - expected > SIGMAS * np.sqrt(np.maximum(expected, 1.0))
     return np.asarray(excess & (dark > TIMES * expected) & (dark > SHARE * photons))
 

@@ -8,12 +8,12 @@ pixel of the square would have on average, a s_k, over its background b, the sum
 log(1 + a s_k / b) must exceed a S. Otherwise surfaces would grow over their edges.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
@@ -27,6 +27,10 @@ SIDES: Final[dict[str, tuple[int, ...]]] = {
     "3": (3,),
     "5": (5,),
 }
+FALSE_ALARMS: Final = 1e-3
+"""Pixels without any return that are believed to have one, unless a caller says otherwise."""
+SPARSE: Final = 0.1
+"""Of all pixels: squares of fewer are summed one by one."""
 LEAST_BACKGROUND: Final = 1e-3
 """Counts of a bin; no detector is darker for certain."""
 
@@ -47,15 +51,27 @@ class Pooled:
 
 
 def fit_pooled(
-    fitter: Fitter, cube: FloatArray, *, pool: Pool = "auto", false_alarms: float = 1e-3
+    fitter: Fitter,
+    cube: FloatArray,
+    *,
+    fit: Callable[[FloatArray], Fit] | None = None,
+    alone: Fit | None = None,
+    pool: Pool = "auto",
+    false_alarms: float = FALSE_ALARMS,
+    sound: NDArray[np.bool_] | None = None,
+    core: slice | None = None,
 ) -> Pooled:
     """Fit one return to every pixel, by as few of its neighbours as it needs.
 
     Args:
         fitter: The bank.
         cube: (h, w, bins) float32 counts, finite and >= 0.
+        fit: Counts (p, bins) -> what is found; None for the `fit` of the fitter.
+        alone: What `fit` found of every pixel, where that is known.
         pool: Side of the squares; auto tries 1, 3 and 5.
         false_alarms: Rate per pixel, shared among the sides that are tried.
+        sound: (h, w) pixels whose photons count in squares; None for all.
+        core: Rows that are asked for; the others only lend their photons. None for all.
 
     Raises:
         ContractError: If pool or rate is none.
@@ -64,41 +80,91 @@ def fit_pooled(
         raise ContractError(f"pool must be one of {', '.join(SIDES)}; got {pool!r}")
     if not 0 < false_alarms < 0.5:
         raise ContractError(f"a rate of false alarms must lie in 0..0.5; got {false_alarms}")
+    fit = fit or fitter.fit
     sides = SIDES[pool]
     threshold = threshold_for(false_alarms / len(sides), fitter.search_length)
     height, width, bins = cube.shape
-    alone = cube.reshape(-1, bins)
-    found: Fit | None = None
+    own = cube.reshape(-1, bins)
+    found = alone
     side_of = np.zeros(height * width, dtype=np.int64)
+    asked = np.zeros((height, width), dtype=bool)
+    asked[core or slice(None)] = True
     for side in sides:
-        rows = np.flatnonzero(side_of == 0)
+        rows = np.flatnonzero(asked.ravel() & (side_of == 0))
         if not len(rows):
             break
-        members = _members(height, width, side)[rows]
-        counts = alone[rows] if side == 1 else _summed(cube, side).reshape(-1, bins)[rows]
-        new = _per_pixel(fitter.fit(counts), members)
+        if side == 1:
+            new = fit(own[rows]) if alone is None else taken(alone, rows)
+        else:
+            square = Squares(cube, side, sound)
+            new = _per_pixel(fit(square.counts(rows)), square.members[rows])
         good = new.evidence > threshold
         if side > 1:
-            good &= _speak_for(fitter, alone[rows], new)
-        found = new if found is None else _merged(found, new, rows)
+            good &= _speak_for(fitter, own[rows], new)
+        found = new if len(rows) == len(own) else _merged(found or _nothing(len(own)), new, rows)
         side_of[rows[good]] = side
-    if found is None:  # no pixel at all
-        found = fitter.fit(alone)
-    return Pooled(fit=found, valid=side_of > 0, side=side_of)
+    return Pooled(fit=found or _nothing(len(own)), valid=side_of > 0, side=side_of)
 
 
-def _members(height: int, width: int, side: int) -> NDArray[np.float64]:
-    """Give how many pixels the square of each pixel has on the array."""
-    reach = side // 2
-    rows = np.minimum(np.arange(height), reach) + np.minimum(np.arange(height)[::-1], reach) + 1
-    columns = np.minimum(np.arange(width), reach) + np.minimum(np.arange(width)[::-1], reach) + 1
-    return np.asarray(np.multiply.outer(rows, columns).ravel(), dtype=np.float64)
+class Squares:
+    """Sums over the square around each pixel; nothing lies beyond the border.
+
+    Attributes:
+        members: (h w,) how many sound pixels each square has, at least 1.
+    """
+
+    def __init__(self, cube: FloatArray, side: int, sound: NDArray[np.bool_] | None = None) -> None:
+        """Look at squares.
+
+        Args:
+            cube: (h, w, bins) counts.
+            side: Of the squares, odd.
+            sound: (h, w) pixels that count; None for all.
+        """
+        height, width, _ = cube.shape
+        self._cube, self._side = cube, side
+        self._sound = np.ones((height, width), bool) if sound is None else sound
+        inside = self._around(self._sound[..., None].astype(np.float32)).reshape(-1)
+        self.members = np.maximum(inside.astype(np.float64), 1.0)
+
+    def counts(self, rows: NDArray[np.int64]) -> FloatArray:
+        """Give the counts (p, bins) of the squares around pixels of these flat numbers."""
+        height, width, bins = self._cube.shape
+        if len(rows) > SPARSE * height * width:
+            sound = np.where(self._sound[..., None], self._cube, np.float32(0))
+            return self._around(sound).reshape(-1, bins)[rows]
+        reach = self._side // 2
+        y, x = np.divmod(rows, width)
+        found = np.zeros((len(rows), bins), np.float32)
+        for dy in range(-reach, reach + 1):
+            for dx in range(-reach, reach + 1):
+                at = (y + dy, x + dx)
+                there = (at[0] >= 0) & (at[0] < height) & (at[1] >= 0) & (at[1] < width)
+                there[there] = self._sound[at[0][there], at[1][there]]
+                found[there] += self._cube[at[0][there], at[1][there]]
+        return found
+
+    def _around(self, values: FloatArray) -> FloatArray:
+        """Give the sums of every square, (h, w, n); whole numbers of photons stay exact."""
+        reach = self._side // 2
+        found = values
+        for axis in (0, 1):
+            found = sum(
+                (_shifted(found, step, axis) for step in range(1, reach + 1)), start=found.copy()
+            )
+        return found
 
 
-def _summed(cube: FloatArray, side: int) -> FloatArray:
-    """Give the sums over squares; nothing lies beyond the border."""
-    mean = uniform_filter(cube.astype(np.float64), size=(side, side, 1), mode="constant", cval=0.0)
-    return np.asarray(np.maximum(mean * side * side, 0.0), dtype=np.float32)
+def _shifted(values: FloatArray, step: int, axis: int) -> FloatArray:
+    """Give what lies so many places before and after along an axis, together."""
+    found = np.zeros_like(values)
+    if step < values.shape[axis]:
+        ahead = [slice(None)] * 3
+        behind = [slice(None)] * 3
+        ahead[axis], behind[axis] = slice(step, None), slice(None, -step)
+        found[tuple(behind)] += values[tuple(ahead)]
+        found[tuple(ahead)] += values[tuple(behind)]
+    return found
 
 
 def _per_pixel(fit: Fit, members: NDArray[np.float64]) -> Fit:
@@ -113,6 +179,17 @@ def _speak_for(fitter: Fitter, own: FloatArray, fit: Fit) -> NDArray[np.bool_]:
     logs = np.log1p(fit.amplitude[:, None] * shares / background[:, None])
     gained = (np.take_along_axis(own, bins, axis=1) * logs).sum(axis=1)
     return np.asarray(gained > fit.amplitude * bank.totals[fit.template])
+
+
+def taken(fit: Fit, rows: NDArray[np.int64]) -> Fit:
+    """Give what was found of some pixels."""
+    return Fit(**{field.name: getattr(fit, field.name)[rows] for field in fields(Fit)})
+
+
+def _nothing(count: int) -> Fit:
+    found: dict[str, NDArray[Any]] = {field.name: np.zeros(count) for field in fields(Fit)}
+    found["template"] = np.zeros(count, dtype=np.int64)
+    return Fit(**found)
 
 
 def _merged(old: Fit, new: Fit, rows: NDArray[np.int64]) -> Fit:

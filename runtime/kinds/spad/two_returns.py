@@ -1,29 +1,40 @@
-"""Two surfaces in one pixel: both pulses and the background fitted together.
+"""Two surfaces in one pixel: both pulses and the background fitted together, where asked for.
 
 Mean counts a1 s_k(mu1) + a2 s_k(mu2) + b. Maximum likelihood by Fisher scoring: each step solves
 the five by five information, and is shortened until the likelihood rises. It begins from several
-places: the second pulse where the residual of the first asks for it most, and both to either side
-of the first, which is where one pulse lies that stands for two.
+places, of which the better ones are followed to the end: the second pulse where the residual of the
+first asks for it most, and both to either side of the first, which is where one pulse lies that
+stands for two.
+
+Few pixels see two surfaces, so the residual of one return is asked first (`asks_for_second`): the
+gain of the likelihood that a little of a second pulse anywhere would bring, to second order.
 """
 
 from dataclasses import dataclass
-from typing import Final
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.runtime.kinds.spad.bank import Bank
+from camkit.runtime.kinds.spad.bank import Banded, Bank
+from camkit.runtime.kinds.spad.between import Between, Floats
 from camkit.runtime.kinds.spad.fit import Fit
 
 STEPS: Final = 25
+TRIED: Final = 3
+"""Steps from every place, before the better ones are followed."""
+FOLLOWED: Final = 2
 CUTS: Final = 4
 SIDES: Final = (0.6, 1.5, 3.0)
 """Of the standard deviation of an edge: how far to either side of one pulse two begin."""
-ENOUGH: Final = 1e-4
-BLOCK: Final = 2048
-
-Floats = NDArray[np.float64]
+ENOUGH: Final = 1e-3
+BLOCK_COUNTS: Final = 262_144
+"""Counts that are fitted at once."""
+ASKED: Final = 5.0
+"""Gain of the likelihood, twice its logarithm, from which on a second pulse is tried."""
+LEAST_BACKGROUND: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,86 +56,177 @@ class TwoReturns:
     evidence: Floats
 
 
-def fit_two(bank: Bank, counts: FloatArray, one: Fit) -> TwoReturns:
-    """Fit two returns to every pixel.
+class TwoFitter:
+    """A bank with what fits of two returns need of it, made when first needed."""
 
-    Args:
-        bank: Templates of the pulse on the axis.
-        counts: (p, bins) >= 0.
-        one: What the fit of one return gave of the same pixels.
-    """
-    parts = [
-        _fit_block(bank, counts[rows].astype(np.float64), one, rows)
-        for rows in (
-            slice(start, min(start + BLOCK, len(counts)))
-            for start in range(0, max(len(counts), 1), BLOCK)
+    def __init__(self, bank: Bank) -> None:
+        self._bank = bank
+
+    @cached_property
+    def _between(self) -> Between:
+        return Between(self._bank)
+
+    @cached_property
+    def _sums(self) -> tuple[Banded, Banded]:
+        """Give the templates, and their squares, for products with (p, bins)."""
+        every = np.arange(len(self._bank.mu_ps))
+        return Banded(self._bank, every, self._bank.shares), Banded(
+            self._bank, every, self._bank.shares**2
         )
-    ]
-    found, evidence, sigmas = (np.concatenate(p, axis=-1) for p in zip(*parts, strict=True))
-    order = np.argsort(found[:2], axis=0)
-    return TwoReturns(
-        times_of_flight_ps=np.take_along_axis(found[:2], order, 0),
-        amplitudes=np.take_along_axis(found[2:4], order, 0),
-        background=found[4],
-        sigmas_ps=np.take_along_axis(sigmas, order, 0),
-        evidence=evidence,
-    )
 
+    def asks_for_second(self, counts: FloatArray, one: Fit) -> NDArray[np.bool_]:
+        """Tell which pixels have a residual that a second return may explain.
 
-def _fit_block(bank: Bank, counts: Floats, one: Fit, rows: slice) -> tuple[Floats, Floats, Floats]:
-    """Give parameters (5, p), evidence (p,) and sigmas (2, p) of a block."""
-    mu, a = one.time_of_flight_ps[rows], np.maximum(one.amplitude[rows], 0.1)
-    b = np.maximum(one.background[rows], 1e-6)
-    alone = np.stack([mu, mu, a / 2, a / 2, b])
-    alone, base = _ascend(bank, counts, alone, is_one=True)
-    spread = bank.pulse.finest_ps
-    starts = [
-        np.stack([alone[0] - side * spread, alone[0] + side * spread, a / 2, a / 2, b])
-        for side in SIDES
-    ]
-    second, extra = _asked_for(bank, counts, alone)
-    starts.append(np.stack([alone[0], second, np.maximum(a - extra, 0.1 * a), extra, b]))
-    best, most = alone, base
-    for start in starts:
-        found, height = _ascend(bank, counts, start)
-        better = height > most
-        best, most = np.where(better, found, best), np.where(better, height, most)
-    mean, gradients = _model(bank, best)
-    sigmas = np.sqrt(np.linalg.inv(_fisher(mean, gradients))[:, [0, 1], [0, 1]]).T
-    return best, np.maximum(2 * (most - base), 0.0), sigmas
+        Args:
+            counts: (p, bins) >= 0.
+            one: What the fit of one return gave of the same pixels.
+        """
+        found = np.zeros(len(counts), dtype=bool)
+        for rows in self._blocks(len(counts)):
+            mean = self._mean_of_one(one, rows)
+            found[rows] = self._wish(counts[rows], mean)[0].max(axis=1, initial=0) > ASKED
+        return found
 
+    def fit(self, counts: FloatArray, one: Fit) -> TwoReturns:
+        """Fit two returns to every pixel; arguments as of `asks_for_second`."""
+        parts = [
+            self._fit_block(counts[rows].astype(np.float64), one, rows)
+            for rows in self._blocks(len(counts))
+        ]
+        found, evidence, sigmas = (np.concatenate(p, axis=-1) for p in zip(*parts, strict=True))
+        order = np.argsort(found[:2], axis=0)
+        return TwoReturns(
+            times_of_flight_ps=np.take_along_axis(found[:2], order, 0),
+            amplitudes=np.take_along_axis(found[2:4], order, 0),
+            background=found[4],
+            sigmas_ps=np.take_along_axis(sigmas, order, 0),
+            evidence=evidence,
+        )
 
-def _asked_for(bank: Bank, counts: Floats, alone: Floats) -> tuple[Floats, Floats]:
-    """Give where the residual of one return asks most for another, and how many photons of it."""
-    mean, _ = _model(bank, alone)
-    whole = np.zeros((len(bank.mu_ps), bank.axis.bins))
-    rows = np.repeat(np.arange(len(whole)), bank.bins.shape[1])
-    np.add.at(whole, (rows, bank.bins.ravel()), bank.shares.ravel())
-    wish = (counts / mean) @ whole.T - bank.totals
-    curvature = (1 / mean) @ (whole * whole).T
-    gain = np.maximum(wish, 0.0) ** 2 / curvature
-    index = gain.argmax(axis=1)
-    at = np.arange(len(counts)), index
-    return bank.mu_ps[index], np.maximum(wish[at] / curvature[at], 0.1)
+    def _blocks(self, count: int) -> list[slice]:
+        size = max(1, BLOCK_COUNTS // self._bank.axis.bins)
+        return [slice(at, min(at + size, count)) for at in range(0, max(count, 1), size)]
 
+    def _mean_of_one(self, one: Fit, rows: slice) -> Floats:
+        bank = self._bank
+        mu = np.clip(one.time_of_flight_ps[rows], bank.mu_ps[0], bank.mu_ps[-1])
+        shares, _ = self._between.shapes(mu)
+        background = np.maximum(one.background[rows], LEAST_BACKGROUND)
+        return np.asarray(one.amplitude[rows, None] * shares + background[:, None])
 
-def _model(bank: Bank, values: Floats) -> tuple[Floats, Floats]:
-    """Give mean counts (p, bins) and their derivatives (p, 5, bins) at (5, p) parameters."""
-    count, bins = values.shape[1], bank.axis.bins
-    every = np.broadcast_to(np.arange(bins), (count, bins))
-    shares = [bank.axis.shares(bank.pulse, values[i], every) for i in (0, 1)]
-    slopes = [bank.axis.slopes(bank.pulse, values[i], every) for i in (0, 1)]
-    mean = values[2][:, None] * shares[0] + values[3][:, None] * shares[1] + values[4][:, None]
-    gradients = np.stack(
-        [
-            values[2][:, None] * slopes[0],
-            values[3][:, None] * slopes[1],
-            *shares,
-            np.ones((count, bins)),
-        ],
-        axis=1,
-    )
-    return mean, gradients
+    def _wish(self, counts: NDArray[Any], mean: Floats) -> tuple[Floats, Floats]:
+        """Give the gain of a second pulse at every template, and its photons: (p, m) each."""
+        shares, squares = self._sums
+        wish = shares.product((counts / mean).astype(np.float32)).astype(np.float64)
+        wish -= self._bank.totals
+        np.maximum(wish, 0.0, out=wish)
+        curvature = squares.product((np.maximum(counts, mean) / mean**2).astype(np.float32))
+        photons = wish / np.maximum(curvature, 1e-12)
+        return wish * photons, photons
+
+    def _fit_block(self, counts: Floats, one: Fit, rows: slice) -> tuple[Floats, Floats, Floats]:
+        """Give parameters (5, p), evidence (p,) and sigmas (2, p) of a block."""
+        bank = self._bank
+        mu = np.clip(one.time_of_flight_ps[rows], bank.mu_ps[0], bank.mu_ps[-1])
+        a, b = np.maximum(one.amplitude[rows], 0.1), np.maximum(one.background[rows], 1e-6)
+        alone, base = self._ascend(counts, np.stack([mu, mu, a / 2, a / 2, b]), STEPS, is_one=True)
+        places = self._starts(counts, alone, a, b)
+        tried = [self._ascend(counts, place, TRIED) for place in places]
+        heights = np.stack([height for _, height in tried])
+        order = np.argsort(heights, axis=0)[::-1]
+        values = np.stack([value for value, _ in tried])
+        best, most = alone, base
+        every = np.arange(len(counts))
+        for rank in range(FOLLOWED):
+            start = values[order[rank], :, every].T
+            found, height = self._ascend(counts, start, STEPS)
+            better = height > most
+            best, most = np.where(better, found, best), np.where(better, height, most)
+        mean, gradients = self._model(best)
+        sigmas = np.sqrt(np.linalg.inv(_fisher(mean, gradients))[:, [0, 1], [0, 1]]).T
+        return best, np.maximum(2 * (most - base), 0.0), sigmas
+
+    def _starts(self, counts: Floats, alone: Floats, a: Floats, b: Floats) -> list[Floats]:
+        """Give places (5, p) to begin from."""
+        spread = self._bank.pulse.finest_ps
+        low, high = self._bank.mu_ps[[0, -1]]
+        starts = [
+            np.stack(
+                [
+                    np.clip(alone[0] - side * spread, low, high),
+                    np.clip(alone[0] + side * spread, low, high),
+                    *(a / 2, a / 2, b),
+                ]
+            )
+            for side in SIDES
+        ]
+        gain, photons = self._wish(counts, self._model(alone)[0])
+        index = gain.argmax(axis=1)
+        extra = np.maximum(photons[np.arange(len(counts)), index], 0.1)
+        second = self._bank.mu_ps[index]
+        starts.append(np.stack([alone[0], second, np.maximum(a - extra, 0.1 * a), extra, b]))
+        return starts
+
+    def _model(self, values: Floats) -> tuple[Floats, Floats]:
+        """Give mean counts (p, bins) and their derivatives (p, 5, bins) at (5, p) parameters."""
+        (s1, d1), (s2, d2) = (self._between.shapes(values[i]) for i in (0, 1))
+        a1, a2, b = (values[i][:, None] for i in (2, 3, 4))
+        gradients = np.stack([a1 * d1, a2 * d2, s1, s2, np.ones_like(s1)], axis=1)
+        return a1 * s1 + a2 * s2 + b, gradients
+
+    def _ascend(
+        self, counts: Floats, start: Floats, steps: int, *, is_one: bool = False
+    ) -> tuple[Floats, Floats]:
+        """Climb the likelihood; with `is_one` both pulses stay the same one."""
+        values = start.copy()
+        mean, gradients = self._model(values)
+        height = _height(counts, mean)
+        going = np.arange(len(counts))
+        for _ in range(steps):
+            step = self._step(counts[going], mean, gradients, is_one=is_one)
+            tried, risen = self._highest(counts[going], values[:, going], step, height[going])
+            values[:, going] = tried
+            height[going] += risen
+            going = going[risen > ENOUGH]
+            if not len(going):
+                break
+            mean, gradients = self._model(values[:, going])
+        return values, height
+
+    def _step(self, counts: Floats, mean: Floats, gradients: Floats, *, is_one: bool) -> Floats:
+        """Give the step of Fisher scoring, (5, p)."""
+        wish = (gradients @ (counts / mean - 1)[..., None])[..., 0]
+        step = np.linalg.solve(_fisher(mean, gradients), wish[..., None])[..., 0].T
+        if is_one:
+            step[:2] = step[:2].mean(axis=0)
+            step[2:4] = step[2:4].mean(axis=0)
+        reach = 2 * self._bank.pulse.finest_ps
+        step[:2] = np.clip(step[:2], -reach, reach)
+        return np.asarray(step, np.float64)
+
+    def _highest(
+        self, counts: Floats, values: Floats, step: Floats, height: Floats
+    ) -> tuple[Floats, Floats]:
+        """Go a step, else a third of it and so on until it rises; give its end, and the rise."""
+        found, risen = values.copy(), np.zeros(len(height))
+        left = np.arange(len(height))
+        for cut in range(CUTS):
+            tried = values[:, left] + step[:, left] / 3**cut
+            tried[:2] = np.clip(tried[:2], self._bank.mu_ps[0], self._bank.mu_ps[-1])
+            tried[2:4] = np.maximum(tried[2:4], 1e-3)
+            tried[4] = np.maximum(tried[4], LEAST_BACKGROUND)
+            rise = _height(counts[left], self._mean(tried)) - height[left]
+            better = rise > 0
+            found[:, left[better]] = tried[:, better]
+            risen[left[better]] = rise[better]
+            left = left[~better]
+            if not len(left):
+                break
+        return found, risen
+
+    def _mean(self, values: Floats) -> Floats:
+        (s1, _), (s2, _) = (self._between.shapes(values[i]) for i in (0, 1))
+        return np.asarray(values[2][:, None] * s1 + values[3][:, None] * s2 + values[4][:, None])
 
 
 def _fisher(mean: Floats, gradients: Floats) -> Floats:
@@ -138,56 +240,3 @@ def _fisher(mean: Floats, gradients: Floats) -> Floats:
 
 def _height(counts: Floats, mean: Floats) -> Floats:
     return np.asarray((counts * np.log(mean) - mean).sum(axis=1))
-
-
-def _ascend(
-    bank: Bank, counts: Floats, start: Floats, *, is_one: bool = False
-) -> tuple[Floats, Floats]:
-    """Climb the likelihood; with `is_one` both pulses stay the same one."""
-    values = start.copy()
-    height = np.full(len(counts), -np.inf)
-    going = np.arange(len(counts))
-    for _ in range(STEPS):
-        mean, gradients = _model(bank, values[:, going])
-        height[going] = _height(counts[going], mean)
-        step = _step(bank, counts[going], mean, gradients, is_one=is_one)
-        tried, risen = _highest(bank, counts[going], values[:, going], step, height[going])
-        values[:, going] = tried
-        height[going] += risen
-        going = going[risen > ENOUGH]
-        if not len(going):
-            break
-    return values, height
-
-
-def _step(bank: Bank, counts: Floats, mean: Floats, gradients: Floats, *, is_one: bool) -> Floats:
-    """Give the step of Fisher scoring, (5, p)."""
-    wish = np.einsum("pgk,pk->pg", gradients, counts / mean - 1)
-    step = np.linalg.solve(_fisher(mean, gradients), wish[..., None])[..., 0].T
-    if is_one:
-        step[:2] = step[:2].mean(axis=0)
-        step[2:4] = step[2:4].mean(axis=0)
-    reach = 2 * bank.pulse.finest_ps
-    step[:2] = np.clip(step[:2], -reach, reach)
-    return step
-
-
-def _highest(
-    bank: Bank, counts: Floats, values: Floats, step: Floats, height: Floats
-) -> tuple[Floats, Floats]:
-    """Go a step, else a third of it and so on until it rises; give its end, and the rise."""
-    found, risen = values.copy(), np.zeros(len(height))
-    left = np.arange(len(height))
-    for cut in range(CUTS):
-        tried = values[:, left] + step[:, left] / 3**cut
-        tried[:2] = np.clip(tried[:2], bank.mu_ps[0], bank.mu_ps[-1])
-        tried[2:4] = np.maximum(tried[2:4], 1e-3)
-        tried[4] = np.maximum(tried[4], 1e-6)
-        rise = _height(counts[left], _model(bank, tried)[0]) - height[left]
-        better = rise > 0
-        found[:, left[better]] = tried[:, better]
-        risen[left[better]] = rise[better]
-        left = left[~better]
-        if not len(left):
-            break
-    return found, risen

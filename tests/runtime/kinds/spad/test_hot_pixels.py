@@ -22,15 +22,25 @@ def test_hot_pixels_are_found_beside_bright_ones(  # type: ignore[no-untyped-def
     counts[hot] += np.random.default_rng(1).poisson(4.0, (3, axis.bins))
     fit = Fitter(make_bank(axis, pulse)).fit(counts)
     shape = (SIDE, SIDE)
-    found = find_hot(
-        fit.background.reshape(shape), counts.sum(1, dtype=float).reshape(shape), axis.bins
-    )
+    found = find_hot(fit.background.reshape(shape), counts.reshape(*shape, axis.bins))
     assert np.flatnonzero(found).tolist() == sorted(hot)
 
 
+def test_a_pixel_with_two_surfaces_is_not_hot(  # type: ignore[no-untyped-def]
+    axis: TimeAxis, pulse: GatedPulse, draw
+) -> None:
+    counts = draw(axis, np.full(SIDE * SIDE, 700.0), 20, 0.01)
+    edge = SIDE * 7 + 4
+    counts[edge] += draw(axis, np.array([1900.0]), 30, 0.0)[0]
+    fit = Fitter(make_bank(axis, pulse)).fit(counts)
+    assert fit.background[edge] > 5 * np.median(fit.background)
+    shape = (SIDE, SIDE)
+    assert not find_hot(fit.background.reshape(shape), counts.reshape(*shape, axis.bins)).any()
+
+
 def test_a_few_counts_in_the_dark_are_no_hot_pixel() -> None:
-    photons = np.random.default_rng(0).poisson(0.5, (200, 200)).astype(float)
-    assert find_hot(photons / 125, photons, 125).sum() == 0
+    cube = np.random.default_rng(0).poisson(0.5 / 16, (200, 200, 16)).astype(np.float32)
+    assert find_hot(cube.mean(axis=2, dtype=float), cube).sum() == 0
 
 
 def test_what_is_painted_is_the_mean_of_sound_neighbours() -> None:

@@ -7,7 +7,7 @@ from scipy.ndimage import convolve
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.fit import Fitter
-from camkit.runtime.kinds.spad.pooling import _members, _summed, fit_pooled
+from camkit.runtime.kinds.spad.pooling import Squares, fit_pooled
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
@@ -24,14 +24,23 @@ def _cube(draw, axis: TimeAxis, photons: float, even: float, seed: int = 0) -> n
     return np.asarray(counts.reshape(SIDE, SIDE, axis.bins))
 
 
-def test_squares_are_summed_as_written_out() -> None:
-    cube = np.random.default_rng(0).poisson(3, (7, 9, 8)).astype(np.float32)
-    for side in (3, 5):
-        weights = np.ones((side, side, 1))
-        expected = convolve(cube.astype(float), weights, mode="constant")
-        np.testing.assert_array_equal(_summed(cube, side), expected)
-        whole = convolve(np.ones((7, 9, 1)), weights, mode="constant")
-        np.testing.assert_array_equal(_members(7, 9, side), whole.ravel())
+@pytest.mark.parametrize("side", [3, 5])
+@pytest.mark.parametrize("shape", [(7, 9), (1, 9), (2, 2)])
+def test_squares_are_summed_as_written_out(side: int, shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(0)
+    cube = rng.poisson(3, (*shape, 8)).astype(np.float32)
+    sound = rng.random(shape) > 0.3
+    weights = np.ones((side, side, 1))
+    expected = convolve(np.where(sound[..., None], cube, 0.0), weights, mode="constant")
+    squares = Squares(cube, side, sound)
+    every = np.arange(sound.size)
+    np.testing.assert_array_equal(squares.counts(every), expected.reshape(-1, 8))
+    # few pixels are summed one by one
+    for row in every:
+        few = squares.counts(np.array([row]))
+        np.testing.assert_array_equal(few, expected.reshape(-1, 8)[[row]])
+    members = convolve(sound[..., None].astype(float), weights, mode="constant")
+    np.testing.assert_array_equal(squares.members, np.maximum(members.ravel(), 1))
 
 
 def test_bright_pixels_stay_alone(fitter: Fitter, axis: TimeAxis, draw) -> None:  # type: ignore[no-untyped-def]

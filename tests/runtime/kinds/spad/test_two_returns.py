@@ -7,14 +7,14 @@ from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.fit import Fitter
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
-from camkit.runtime.kinds.spad.two_returns import TwoReturns, fit_two
+from camkit.runtime.kinds.spad.two_returns import TwoFitter, TwoReturns
 
 PIXELS = 200
 
 
 def _found(axis: TimeAxis, pulse: GatedPulse, counts: np.ndarray) -> TwoReturns:
     bank = make_bank(axis, pulse)
-    return fit_two(bank, counts, Fitter(bank).fit(counts))
+    return TwoFitter(bank).fit(counts, Fitter(bank).fit(counts))
 
 
 @pytest.mark.parametrize(("apart", "share"), [(250.0, 0.5), (400.0, 0.25), (800.0, 0.5)])

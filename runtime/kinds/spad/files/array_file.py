@@ -1,0 +1,95 @@
+"""An array in any order of axes, read by strips of rows."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import DecodeError
+from camkit.runtime.kinds.spad.files.counts_file import (
+    CountsFile,
+    CountsKind,
+    Hints,
+    axes_of,
+    checked_counts,
+    checked_size,
+)
+
+
+class Sliced(Protocol):
+    """What can be sliced as an array can: an array, a mapped file, a data set."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...  # noqa: D102
+    @property
+    def dtype(self) -> np.dtype[Any]: ...  # noqa: D102
+    def __getitem__(self, item: Any, /) -> Any: ...
+
+
+class ArrayFile(CountsFile):
+    """Counts that lie in one array."""
+
+    def __init__(
+        self,
+        path: Path,
+        values: Sliced,
+        hints: Hints,
+        *,
+        kind: CountsKind | None = None,
+        usual: str | None = "tyx",
+        stated: Mapping[str, object] | None = None,
+        close: Callable[[], None] | None = None,
+    ) -> None:
+        """Look at an array.
+
+        Args:
+            path: Where it came from.
+            values: (t, y, x) in any order, or (y, x).
+            hints: What the caller knows.
+            kind: What it holds; None: times where it has three axes, else counts.
+            usual: The axes that it has unless the caller says otherwise; None if that is not known.
+            stated: What is known of its times.
+            close: Lets go of what it lies in.
+
+        Raises:
+            DecodeError: If it holds no numbers, or has no pixels.
+            ContractError: If its axes are not known.
+        """
+        self.path, self.stated, self._close = path, stated or {}, close or (lambda: None)
+        if values.dtype.kind not in "biuf" or values.dtype.itemsize > 8:
+            raise DecodeError(f"{path.name} holds {values.dtype}; expected numbers")
+        if len(values.shape) not in {2, 3}:
+            raise DecodeError(
+                f"{path.name} holds an array of {values.shape}; expected time, rows and columns, "
+                "or rows and columns"
+            )
+        is_flat = len(values.shape) == 2
+        self._axes = axes_of(path, values.shape, hints, "yx" if is_flat else usual)
+        self._values = values
+        sizes = dict(zip(self._axes, values.shape, strict=True))
+        self.height, self.width = checked_size(path, sizes["y"], sizes["x"])
+        self.bins = sizes.get("t", 1)
+        if self.bins < 1:
+            raise DecodeError(f"{path.name} has no time bins")
+        self.kind = kind or ("counts" if is_flat else "histogram")
+
+    def rows(self, top: int, bottom: int, edges: NDArray[np.float64] | None = None) -> FloatArray:
+        """Read some rows; see `CountsFile`."""
+        del edges
+        chosen = tuple(slice(top, bottom) if axis == "y" else slice(None) for axis in self._axes)
+        try:
+            part = np.asarray(self._values[chosen])
+        except (OSError, ValueError, RuntimeError) as error:
+            raise DecodeError(f"{self.path.name} is damaged: {error}") from error
+        if "t" not in self._axes:
+            part, axes = part[..., None], self._axes + "t"
+        else:
+            axes = self._axes
+        return checked_counts(self.path, part.transpose([axes.index(a) for a in "yxt"]), top)
+
+    def close(self) -> None:
+        """Let go of what it lies in."""
+        self._close()

@@ -1,0 +1,58 @@
+"""Which of the variables of a file is meant, and what the others say of times."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.files.counts_file import KEYS, Hints
+from camkit.runtime.kinds.spad.timing import TABLE_OF
+
+
+def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arrays") -> str:
+    """Give the variable to read.
+
+    Args:
+        path: The file, for errors.
+        names: Of all variables that could be one.
+        hints: The caller's choice.
+        what: How the file calls them.
+
+    Raises:
+        ContractError: If the choice is none of them, or nobody chose among several.
+        DecodeError: If there are none.
+    """
+    known = sorted(names)
+    if not known:
+        raise DecodeError(f"{path.name} holds no {what} of counts, histograms or time stamps")
+    if hints.key is not None:
+        if hints.key not in known:
+            raise ContractError(
+                f"{path.name} holds no {hints.key!r} ([array] key); it holds {', '.join(known)}"
+            )
+        return hints.key
+    telling = [name for name in known if name.rsplit("/", 1)[-1] in KEYS]
+    candidates = telling or known
+    if len(candidates) > 1:
+        raise ContractError(
+            f"{path.name} holds several {what}: {', '.join(candidates)}; say which by [array] key "
+            "in a file for --timing"
+        )
+    return candidates[0]
+
+
+def stated_values(values: Mapping[str, Any]) -> dict[str, object]:
+    """Give what small values say of times, those of other names left out."""
+    found: dict[str, object] = {}
+    for name, value in values.items():
+        if name not in TABLE_OF:
+            continue
+        plain = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+        array = np.asarray(plain)
+        if array.dtype.kind in "US":
+            found[name] = str(array.ravel()[0]) if array.size == 1 else plain
+        elif array.dtype.kind in "biuf":
+            found[name] = array.ravel()[0].item() if array.size == 1 else array.ravel()
+    return found

@@ -1,0 +1,151 @@
+"""A capture of single photons, open: its size, what it states, and its rows when asked."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError, DecodeError
+
+CountsKind = Literal["histogram", "counts", "stamps"]
+KEYS: Final[Mapping[str, CountsKind]] = {"histogram": "histogram", "counts": "counts"}
+"""Names of variables that say what they hold."""
+EXTRA: Final = 'pip install "camkit[spad]"'
+MOST_COUNT: Final = 2**24
+"""Whole numbers up to here are exact in float32."""
+MOST_PIXELS: Final = 100_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hints:
+    """What the caller knows of a file.
+
+    Attributes:
+        axes: Letters t, y, x in the order of the file's array, such as "yxt".
+        key: The variable, data set, channel or block to take.
+        max_bytes: What may be held at once.
+    """
+
+    axes: str | None = None
+    key: str | None = None
+    max_bytes: int = 930_000_000
+
+
+class CountsFile(ABC):
+    """An open file; closes with `with`.
+
+    Attributes:
+        path: The file.
+        kind: histogram: photons by time. counts: photons of one picture or of frames. stamps: the
+            time of every photon, sorted into bins when rows are read.
+        height: Rows of pixels.
+        width: Pixels of a row.
+        bins: Time bins, or frames; 0 for stamps.
+        stated: What the file says of its times, by the names of the timing file.
+    """
+
+    path: Path
+    kind: CountsKind
+    height: int
+    width: int
+    bins: int
+    stated: Mapping[str, object]
+
+    @property
+    def outside(self) -> int:
+        """Give how many time stamps of the rows read so far lay outside all bins."""
+        return 0
+
+    @abstractmethod
+    def rows(self, top: int, bottom: int, edges: NDArray[np.float64] | None = None) -> FloatArray:
+        """Read some rows.
+
+        Args:
+            top: The first.
+            bottom: The one after the last.
+            edges: (bins + 1,) of time bins, in the unit of the stamps; for stamps alone.
+
+        Returns:
+            (rows, width, bins) float32, whole numbers >= 0; the caller's own.
+
+        Raises:
+            DecodeError: If the file is damaged, or what it holds are no counts.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of the file."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def checked_size(path: Path, height: int, width: int) -> tuple[int, int]:
+    """Refuse an array without pixels, or with more than any array has.
+
+    Raises:
+        DecodeError: Says what came.
+    """
+    if height < 1 or width < 1 or height * width > MOST_PIXELS:
+        raise DecodeError(
+            f"{path.name} holds {width}x{height} pixels; expected some, and not more "
+            f"than {MOST_PIXELS // 10**6} million"
+        )
+    return height, width
+
+
+def checked_counts(path: Path, values: NDArray[Any], top: int) -> FloatArray:
+    """Give values (rows, w, n) as counts.
+
+    Raises:
+        DecodeError: If one is negative, fractional, not finite or beyond what is exact; names
+            where the first is.
+    """
+    found = np.ascontiguousarray(values, dtype=np.float32)
+    if values.dtype.kind == "b" or (values.dtype.kind == "u" and values.dtype.itemsize <= 2):
+        return found.copy() if np.shares_memory(found, values) else found
+    with np.errstate(invalid="ignore"):
+        bad = ~((values >= 0) & (values <= MOST_COUNT))
+        if values.dtype.kind == "f":
+            bad |= values != np.floor(values)
+    if bad.any():
+        y, x, t = (int(i) for i in np.argwhere(bad)[0])
+        raise DecodeError(
+            f"{path.name} holds no counts: {values[y, x, t]} at pixel ({x}, {y + top}), bin {t}; "
+            "expected whole numbers >= 0"
+        )
+    return found.copy() if np.shares_memory(found, values) else found
+
+
+def axes_of(path: Path, shape: tuple[int, ...], hints: Hints, usual: str | None) -> str:
+    """Give the axes of an array, letters t, y, x in its order.
+
+    Args:
+        path: The file, for errors.
+        shape: Of the array.
+        hints: What the caller knows.
+        usual: What such arrays have; None where that cannot be known.
+
+    Raises:
+        ContractError: If axes are stated that cannot be, or none are known.
+    """
+    axes = hints.axes if hints.axes is not None else usual
+    if axes is None:
+        raise ContractError(
+            f"{path.name} holds an array of {shape}: nothing says which axis is time; say [array] "
+            'axes = "yxt", "tyx" or what it is, in a file for --timing'
+        )
+    if sorted(axes) not in (sorted("tyx"), sorted("yx")) or len(axes) != len(shape):
+        raise ContractError(
+            f'[array] axes = "{axes}" does not fit {path.name}, an array of {shape}: expected each '
+            f"of the letters {'t, y, x' if len(shape) == 3 else 'y, x'} once, in its order"
+        )
+    return axes

@@ -1,0 +1,89 @@
+"""MATLAB files: version 5 by scipy, version 7.3 as HDF5."""
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import scipy.io
+
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.files.array_file import ArrayFile
+from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
+from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
+from camkit.runtime.kinds.spad.files.hdf5 import open_hdf5
+from camkit.runtime.kinds.spad.files.stamps import StampsFile
+from camkit.runtime.kinds.spad.timing import TABLE_OF
+
+HDF5_MAGIC: Final = b"\x89HDF\r\n\x1a\n"
+USER_BLOCK: Final = 512
+"""Bytes before the HDF5 of version 7.3."""
+BROKEN: Final = (
+    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
+    *(NotImplementedError, UnicodeDecodeError, MemoryError, struct.error, zlib.error),
+    *(AttributeError, UnboundLocalError, RuntimeError, scipy.io.matlab.MatReadError),
+)
+"""What scipy raises of files that are damaged."""
+BYTES_OF: Final = {
+    "single": 4,
+    "logical": 1,
+    "int8": 1,
+    "uint8": 1,
+    "int16": 2,
+    "uint16": 2,
+    "int32": 4,
+    "uint32": 4,
+}
+TIMES: Final = 3
+"""Of max_bytes: version 5 is read whole."""
+
+
+def open_mat(path: Path, hints: Hints) -> CountsFile:
+    """Open a MATLAB file; see `open_counts`."""
+    with path.open("rb") as file:
+        head = file.read(USER_BLOCK + len(HDF5_MAGIC))
+    if HDF5_MAGIC in (head[: len(HDF5_MAGIC)], head[USER_BLOCK:]):
+        return open_hdf5(path, hints, is_matlab=True)
+    try:
+        listed = scipy.io.whosmat(str(path), appendmat=False)
+    except BROKEN as error:
+        raise DecodeError(f"{path.name} is damaged, or no MATLAB file: {error}") from error
+    kinds = {name: (shape, kind) for name, shape, kind in listed if min(shape, default=0) > 0}
+    large = [name for name, (shape, kind) in kinds.items() if _may_be(name, shape, kind)]
+    asked = [name for name in kinds if name == hints.key]
+    name = chosen_name(path, asked or large, hints, "variables")
+    shape, kind = kinds[name]
+    size = int(np.prod(shape, dtype=np.float64)) * BYTES_OF.get(kind, 8)
+    if kind != "cell" and size > TIMES * hints.max_bytes:
+        raise ContractError(
+            f"{path.name}: {name} takes {size / 1e9:.1f} GB, and this version of MATLAB file can "
+            "only be read whole; save it with -v7.3, or raise --max-mem"
+        )
+    small = [n for n in kinds if n in TABLE_OF]
+    try:
+        found = scipy.io.loadmat(str(path), appendmat=False, variable_names=[name, *small])
+        values, stated = found[name], stated_values({n: found[n] for n in small})
+    except BROKEN as error:
+        raise DecodeError(f"{path.name} is damaged: {error}") from error
+    if values.dtype == object:
+        if values.ndim != 2:
+            raise DecodeError(f"{path.name}: cells of time stamps must be (rows, columns)")
+        return StampsFile(
+            path, values.shape, lambda y: [_cell(path, c) for c in values[y]], stated=stated
+        )
+    usual = "tyx" if name in KEYS else None
+    return ArrayFile(path, values, hints, kind=KEYS.get(name), usual=usual, stated=stated)
+
+
+def _may_be(name: str, shape: tuple[int, ...], kind: str) -> bool:
+    """Tell whether a variable may hold counts or cells of stamps."""
+    if name in TABLE_OF or kind in {"char", "struct", "object", "opaque", "function", "sparse"}:
+        return False
+    return kind == "cell" or sum(side > 1 for side in shape) > 1
+
+
+def _cell(path: Path, cell: Any) -> np.ndarray[Any, Any]:
+    if not isinstance(cell, np.ndarray):
+        raise DecodeError(f"{path.name}: a cell holds {type(cell).__name__}, not time stamps")
+    return cell

@@ -1,0 +1,85 @@
+"""NPZ: arrays by name, the cube among them; nothing in it is ever executed."""
+
+import io
+import zipfile
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from camkit.errors import DecodeError
+from camkit.runtime.kinds.spad.files.array_file import ArrayFile
+from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
+from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
+from camkit.runtime.kinds.spad.files.packed import member_bytes, opened_zip
+
+HEADER_BYTES: Final = 20_000
+SMALL_BYTES: Final = 1_000_000
+SUFFIX: Final = ".npy"
+
+
+def open_npz(path: Path, hints: Hints) -> CountsFile:
+    """Open an NPZ; see `open_counts`."""
+    with opened_zip(path) as archive:
+        members = {i.filename.removesuffix(SUFFIX): i for i in archive.infolist()}
+        if not members:
+            raise DecodeError(f"{path.name} holds no arrays")
+        headers = {name: _header(archive, info) for name, info in members.items()}
+        large = [name for name, (shape, _, _) in headers.items() if len(shape) > 1]
+        name = chosen_name(path, large, hints)
+        small = {
+            other: _array(archive, members[other], headers[other], SMALL_BYTES)
+            for other, (shape, _, _) in headers.items()
+            if len(shape) <= 1 and members[other].file_size < SMALL_BYTES
+        }
+        values = _array(archive, members[name], headers[name], hints.max_bytes)
+    return ArrayFile(path, values, hints, kind=KEYS.get(name), stated=stated_values(small))
+
+
+Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
+
+
+def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
+    """Give shape, order and type of an array.
+
+    Raises:
+        DecodeError: If the member is no array, or a pickled one.
+    """
+    with archive.open(member) as file:
+        start = io.BytesIO(file.read(HEADER_BYTES))
+    try:
+        version = npy.read_magic(start)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, is_fortran, dtype = read(start)
+    except (ValueError, SyntaxError, TypeError) as error:
+        raise DecodeError(f"{member.filename} is no array: {error}") from error
+    if dtype.hasobject:
+        raise DecodeError(
+            f"{member.filename} holds pickled objects, which are never read; store numbers"
+        )
+    return shape, is_fortran, dtype
+
+
+def _array(
+    archive: zipfile.ZipFile, member: zipfile.ZipInfo, header: Header, max_bytes: int
+) -> NDArray[Any]:
+    """Give an array, mapped where it is stored as it is.
+
+    Raises:
+        DecodeError: If the member has fewer bytes than its header says.
+    """
+    shape, is_fortran, dtype = header
+    data = member_bytes(archive, member, max_bytes)
+    count = int(np.prod(shape, dtype=np.int64)) if min(shape, default=1) >= 0 else -1
+    start = io.BytesIO(bytes(data[:HEADER_BYTES]))
+    version = npy.read_magic(start)
+    (npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0)(start)
+    if count < 0 or start.tell() + count * dtype.itemsize > member.file_size:
+        raise DecodeError(
+            f"{member.filename} says it is an array of {shape}, {dtype}, and has only "
+            f"{member.file_size} bytes"
+        )
+    flat: NDArray[Any] = np.frombuffer(data, dtype=dtype, count=count, offset=start.tell())
+    return flat.reshape(shape, order="F" if is_fortran else "C")

@@ -1,0 +1,94 @@
+"""Members of a zip as bytes that can be sliced: mapped, in memory, or in a file without a name."""
+
+import mmap
+import struct
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Final
+
+from camkit.errors import CamkitError, DecodeError
+
+MOST_UNPACKED: Final = 4_000_000_000
+"""Bytes of one member."""
+PIECE: Final = 1 << 20
+LOCAL_HEADER: Final = 30
+BROKEN: Final = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    OSError,
+    ValueError,
+    NotImplementedError,
+    RuntimeError,
+    struct.error,
+)
+"""What zipfile raises of files that are damaged, encrypted or packed in other ways."""
+
+
+@contextmanager
+def opened_zip(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open a zip; what is wrong with it inside the block is told as a `DecodeError`."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            yield archive
+    except CamkitError:
+        raise
+    except BROKEN as error:
+        raise DecodeError(f"{path.name} is damaged, or no zip: {error}") from error
+
+
+def member_bytes(
+    archive: zipfile.ZipFile, member: zipfile.ZipInfo, max_bytes: int
+) -> memoryview | mmap.mmap:
+    """Give the bytes of a member.
+
+    Args:
+        archive: Open.
+        member: Which.
+        max_bytes: What may be held in memory; more lies in a file.
+
+    Raises:
+        DecodeError: If it unpacks to more than a capture has.
+    """
+    if member.file_size > MOST_UNPACKED:
+        raise DecodeError(
+            f"{member.filename} unpacks to {member.file_size / 1e9:.1f} GB, more than "
+            f"{MOST_UNPACKED / 1e9:.0f} GB are unpacked; store it as it is, or as HDF5"
+        )
+    if member.file_size == 0:
+        raise DecodeError(f"{member.filename} is empty")
+    if member.compress_type == zipfile.ZIP_STORED and archive.filename is not None:
+        return memoryview(_mapped(Path(archive.filename), member))[_at(archive, member) :]
+    with archive.open(member) as packed:
+        if member.file_size <= max_bytes:
+            return memoryview(packed.read())
+        with tempfile.TemporaryFile() as file:
+            return _spilled(packed, file)
+
+
+def _mapped(path: Path, member: zipfile.ZipInfo) -> mmap.mmap:
+    with path.open("rb") as file:
+        found = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    if member.header_offset + LOCAL_HEADER + member.file_size > len(found):
+        raise DecodeError(f"{path.name} is cut off")
+    return found
+
+
+def _at(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> int:
+    """Give where the bytes of a stored member begin (APPNOTE 4.3.7)."""
+    with Path(str(archive.filename)).open("rb") as file:
+        file.seek(member.header_offset)
+        header = file.read(LOCAL_HEADER)
+    name, extra = struct.unpack("<HH", header[26:30])
+    return int(member.header_offset + LOCAL_HEADER + name + extra)
+
+
+def _spilled(packed: IO[bytes], file: IO[bytes]) -> mmap.mmap:
+    while piece := packed.read(PIECE):
+        file.write(piece)
+    file.flush()
+    return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)

@@ -1,0 +1,85 @@
+"""PTU of PicoQuant, T3: images as histograms of every pixel, other measurements as one pixel."""
+
+import logging
+import struct
+import warnings
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
+from camkit.runtime.kinds.spad.files.array_file import ArrayFile
+from camkit.runtime.kinds.spad.files.counts_file import EXTRA, CountsFile, Hints
+
+BROKEN: Final = (
+    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError, MemoryError),
+    *(NotImplementedError, UnicodeDecodeError, UnboundLocalError, ZeroDivisionError),
+    *(AttributeError, RuntimeError, struct.error),
+)
+"""What ptufile raises of files that are damaged, or of other measurements."""
+RECORD_BYTES: Final = 4
+COUNT_BYTES: Final = 4
+TIMES: Final = 2
+"""Of max_bytes: such files are read whole."""
+logging.getLogger("ptufile").addHandler(logging.NullHandler())
+
+
+def open_ptu(path: Path, hints: Hints) -> CountsFile:
+    """Open a PTU file; see `open_counts`."""
+    try:
+        import ptufile
+    except ImportError as error:
+        raise UnsupportedError(f"reading {path.name} needs ptufile: {EXTRA}") from error
+    try:
+        with warnings.catch_warnings(), ptufile.PtuFile(path) as file:
+            warnings.simplefilter("ignore")
+            _check_whole(path, file)
+            values = _histograms(path, file, hints)
+            width_ps = float(file.tcspc_resolution) * 1e12
+    except CamkitError:
+        raise
+    except BROKEN as error:
+        raise DecodeError(f"{path.name} is damaged, or no PTU of T3: {error}") from error
+    stated = {"orientation": "histogram", "time_bin_ps": width_ps}
+    return ArrayFile(path, values, hints, kind="histogram", usual="yxt", stated=stated)
+
+
+def _check_whole(path: Path, file: Any) -> None:
+    room = path.stat().st_size - int(file.record_offset)
+    if int(file.number_records) * RECORD_BYTES > room:
+        raise DecodeError(
+            f"{path.name} is cut off: {file.number_records} photons and markers are announced, "
+            f"{max(room, 0) // RECORD_BYTES} are there"
+        )
+
+
+def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
+    """Give (y, x, t), all frames summed."""
+    if not file.is_t3:
+        raise DecodeError(f"{path.name} is no T3 measurement: it has no times within a cycle")
+    channels = len(file.active_channels)
+    channel = _channel(path, channels, hints)
+    size = float(np.prod(file.shape[1:], dtype=np.float64)) * COUNT_BYTES
+    if size > TIMES * hints.max_bytes:
+        raise ContractError(
+            f"{path.name} unpacks to {size / 1e9:.3g} GB, and such files are read whole; raise "
+            "--max-mem, or save its histograms as HDF5"
+        )
+    if not file.is_image:
+        found = np.asarray(file.decode_histogram(dtype="uint32"))
+        return np.asarray(found.reshape(-1, found.shape[-1])[channel])[None, None]
+    cube = np.asarray(file.decode_image(frame=-1, channel=channel, dtype="uint32"))
+    return cube.reshape(cube.shape[1], cube.shape[2], cube.shape[-1])
+
+
+def _channel(path: Path, count: int, hints: Hints) -> int:
+    known = [f"channel {number}" for number in range(count)]
+    if hints.key is None and count == 1:
+        return 0
+    if hints.key not in known:
+        raise ContractError(
+            f"{path.name} holds {', '.join(known)}; say which by [array] key in a file for --timing"
+        )
+    return known.index(hints.key)

@@ -1,0 +1,97 @@
+"""SPC of Becker & Hickl (SPC-130, SPC-150): one record of 32 bits for every photon.
+
+    bits 0..11   macro time, in ticks of the clock, modulo 4096
+    bits 12..15  routing
+    bits 16..27  ADC; the time within a cycle is 4095 - ADC, for the clock stops what a photon began
+    bit 28       marker, 29 gap, 30 overflow of the macro time, 31 no photon
+
+The first record is a header. A record that is an overflow and no photon holds in its lower 28 bits
+how many times the macro time ran over.
+
+References: The bh TCSPC Handbook, FIFO data format of the SPC-130 and SPC-150 modules.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.errors import DecodeError
+from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
+from camkit.runtime.kinds.spad.files.stamps import StampsFile
+
+RECORD_BYTES: Final = 4
+MACRO_TICKS: Final = 4096
+LAST_ADC: Final = 4095
+MARKER: Final = np.uint32(1 << 28)
+OVERFLOW: Final = np.uint32(1 << 30)
+NO_PHOTON: Final = np.uint32(1 << 31)
+OVERFLOWS: Final = np.uint32((1 << 28) - 1)
+TAC_STEP: Final = re.compile(rb"SP_TAC_TC,F,([0-9.eE+-]+)\]")
+SET_BYTES: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Photons:
+    """The photons of a stream, in the order they came.
+
+    Attributes:
+        macro: (n,) ticks of the clock since the beginning.
+        micro: (n,) time within the cycle, in steps of the TAC.
+        routing: (n,) which detector.
+    """
+
+    macro: NDArray[np.int64]
+    micro: NDArray[np.uint16]
+    routing: NDArray[np.uint8]
+
+
+def decode_spc(data: bytes) -> Photons:
+    """Decode a stream.
+
+    Raises:
+        DecodeError: If it is not whole records, or has no header.
+    """
+    if len(data) < RECORD_BYTES or len(data) % RECORD_BYTES:
+        raise DecodeError(f"{len(data)} bytes are no whole records of {RECORD_BYTES}")
+    records = np.frombuffer(data, dtype="<u4")
+    if not records[0] & NO_PHOTON:
+        raise DecodeError("the first record is no header of an SPC-130 or SPC-150")
+    records = records[1:]
+    is_over, is_none = (records & OVERFLOW) > 0, (records & NO_PHOTON) > 0
+    many = np.where(is_none, records & OVERFLOWS, 1)
+    overflows = np.cumsum(np.where(is_over, many, 0).astype(np.int64))
+    is_photon = ~is_none & ~((records & MARKER) > 0)
+    own = records[is_photon]
+    return Photons(
+        macro=(own & 0xFFF).astype(np.int64) + MACRO_TICKS * overflows[is_photon],
+        micro=(LAST_ADC - ((own >> 16) & 0xFFF)).astype(np.uint16),
+        routing=((own >> 12) & 0xF).astype(np.uint8),
+    )
+
+
+def open_spc(path: Path, hints: Hints) -> CountsFile:
+    """Open a stream as the time stamps of one pixel; see `open_counts`."""
+    del hints
+    try:
+        photons = decode_spc(path.read_bytes())
+    except DecodeError as error:
+        raise DecodeError(f"{path.name} is damaged, or no SPC: {error}") from error
+    step = _tac_step_ps(path.with_suffix(".set"))
+    stated = {} if step is None else {"stamp_ps": step}
+    return StampsFile(path, (1, 1), lambda _: [photons.micro], stated=stated)
+
+
+def _tac_step_ps(path: Path) -> float | None:
+    """Give the step of the TAC from the set-up file beside a stream; None without one."""
+    if not path.is_file():
+        return None
+    with path.open("rb") as file:
+        found = TAC_STEP.search(file.read(SET_BYTES))
+    try:
+        return None if found is None else float(found[1]) * 1e12
+    except ValueError:
+        return None

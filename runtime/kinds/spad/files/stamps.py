@@ -1,0 +1,77 @@
+"""Time stamps of photons, pixel by pixel, sorted into bins when rows are asked for."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.files.counts_file import CountsFile, checked_size
+
+
+class StampsFile(CountsFile):
+    """The stamps of every pixel."""
+
+    def __init__(
+        self,
+        path: Path,
+        shape: tuple[int, int],
+        cells: Callable[[int], Sequence[NDArray[Any]]],
+        *,
+        stated: Mapping[str, object] | None = None,
+        close: Callable[[], None] | None = None,
+    ) -> None:
+        """Look at stamps.
+
+        Args:
+            path: Where they came from.
+            shape: (h, w).
+            cells: Row -> the stamps of each of its pixels, arrays of any shape.
+            stated: What is known of their times.
+            close: Lets go of what they lie in.
+        """
+        self.path, self.kind, self.bins = path, "stamps", 0
+        self.height, self.width = checked_size(path, *shape)
+        self.stated, self._close = {"orientation": "histogram", **(stated or {})}, close
+        self._cells = cells
+        self._outside: dict[int, int] = {}
+
+    def rows(self, top: int, bottom: int, edges: NDArray[np.float64] | None = None) -> FloatArray:
+        """Sort the stamps of some rows; see `CountsFile`."""
+        if edges is None:
+            raise ContractError("time stamps need the edges of bins")
+        found = np.empty((bottom - top, self.width, len(edges) - 1), np.float32)
+        for y in range(top, bottom):
+            cells = [np.ravel(cell) for cell in self._cells(y)]
+            sizes = [cell.size for cell in cells]
+            stamps = np.concatenate([_numbers(self.path, cell) for cell in cells])
+            at = np.searchsorted(edges, stamps, side="right") - 1
+            inside = (at >= 0) & (at < len(edges) - 1)
+            self._outside[y] = int((~inside).sum())
+            pixel = np.repeat(np.arange(self.width), sizes)
+            flat = pixel[inside] * (len(edges) - 1) + at[inside]
+            counts = np.bincount(flat, minlength=self.width * (len(edges) - 1))
+            found[y - top] = counts.reshape(self.width, -1)
+        return found
+
+    @property
+    def outside(self) -> int:
+        """Give how many stamps of the rows read so far lay outside all bins."""
+        return sum(self._outside.values())
+
+    def close(self) -> None:
+        """Let go of what they lie in."""
+        if self._close is not None:
+            self._close()
+
+
+def _numbers(path: Path, cell: NDArray[Any]) -> NDArray[np.float64]:
+    if cell.size and cell.dtype.kind not in "biuf":
+        raise DecodeError(f"{path.name}: a cell holds {cell.dtype}; expected time stamps")
+    stamps = cell.astype(np.float64) if cell.size else np.empty(0)
+    if not np.isfinite(stamps).all():
+        raise DecodeError(f"{path.name} holds time stamps that are not finite")
+    return np.asarray(stamps)

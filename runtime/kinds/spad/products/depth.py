@@ -1,0 +1,164 @@
+"""Depth and what goes with it, of histograms and gate scans."""
+
+import time
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.kinds.spad.products.archive import write_archive
+from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
+from camkit.runtime.kinds.spad.products.points import write_points
+from camkit.runtime.kinds.spad.products.preview import depth_picture, write_preview
+from camkit.runtime.kinds.spad.products.record import told_pulse, told_way
+from camkit.runtime.kinds.spad.products.strips import pieces
+from camkit.runtime.kinds.spad.products.survey import Survey
+from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, stacked
+from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
+from camkit.runtime.maker import Made, Making
+
+PIXEL_BYTES: Final = 150
+"""Of all arrays of one return."""
+NAMED_HOT: Final = 10
+
+
+def make_depth(making: Making, survey: Survey, began: float) -> Made:
+    """Fit every pixel and say what was found.
+
+    Args:
+        making: The capture.
+        survey: It, opened.
+        began: When work on it began, of `time.perf_counter`.
+
+    Raises:
+        DecodeError: If the file is damaged, or holds no counts.
+        ContractError: If what is stated of it cannot be true of it.
+        Cancelled: If the caller wished so.
+    """
+    pulse, guessed = survey.pulse()
+    read_s = time.perf_counter() - began
+    sharpener = Sharpener(survey.an_axis, pulse, survey.settings.way)
+    found, blind, worst = _worked_through(making, survey, sharpener)
+    arrays = _arrays(found, survey)
+    fit_s = time.perf_counter() - began - read_s
+    array = survey.timing.array
+    is_known = array.pitch_um is not None and array.focal_length_mm is not None
+    # where nothing is known of the lens, one whose focal length is the width of the array
+    lens = {
+        "pitch_um": (array.pitch_um or 1.0) if is_known else 1.0,
+        "focal_length_mm": (array.focal_length_mm or 1.0) if is_known else survey.shape[1] * 1e-3,
+    }
+    layers = arrays["depth_m"].reshape(found.valid.shape)
+    return Made(
+        arrays=arrays,
+        writers={
+            ".npz": lambda path: write_archive(path, arrays),
+            ".ply": lambda path: write_points(path, layers, found.intensity, **lens),
+            ".png": lambda path: write_preview(path, depth_picture(layers[0])),
+        },
+        pictures={
+            "exr": (".exr", lambda path: write_exr(path, layers, "Z")),
+            "tiff": (".tif", lambda path: write_tiff(path, layers)),
+        },
+        record={
+            "product": "depth",
+            **told_way(survey.settings.way),
+            **told_pulse(pulse, is_guessed=guessed is not None),
+            "templates": len(sharpener.fitter.bank.mu_ps),
+        },
+        seconds={"read": read_s, "sharpen": fit_s},
+        warnings=_warnings(found, blind, survey, guessed, is_lens_known=is_known),
+        sections={"spad": _section(found, blind, worst)},
+    )
+
+
+def _worked_through(
+    making: Making, survey: Survey, sharpener: Sharpener
+) -> tuple[Sharpened, NDArray[np.bool_], float]:
+    """Give what was found, which pixels were blind, and the worst loss to pile-up."""
+    way = survey.settings.way
+    cut = pieces(
+        survey.shape,
+        survey.bins,
+        reach=way.reach_px,
+        max_mem_bytes=survey.settings.max_mem_bytes,
+        held_bytes=PIXEL_BYTES * way.returns * survey.shape[0] * survey.shape[1],
+    )
+    hot = survey.timing.hot(survey.shape)
+    found, blind, worst = [], [], 0.0
+    for piece in cut:
+        check_cancelled(making.cancel)
+        strip = survey.rows.rows(piece.first, piece.end)
+        rows = slice(piece.first, piece.end)
+        found.append(
+            sharpener.strip(strip.counts, hot=hot[rows], blind=strip.blind, core=piece.core)
+        )
+        blind.append(strip.blind[piece.core])
+        worst = max(worst, strip.worst)
+        if making.progress is not None:
+            making.progress(piece.bottom, survey.shape[0])
+    return stacked(found), np.concatenate(blind), worst
+
+
+def _arrays(found: Sharpened, survey: Survey) -> dict[str, NDArray[Any]]:
+    """Give the arrays of the archive; the leading axis goes where there is one return."""
+    dark = survey.timing.dark(survey.shape)
+    depth = (found.time_of_flight_ps - survey.timing.correction.offset_ps) * LIGHT_M_PER_PS / 2
+    arrays: dict[str, NDArray[Any]] = {
+        "depth_m": np.where(found.valid, depth, np.nan),
+        "time_of_flight_ps": found.time_of_flight_ps,
+        "amplitude": found.amplitude.astype(np.float32),
+        "background": np.maximum(found.background - dark, 0.0).astype(np.float32),
+        "sigma_ps": found.sigma_ps.astype(np.float32),
+        "evidence": found.evidence.astype(np.float32),
+        "intensity": (found.intensity - dark * survey.bins).astype(np.float32),
+        "valid": found.valid,
+        "pooled": found.pooled.astype(np.uint8),
+    }
+    if survey.settings.way.returns == 1:
+        return {name: values[0] for name, values in arrays.items()}
+    return arrays
+
+
+def _section(found: Sharpened, blind: NDArray[np.bool_], worst: float) -> Mapping[str, Any]:
+    sides, counts = np.unique(found.pooled[found.valid], return_counts=True)
+    return {
+        "pixels": int(found.hot[0].size),
+        "valid": [int(layer.sum()) for layer in found.valid],
+        "hot": [[int(x), int(y)] for y, x in np.argwhere(found.hot[0])],
+        "blind": int(blind.sum()),
+        "pile_up": round(worst, 4),
+        "pooled": {str(s): int(n) for s, n in zip(sides.tolist(), counts.tolist(), strict=True)},
+        "photons": float(np.round(found.intensity[0].sum(), 1)),
+    }
+
+
+def _warnings(
+    found: Sharpened,
+    blind: NDArray[np.bool_],
+    survey: Survey,
+    guessed: str | None,
+    *,
+    is_lens_known: bool,
+) -> tuple[str, ...]:
+    told = [] if guessed is None else [guessed]
+    hot = np.argwhere(found.hot[0])
+    if len(hot):
+        places = ", ".join(f"({x}, {y})" for y, x in hot[:NAMED_HOT])
+        more = f" and {len(hot) - NAMED_HOT} more" if len(hot) > NAMED_HOT else ""
+        told.append(f"hot pixels at {places}{more}: painted over and not valid")
+    if blind.any():
+        told.append(
+            f"{int(blind.sum())} pixels lost bins to pile-up: more cycles were used up than can "
+            "be corrected for; they are not valid"
+        )
+    if not found.valid.any():
+        told.append("no pixel has enough photons to believe a return")
+    if not is_lens_known:
+        told.append(
+            "nothing says how the array looks out: the points assume a focal length of the "
+            "array's width; state [array] pitch_um and focal_length_mm"
+        )
+    return (*told, *survey.warnings())

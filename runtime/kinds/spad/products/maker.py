@@ -1,0 +1,110 @@
+"""A capture of single photons -> its product; and what would be done, without doing it."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from camkit.runtime.kinds.spad.products.depth import make_depth
+from camkit.runtime.kinds.spad.products.intensity import make_intensity
+from camkit.runtime.kinds.spad.products.record import told_axis, told_way
+from camkit.runtime.kinds.spad.products.settings import identity
+from camkit.runtime.kinds.spad.products.survey import Survey, surveyed
+from camkit.runtime.kinds.spad.products.transient import make_transient
+from camkit.runtime.kinds.spad.sharpen import METHODS
+from camkit.runtime.maker import Made, Maker, Making
+from camkit.runtime.options import Options
+
+MAKERS: Final = {
+    "depth": make_depth,
+    "intensity": make_intensity,
+    "transient": make_transient,
+}
+BESIDE: Final[Mapping[str | None, tuple[str, ...]]] = {
+    "depth": (".ply", ".png"),
+    "intensity": (".png", ".mp4"),
+    "transient": (".png", ".mp4"),
+    None: (".ply", ".png", ".mp4"),
+}
+
+
+def make(making: Making) -> Made:
+    """Make the product of a capture.
+
+    Raises:
+        DecodeError: If it cannot be read.
+        ContractError: If capture and options do not fit each other.
+        Cancelled: If the caller wished so.
+    """
+    began = time.perf_counter()
+    with surveyed(making) as survey:
+        return MAKERS[survey.product](making, survey, began)
+
+
+def plan(making: Making) -> Mapping[str, Any]:
+    """Say what `make` would do; errors as there."""
+    with surveyed(making) as survey:
+        found: dict[str, Any] = {
+            "product": survey.product,
+            "width": survey.shape[1],
+            "height": survey.shape[0],
+            "bins": survey.bins,
+        }
+        if survey.axis is not None:
+            found |= told_axis(survey.axis)
+        if survey.product == "depth":
+            found |= told_way(survey.settings.way)
+        return {
+            "size": None,
+            "decisions": list(_decisions(survey)),
+            "estimate": None,
+            "plan": found,
+            "warnings": list(survey.warnings()),
+        }
+
+
+def _decisions(survey: Survey) -> list[dict[str, Any]]:
+    way, is_asked = survey.settings.way, survey.settings.product is not None
+    of_file = "the capture holds " + ("counts" if survey.axis is None else "times of photons")
+    found: list[tuple[str, str, str]] = [
+        ("product", survey.product, "asked" if is_asked else of_file)
+    ]
+    if survey.product == "depth":
+        pulse = "a pulse is stated" if survey.timing.pulse() is not None else "none is stated"
+        found += [
+            ("pulse", "stated" if "a pulse" in pulse else "estimated", pulse),
+            ("method", way.method, "asked" if "method" in survey.settings.chosen else "default"),
+            (
+                "neighbours",
+                way.pool,
+                "only where one pixel has too few photons" if way.pool == "auto" else "asked",
+            ),
+        ]
+    cycles = survey.timing.timing.cycles
+    reason = f"{cycles} cycles are stated" if cycles else "no cycles are stated"
+    found.append(("pile-up", "corrected" if cycles else "left as it is", reason))
+    return [
+        {"what": what, "choice": choice, "reason": reason, "saving_s": 0.0, "cost_db": 0.0}
+        for what, choice, reason in found
+    ]
+
+
+def stem(path: Path) -> str:
+    """Give the name of a capture without its type; NAME.sdt.zip is NAME."""
+    return Path(path.stem).stem if path.name.lower().endswith(".sdt.zip") else path.stem
+
+
+def _beside(options: Options) -> tuple[str, ...]:
+    return BESIDE[options.chosen("product")]
+
+
+MAKER: Final = Maker(
+    make=make,
+    plan=plan,
+    suffix=".npz",
+    beside=_beside,
+    formats={"exr": ".exr", "tiff": ".tif"},
+    methods=METHODS,
+    identity=identity,
+    stem=stem,
+)

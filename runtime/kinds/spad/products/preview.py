@@ -1,0 +1,72 @@
+"""Pictures to look at: depth in colours, photons in grey, small arrays enlarged."""
+
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.errors import ContractError
+
+Codes = NDArray[np.uint8]
+UNKNOWN: Final = 48
+"""Grey of a pixel that is not valid."""
+LEAST_SIDE_PX: Final = 256
+SHOWN: Final = (2.0, 98.0)
+"""Percentiles of depth between which colours run."""
+BRIGHTEST: Final = 99.5
+"""Percentile of photons that is white."""
+GAMMA: Final = 2.2
+
+
+def depth_picture(depth_m: NDArray[np.float64]) -> Codes:
+    """Give depth (h, w) as colours (h, w, 3) BGR: near is red, far blue, not known grey."""
+    known = np.isfinite(depth_m)
+    if not known.any():
+        return np.full((*depth_m.shape, 3), UNKNOWN, np.uint8)
+    near, far = np.percentile(depth_m[known], SHOWN)
+    place = (far - np.where(known, depth_m, far)) / max(far - near, 1e-9)
+    codes = np.round(np.clip(place, 0, 1) * 255).astype(np.uint8)
+    found = cv2.applyColorMap(codes, cv2.COLORMAP_TURBO)
+    found[~known] = UNKNOWN
+    return np.asarray(found, dtype=np.uint8)
+
+
+def grey_picture(photons: NDArray[np.floating], white: float) -> Codes:
+    """Give photons (h, w) as grey (h, w, 3), `white` photons as white."""
+    share = np.clip(photons / max(white, 1e-9), 0, 1)
+    codes = np.round(share ** (1 / GAMMA) * 255).astype(np.uint8)
+    return np.repeat(codes[..., None], 3, axis=2)
+
+
+def white_of(photons: NDArray[np.floating]) -> float:
+    """Give how many photons are shown white in a picture (h, w)."""
+    return float(np.percentile(photons, BRIGHTEST)) if photons.size else 1.0
+
+
+def enlarged(codes: Codes, *, even: bool = False) -> Codes:
+    """Give a picture with every pixel as a square where it would be too small to look at.
+
+    Args:
+        codes: (h, w, 3).
+        even: Whether sides must be even numbers, as films want them.
+    """
+    times = max(1, -(-LEAST_SIDE_PX // max(codes.shape[:2])))
+    times += times % 2 if even and times > 1 else 0
+    found = codes.repeat(times, axis=0).repeat(times, axis=1)
+    if even:
+        found = np.pad(found, ((0, found.shape[0] % 2), (0, found.shape[1] % 2), (0, 0)), "edge")
+    return np.asarray(found, dtype=np.uint8)
+
+
+def write_preview(path: Path, codes: Codes) -> None:
+    """Write a PNG.
+
+    Raises:
+        ContractError: If it cannot be encoded.
+    """
+    done, data = cv2.imencode(".png", enlarged(codes))
+    if not done:
+        raise ContractError(f"cannot write a PNG of {codes.shape[1]}x{codes.shape[0]}")
+    path.write_bytes(data.tobytes())

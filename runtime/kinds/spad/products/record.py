@@ -1,0 +1,39 @@
+"""What a sidecar and a plan say of how a capture is worked through."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, GatedPulse, GaussianPulse, Pulse
+from camkit.runtime.kinds.spad.sharpen import Way
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
+
+
+def told_way(way: Way) -> Mapping[str, Any]:
+    """Say how pixels are fitted, as plain JSON values."""
+    return {
+        "method": way.method,
+        "pool": way.pool,
+        "returns": way.returns,
+        "false_alarms": way.false_alarms,
+    }
+
+
+def told_axis(axis: TimeAxis) -> Mapping[str, Any]:
+    """Say where the bins lie, as plain JSON values."""
+    return {
+        "orientation": axis.orientation,
+        "bins": axis.bins,
+        "time_bin_ps": round(axis.step_ps, 4),
+        "first_ps": round(float(axis.centres_ps[0]), 4),
+    }
+
+
+def told_pulse(pulse: Pulse, *, is_guessed: bool) -> Mapping[str, Any]:
+    """Say what a pulse looks like, as plain JSON values."""
+    if isinstance(pulse, GatedPulse):
+        shape = {"width_ps": pulse.width_ps, "rc_ps": pulse.rc_ps, "sigma_ps": pulse.sigma_ps}
+    elif isinstance(pulse, GaussianPulse):
+        shape = {"fwhm_ps": round(pulse.sigma_ps * FWHM_PER_SIGMA, 2)}
+    else:
+        shape = {"measured_from_ps": pulse.start_ps, "measured_to_ps": pulse.end_ps}
+    return {"pulse": {**shape, "guessed": is_guessed}}

@@ -1,0 +1,85 @@
+"""What the caller chose for a capture of single photons, with the timing file it names."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal, get_args
+
+from camkit.errors import ContractError
+from camkit.runtime.kinds.spad.pooling import Pool
+from camkit.runtime.kinds.spad.sharpen import METHODS, Method, Way
+from camkit.runtime.kinds.spad.timing import Timing, read_timing
+from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
+
+Product = Literal["depth", "intensity", "transient"]
+PRODUCTS: Final[tuple[Product, ...]] = get_args(Product)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """What is to be made, and how.
+
+    Attributes:
+        product: None for what the capture is: depth of histograms, intensity of counts.
+        way: How depth is fitted.
+        chosen: Options of depth alone that were chosen.
+        timing: What is known of times.
+        max_mem_bytes: Memory that the process may take.
+    """
+
+    product: Product | None
+    way: Way
+    chosen: tuple[str, ...]
+    timing: Timing
+    max_mem_bytes: int
+
+    @classmethod
+    def of(cls, options: Options) -> "Settings":
+        """Read what was chosen.
+
+        Raises:
+            ContractError: If the timing file is none.
+        """
+        named = options.chosen("timing")
+        method: Method = next((m for m in METHODS if m == options.method), "log")
+        pool: Pool = options.chosen("pool") or "auto"  # type: ignore[assignment]
+        chosen = [name for name in ("pool", "returns") if options.chosen(name) is not None]
+        return cls(
+            product=options.chosen("product"),  # type: ignore[arg-type]
+            way=Way(method=method, pool=pool, returns=int(options.chosen("returns") or 1)),
+            chosen=(*["method"][: options.method is not None], *chosen),
+            timing=Timing() if named is None else read_timing(Path(named)),
+            max_mem_bytes=options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES,
+        )
+
+    def product_of(self, *, is_histogram: bool) -> Product:
+        """Give what is to be made of a capture.
+
+        Raises:
+            ContractError: If it cannot be, or an option means nothing to it.
+        """
+        product = self.product or ("depth" if is_histogram else "intensity")
+        if product != "intensity" and not is_histogram:
+            raise ContractError(
+                f"{product} needs the times of photons, and this capture holds counts alone; say "
+                "--product intensity"
+            )
+        if product != "depth" and self.chosen:
+            raise ContractError(
+                f"{', '.join('--' + name for name in self.chosen)} means nothing to the product "
+                f"{product}: it is for depth; leave it out"
+            )
+        return product
+
+
+def identity(options: Options) -> Mapping[str, Any]:
+    """Give the content of the files that options name, and of those that these name."""
+    named = options.chosen("timing")
+    if named is None:
+        return {}
+    files = [Path(named), *read_timing(Path(named)).files]
+    return {
+        f"timing_{number}": hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+        for number, file in enumerate(files)
+    }

@@ -1,0 +1,74 @@
+"""In how many rows at once a capture is worked through, under a cap of memory."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from camkit.errors import ContractError
+
+KEPT_BYTES: Final = 260_000_000
+"""What the process needs beside its rows."""
+BYTES_OF_COUNT: Final = 32
+"""What a count of a strip takes, with all that is made of it in between."""
+MOST_COUNTS: Final = 24_000_000
+"""Of a strip: more rows at once make nothing faster."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """Some rows, with those around that bear on them.
+
+    Attributes:
+        top: First row that is asked for.
+        bottom: The one after the last.
+        first: First row that is read.
+        end: The one after the last that is read.
+    """
+
+    top: int
+    bottom: int
+    first: int
+    end: int
+
+    @property
+    def core(self) -> slice:
+        """Give the rows that are asked for among those that are read."""
+        return slice(self.top - self.first, self.bottom - self.first)
+
+
+def pieces(
+    shape: tuple[int, int], bins: int, *, reach: int, max_mem_bytes: int, held_bytes: int
+) -> list[Piece]:
+    """Cut an array into pieces.
+
+    Args:
+        shape: (h, w).
+        bins: Counts of a pixel.
+        reach: Rows above and below that bear on a row.
+        max_mem_bytes: Memory that the process may take.
+        held_bytes: What of it all products together take.
+
+    Raises:
+        ContractError: If not even one row fits.
+    """
+    height, width = shape
+    free = max_mem_bytes - KEPT_BYTES - held_bytes
+    of_row = width * bins
+    rows = min(free // BYTES_OF_COUNT, MOST_COUNTS) // of_row - 2 * reach
+    least = of_row * BYTES_OF_COUNT * min(height, 2 * reach + 1)
+    if free < least:
+        need = KEPT_BYTES + held_bytes + least
+        raise ContractError(
+            f"{width}x{height} pixels of {bins} bins need --max-mem {need // 10**6 + 1}M; the cap "
+            f"is {max_mem_bytes // 10**6}M"
+        )
+    return list(_cut(height, max(rows, 1), reach))
+
+
+def _cut(height: int, rows: int, reach: int) -> Iterator[Piece]:
+    count = -(-height // rows)
+    for number in range(count):
+        top, bottom = number * height // count, (number + 1) * height // count
+        yield Piece(
+            top=top, bottom=bottom, first=max(0, top - reach), end=min(height, bottom + reach)
+        )

@@ -1,0 +1,137 @@
+"""An open capture with its axis and pulse: what every product begins with."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.kinds.spad.corrected import CorrectedRows
+from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
+from camkit.runtime.kinds.spad.files.open_counts import open_counts
+from camkit.runtime.kinds.spad.guess_pulse import guess_pulse
+from camkit.runtime.kinds.spad.products.settings import Product, Settings
+from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, Pulse
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
+from camkit.runtime.kinds.spad.timing import Timing
+from camkit.runtime.maker import Making
+
+SAMPLE_ROWS: Final = 16
+"""Rows, evenly spread, in which a pulse is looked for that nobody stated."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """A capture before its rows are worked through.
+
+    Attributes:
+        file: Open.
+        product: What is to be made.
+        timing: What is known of times, from the caller and the capture.
+        axis: Of its times; None for counts.
+        rows: Its rows, pile-up undone.
+        settings: What the caller chose.
+    """
+
+    file: CountsFile
+    product: Product
+    timing: Timing
+    axis: TimeAxis | None
+    rows: CorrectedRows
+    settings: Settings
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Give (h, w)."""
+        return self.file.height, self.file.width
+
+    @property
+    def bins(self) -> int:
+        """Give how many time bins, or frames, a pixel has."""
+        return self.file.bins if self.axis is None else self.axis.bins
+
+    @property
+    def an_axis(self) -> TimeAxis:
+        """Give the axis.
+
+        Raises:
+            ContractError: If the capture has no times.
+        """
+        if self.axis is None:
+            raise ContractError(f"{self.file.path.name} holds no times of photons")
+        return self.axis
+
+    def pulse(self) -> tuple[Pulse, str | None]:
+        """Give the pulse, and what the user should know if nobody stated it.
+
+        Raises:
+            ContractError: If none is stated and too few photons show one.
+        """
+        stated = self.timing.pulse()
+        if stated is not None:
+            return stated, None
+        guessed = guess_pulse(self._sample(), self.an_axis)
+        told = (
+            f"no pulse is stated: a Gaussian of {FWHM_PER_SIGMA * guessed.sigma_ps:.3g} ps full "
+            "width was found in the capture; state [laser] fwhm_ps, [gate] or [irf] if it is known"
+        )
+        return guessed, told
+
+    def warnings(self) -> tuple[str, ...]:
+        """Give what the user should know of the capture itself, once its rows were read."""
+        outside = self.file.outside
+        if not outside:
+            return ()
+        return (f"{outside} time stamps lie outside the bins of [timing] and were left out",)
+
+    def _sample(self) -> FloatArray:
+        height = self.file.height
+        rows = np.unique(np.linspace(0, height - 1, min(height, SAMPLE_ROWS)).astype(int))
+        found = [self.rows.rows(int(row), int(row) + 1).counts for row in rows]
+        return np.concatenate(found).reshape(-1, self.bins)
+
+
+@contextmanager
+def surveyed(making: Making) -> Iterator[Survey]:
+    """Open a capture and say what it is.
+
+    Raises:
+        DecodeError: If it cannot be read.
+        ContractError: If capture and options do not fit each other.
+        UnsupportedError: If a bundle is given.
+    """
+    if making.bundle is not None:
+        raise UnsupportedError(
+            f"this camkit sharpens counts without a bundle only; {making.bundle.manifest.name} "
+            "needs a newer one"
+        )
+    settings = Settings.of(making.options)
+    array = settings.timing.array
+    hints = Hints(axes=array.axes, key=array.key, max_bytes=settings.max_mem_bytes // 4)
+    with open_counts(Path(making.path), hints) as file:
+        timing = settings.timing.with_stated(file.stated)
+        product = settings.product_of(is_histogram=file.kind != "counts")
+        axis = None if file.kind == "counts" else _axis(file, timing)
+        yield Survey(
+            file=file,
+            product=product,
+            timing=timing,
+            axis=axis,
+            rows=CorrectedRows(
+                file,
+                axis,
+                cycles=timing.timing.cycles,
+                stamp_ps=timing.array.stamp_ps or 1.0,
+            ),
+            settings=settings,
+        )
+
+
+def _axis(file: CountsFile, timing: Timing) -> TimeAxis:
+    if file.kind == "stamps":
+        return timing.axis(orientation="histogram")
+    return timing.axis(bins=file.bins)

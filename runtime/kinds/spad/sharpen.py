@@ -1,0 +1,186 @@
+"""Depth of every pixel: rows of counts -> fit, hot pixels, neighbours where needed, two returns.
+
+    counts -> every pixel alone -> hot pixels -> squares where one pixel is not enough
+                                             `-> second return where the residual asks for one
+           -> Sharpened: time, amplitude, background, sigma, evidence, what is believed
+
+A hot pixel shows what lies around it and is never believed. A blind one (pile-up left nothing of
+some of its bins) is fitted and not believed.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.runtime.kinds.spad.bank import make_bank
+from camkit.runtime.kinds.spad.fit import Fit, Fitter
+from camkit.runtime.kinds.spad.hot_pixels import AROUND, find_hot, painted_over
+from camkit.runtime.kinds.spad.least_squares import LeastSquares
+from camkit.runtime.kinds.spad.pooling import FALSE_ALARMS, SIDES, Pool, Pooled, fit_pooled
+from camkit.runtime.kinds.spad.pulse import Pulse
+from camkit.runtime.kinds.spad.second_return import SecondReturns
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
+
+Method = Literal["log", "lsq"]
+METHODS: Final[tuple[Method, ...]] = ("log", "lsq")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Way:
+    """How pixels are fitted.
+
+    Attributes:
+        method: log: the log-matched bank. lsq: least squares, as the dissertation does.
+        pool: Side of the squares where one pixel is not enough.
+        returns: How many surfaces a pixel may show, 1 or 2.
+        false_alarms: Rate per pixel at which a return is believed that is none.
+    """
+
+    method: Method = "log"
+    pool: Pool = "auto"
+    returns: int = 1
+    false_alarms: float = FALSE_ALARMS
+
+    @property
+    def reach_px(self) -> int:
+        """Give how far beyond a row others bear on it."""
+        widest = max(SIDES[self.pool])
+        return AROUND // 2 + widest // 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sharpened:
+    """What was found of every pixel; all arrays (returns, h, w), the nearest surface first.
+
+    Attributes:
+        time_of_flight_ps: mu.
+        amplitude: Signal photons.
+        background: Counts of a bin.
+        sigma_ps: Standard deviation that the time should have.
+        evidence: Twice the log likelihood over background alone; of a second return over one.
+        intensity: All photons of the pixel itself.
+        valid: Whether the return is believed.
+        pooled: Side of the square whose photons were fitted; 0 where none was enough.
+        hot: Whether the pixel counts without light.
+    """
+
+    time_of_flight_ps: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+    background: NDArray[np.float64]
+    sigma_ps: NDArray[np.float64]
+    evidence: NDArray[np.float64]
+    intensity: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    pooled: NDArray[np.int64]
+    hot: NDArray[np.bool_]
+
+
+def stacked(strips: Sequence[Sharpened]) -> Sharpened:
+    """Give strips, from top to bottom, as one."""
+    names = [field.name for field in fields(Sharpened)]
+    return Sharpened(
+        **{name: np.concatenate([getattr(s, name) for s in strips], axis=1) for name in names}
+    )
+
+
+class Sharpener:
+    """A pulse on an axis with what fits need of it; serves any number of strips.
+
+    Attributes:
+        fitter: The bank.
+        way: How pixels are fitted.
+    """
+
+    def __init__(self, axis: TimeAxis, pulse: Pulse, way: Way) -> None:
+        """Make the bank.
+
+        Raises:
+            ContractError: If it would take too many templates.
+        """
+        self.fitter = Fitter(make_bank(axis, pulse))
+        self.way = way
+        self._second = SecondReturns(self.fitter)
+        is_log = way.method == "log"
+        self._fit: Callable[[FloatArray], Fit] = (
+            self.fitter.fit if is_log else LeastSquares(self.fitter).fit
+        )
+
+    def strip(
+        self,
+        cube: FloatArray,
+        *,
+        hot: NDArray[np.bool_] | None = None,
+        blind: NDArray[np.bool_] | None = None,
+        core: slice | None = None,
+    ) -> Sharpened:
+        """Fit the pixels of some rows.
+
+        Args:
+            cube: (h, w, bins) counts, with `Way.reach_px` more rows where the array goes on.
+            hot: (h, w) pixels that are known to be hot; others are found.
+            blind: (h, w) pixels that pile-up left no counts in some bins.
+            core: Rows that are asked for; None for all.
+
+        Returns:
+            Of the core rows.
+
+        Raises:
+            ContractError: If more than half of the pixels are hot.
+        """
+        shape, bins = cube.shape[:2], cube.shape[2]
+        alone = self._fit(cube.reshape(-1, bins))
+        photons = cube.sum(axis=2, dtype=np.float64)
+        is_hot = find_hot(alone.background.reshape(shape), cube)
+        if hot is not None:
+            is_hot |= hot
+        pooled = fit_pooled(
+            self.fitter,
+            cube,
+            fit=self._fit,
+            alone=alone,
+            pool=self.way.pool,
+            false_alarms=self.way.false_alarms,
+            sound=~is_hot,
+            core=core,
+        )
+        doubtful = is_hot if blind is None else is_hot | blind
+        found = self._arrays(pooled, photons, doubtful, is_hot)
+        if self.way.returns == 2:
+            found = self._second.added(found, pooled, cube, ~is_hot, self.way.false_alarms)
+        if is_hot[core or slice(None)].any():
+            painted = painted_over(cube, is_hot)
+            self._put(found, self._fit(painted[is_hot]), is_hot)
+            found["intensity"][:, is_hot] = painted[is_hot].sum(axis=1, dtype=np.float64)
+        return Sharpened(**{name: a[:, core or slice(None)] for name, a in found.items()})
+
+    def _arrays(
+        self,
+        pooled: Pooled,
+        photons: NDArray[np.float64],
+        doubtful: NDArray[np.bool_],
+        hot: NDArray[np.bool_],
+    ) -> dict[str, NDArray[Any]]:
+        """Give the arrays of `Sharpened` for one return, (1, h, w) each."""
+        shape = photons.shape
+        valid = pooled.valid.reshape(shape) & ~doubtful
+        of_fit = {name: getattr(pooled.fit, name).reshape(1, *shape) for name in FITTED}
+        return {
+            **of_fit,
+            "intensity": photons[None],
+            "valid": valid[None],
+            "pooled": np.where(valid, pooled.side.reshape(shape), 0)[None],
+            "hot": hot[None],
+        }
+
+    @staticmethod
+    def _put(found: dict[str, NDArray[Any]], fit: Fit, where: NDArray[np.bool_]) -> None:
+        for name in FITTED:
+            found[name] = found[name].copy()
+            found[name][:, where] = getattr(fit, name)
+
+
+FITTED: Final = ("time_of_flight_ps", "amplitude", "background", "sigma_ps", "evidence")

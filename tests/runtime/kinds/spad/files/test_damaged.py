@@ -1,0 +1,245 @@
+"""Damaged and hostile files are refused in one line, whatever is broken and wherever."""
+
+import io
+import pickle
+import zipfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+import ptufile
+import pytest
+import scipy.io
+import tifffile
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from camkit.errors import CamkitError, ContractError, DecodeError
+from camkit.runtime.kinds.spad.files.counts_file import Hints
+from camkit.runtime.kinds.spad.files.open_counts import open_counts
+from tests.spad_files import AXES, STAMPS, WRITERS, small_cube
+
+EVERY = {**WRITERS, **STAMPS}
+EDGES = np.arange(41) - 0.5
+
+
+def _read(path: Path) -> np.ndarray:
+    hints = Hints(axes=AXES.get(path.suffix) if path.name not in STAMPS else None)
+    with open_counts(path, hints) as file:
+        return np.asarray(file.rows(0, file.height, EDGES))
+
+
+class Files(dict[str, bytes]):
+    """Content by name; it is not shown where a test fails."""
+
+    def __repr__(self) -> str:
+        return f"{len(self)} files"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    folder = tmp_path_factory.mktemp("whole")
+    for name, write in EVERY.items():
+        write(folder / name, small_cube())
+    return Files({name: (folder / name).read_bytes() for name in EVERY})
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_files_that_are_cut_off_are_refused(name: str, whole: Files, tmp_path: Path) -> None:
+    data, path = whole[name], tmp_path / name
+    path.write_bytes(data)
+    truth = _read(path)
+    refused = 0
+    lengths = sorted({0, 1, 7, 100, len(data) - 1, *np.linspace(8, len(data) - 2, 25).astype(int)})
+    for length in lengths:
+        path.write_bytes(data[:length])
+        try:
+            np.testing.assert_array_equal(_read(path), truth)  # what is cut off was padding
+        except CamkitError as error:
+            refused += 1
+            assert "\n" not in str(error)  # noqa: PT017 - either it is whole or it is refused
+    assert refused > len(lengths) / 2
+
+
+@pytest.mark.parametrize("name", EVERY)
+@settings(
+    max_examples=30,
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(changes=st.lists(st.tuples(st.integers(0, 2**20), st.integers(0, 255)), max_size=6))
+def test_files_with_other_bytes_are_read_or_refused(
+    name: str,
+    changes: list[tuple[int, int]],
+    whole: Files,
+    tmp_path: Path,
+) -> None:
+    data = bytearray(whole[name])
+    for place, value in changes:
+        # most that matters stands at the beginning and at the end
+        data[place % min(len(data), 3000) * (-1 if place % 2 else 1)] = value
+    path = tmp_path / name
+    path.write_bytes(data)
+    try:
+        found = _read(path)
+    except CamkitError as error:
+        assert "\n" not in str(error)  # noqa: PT017 - either it is read or it is refused
+    else:
+        assert np.isfinite(found).all()
+        assert (found >= 0).all()
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_another_kind_of_file_under_the_name_is_refused(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    for data in (b"", b"\0" * 5000, b"P" * 5000, np.random.default_rng(0).bytes(5000)):
+        path.write_bytes(data)
+        with pytest.raises(DecodeError, match=name.replace(".", r"\.")):
+            _read(path)
+    path.unlink()
+    with pytest.raises(DecodeError):
+        _read(path)
+    path.mkdir()
+    with pytest.raises(DecodeError):
+        _read(path)
+
+
+class Trap:
+    """An object that would write a file if it were unpickled."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        return (Path.write_text, (self.path, "caught"))
+
+
+def test_pickled_arrays_are_never_opened(tmp_path: Path) -> None:
+    trap = tmp_path / "trap"
+    array = np.array([[Trap(trap)]], dtype=object)
+    np.savez(tmp_path / "a.npz", histogram=array)
+    with pytest.raises(DecodeError, match="pickled objects, which are never read"):
+        _read(tmp_path / "a.npz")
+    with zipfile.ZipFile(tmp_path / "b.npz", "w") as archive:
+        archive.writestr("histogram.npy", pickle.dumps(Trap(trap)))
+    with pytest.raises(DecodeError, match=r"histogram\.npy is no array"):
+        _read(tmp_path / "b.npz")
+    assert not trap.exists()
+
+
+def _npy(shape: tuple[int, ...], dtype: str = "<u2") -> bytes:
+    """Give the header of an array without its numbers."""
+    file = io.BytesIO()
+    facts = {"descr": dtype, "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(file, facts)
+    return file.getvalue()
+
+
+def test_archives_that_announce_more_than_they_hold_are_refused(tmp_path: Path) -> None:
+    for number, shape in enumerate([(10**6, 10**6, 10**6), (9, 1000, 1000), (-1, 3, 3)]):
+        path = tmp_path / f"{number}.npz"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("histogram.npy", _npy(shape) + bytes(1000))
+        with pytest.raises(DecodeError):
+            _read(path)
+
+
+def test_bombs_are_refused_before_they_go_off(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.npz"
+    data = _npy((100_000, 100, 250))
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("histogram.npy", "w", force_zip64=True) as member,
+    ):
+        member.write(data)
+        member.write(bytes(1000))
+    raw = bytearray(path.read_bytes())
+    # the directory announces 5 GB where 1 kB is packed
+    at = raw.rindex(b"PK\x01\x02")
+    raw[at + 24 : at + 28] = (4_100_000_000).to_bytes(4, "little")
+    path.write_bytes(raw)
+    with pytest.raises(DecodeError):
+        _read(path)
+    tifffile.imwrite(tmp_path / "bomb.tif", np.zeros((4, 4), np.uint16), photometric="minisblack")
+    with tifffile.TiffFile(tmp_path / "bomb.tif") as file:
+        places = [file.pages[0].tags[tag].valueoffset for tag in (256, 257)]
+    tiff = bytearray((tmp_path / "bomb.tif").read_bytes())
+    for place in places:  # 60,000 pixels a side
+        tiff[place : place + 2] = (60_000).to_bytes(2, "little")
+    (tmp_path / "bomb.tif").write_bytes(tiff)
+    with pytest.raises(DecodeError):
+        _read(tmp_path / "bomb.tif")
+
+
+def test_a_zip_must_hold_one_sdt(tmp_path: Path) -> None:
+    for names, told in (([], "none"), (["a.sdt", "b.sdt"], r"a\.sdt, b\.sdt")):
+        with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+            archive.writestr("readme.txt", "no histogram")
+            for name in names:
+                archive.writestr(name, "x")
+        with pytest.raises(DecodeError, match=rf"must hold one \.sdt file; it holds {told}"):
+            open_counts(tmp_path / "a.zip", Hints())
+
+
+def test_data_that_lie_in_other_files_are_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["cube"] = small_cube()
+    layout = h5py.VirtualLayout(shape=small_cube().shape, dtype="u2")
+    layout[:] = h5py.VirtualSource(tmp_path / "other.h5", "cube", shape=small_cube().shape)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_virtual_dataset("histogram", layout)
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file.create_dataset("histogram", (2, 3, 4), "u1", external=[(str(tmp_path / "raw"), 0, 24)])
+    with h5py.File(tmp_path / "c.h5", "w") as file:
+        file["histogram"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "cube")
+    for name in ("a.h5", "b.h5"):
+        with pytest.raises(DecodeError, match="histogram lies in other files"):
+            open_counts(tmp_path / name, Hints())
+    with pytest.raises(DecodeError, match="holds no data sets"):
+        open_counts(tmp_path / "c.h5", Hints())
+
+
+def test_arrays_that_are_no_cubes_are_refused(tmp_path: Path) -> None:
+    for name, array, told in (
+        ("text", np.array([["a", "b"]]), "expected numbers"),
+        ("complex", np.ones((9, 2, 2), complex), "expected numbers"),
+        ("four", np.ones((2, 2, 2, 2)), "expected time, rows and columns"),
+        ("none", np.ones((9, 0, 3)), "holds 3x0 pixels"),
+        ("no_time", np.ones((0, 2, 3)), "has no time bins"),
+        ("line", np.ones(9), "holds no arrays"),
+    ):
+        np.savez(tmp_path / f"{name}.npz", histogram=array)
+        with pytest.raises(DecodeError, match=told):
+            open_counts(tmp_path / f"{name}.npz", Hints())
+    tifffile.imwrite(tmp_path / "rgb.tif", np.zeros((8, 8, 3), np.uint8), photometric="rgb")
+    with pytest.raises(DecodeError, match="expected rows and columns of counts"):
+        open_counts(tmp_path / "rgb.tif", Hints())
+    with tifffile.TiffWriter(tmp_path / "sizes.tif") as file:
+        for side in (4, 5):
+            file.write(np.zeros((side, side), np.uint8), photometric="minisblack")
+    with pytest.raises(DecodeError, match="pages of several sizes"):
+        open_counts(tmp_path / "sizes.tif", Hints())
+    scipy.io.savemat(tmp_path / "a.mat", {"words": "text", "one": 3.0, "facts": {"a": 1}})
+    with pytest.raises(DecodeError):
+        open_counts(tmp_path / "a.mat", Hints())
+
+
+def test_cells_that_hold_no_stamps_are_refused(tmp_path: Path) -> None:
+    for wrong in (np.array(["a"]), np.array([np.nan]), np.array([[np.array([1])]], dtype=object)):
+        cells = np.empty((2, 2), dtype=object)
+        for y, x in np.ndindex(2, 2):
+            cells[y, x] = np.arange(3)
+        cells[1, 1] = wrong
+        scipy.io.savemat(tmp_path / "a.mat", {"photons": cells})
+        with open_counts(tmp_path / "a.mat", Hints()) as file, pytest.raises(DecodeError):
+            file.rows(0, 2, EDGES)
+
+
+def test_channels_are_chosen(tmp_path: Path) -> None:
+    cube = np.random.default_rng(0).poisson(1, (6, 5, 2, 16)).astype(np.uint16)
+    ptufile.imwrite(tmp_path / "a.ptu", cube, 25e-9, 20e-12)
+    with pytest.raises(ContractError, match=r"holds channel 0, channel 1; say which"):
+        open_counts(tmp_path / "a.ptu", Hints())
+    with open_counts(tmp_path / "a.ptu", Hints(key="channel 1")) as file:
+        np.testing.assert_array_equal(file.rows(0, 6)[..., :16], cube[:, :, 1])
