@@ -10,7 +10,6 @@
 - `optics`: the lens as a torch module: free numbers, kernels over fields and depths
 - `front`: what stands between sensor and network
 - `sensor`: sharp patches blurred and recorded
-- `similarity`: SSIM with gradients
 - `loss`: eq. (6.15) and (6.16) of the thesis, and the loss of a recovered picture
 - `loop`: the training loop: parameter groups, decay, hold and freeze, the best lens kept, resume
 - `assembly`: a recipe turned into the parts of a loop

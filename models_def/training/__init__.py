@@ -8,6 +8,7 @@
     losses, schedule, fitter       one step
     fitting                        the steps that a kind brings
     trainer, progress, log         the run, its bar and its log
+    similarity                     SSIM with gradients
     checkpoint, credits            what is kept, and what it was trained on
     first_weights, refinement      what was trained before goes on
 

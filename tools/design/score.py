@@ -10,9 +10,9 @@ from camkit.colorimetry import decode_srgb
 from camkit.models_def.design.loop import DesignLoop, DesignParts, DesignSchedule
 from camkit.models_def.design.optics import LensModule
 from camkit.models_def.design.sensor import capture
-from camkit.models_def.design.similarity import ssim
 from camkit.models_def.optics.pupil import half_disc
 from camkit.models_def.training.pictures import SceneSource
+from camkit.models_def.training.similarity import ssim
 from tools.design.edge import Across, EdgeContrast, edge_contrast, slanted_edge
 
 DENSE_RAYS = 4000

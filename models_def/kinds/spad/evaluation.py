@@ -1,0 +1,123 @@
+"""The protocol of tables 4.1 and 4.2: whole pictures of known sets, PSNR and SSIM on luminance.
+
+L = 0.299 R + 0.587 G + 0.114 B of the sRGB-coded values, full range; a picture is cut to whole
+pixels at its right and lower border, seen at the true phase, counted once, restored, clipped to
+0..1 and compared over its whole area. The thesis's own figures could not be reproduced by any
+protocol, so they stand beside these as printed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from camkit.contracts import FloatArray
+from camkit.models_def.kinds.spad.counting import Exposure
+from camkit.models_def.kinds.spad.samples import luminance, photograph
+from camkit.models_def.kinds.spad.sampling import Sampling
+from camkit.models_def.networks.bicubic import SCALE, Bicubic
+from camkit.models_def.training.kind import Restorer
+from camkit.models_def.training.pictures import list_pictures, read_picture
+from camkit.models_def.training.similarity import ssim
+
+SEED: Final = 404
+SETS: Final = ("set5", "set14", "bsd100_half_a")
+"""Folders of the test pictures, as they lie beside each other."""
+MOST_DB: Final = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureScore:
+    """How near pictures come to the truth.
+
+    Attributes:
+        psnr_db: White = 1; mean over the pictures.
+        ssim: 11 px Gaussian of 1.5 px; mean over the pictures.
+        pictures: How many.
+    """
+
+    psnr_db: float
+    ssim: float
+    pictures: int
+
+
+def read_luminance(path: Path) -> FloatArray:
+    """Read L (h, w) of a picture, cut to whole pixels of the array.
+
+    Raises:
+        DecodeError: If it cannot be decoded.
+    """
+    coded = np.asarray(read_picture(path).transpose(2, 0, 1) / 255, dtype=np.float32)
+    found = luminance(coded)
+    height, width = (n // SCALE * SCALE for n in found.shape)
+    return np.ascontiguousarray(found[:height, :width])
+
+
+def read_set(folder: Path) -> tuple[FloatArray, ...]:
+    """Read all pictures of a folder; raises as `list_pictures` and `read_luminance` do."""
+    return tuple(read_luminance(path) for path in list_pictures(folder))
+
+
+def psnr_db(found: Tensor, truth: Tensor) -> float:
+    """Give the PSNR in dB, white = 1, at most `MOST_DB`."""
+    error = float((found.double() - truth.double()).square().mean())
+    return min(float(-10 * np.log10(max(error, 1e-30))), MOST_DB)
+
+
+def bicubic(sampling: Sampling) -> Restorer:
+    """Give bicubic interpolation, a = -0.5, at the true phase of a sampling."""
+    finer = Bicubic(SCALE, sampling.phase)
+    return lambda planes: torch.as_tensor(finer(planes[:, :1]))
+
+
+def evaluate(
+    pictures: Sequence[FloatArray],
+    sampling: Sampling,
+    exposure: Exposure,
+    restore: Restorer,
+    *,
+    seed: int = SEED,
+) -> PictureScore:
+    """Photograph pictures, restore them and compare.
+
+    Args:
+        pictures: (h, w) each, of whole pixels.
+        sampling: How the array samples.
+        exposure: Of one sub-pixel; a pixel that collects more light counts more.
+        restore: (1, 2, h, w) light and noise -> (1, 1, 4 h, 4 w).
+        seed: Of the noise; every picture has its own.
+    """
+    scores = [
+        _compare(torch.from_numpy(picture)[None, None], sampling, exposure, restore, (seed, i))
+        for i, picture in enumerate(pictures)
+    ]
+    found, alike = np.mean(scores, axis=0)
+    return PictureScore(psnr_db=float(found), ssim=float(alike), pictures=len(scores))
+
+
+def evaluate_sets(
+    sets: Mapping[str, Sequence[FloatArray]],
+    sampling: Sampling,
+    exposure: Exposure,
+    methods: Mapping[str, Restorer],
+) -> dict[str, dict[str, PictureScore]]:
+    """Evaluate methods on sets of pictures: method -> set -> score."""
+    return {
+        method: {
+            name: evaluate(pictures, sampling, exposure, restore) for name, pictures in sets.items()
+        }
+        for method, restore in methods.items()
+    }
+
+
+@torch.no_grad()
+def _compare(
+    fine: Tensor, sampling: Sampling, exposure: Exposure, restore: Restorer, seed: tuple[int, int]
+) -> tuple[float, float]:
+    planes = photograph(fine, sampling, exposure, np.random.default_rng(seed))
+    found = restore(planes).clamp(0, 1)
+    return psnr_db(found, fine), float(ssim(found, fine))

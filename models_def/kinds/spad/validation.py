@@ -1,0 +1,109 @@
+"""Fixed photographs of pictures that are never trained on, at several levels of light."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from camkit.models_def.kinds.spad.evaluation import bicubic, psnr_db
+from camkit.models_def.kinds.spad.recipe import PLATE, SpadRecipe
+from camkit.models_def.kinds.spad.samples import draw_luminance, photograph
+from camkit.models_def.kinds.spad.sampling import Sampling
+from camkit.models_def.networks.bicubic import SCALE
+from camkit.models_def.training.kind import Restorer, Score
+from camkit.models_def.training.pictures import SceneSource, open_source
+
+CROPS: Final = 8
+CROP_PX: Final = 192
+"""Sub-pixels."""
+LEVELS: Final = 3
+SEED: Final = 505
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Photograph:
+    """A picture and what is known of it.
+
+    Attributes:
+        photons: Of white.
+        planes: (1, c, h, w), what a network is given.
+        light: (1, 1, h, w) as counted, for the interpolation it must beat.
+        fine: (1, 1, 4 h, 4 w), the truth.
+    """
+
+    photons: float
+    planes: Tensor
+    light: Tensor
+    fine: Tensor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SpadJudge:
+    """Judges by fixed photographs.
+
+    Attributes:
+        shots: At every level.
+        sampling: With which they were taken.
+    """
+
+    shots: Sequence[Photograph]
+    sampling: Sampling
+
+    def baselines(self) -> Mapping[str, float]:
+        """Give the mean dB of bicubic interpolation."""
+        finer = bicubic(self.sampling)
+        return {"bicubic": self._mean([finer(shot.light) for shot in self.shots]).mean_db}
+
+    def score(self, restore: Restorer) -> Score:
+        """Judge a restoration by its mean PSNR in dB, by photons."""
+        with torch.no_grad():
+            return self._mean([restore(shot.planes) for shot in self.shots])
+
+    def _mean(self, found: Sequence[Tensor]) -> Score:
+        by_photons: dict[str, list[float]] = {}
+        for shot, picture in zip(self.shots, found, strict=True):
+            db = psnr_db(picture.clamp(0, 1), shot.fine)
+            by_photons.setdefault(f"{shot.photons:.0f}", []).append(db)
+        every = [db for several in by_photons.values() for db in several]
+        parts = {level: float(np.mean(several)) for level, several in by_photons.items()}
+        return Score(mean_db=float(np.mean(every)), parts={"by_photons": parts})
+
+
+def make_judge(
+    recipe: SpadRecipe, role: str, sampling: Sampling, pictures: Path | None
+) -> SpadJudge:
+    """Photograph crops at the ends and in the middle of the trained range of light."""
+    data = recipe.data
+    source = open_source(
+        pictures, picture_share=1.0, scenes=data.procedural_scenes, scene_px=data.scene_px
+    )
+    levels = np.unique(np.geomspace(data.photons_min, data.photons_max, LEVELS).round(3))
+    shots = [
+        _take(recipe, role, sampling, source, (number, float(level)))
+        for level in levels
+        for number in range(CROPS)
+    ]
+    return SpadJudge(shots=shots, sampling=sampling)
+
+
+def _take(
+    recipe: SpadRecipe,
+    role: str,
+    sampling: Sampling,
+    source: SceneSource,
+    which: tuple[int, float],
+) -> Photograph:
+    number, photons = which
+    rng = np.random.default_rng((SEED, number))
+    fine = draw_luminance(source, rng, CROP_PX // SCALE * SCALE)
+    exposure = recipe.data.exposure(photons)
+    seen = photograph(fine, sampling, exposure, rng)
+    planes = seen if recipe.data.told else seen[:, :1]
+    if role == PLATE:
+        deviation = torch.full_like(fine, 1 / np.sqrt(exposure.white_counts))
+        planes = torch.cat([fine, deviation], dim=1)
+    return Photograph(photons=photons, planes=planes, light=seen[:, :1], fine=fine)

@@ -1,0 +1,97 @@
+"""A single-photon camera so small that a step of its network takes no second."""
+
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from camkit.models_def.kinds.spad.recipe import SpadRecipe, to_spad_recipe
+
+TINY = """
+name = "tiny-spad"
+kind = "spad"
+
+[sensor]
+type = "spad"
+width_px = 64
+height_px = 32
+pixel_pitch_um = 150.0
+fill_factor = 0.0314
+
+[sampling]
+mode = "gaussian"
+
+[data]
+procedural_scenes = 2
+scene_px = 256
+sample_px = 16
+photons_min = 100.0
+photons_max = 1e4
+first_samples = 4
+pool_samples = 40
+steps_per_sample = 2
+
+[schedule]
+steps = 4
+batch = 2
+patch_px = 8
+loss = "mse"
+
+[networks.S]
+network = "sub_pixel_s"
+config = { width = 16, blocks = 1 }
+
+[networks.plate.S]
+network = "joint_sub_pixel_s"
+config = { width = 16, blocks = 1 }
+"""
+
+Table = dict[str, Any]
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="session")
+def tiny_text() -> str:
+    return TINY
+
+
+@pytest.fixture
+def changed() -> Callable[..., Table]:
+    """Give the table of the tiny recipe, changed at dotted keys; None takes a key out."""
+
+    def change(**changes: Any) -> Table:
+        table = tomllib.loads(TINY)
+        for dotted, value in changes.items():
+            *path, last = dotted.split("__")
+            place = table
+            for part in path:
+                place = place.setdefault(part, {})
+            if value is None:
+                del place[last]
+            else:
+                place[last] = value
+        return table
+
+    return change
+
+
+@pytest.fixture(scope="session")
+def tiny() -> SpadRecipe:
+    return to_spad_recipe(tomllib.loads(TINY))
+
+
+@pytest.fixture
+def tiny_file(tmp_path: Path) -> Path:
+    path = tmp_path / "tiny.toml"
+    path.write_text(TINY, encoding="utf-8")
+    return path
