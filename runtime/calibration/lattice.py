@@ -59,6 +59,11 @@ class Lattice:
         turned[row, column] = mosaic[y, x]
         return cls(values=turned, matrix=matrix, shift=shift)
 
+    @property
+    def pitch_px(self) -> float:
+        """Give the root of the area of a sample, in pixels."""
+        return float(np.abs(np.linalg.det(self.matrix)) ** -0.5)
+
     def places(self) -> tuple[FloatGrid, FloatGrid]:
         """Give (y, x) in pixels of every sample, each of the shape of `values`."""
         inverse = np.linalg.inv(self.matrix)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, FrozenPsf, RadialDistortion, cfa_channels
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.calibration.lattice import FloatGrid, Lattice
+from camkit.runtime.calibration.lattice import FloatGrid, Lattice, filled
 from camkit.runtime.calibration.light import Core, background, find_light, fit_core
 from camkit.runtime.calibration.trim import cropped, reach_px, smooth_noise
 from camkit.runtime.merging.merge import DarkRows, Merged, merge
@@ -26,6 +26,8 @@ from camkit.units import MM_PER_M
 
 COLOURS: Final = ("blue", "green", "red")
 CHANNELS: Final = (2, 1, 0)
+RED: Final = 2
+"""Its place in both."""
 WAVELENGTHS_UM: Final = (0.46, 0.54, 0.60)
 CORE_SHARE_PX: Final = 3.0
 MOST_HALF_PX: Final = 511
@@ -75,6 +77,9 @@ class MeasuredPoint:
 
     Attributes:
         psf: One field, one depth, three colours as wavelengths.
+        red: (h, w) light of red as its samples lie on the sensor, as far as the kernels reach,
+            background taken off: what is summed over many samples is not to be resampled.
+        red_pitch_um: Of these samples.
         centre_px: (x, y) of the light in the frames.
         colours: Facts of each colour.
         filled_samples: Samples of the crop that no frame holds, taken from their neighbours.
@@ -82,6 +87,8 @@ class MeasuredPoint:
     """
 
     psf: FrozenPsf
+    red: FloatGrid
+    red_pitch_um: float
     centre_px: tuple[float, float]
     colours: tuple[ColourFacts, ...]
     filled_samples: int
@@ -153,6 +160,8 @@ def measure_point(survey: Survey, options: PointOptions, dark: DarkRows | None) 
     kernels /= kernels.sum((-2, -1), keepdims=True)
     return MeasuredPoint(
         psf=_frozen(kernels, pitch_um, options.depth_m),
+        red=patch.red(kernels.shape[-1] // 2, facts[1]),
+        red_pitch_um=pitch_um * patch.light[RED].pitch_px,
         centre_px=(patch.left + facts[1].x, patch.top + facts[1].y),
         colours=_facts(kernels, facts, patch.floors),
         filled_samples=patch.filled_samples(kernels.shape[-1] // 2, facts[1]),
@@ -189,6 +198,14 @@ class _Patch:
             self.floors.append(max(spread, float(np.sqrt(np.nanmedian(self.variance[-1].values)))))
         self.place = place[0] - self.top, place[1] - self.left
         self.cfa = like.cfa
+
+    def red(self, half: int, core: Core) -> FloatGrid:
+        """Give the light of red as its samples lie, up to so many pixels from a core."""
+        lattice = self.light[RED]
+        y, x = lattice.places()
+        inside = np.maximum(np.abs(y - core.y), np.abs(x - core.x)) <= half
+        rows, columns = (np.flatnonzero(inside.any(axis=n)) for n in (1, 0))
+        return filled(lattice.values[np.ix_(rows, columns)])
 
     def filled_samples(self, half: int, core: Core) -> int:
         """Count the samples of the crop that no frame holds."""
@@ -288,9 +305,8 @@ def _doubts(patch: _Patch, cores: Sequence[Core]) -> list[str]:
     for lattice, core in zip(patch.light, cores, strict=True):
         y, x = lattice.places()
         rest = np.abs(lattice.values - core.at(y, x))[np.hypot(y - core.y, x - core.x) <= REST_PX]
-        pitch_px = float(np.abs(np.linalg.det(lattice.matrix)) ** -0.5)
-        narrow = core.spread_px < LEAST_SPREADS * pitch_px
-        if pitch_px > 1 and (narrow or np.nanmax(rest) > MOST_REST * core.height):
+        narrow = core.spread_px < LEAST_SPREADS * lattice.pitch_px
+        if lattice.pitch_px > 1 and (narrow or np.nanmax(rest) > MOST_REST * core.height):
             return [
                 "the core is too fine for the mosaic: what lies between the samples of a colour "
                 "is a guess; measure such optics on a sensor without a mosaic"

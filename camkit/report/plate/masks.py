@@ -15,7 +15,7 @@ from camkit.runtime.output.part_file import atomic_outputs
 
 MaskFormat = Literal["png", "tiff"]
 WHITE: Final = 255
-_POLARITY: Final = "white: glass stays; black: glass is etched away to depth_um"
+POLARITY: Final = "white: glass stays; black: glass is etched away to depth_um"
 
 
 def etching_of(plate: Plate) -> Etching:
@@ -72,7 +72,7 @@ def write_masks(plate: Plate, folder: Path, name: str, kind: MaskFormat) -> dict
         "aperture": plate.bench.aperture,
         "levels": etching.levels,
         "step_um": etching.step_um,
-        "polarity": _POLARITY,
+        "polarity": POLARITY,
         "masks": [
             {
                 "file": path.name,
@@ -83,7 +83,7 @@ def write_masks(plate: Plate, folder: Path, name: str, kind: MaskFormat) -> dict
         ],
     }
     files: Mapping[Path, bytes] = {
-        **{path: _image(layer, kind) for path, layer in zip(paths, layers, strict=True)},
+        **{path: mask_image(layer, kind) for path, layer in zip(paths, layers, strict=True)},
         told_path: (json.dumps(told, indent=2) + "\n").encode(),
     }
     folder.mkdir(parents=True, exist_ok=True)
@@ -93,8 +93,8 @@ def write_masks(plate: Plate, folder: Path, name: str, kind: MaskFormat) -> dict
     return told
 
 
-def _image(layer: NDArray[np.bool_], kind: MaskFormat) -> bytes:
-    """Give an image file: a PNG of one bit, or a TIFF of eight."""
+def mask_image(layer: NDArray[np.bool_], kind: MaskFormat) -> bytes:
+    """Give an image file of a mask: a PNG of one bit, or a TIFF of eight."""
     import cv2
 
     picture = np.where(layer, np.uint8(WHITE), np.uint8(0))

@@ -110,9 +110,16 @@ def write_pictures(
     folder: Path, point: Point, *, peak: float = 0.7, times_s: tuple[float, ...] = TIMES_S
 ) -> list[Path]:
     """Write linear PNGs of 16 bits, longest first."""
+    return write_planes(folder, point.planes(), peak=peak, times_s=times_s)
+
+
+def write_planes(
+    folder: Path, planes: FloatGrid, *, peak: float = 0.7, times_s: tuple[float, ...] = TIMES_S
+) -> list[Path]:
+    """Write (3, h, w) light, 1 at the peak, as linear PNGs of 16 bits, longest first."""
     paths = [folder / f"{n}.png" for n in range(len(times_s))]
     for n, (path, time_s) in enumerate(zip(paths, times_s, strict=True)):
-        seen = exposed(point.planes(), peak * time_s / times_s[-1], n)
+        seen = exposed(planes, peak * time_s / times_s[-1], n)
         codes = np.clip(np.rint(seen * 65535), 0, 65535).astype(np.uint16)
         assert cv2.imwrite(str(path), codes[::-1].transpose(1, 2, 0))
     return paths

@@ -4,5 +4,7 @@
 - `show`: a plate on one page
 - `design`: a relief by gradients, from a recipe
 - `masks`: what it is etched through
+- `match`: a plate of dots for a PSF
+- `target`: that PSF, read
 - `sensor`: the sensor of a recipe, which they look through
 """

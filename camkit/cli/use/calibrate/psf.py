@@ -12,6 +12,7 @@ from camkit.cli.use.merge import BlackLevel, MosaicCfa, Times, WhiteLevel
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
+    from camkit.runtime.calibration.dots import SeenDots
     from camkit.runtime.calibration.psf import MeasuredPoint
     from camkit.runtime.merging.survey import Survey
 
@@ -36,6 +37,13 @@ def psf(
     depth_m: Annotated[
         float, typer.Option(help="Distance of the light in m; 'inf' is infinity.")
     ] = float("inf"),
+    dots: Annotated[
+        Path | None,
+        typer.Option(
+            help="The light went through a plate of dots made for this PSF (safetensors): sum them "
+            "to what an array of small pixels sees."
+        ),
+    ] = None,
     mosaic: MosaicCfa = None,
     black_level: BlackLevel = None,
     white_level: WhiteLevel = None,
@@ -48,23 +56,26 @@ def psf(
         raise ContractError(f"a PSF is safetensors; expected a name in .safetensors, got {out}")
     if out.exists() and not overwrite:
         raise ContractError(f"{out} exists; say --overwrite or another name")
-    from camkit.bundle.psf_file import psf_to_bytes
+    from camkit.bundle.psf_file import psf_to_bytes, read_psf
     from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.darks import Darks
+    from camkit.runtime.calibration.dots import dots_psf
     from camkit.runtime.calibration.psf import PointOptions, measure_point
     from camkit.runtime.merging.survey import survey
     from camkit.runtime.output.part_file import atomic_output
 
+    designed = None if dots is None else read_psf(dots)
     options = PointOptions(side_px=side_px, pixel_pitch_um=pixel_pitch_um, depth_m=depth_m)
     said = mosaic_options(mosaic, black_level, white_level)
     times_s, dark_times_s = _times(times, files, dark or [])
     bracket = survey(files, times_s, mosaic=said)
     darks = Darks.read(dark, dark_times_s, bracket, said) if dark else None
     found = measure_point(bracket, options, None if darks is None else darks.rows)
+    made, seen = (found.psf, None) if designed is None else dots_psf(found, designed)
     out.parent.mkdir(parents=True, exist_ok=True)
     with atomic_output(out) as part:
-        part.write_bytes(psf_to_bytes(found.psf))
-    _tell(out, bracket, found, as_json=json_)
+        part.write_bytes(psf_to_bytes(made))
+    _tell(out, bracket, found, seen, as_json=json_)
 
 
 def _times(
@@ -82,7 +93,14 @@ def _times(
     return every[: len(files)], every[len(files) :]
 
 
-def _tell(out: Path, bracket: "Survey", found: "MeasuredPoint", *, as_json: bool) -> None:
+def _tell(
+    out: Path,
+    bracket: "Survey",
+    found: "MeasuredPoint",
+    seen: "SeenDots | None",
+    *,
+    as_json: bool,
+) -> None:
     x, y = found.centre_px
     if as_json:
         record: dict[str, Any] = {
@@ -96,11 +114,19 @@ def _tell(out: Path, bracket: "Survey", found: "MeasuredPoint", *, as_json: bool
             "notes": [*bracket.notes, *found.notes],
             "out": str(out),
         }
+        if seen is not None:
+            record["dots"] = seen.to_json()
         say(json.dumps(record))
         return
     for note in (*bracket.notes, *found.notes):
         say(f"note: {note}", err=True)
     say(f"{out}: {found.side_px} px, the light at ({x:.2f}, {y:.2f})")
+    if seen is not None:
+        say(
+            f"  dots: {seen.share:.1%} of the light in active areas, like the design by "
+            f"{seen.likeness:.4f}"
+        )
+        return
     for colour in found.colours:
         say(
             f"  {colour.colour:<5}  {colour.core_share:.2%} within 3 px, "

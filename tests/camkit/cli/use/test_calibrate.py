@@ -8,7 +8,22 @@ import pytest
 
 from camkit.bundle.psf_file import read_psf
 from camkit.cli.exit_code import ExitCode
-from tests.runtime.calibration.point_factory import Point, exposed, write_bracket, write_pictures
+from camkit.models_def.kinds.spad.plate_psf import read_plate_psf, write_plate_psf
+from camkit.models_def.kinds.spad.sampling import gaussian_psf
+from camkit.models_def.optics.diffraction.wave import PixelGrid
+from camkit.models_def.optics.dots.camera import DotCamera
+from camkit.models_def.optics.dots.effective import effective_psf
+from camkit.models_def.optics.dots.match import match_dots
+from camkit.models_def.optics.dots.pattern import dot_picture
+from camkit.models_def.optics.dots.target import likeness, to_target
+from camkit.models_def.optics.dots.unit import DotPlate
+from tests.runtime.calibration.point_factory import (
+    Point,
+    exposed,
+    write_bracket,
+    write_pictures,
+    write_planes,
+)
 from tests.runtime.calibration.point_factory import write_mosaic as write_dark
 
 SMALL = Point(side=96, x=47.7, y=46.2, reach=20, streak=1e-3)
@@ -108,3 +123,60 @@ def test_notes_are_said_on_stderr(camkit_command, tmp_path: Path) -> None:
     done = camkit_command("calibrate", "psf", *files, *asked)
     assert done.code == 0
     assert "note: light is still seen" in done.err
+
+
+DOTS = DotCamera(cells=32, tiles=16)
+DESIGNED = gaussian_psf(1.84)
+
+
+@pytest.fixture(name="mis_etched", scope="module")
+def plate_etched_too_deep() -> np.ndarray:
+    """Heights of a plate whose masks etch 8 % too deep."""
+    rng = np.random.default_rng(0)
+    plate: DotPlate = match_dots(to_target(DESIGNED), DOTS, 8, rng, starts=1).plate
+    return plate.etched_um((0.08,) * 3)
+
+
+def test_a_photographed_plate_becomes_the_psf_that_training_takes(
+    camkit_command, mis_etched: np.ndarray, tmp_path: Path
+) -> None:
+    grid = PixelGrid(side_px=241, pitch_um=3.45, samples=3)
+    light = dot_picture(mis_etched, DOTS, grid)
+    files = write_planes(tmp_path, np.stack([light] * 3) / light.max(), times_s=TIMES_S)
+    designed, out = tmp_path / "designed.safetensors", tmp_path / "seen.safetensors"
+    write_plate_psf(designed, DESIGNED)
+    asked = ("--times", "1,1/8,1/64", "--pixel-pitch-um", 3.45, "--depth-m", 1.35)
+    done = camkit_command("calibrate", "psf", *files, *asked, "--dots", designed, "-o", out, "--json")  # noqa: E501 # fmt: skip
+    assert done.code == 0, done.err
+    true = effective_psf(mis_etched, DOTS)
+    found, missed = (likeness(k, true) for k in (read_plate_psf(out), DESIGNED))
+    # white is 10,000 electrons, so the brightest dot is known to about 1 % in the shortest frame
+    assert found.rmse < 0.008
+    assert found.correlation > 0.9997
+    assert missed.rmse > 5 * found.rmse
+    told = json.loads(done.out)["dots"]
+    assert set(told) == {"place_um", "share", "modulation", "likeness"}
+    assert told["likeness"] > 0.95
+    again = camkit_command("calibrate", "psf", *files, *asked, "--dots", designed, "-o", out, "--overwrite")  # noqa: E501 # fmt: skip
+    assert "dots: " in again.out
+    assert "of the light in active areas" in again.out
+
+
+def test_a_design_that_is_no_psf_is_refused_before_the_frames_are_read(
+    camkit_command, tmp_path: Path
+) -> None:
+    done = camkit_command("calibrate", "psf", "a.png", "b.png", "-o", tmp_path / "psf.safetensors", "--dots", tmp_path / "none.safetensors")  # noqa: E501 # fmt: skip
+    assert done.code == ExitCode.BUNDLE_REFUSED
+    assert "none.safetensors" in done.err
+
+
+def test_a_point_without_a_plate_has_no_dots(
+    camkit_command, bracket: list[Path], tmp_path: Path
+) -> None:
+    designed, out = tmp_path / "designed.safetensors", tmp_path / "psf.safetensors"
+    write_plate_psf(designed, DESIGNED)
+    asked = ("--times", "1,1/8,1/64", "--pixel-pitch-um", 9, "--dots", designed, "-o", out)
+    done = camkit_command("calibrate", "psf", *bracket, *asked)
+    assert done.code == ExitCode.INPUT_FAILED
+    assert "no dots every 37.5 um" in done.err
+    assert not out.exists()

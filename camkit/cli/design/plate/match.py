@@ -1,0 +1,88 @@
+"""`camkit plate match`: a PSF to a plate of dots that can be etched."""
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
+
+_SUM_TOLERANCE = 1e-4
+_POOR = 0.999
+
+
+def match(
+    psf: Annotated[
+        Path,
+        typer.Argument(help="NPZ with the key psf, 11x11, or a frozen PSF (.safetensors)."),
+    ],
+    out_dir: Annotated[Path, typer.Option("-o", "--out-dir", help="Folder for plate and masks.")],
+    levels: Annotated[int, typer.Option(help="Levels to etch: 2, 4, 8, ...")] = 8,
+    cells: Annotated[int, typer.Option(help="Cells along a side of the 0.873-mm unit.")] = 88,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first phases.")] = 0,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Find the plate whose dots are a PSF, and its masks (needs torch).
+
+    One unit of it is written: side by side, 16x16 units make the plate of a SPAD camera.
+    """
+    from camkit.cli.design.design_time import refuse_existing, require_torch
+
+    require_torch("camkit plate match")
+    import numpy as np
+
+    from camkit.cli.design.plate.target import read_target
+    from camkit.models_def.optics.dots.camera import DotCamera
+    from camkit.models_def.optics.dots.match import check_levels, match_dots
+    from camkit.models_def.optics.dots.target import to_target
+    from camkit.report.plate.dots import older_files, write_dots
+
+    check_levels(levels)
+    camera = DotCamera(cells=cells)
+    given = read_target(psf)
+    target = to_target(given)
+    refuse_existing(older_files(out_dir), overwrite=overwrite)
+    began = time.process_time()
+    found = match_dots(target, camera, levels, np.random.default_rng(seed))
+    cpu_seconds = time.process_time() - began
+    told = write_dots(found, target, out_dir)
+    told |= {"cpu_seconds": round(cpu_seconds, 2), "notes": _notes(float(given.sum()), told)}
+    if json_:
+        say(json.dumps(told))
+        return
+    for note in told["notes"]:
+        say(f"note: {note}", err=True)
+    _tell(told, out_dir)
+
+
+def _notes(total: float, told: dict[str, Any]) -> list[str]:
+    notes = []
+    if abs(total - 1) > _SUM_TOLERANCE:
+        notes.append(f"the PSF had a sum of {total:g}; it was divided by it")
+    if told["correlation"] < _POOR:
+        more = (
+            "a plate of two levels is as bright on one side as on the other"
+            if told["levels"] == 2
+            else "give it more levels, or more cells"
+        )
+        notes.append(f"the plate is little like the PSF: {more}")
+    return notes
+
+
+def _tell(told: dict[str, Any], folder: Path) -> None:
+    for mask in told["masks"]:
+        say(
+            f"{folder / mask['file']}: etch {mask['depth_um']:.4f} um, "
+            f"{mask['etched_share']:.1%} of the cells"
+        )
+    for what, reached in (("dots", told), ("seen by the array", told["seen"])):
+        say(
+            f"{what}: correlation {reached['correlation']:.5f}, RMSE {reached['rmse']:.4f} of the "
+            f"peak, {reached['efficiency']:.1%} of the light"
+        )
+    say(told["plate"])
