@@ -4,6 +4,8 @@
     quality          where a picture is placed, how it is captured and scored
     hdr_score        how well a picture of high dynamic range was recovered
     pu21, jod        what the eye sees of it, on a stated display
+    edge_profile     the profile across an edge, finer than the pixels, and its spectrum
+    edge_mtf         MTF by slanted edge, of a capture or a picture of any camera
     discovery        modules of a folder that register themselves
     kind, kind_finder   what reports ask of a kind of camera, and where they find it
     kinds/           the kinds that come with camkit

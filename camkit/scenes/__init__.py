@@ -5,6 +5,7 @@ leaves        dead leaves: what the statistics of natural images are made of
 lettering     lines of made-up glyphs
 procedural    `procedural:SEED`, a bit of everything
 night         `night:SEED`, dark surfaces and lights up to 256 times white
+slanted_edge  a sharp edge, to measure an MTF on
 saturation    the exposure at which a share of a scene saturates
 named         the register: a scene by its name
 """

@@ -1,8 +1,8 @@
 """Contrast of what is recovered, measured on a slanted edge: a network has no kernel to transform.
 
 A sharp edge, slanted so that every position within a pixel occurs, is photographed and recovered.
-Its profile across the edge is sampled four times as finely as the pixels, differentiated and
-transformed; divided by the same of the sharp edge it is the contrast, free of pixel and method.
+The spectrum of its profile (`camkit.report.edge_profile`), where the edge is known to lie, divided
+by the same of the sharp edge, is the contrast, free of pixel and method.
 Not scaled to 1 at frequency 0: light that was spread wider than the window counts as lost.
 
 References: ISO 12233 (the slanted edge).
@@ -12,10 +12,13 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.errors import ContractError
+from camkit.report.edge_profile import edge_waves, sort_samples
 
 Across = Literal["tangential", "sagittal"]
 ACROSS: Final[tuple[Across, ...]] = get_args(Across)
@@ -24,7 +27,6 @@ ACROSS: Final[tuple[Across, ...]] = get_args(Across)
 SLANT: Final = 0.0618
 LEVELS: Final = (0.15, 0.6)
 _FINE: Final = 8
-_BINS: Final = 4
 _RISE: Final = 0.02
 
 
@@ -98,28 +100,15 @@ def edge_contrast(
             f"edges need square pictures of at least {2 * reach_px + 4} px; got {list(sharp.shape)}"
         )
     place = torch.arange(side, dtype=torch.float64) + 0.5 - side / 2
-    distance = _distance(place[:, None], place[None], across).flatten()
-    number = torch.floor(distance * _BINS).to(torch.int64) + reach_px * _BINS
-    bins = 2 * reach_px * _BINS
-    inside = (number >= 0) & (number < bins)
-    places = number[inside]
-    filled = torch.bincount(places, minlength=bins).to(torch.float64)
-
-    def profile(values: Tensor) -> Tensor:
-        flat = values.to(torch.float64).flatten(-2)[..., inside]
-        sums = torch.zeros(*flat.shape[:-1], bins, dtype=torch.float64)
-        return sums.index_add(-1, places, flat) / filled
-
+    bins = sort_samples(_distance(place[:, None], place[None], across).numpy(), reach_px)
     cycles = torch.linspace(0.5 / count, 0.5, count, dtype=torch.float64)
-    where = (torch.arange(bins - 1, dtype=torch.float64) - (bins - 2) / 2) / _BINS
-    # what is near the edge counts in full, what is far from it is noise
-    spread = torch.cos(math.pi * (where.abs() / reach_px - 0.5).clamp_min(0)) ** 2
-    waves = torch.polar(
-        torch.ones(count, bins - 1).double(), -2 * math.pi * cycles[:, None] * where
+    waves = edge_waves(bins, cycles.numpy())
+
+    def spectrum(values: Tensor) -> NDArray[np.float64]:
+        planes = values.detach().numpy().reshape(-1, side, side)
+        return np.abs(np.stack([waves @ bins.means(plane) for plane in planes]))
+
+    contrast = torch.from_numpy(spectrum(pictures) / spectrum(sharp))
+    return EdgeContrast(
+        cycles_per_px=cycles, contrast=contrast.reshape(*pictures.shape[:-2], count)
     )
-
-    def spectrum(values: Tensor) -> Tensor:
-        line = (profile(values).diff(dim=-1) * spread).to(waves.dtype)
-        return torch.abs(line @ waves.T)
-
-    return EdgeContrast(cycles_per_px=cycles, contrast=spectrum(pictures) / spectrum(sharp))

@@ -7,6 +7,7 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.sensors.forward import blur
+from camkit.report.edge_mtf import edge_mtf
 from tools.design.edge import (
     LEVELS,
     Across,
@@ -76,3 +77,17 @@ def test_small_pictures_are_refused_with_the_size_needed() -> None:
     edge = slanted_edge(64, "tangential")[1]
     with pytest.raises(ContractError, match="at least 84 px"):
         edge_contrast(edge, edge, "tangential")
+
+
+def test_the_contrast_of_a_known_edge_is_its_mtf_over_that_of_the_sharp_one() -> None:
+    """`edge_mtf` must find the edge, and starts from 1 at frequency 0; the rest is the same."""
+    edge = slanted_edge(222, "sagittal")
+    place = torch.arange(31, dtype=torch.float64) - 15
+    line = torch.exp(-0.5 * (place / 1.5) ** 2)
+    kernel = (line[:, None] * line / line.sum() ** 2).expand(1, 3, -1, -1)
+    soft, sharp = blur(edge[None], kernel)[0][1], edge[1, CUT, CUT]
+    found = edge_contrast(soft, sharp, "sagittal")
+    cycles = found.cycles_per_px.numpy()
+    over = edge_mtf(soft.numpy(), cycles_per_px=cycles).mtf
+    under = edge_mtf(sharp.numpy(), cycles_per_px=cycles).mtf
+    assert torch.allclose(found.contrast, torch.from_numpy(over / under), rtol=0, atol=5e-3)
