@@ -131,7 +131,7 @@ SPAD: Final = Kind(
         KindOption(
             name="product",
             text="What to make; default: depth of histograms, intensity of counts.",
-            choices=("depth", "intensity", "transient"),
+            choices=("depth", "intensity", "transient", "lifetime"),
         ),
         KindOption(
             name="pool",

@@ -50,12 +50,15 @@ from camkit.models_def.training.checkpoint import (
 )
 from camkit.models_def.training.kind import Design, TrainingKind, training_kind
 from camkit.models_def.training.recipe import Recipe, differing_part
+from camkit.runtime.kind import part_of
 from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
+WHITE: Final = "white"
+"""In the recipe of a case whose pictures have another white than 1."""
 PROBE: Final = "probe"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
 SIZES: Final = ("S", "M", "L")
@@ -109,7 +112,8 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         second = write_bundle(Path(folder) / "second.camkit", manifest, members)
         golden = add_outputs(second, cases)
         members[GOLDEN] = golden_to_bytes(golden)
-        members[CARD] = card_text(second, golden, camera.design.fails_on).encode()
+        whites = {name: float(case.recipe.get(WHITE, 1.0)) for name, (case, _) in cases.items()}
+        members[CARD] = card_text(second, golden, camera.design.fails_on, whites).encode()
         members[PREVIEW] = preview_png(second, golden)
         manifest = manifest.model_copy(update={"golden": tuple(case for case, _ in cases.values())})
         third = Path(folder) / "third.camkit"
@@ -206,9 +210,14 @@ def _models(networks: Networks) -> dict[str, bytes]:
 
 def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatArray]]:
     """Give what every network is given: for a larger probe first, then for the golden cases."""
-    case, capture, reference = photograph(PROBE, PROBE_RECIPE, bundle)
-    captures = [(case, GoldenArrays(capture=capture, reference=reference)), *cases.values()]
+    captures, proving = list(cases.values()), part_of(bundle.manifest).proving
     windows: dict[tuple[str, str], list[FloatArray]] = {}
+    if proving is None:
+        case, capture, reference = photograph(PROBE, PROBE_RECIPE, bundle)
+        captures.insert(0, (case, GoldenArrays(capture=capture, reference=reference)))
+    else:
+        for role, sizes in bundle.manifest.networks.items():
+            windows |= {(role, size): [proving.probe(bundle, role)[None]] for size in sizes}
     for size in bundle.manifest.sizes:
         for one, arrays in captures:
             work = case_work(bundle, one, arrays, size)

@@ -18,7 +18,10 @@ _PLACES: Final = {"radial": "field heights", "uniform": "place", "grid": "places
 
 
 def card_text(
-    bundle: Bundle, golden: Mapping[str, GoldenArrays], fails_on: Sequence[str] = ()
+    bundle: Bundle,
+    golden: Mapping[str, GoldenArrays],
+    fails_on: Sequence[str] = (),
+    whites: Mapping[str, float] | None = None,
 ) -> str:
     """Write the card: what it is, what it was trained on, what was measured, where it fails.
 
@@ -26,6 +29,7 @@ def card_text(
         bundle: The camera, with its networks.
         golden: Its golden cases, outputs included.
         fails_on: What it fails on, besides objects at other depths.
+        whites: Name of a case -> what is white in its pictures; 1 unless stated.
     """
     manifest = bundle.manifest
     sensor, psf = manifest.sensor, bundle.psf
@@ -59,9 +63,12 @@ def card_text(
         "| case | " + " | ".join(manifest.sizes) + " |",
         "|---|" + "---|" * len(manifest.sizes),
     ]
-    for name, arrays in golden.items():
-        images = arrays.outputs[IMAGE]
-        values = (f"{_psnr_db(images[size], arrays.reference):.2f}" for size in manifest.sizes)
+    for name, arrays in _pictures(golden).items():
+        images, white = arrays.outputs[IMAGE], np.float32((whites or {}).get(name, 1.0))
+        values = (
+            f"{_psnr_db(images[size] / white, arrays.reference / white):.2f}"
+            for size in manifest.sizes
+        )
         lines.append(f"| {name} | " + " | ".join(values) + " |")
     lines += [
         "",
@@ -123,10 +130,11 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
         axes[1, column].set_xlabel("cycles/px", fontsize=8)
     axes[1, 0].set_ylabel("MTF")
     best = bundle.manifest.sizes[-1]
-    for column, (name, arrays) in enumerate(golden.items()):
+    for column, (name, arrays) in enumerate(_pictures(golden).items()):
         image = arrays.outputs[IMAGE][best]
         gain = 1 / max(float(np.quantile(arrays.reference, 0.99)), 1e-3)
         pair = np.concatenate([image, arrays.reference], axis=1) * gain
+        pair = np.broadcast_to(pair, (3, *pair.shape[1:]))
         axes[2, column].imshow(encode_srgb(pair.astype(np.float32)).transpose(1, 2, 0))
         axes[2, column].set_title(f"{name}: {best} over truth", fontsize=8)
     for axis in (*axes[0, shown.size :], *axes[1, shown.size :], *axes[2]):
@@ -134,6 +142,11 @@ def preview_png(bundle: Bundle, golden: Mapping[str, GoldenArrays]) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()
+
+
+def _pictures(golden: Mapping[str, GoldenArrays]) -> dict[str, GoldenArrays]:
+    """Give the cases of which the pipeline makes pictures."""
+    return {name: arrays for name, arrays in golden.items() if IMAGE in arrays.outputs}
 
 
 def _psnr_db(image: FloatArray, reference: FloatArray) -> float:

@@ -92,6 +92,9 @@ def photograph(
 
 def photograph_all(bundle: Bundle) -> Cases:
     """Photograph all golden cases, their outputs still to be added."""
+    proving = part_of(bundle.manifest).proving
+    if proving is not None:
+        return dict(proving.cases(bundle))
     cases: Cases = {}
     for name, recipe in GOLDEN_RECIPES.items():
         case, capture, reference = photograph(name, recipe, bundle)
@@ -109,11 +112,16 @@ def add_outputs(bundle: Bundle, cases: Cases) -> dict[str, GoldenArrays]:
                     size: case_work(bundle, case, arrays, size).fill(product=product)
                     for size in bundle.manifest.sizes
                 }
-                for product in bundle.manifest.products
+                for product in _products(bundle, arrays)
             },
         )
         for name, (case, arrays) in cases.items()
     }
+
+
+def _products(bundle: Bundle, arrays: GoldenArrays) -> tuple[str, ...]:
+    proving = part_of(bundle.manifest).proving
+    return tuple(bundle.manifest.products) if proving is None else proving.products(arrays)
 
 
 def _side_px(extent: Extent, recipe: CaseRecipe) -> int:

@@ -18,6 +18,8 @@ from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import BAYER, Kind, all_kinds, find_kind, kind_of_file
 from camkit.runtime.array_capture import capture_of_array
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.kind_parts.proving import Proving
+from camkit.runtime.kind_parts.recording import Recording
 from camkit.runtime.maker import Maker
 from camkit.runtime.options import Options
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph
@@ -58,6 +60,8 @@ class RuntimePart:
         from_array: An array as a capture.
         simulate: (scene (3, h, w) linear Rec.709, bundle, options) -> what the camera records.
         maker: What makes its products; None for photographs.
+        proving: How its bundles prove themselves, where it has a maker.
+        recording: How its captures are simulated, where it has a maker.
     """
 
     read: Callable[[Path, MosaicOptions | None, Manifest | None], Capture] = _no_photograph
@@ -66,6 +70,8 @@ class RuntimePart:
     from_array: FromArray = capture_of_array
     simulate: Callable[[FloatArray, Bundle, SimulationOptions], Simulation] = photograph
     maker: Maker | None = None
+    proving: Proving | None = None
+    recording: Recording | None = None
 
 
 def runtime_part(kind: str) -> RuntimePart:

@@ -86,6 +86,10 @@ class Made:
         return found
 
 
+def _nameless(_: Path) -> None:
+    return None
+
+
 def _stem(path: Path) -> str:
     return path.stem
 
@@ -103,6 +107,8 @@ class Maker:
         methods: What --method may say.
         identity: Options -> what decides the products beyond the options themselves, such as the
             content of a file that they name; plain JSON values.
+        with_bundle: Names of the options that mean something with a bundle alone.
+        named: A capture's file -> the bundle that it names; None if it names none.
         stem: A capture's file -> the name of its products, without suffix.
     """
 
@@ -113,6 +119,8 @@ class Maker:
     formats: Mapping[str, str]
     methods: tuple[str, ...]
     identity: Callable[[Options], Mapping[str, Any]]
+    with_bundle: frozenset[str] = frozenset()
+    named: Callable[[Path], str | None] = _nameless
     stem: Callable[[Path], str] = _stem
 
     def check(self, kind: Kind, bundle: Bundle | None, options: Options) -> None:
@@ -124,6 +132,8 @@ class Maker:
         where = "without a bundle" if bundle is None else f"to bundle {bundle.manifest.name}"
         check_kind_options(options, kind, where)
         known = GENERAL | {option.name for option in kind.options}
+        if bundle is not None:
+            known |= self.with_bundle
         if foreign := [name for name in given_options(options) if name not in known]:
             raise ContractError(
                 f"{', '.join(map(flag_of, foreign))} means nothing to captures of the kind "

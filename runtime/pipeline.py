@@ -114,8 +114,9 @@ class Pipeline:
         self.options = options
         self.threads = available_threads(options.threads)
         if bundle is not None:
-            check_stages(bundle.manifest, options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES)
             self._part = part_of(bundle.manifest)
+            if self._part.maker is None:
+                check_stages(bundle.manifest, options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES)
             self.kind = find_kind(bundle.manifest.kind)
         else:
             self.kind = kind or kind_without_bundle(None, options)
@@ -130,7 +131,7 @@ class Pipeline:
         self._speeds: dict[tuple[str, str], float] = {}
         self._speed: Speed | None = None
         self.size: str | None = None
-        if bundle is not None and asked_work(bundle, options).networks:
+        if bundle is not None and self.maker is None and asked_work(bundle, options).networks:
             self.size = default_size(bundle, options)
             for role in bundle.manifest.networks:
                 self.network(role, self.size)

@@ -29,12 +29,12 @@ from camkit.bundle.facts import Card, NetworkFacts
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
-from camkit.bundle.stages import JoinError, Network, Parts, Stage
+from camkit.bundle.stages import JoinError, Parts, Stage
 from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.errors import BundleError
 
-FORMAT_VERSION: Final = (2, 2)
+FORMAT_VERSION: Final = (2, 3)
 _OLDEST: Final = 1
 _S = TypeVar("_S", bound=Entry)
 NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
@@ -114,7 +114,7 @@ class Manifest(Entry):
         exported_with: Package -> version.
     """
 
-    format_version: Annotated[str, Field(pattern=r"^[0-9]{1,4}\.[0-9]{1,4}$")] = "2.2"
+    format_version: Annotated[str, Field(pattern=r"^[0-9]{1,4}\.[0-9]{1,4}$")] = "2.3"
     kind: Word = "bayer"
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
     version: Annotated[str, Field(pattern=r"^[0-9]+\.[0-9]+\.[0-9]+(-[0-9A-Za-z.-]+)?$")]
@@ -152,7 +152,7 @@ class Manifest(Entry):
                     f"gives {found[name].describe()}"
                 )
         check_use(self.stages, self.products, self.planes)
-        if idle := self.networks.keys() - {stage.role for stage in self.stages_of(Network)}:
+        if idle := self.networks.keys() - {getattr(stage, "role", None) for stage in self.stages}:
             raise ValueError(f"no stage uses the networks of the role {', '.join(sorted(idle))}")
         names = [case.name for case in self.golden]
         if len(set(names)) != len(names):

@@ -9,9 +9,10 @@ from camkit.bundle.entry import Entry, Positive
 Axes = Literal["y x", "t y x"]
 """Axes behind that of the channels."""
 SampleType = Literal["uint8", "uint16", "uint32", "float32", "bool"]
-Domain = Literal["dn", "linear", "stabilised", "counts", "mask", "output"]
+Domain = Literal["dn", "linear", "stabilised", "counts", "mask", "output", "depth"]
 """dn: digital numbers; linear: light, 1.0 = white level; stabilised: of equal noise everywhere;
-counts: photons; mask: true or false; output: linear light in the colour of the output."""
+counts: photons; mask: true or false; output: linear light in the colour of the output; depth:
+metres (2.3)."""
 
 
 class Grid(Entry):

@@ -310,6 +310,9 @@ class SpadSensor(PixelSensor):
         dead_time_ps: Time for which a diode is blind after a photon.
         dark_count_rate_hz: Counts per second and pixel without light.
         fill_factor: Share of a pixel that sees light.
+        detection_efficiency: Share of the photons there that are counted (format 2.3).
+        sub_pixels: Along a side of a pixel, of the grid on which pictures are made (format 2.3).
+        phase: Sub-pixel, along either axis, at which a pixel sees (format 2.3).
     """
 
     type: Literal["spad"] = "spad"
@@ -318,9 +321,14 @@ class SpadSensor(PixelSensor):
     dead_time_ps: NonNegative = 0.0
     dark_count_rate_hz: NonNegative = 0.0
     fill_factor: Annotated[float, Field(gt=0, le=1)] = 1.0
+    detection_efficiency: Annotated[float, Field(gt=0, le=1)] = 1.0
+    sub_pixels: Annotated[int, Field(ge=1, le=16)] = 1
+    phase: Annotated[int, Field(ge=0, lt=16)] = 0
 
     @model_validator(mode="after")
     def _check(self) -> "SpadSensor":
+        if self.phase >= self.sub_pixels:
+            raise ValueError(f"phase must be one of the sub-pixels 0..{self.sub_pixels - 1}")
         if self.time_bins and self.time_bin_ps is None:
             raise ValueError("time_bins need their width, time_bin_ps")
         return self

@@ -1,7 +1,7 @@
 """What is decided for every input before any work: its bundle, its picture, why it cannot be."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -11,6 +11,7 @@ from camkit.kinds import Kind
 from camkit.runtime.batch.sources import refusal_of
 from camkit.runtime.development import WriteOptions
 from camkit.runtime.kind import kind_without_bundle, runtime_part
+from camkit.runtime.maker import Maker
 from camkit.runtime.options import Options
 from camkit.runtime.raw import named_bundle
 
@@ -66,14 +67,11 @@ def list_tasks(
             nor overwrite was asked for), or no input names a bundle.
     """
     folders = _folders(sources, write)
+    made = options or Options()
+    makers = [runtime_part((kind or kind_without_bundle(s, made)).name).maker for s in sources]
     tasks = [
-        _make_task(source, bundle, folder, names)
-        for source, folder, names in zip(
-            sources,
-            folders,
-            _names(sources, kind, options or Options(), write),
-            strict=True,
-        )
+        _make_task(source, bundle, folder, maker, _names(source, maker, made, write))
+        for source, folder, maker in zip(sources, folders, makers, strict=True)
     ]
     sound = [t for t in tasks if t.refusal is None]
     _refuse_clashes(sound)
@@ -103,24 +101,22 @@ def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
 
 
 def _names(
-    sources: Sequence[Path], kind: Kind | None, options: Options, write: WriteOptions
-) -> Iterator[tuple[str, ...]]:
-    """Name the files of every input, the main one first."""
-    for source in sources:
-        own = kind or kind_without_bundle(source, options)
-        maker = runtime_part(own.name).maker
-        if maker is None:
-            yield (f"{source.stem}{write.suffix}",)
-        else:
-            yield maker.names(source, options, write.format)
+    source: Path, maker: Maker | None, options: Options, write: WriteOptions
+) -> tuple[str, ...]:
+    """Name the files of an input, the main one first."""
+    if maker is None:
+        return (f"{source.stem}{write.suffix}",)
+    return maker.names(source, options, write.format)
 
 
-def _make_task(source: Path, bundle: str | None, folder: Path, names: tuple[str, ...]) -> Task:
+def _make_task(
+    source: Path, bundle: str | None, folder: Path, maker: Maker | None, names: tuple[str, ...]
+) -> Task:
     target, *beside = (folder / name for name in names)
     refusal = refusal_of(source)
     chosen = bundle
     if chosen is None and refusal is None:
-        chosen = named_bundle(source)
+        chosen = (named_bundle if maker is None else maker.named)(source)
         if chosen is None:
             refusal = f"{source} {_NAMELESS}"
     return Task(

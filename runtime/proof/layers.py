@@ -6,9 +6,9 @@ bundle does not keep its word.
 
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
+from camkit.runtime.kind_parts.proving import GoldenRun
 from camkit.runtime.machine.limits import PROOF_MB, PROOF_WORK
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
@@ -38,25 +39,6 @@ _SAMPLES: Final = 2
 _RANGE_RTOL: Final = 1e-3
 
 Result = tuple[bool, str]
-
-
-class CaseWork(Protocol):
-    """A golden capture on its way through the pipeline."""
-
-    def shape_of(self, product: str) -> tuple[int, int, int]:
-        """Give (c, h, w) of a product before any of it is computed."""
-        ...
-
-    def fill(self, out: FloatArray | None = None, product: str = "image") -> FloatArray:
-        """Give a product, (c, h, w)."""
-        ...
-
-    def network_input(self, role: str) -> FloatArray:
-        """Give what the network of a role is given, (c, h, w)."""
-        ...
-
-
-GoldenRun = Callable[[Bundle, GoldenCase, GoldenArrays, str | None], CaseWork]
 
 
 def prove_golden(bundle: Bundle, *, run: GoldenRun | None) -> Result:

@@ -21,6 +21,7 @@ import torch
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.output.part_file import atomic_output
 from tools.comparison.compact_json import to_compact_json
+from tools.comparison.equal_training import EqualTime
 from tools.hdr.table.measuring import measure_rows
 from tools.hdr.table.record import record_of
 from tools.hdr.table.rows import LDR, ROWS, chosen_rows
@@ -73,13 +74,13 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _train(arguments: argparse.Namespace) -> None:
-    settings = TrainSettings(
+    time = EqualTime(
         out_dir=arguments.out_dir,
         pictures=arguments.data,
         cpu_minutes=arguments.cpu_minutes,
-        vgg=arguments.vgg,
         workers=arguments.workers,
     )
+    settings = TrainSettings(time=time, vgg=arguments.vgg)
     train_rows(chosen_rows(arguments.rows), settings, _tell)
 
 

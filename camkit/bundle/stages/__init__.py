@@ -6,6 +6,7 @@ does stands in the module of the same name in `camkit.runtime.stages`.
 linearise, repair, white_balance, demosaic    the front
 wiener, highlights, deglare, network          the restoration
 raise_clipped, illumination, undistort, color what every picture needs behind it
+correct, super_resolve, sharpen               single photons
 """
 
 from typing import Annotated
@@ -13,6 +14,7 @@ from typing import Annotated
 from pydantic import Field
 
 from camkit.bundle.stages.color import Color
+from camkit.bundle.stages.correct import Correct
 from camkit.bundle.stages.deglare import Deglare
 from camkit.bundle.stages.demosaic import Demosaic
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry
@@ -22,12 +24,15 @@ from camkit.bundle.stages.linearise import Linearise
 from camkit.bundle.stages.network import Network
 from camkit.bundle.stages.raise_clipped import RaiseClipped
 from camkit.bundle.stages.repair import Repair
+from camkit.bundle.stages.sharpen import Sharpen
+from camkit.bundle.stages.super_resolve import SuperResolve
 from camkit.bundle.stages.undistort import Undistort
 from camkit.bundle.stages.white_balance import WhiteBalance
 from camkit.bundle.stages.wiener import Wiener
 
 __all__ = [
     "Color",
+    "Correct",
     "Deglare",
     "Demosaic",
     "Highlights",
@@ -38,8 +43,10 @@ __all__ = [
     "Parts",
     "RaiseClipped",
     "Repair",
+    "Sharpen",
     "Stage",
     "StageEntry",
+    "SuperResolve",
     "Undistort",
     "WhiteBalance",
     "Wiener",
@@ -57,6 +64,9 @@ Stage = Annotated[
     | RaiseClipped
     | Illumination
     | Undistort
-    | Color,
+    | Color
+    | Correct
+    | SuperResolve
+    | Sharpen,
     Field(discriminator="type"),
 ]

@@ -24,12 +24,15 @@ def simulate(
     scene: Annotated[
         str,
         typer.Argument(
-            help="A picture (8/16-bit sRGB, linear EXR or HDR), procedural:SEED or night:SEED."
+            help="A picture (8/16-bit sRGB, linear EXR or HDR), procedural:SEED or night:SEED; of "
+            "single photons also an NPZ of depth_m and albedo, or of transient."
         ),
     ],
     bundle: Annotated[str, typer.Option(help="Bundle NAME or PATH of the camera.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The capture to write, such as a DNG.")],
-    iso: Annotated[float, typer.Option(help="ISO speed of the capture.")] = 100.0,
+    iso: Annotated[
+        float | None, typer.Option(help="ISO speed of the capture; default: 100.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     origin_px: Annotated[
         str | None, typer.Option(help="X,Y of a crop on the sensor; default: centred.")
@@ -40,6 +43,13 @@ def simulate(
     saturate: Annotated[
         float | None,
         typer.Option(help="Share of the scene that exceeds white in any colour, such as 0.015."),
+    ] = None,
+    photons: Annotated[
+        float | None,
+        typer.Option(help="Of a pixel: of white in counts, on average by time; default: 10000."),
+    ] = None,
+    sbr: Annotated[
+        float | None, typer.Option(help="Photons of the signal over those of the background.")
     ] = None,
     surround_px: Annotated[
         int, typer.Option(min=0, help="Ring of the scene outside the frame that lights it.")
@@ -63,6 +73,7 @@ def simulate(
 ) -> None:
     """Photograph a scene with the bundle's camera: blur, vignetting, noise, saturation."""
     from camkit.bundle.reader import find_bundle, open_bundle
+    from camkit.cli.use.recorded import light_of, simulate_recorded
     from camkit.runtime.kind import part_of
     from camkit.runtime.network.engine import available_threads
     from camkit.runtime.twin.simulate import SimulationOptions, bare_psf
@@ -75,6 +86,22 @@ def simulate(
             raise ContractError(f"{path} exists; say --overwrite or another name")
     opened = open_bundle(find_bundle(bundle))
     part, sensor = part_of(opened.manifest), opened.manifest.sensor
+    counted = light_of(photons, sbr, seed, opened)
+    if counted is not None:
+        given = {
+            "--iso": iso,
+            "--origin-px": origin_px,
+            "--exposure": exposure,
+            "--bits": bits,
+            "--saturate": saturate,
+            "--surround-px": surround_px or None,
+            "--truth": truth,
+            "--no-plate": no_plate,
+            "--depth-m": depth_m,
+            "--size-px": size_px,
+        }
+        simulate_recorded(scene, opened, out, counted, given, overwrite=overwrite, json_=json_)
+        return
     if out.suffix.lower() != part.suffix:
         raise ContractError(
             f"a simulated capture of this camera is a {part.suffix[1:].upper()}; expected a name "
@@ -87,7 +114,7 @@ def simulate(
     whole = (sensor.width_px, sensor.height_px)
     size = whole if size_px is None else whole_pair(size_px, "--size-px")
     options = SimulationOptions(
-        iso=iso,
+        iso=100.0 if iso is None else iso,
         seed=seed,
         origin_px=None if origin_px is None else whole_pair(origin_px, "--origin-px"),
         exposure=1.0 if exposure is None else exposure,

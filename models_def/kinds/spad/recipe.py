@@ -7,18 +7,19 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from camkit.bundle.sensor import SpadSensor
+from camkit.bundle.stages import Sharpen
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.sampling import MODES
-from camkit.models_def.networks.bicubic import PHASE, SCALE
+from camkit.models_def.networks.bicubic import SCALE
 from camkit.models_def.toml_table import section
-from camkit.models_def.training.recipe import DataRecipe, Recipe, common_tables
+from camkit.models_def.training.recipe import DataRecipe, Recipe, common_tables, model
 
 ROLES: Final = ("upscale",)
 PLATE: Final = "plate"
 """Role of a network that is trained with its plate; no bundle holds it."""
-OWN: Final = ("sampling",)
-CAMERA_PARTS: Final = ("name", "sensor", "sampling")
+OWN: Final = ("sampling", "times")
+CAMERA_PARTS: Final = ("name", "sensor", "sampling", "times")
 """What says which camera it is; how its networks are trained may differ."""
 
 
@@ -31,13 +32,11 @@ class SamplingRecipe:
         psf: Of `learned`: PSF file, or the checkpoint the plate was trained in, relative to the
             recipe.
         sigma: Of `gaussian`, in sub-pixels; without it that of the thesis.
-        phase: Sub-pixel of its block at which a pixel sees.
     """
 
     mode: str = "learned"
     psf: str | None = None
     sigma: float | None = None
-    phase: int = PHASE
 
     def __post_init__(self) -> None:
         if self.mode not in MODES:
@@ -50,8 +49,6 @@ class SamplingRecipe:
             )
         if self.sigma is not None and self.mode != "gaussian":
             raise ContractError(f"sampling.sigma belongs to the mode gaussian; got {self.mode}")
-        if not 0 <= self.phase < SCALE:
-            raise ContractError(f"sampling.phase must be one of 0..{SCALE - 1}; got {self.phase}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,11 +94,13 @@ class SpadRecipe(Recipe):
         sensor: The array.
         data: How samples are made.
         sampling: How the array samples.
+        times: Gate and pulse that a bundle takes captures to have which state none.
     """
 
     sensor: SpadSensor
     data: SpadDataRecipe
     sampling: SamplingRecipe = field(default_factory=SamplingRecipe)
+    times: Sharpen = field(default_factory=Sharpen)
 
 
 def to_spad_recipe(table: Mapping[str, Any]) -> SpadRecipe:
@@ -116,12 +115,18 @@ def to_spad_recipe(table: Mapping[str, Any]) -> SpadRecipe:
             f'this kind of camera counts photons; sensor.type must be "spad", got '
             f'"{common.sensor.type}"'
         )
+    if common.sensor.sub_pixels != SCALE:
+        raise ContractError(
+            f"pictures are made {SCALE} times as fine as the array; sensor.sub_pixels must be "
+            f"{SCALE}, got {common.sensor.sub_pixels}"
+        )
     return SpadRecipe(
         name=common.name,
         kind=common.kind,
         sensor=common.sensor,
         networks=common.networks,
         sampling=section("sampling", SamplingRecipe, table.get("sampling", {})),
+        times=model("times", Sharpen, table),
         data=section("data", SpadDataRecipe, table.get("data", {})),
     )
 
@@ -130,6 +135,7 @@ def samples_digest(recipe: SpadRecipe, role: str, seed: int) -> str:
     """Give a hash of all that decides the training samples, to name their pool by."""
     content = {
         "sampling": asdict(recipe.sampling),
+        "phase": recipe.sensor.phase,
         "data": asdict(recipe.data),
         "role": role,
         "seed": seed,

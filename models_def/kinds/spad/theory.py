@@ -94,8 +94,9 @@ def wiener_error(
     """
     values = covariance.values
     kernel = kernel.double()
-    seen = _spread(values, kernel)
-    twice = _spread(seen, kernel.flip(0, 1))
+    # a sample is sum p(u) I(x - u), so it has C(d + u) in common with a sub-pixel d beside it
+    seen = _spread(values, kernel.flip(0, 1))
+    twice = _spread(seen, kernel)
     at = torch.arange(-REACH, REACH + 1) * SCALE
     rows, columns = (v.flatten() for v in torch.meshgrid(at, at, indexing="ij"))
     middle = twice.shape[0] // 2

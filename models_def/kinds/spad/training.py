@@ -8,7 +8,9 @@ from typing import Any, Final
 
 from torch import nn
 
+from camkit.bundle.golden import IMAGE
 from camkit.bundle.psf_file import psf_to_bytes
+from camkit.bundle.stages import Correct, Stage, SuperResolve
 from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.models_def.kinds.spad.fitter import FITTING
@@ -29,6 +31,12 @@ from camkit.models_def.training.pictures import open_source
 from camkit.models_def.training.sample import SampleLayout
 
 PSF_FILE: Final = "psf.safetensors"
+DEPTH: Final = "depth_m"
+FAILS_ON: Final = (
+    "fewer than 100 to 200 photons a pixel (the bare array is better there)",
+    "a plate turned by several degrees",
+    "another fill factor or phase of the samples",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,15 +78,22 @@ class SpadTraining:
         return to_spad_recipe(table)
 
     def design(self, recipe: SpadRecipe) -> Design:
-        """Refuse: no stage of a bundle makes light and noise of counts yet.
+        """Give the stages: photons, the fine grid, and depth where there are time bins.
 
         Raises:
-            UnsupportedError: Always.
+            UnsupportedError: If its networks are not told the noise of pixels, as the stage does.
         """
-        raise UnsupportedError(
-            f"no bundle can be made of {recipe.name}: a stage that makes light of counts is "
-            "missing; use its checkpoints"
-        )
+        if not recipe.data.told:
+            raise UnsupportedError(
+                f"no bundle can be made of {recipe.name}: a bundle tells its networks the noise "
+                "of every pixel; train them with data.told"
+            )
+        stages: tuple[Stage, ...] = (Correct(), SuperResolve())
+        products = {IMAGE: stages[-1].gives[0]}
+        if recipe.sensor.time_bins:
+            stages = (*stages, recipe.times)
+            products[DEPTH] = stages[-1].gives[0]
+        return Design(stages=stages, products=products, fails_on=FAILS_ON)
 
     def build_network(self, name: str, **config: Any) -> nn.Module:
         """Build a network of this kind."""
@@ -93,7 +108,7 @@ class SpadTraining:
         del cache_folder
         plan = recipe.sampling
         learned = None if plan.psf is None else read_plate_psf(recipe_folder / plan.psf)
-        made = make_sampling(plan.mode, kernel=learned, sigma=plan.sigma, phase=plan.phase)
+        made = make_sampling(plan.mode, kernel=learned, sigma=plan.sigma, phase=recipe.sensor.phase)
         return SpadMaterial(kernel=made.kernel)
 
     def read_material(self, folder: Path) -> SpadMaterial:
@@ -135,7 +150,7 @@ def sampling_of(recipe: SpadRecipe, material: SpadMaterial) -> Sampling:
     return Sampling(
         mode=plan.mode,  # type: ignore[arg-type]
         kernel=material.kernel,
-        phase=plan.phase,
+        phase=recipe.sensor.phase,
     )
 
 

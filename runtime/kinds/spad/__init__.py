@@ -17,12 +17,24 @@ evidence       from when on a return is believed
 pooling        photons shared with neighbours where a pixel alone has too few
 hot_pixels     pixels that count without light: found and painted over
 sharpen        all of it for the rows of a capture
+lifetime       decays of fluorescence behind a pulse
+finer          the fine grid behind the plate of a bundle
+twin           scenes recorded by the array of a bundle
+proving        its golden cases
 products       depth, intensity, light in flight, and their files
 """
 
 from typing import Final
 
 from camkit.runtime.kind import RuntimePart
+from camkit.runtime.kind_parts.recording import Recording
 from camkit.runtime.kinds.spad.products.maker import MAKER
+from camkit.runtime.kinds.spad.proving import PROVING
+from camkit.runtime.kinds.spad.twin.simulate import record
+from camkit.runtime.kinds.spad.twin.write import SUFFIXES, files_of, write_recorded
 
-PART: Final = RuntimePart(maker=MAKER)
+PART: Final = RuntimePart(
+    maker=MAKER,
+    proving=PROVING,
+    recording=Recording(suffixes=SUFFIXES, record=record, write=write_recorded, files=files_of),
+)

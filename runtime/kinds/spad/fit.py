@@ -29,6 +29,9 @@ MOST_PASSES: Final = 3
 MOST_AT_ONCE: Final = 4096
 BLOCK_BYTES: Final = 48_000_000
 """What pixels that are fitted at once may need in between."""
+DOUBTFUL: Final = 60.0
+"""Evidence below which it is asked again at the pixel's own ratio: the table's gives too little."""
+LEAST_RATE: Final = 1e-6
 LEAST_SIGNAL: Final = 0.1
 """Photons: fewer are no signal to divide by."""
 
@@ -115,6 +118,10 @@ class Fitter:
             used = wanted
             amplitude, background = self.split(sums, template)
         evidence = 2 * (best + photons * np.log(self.bank.axis.bins))
+        doubtful = np.flatnonzero(evidence < DOUBTFUL)
+        own = (template[doubtful], amplitude[doubtful], background[doubtful])
+        exact = evidence_at(self.bank, counts[doubtful], *own)
+        evidence[doubtful] = np.maximum(evidence[doubtful], exact)
         return Fit(
             time_of_flight_ps=self.bank.mu_ps[template] + shift * self.bank.step_ps,
             amplitude=amplitude,
@@ -174,6 +181,33 @@ class Fitter:
         beyond = np.maximum(ratio - known[-1], 0.0)
         bound = np.exp(-0.5 * (logs - beyond)) / np.sqrt(np.maximum(amplitude, LEAST_SIGNAL))
         return np.asarray(np.hypot(bound, self.bank.resolved_ps / np.sqrt(12)))
+
+
+def evidence_at(
+    bank: Bank,
+    counts: FloatArray,
+    template: NDArray[np.int64],
+    amplitude: NDArray[np.float64],
+    background: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Give twice the log likelihood over background alone, at what was found of some pixels.
+
+    Args:
+        bank: The templates.
+        counts: (p, bins).
+        template: (p,) the template of every pixel.
+        amplitude: (p,) signal photons.
+        background: (p,) counts of a bin.
+    """
+    s = bank.shares[template]
+    near = np.where(s > 0, np.take_along_axis(counts, bank.bins[template], axis=1), 0.0)
+    photons = counts.sum(axis=1, dtype=np.float64)
+    dark = np.maximum(background, LEAST_RATE)
+    even = np.maximum(photons / bank.axis.bins, LEAST_RATE)
+    gained = (near * np.log1p(amplitude[:, None] * s / dark[:, None])).sum(axis=1)
+    gained += photons * np.log(dark / even)
+    gained -= amplitude * s.sum(axis=1) + (dark - even) * bank.axis.bins
+    return np.asarray(np.maximum(2 * gained, 0.0))
 
 
 def in_blocks(fit: Callable[[FloatArray], Fit], counts: FloatArray, bank: Bank) -> Fit:

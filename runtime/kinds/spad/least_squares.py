@@ -7,16 +7,20 @@ pulse. Squares trust a bright bin as much as a dark one; photons do not, so that
 References: dissertation, eq. (4.9), with a background beside it.
 """
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.bank import Banded, Bank
-from camkit.runtime.kinds.spad.fit import Fit, Fitter, in_blocks, peak, summed_from_left
-
-LEAST_RATE: Final = 1e-6
+from camkit.runtime.kinds.spad.fit import (
+    LEAST_RATE,
+    Fit,
+    Fitter,
+    evidence_at,
+    in_blocks,
+    peak,
+    summed_from_left,
+)
 
 
 class LeastSquares:
@@ -56,7 +60,7 @@ class LeastSquares:
             amplitude=amplitude,
             background=background,
             sigma_ps=_scatter(bank, template, amplitude, background),
-            evidence=_evidence(bank, counts, template, amplitude, background),
+            evidence=evidence_at(bank, counts, template, amplitude, background),
             template=template,
         )
 
@@ -83,22 +87,3 @@ def _scatter(
     noise += (bins - held.sum(axis=1)) * outside**2 * background
     steepness = np.maximum(amplitude, LEAST_RATE) * np.maximum((g * ds).sum(axis=1), 1e-12)
     return np.asarray(np.hypot(np.sqrt(noise) / steepness, bank.resolved_ps / np.sqrt(12)))
-
-
-def _evidence(
-    bank: Bank,
-    counts: FloatArray,
-    template: NDArray[np.int64],
-    amplitude: NDArray[np.float64],
-    background: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Give twice the log likelihood over background alone, at what was found."""
-    s = bank.shares[template]
-    near = np.where(s > 0, np.take_along_axis(counts, bank.bins[template], axis=1), 0.0)
-    photons = counts.sum(axis=1, dtype=np.float64)
-    dark = np.maximum(background, LEAST_RATE)
-    even = np.maximum(photons / bank.axis.bins, LEAST_RATE)
-    gained = (near * np.log1p(amplitude[:, None] * s / dark[:, None])).sum(axis=1)
-    gained += photons * np.log(dark / even)
-    gained -= amplitude * s.sum(axis=1) + (dark - even) * bank.axis.bins
-    return np.asarray(np.maximum(2 * gained, 0.0))

@@ -4,8 +4,13 @@
                   `-> squares of 3, then of 5 pixels, each fitted anew, and
 
 a pixel takes what its square found only if its own photons speak for it: with the pulse that each
-pixel of the square would have on average, a s_k, over its background b, the sum over its photons of
-log(1 + a s_k / b) must exceed a S. Otherwise surfaces would grow over their edges.
+pixel of the square would have on average, a s_k, over its background b, its gain, the sum over its
+photons of log(1 + a s_k / b) less a S, must exceed 0. Otherwise surfaces would grow over their
+edges.
+
+Who chooses a side wants every pixel to share: there it is enough that its own photons do not refute
+the square at a level of one in twenty, neither by their silence nor by speaking so much more for
+another time, the search for it counted.
 """
 
 from collections.abc import Callable
@@ -31,6 +36,8 @@ FALSE_ALARMS: Final = 1e-3
 """Pixels without any return that are believed to have one, unless a caller says otherwise."""
 SPARSE: Final = 0.1
 """Of all pixels: squares of fewer are summed one by one."""
+REFUTED: Final = 0.05
+"""Chance at which a pixel's own photons refute the square that was chosen for it."""
 LEAST_BACKGROUND: Final = 1e-3
 """Counts of a bin; no detector is darker for certain."""
 
@@ -99,8 +106,11 @@ def fit_pooled(
             square = Squares(cube, side, sound)
             new = _per_pixel(fit(square.counts(rows)), square.members[rows])
         good = new.evidence > threshold
-        if side > 1:
-            good &= _speak_for(fitter, own[rows], new)
+        if side > 1 and pool == "auto":
+            good &= _gain(fitter, own[rows], new) > 0
+        elif side > 1:
+            single = fit(own[rows]) if alone is None else taken(alone, rows)
+            good &= ~_refute(fitter, own[rows], new, single)
         found = new if len(rows) == len(own) else _merged(found or _nothing(len(own)), new, rows)
         side_of[rows[good]] = side
     return Pooled(fit=found or _nothing(len(own)), valid=side_of > 0, side=side_of)
@@ -171,14 +181,35 @@ def _per_pixel(fit: Fit, members: NDArray[np.float64]) -> Fit:
     return replace(fit, amplitude=fit.amplitude / members, background=fit.background / members)
 
 
-def _speak_for(fitter: Fitter, own: FloatArray, fit: Fit) -> NDArray[np.bool_]:
-    """Tell which pixels' own photons speak for the pulse that their square found."""
+def _gain(
+    fitter: Fitter, own: FloatArray, fit: Fit, template: NDArray[np.int64] | None = None
+) -> NDArray[np.float64]:
+    """Give how much pixels' own photons speak for the pulse of their square."""
     bank = fitter.bank
-    bins, shares = bank.bins[fit.template], bank.shares[fit.template]
+    at = fit.template if template is None else template
     background = np.maximum(fit.background, LEAST_BACKGROUND)
-    logs = np.log1p(fit.amplitude[:, None] * shares / background[:, None])
-    gained = (np.take_along_axis(own, bins, axis=1) * logs).sum(axis=1)
-    return np.asarray(gained > fit.amplitude * bank.totals[fit.template])
+    logs = np.log1p(fit.amplitude[:, None] * bank.shares[at] / background[:, None])
+    gained = (np.take_along_axis(own, bank.bins[at], axis=1) * logs).sum(axis=1)
+    return np.asarray(gained - fit.amplitude * bank.totals[at])
+
+
+def _refute(fitter: Fitter, own: FloatArray, fit: Fit, single: Fit) -> NDArray[np.bool_]:
+    """Tell which pixels' own photons refute the pulse that their square found.
+
+    Args:
+        fitter: The bank.
+        own: (p, bins) counts of the pixels alone.
+        fit: What the squares found.
+        single: What the pixels found alone.
+    """
+    gained = _gain(fitter, own, fit)
+    elsewhere = _gain(fitter, own, fit, single.template)
+    near = fitter.bank.near
+    here, there = near[fit.template], near[single.template]
+    apart = (there[:, 0] >= here[:, 1]) | (here[:, 0] >= there[:, 1])
+    is_silent = gained < np.log(REFUTED)
+    surplus = threshold_for(REFUTED, fitter.search_length) / 2
+    return np.asarray(is_silent | (apart & (elsewhere - gained > surplus)))
 
 
 def taken(fit: Fit, rows: NDArray[np.int64]) -> Fit:

@@ -53,6 +53,25 @@ class Pulse(Protocol):
         ...
 
 
+def pending(u_ps: Times, sigma_ps: float, decay_ps: float | Times) -> Times:
+    """Give the share that a Gaussian has begun and an exponential decay not yet let out.
+
+    It is the distribution of a normal less that of a normal plus an exponential; over the time
+    constant it is the density of the latter.
+
+    Args:
+        u_ps: Times.
+        sigma_ps: Standard deviation, > 0.
+        decay_ps: Time constant, > 0.
+    """
+    z = (sigma_ps / decay_ps - u_ps / sigma_ps) / np.sqrt(2)
+    far = z < 0  # there erfcx would overflow, and its other form does not
+    near = np.exp(-0.5 * (u_ps / sigma_ps) ** 2) * erfcx(np.maximum(z, 0)) / 2
+    slope = 0.5 * (sigma_ps / decay_ps) ** 2 - u_ps / decay_ps
+    late = np.exp(np.where(far, slope, 0.0)) * ndtr(-np.sqrt(2) * z)
+    return np.asarray(np.where(far, late, near))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GaussianPulse:
     """A pulse without a gate: laser and jitter.
@@ -164,15 +183,8 @@ class GatedPulse:
     def _edge(self, u: Times) -> Times:
         """Give R convolved with the Gaussian: the distribution of an exponential plus a normal."""
         sigma = max(self.sigma_ps, _LEAST_SIGMA_PS)
-        whole = ndtr(u / sigma)
-        if self.rc_ps == 0:
-            return np.asarray(whole)
-        z = (sigma / self.rc_ps - u / sigma) / np.sqrt(2)
-        far = z < 0  # there erfcx would overflow, and its other form does not
-        tail = np.where(far, 0.0, np.exp(-0.5 * (u / sigma) ** 2) * erfcx(np.maximum(z, 0)) / 2)
-        slope = 0.5 * (sigma / self.rc_ps) ** 2 - u / self.rc_ps
-        late = np.exp(np.where(far, slope, 0.0)) * ndtr(-np.sqrt(2) * z)
-        return np.asarray(whole - np.where(far, late, tail))
+        whole = np.asarray(ndtr(u / sigma))
+        return whole if self.rc_ps == 0 else whole - pending(u, sigma, self.rc_ps)
 
     def _ramp(self, u: Times) -> Times:
         """Give the integral of `_edge`."""

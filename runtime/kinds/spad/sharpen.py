@@ -38,12 +38,14 @@ class Way:
         pool: Side of the squares where one pixel is not enough.
         returns: How many surfaces a pixel may show, 1 or 2.
         false_alarms: Rate per pixel at which a return is believed that is none.
+        seek_hot: Whether pixels are looked for that count without light.
     """
 
     method: Method = "log"
     pool: Pool = "auto"
     returns: int = 1
     false_alarms: float = FALSE_ALARMS
+    seek_hot: bool = True
 
     @property
     def reach_px(self) -> int:
@@ -134,7 +136,9 @@ class Sharpener:
         shape, bins = cube.shape[:2], cube.shape[2]
         alone = self._fit(cube.reshape(-1, bins))
         photons = cube.sum(axis=2, dtype=np.float64)
-        is_hot = find_hot(alone.background.reshape(shape), cube)
+        is_hot = np.zeros(shape, dtype=bool)
+        if self.way.seek_hot:
+            is_hot = find_hot(alone.background.reshape(shape), cube)
         if hot is not None:
             is_hot |= hot
         pooled = fit_pooled(

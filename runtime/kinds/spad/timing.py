@@ -7,6 +7,8 @@
 [laser]       fwhm_ps (full width), wavelength_nm
 [irf]         file: two columns, times in ps and values; mu is where the time is 0
 [array]       axes, key, stamp_ps, pitch_um, focal_length_mm
+[lifetime]    period_ps (of the laser, where what it excited before is still seen), from_ps, to_ps
+              (bins that are fitted); for the product lifetime alone
 [correction]  offset_ps, dark (counts of a bin: a number, or an .npy map), hot (an .npy map)
 """
 
@@ -82,6 +84,14 @@ class Array(_Table):
     focal_length_mm: Positive | None = None
 
 
+class Lifetime(_Table):
+    """What fits of lifetimes may know."""
+
+    period_ps: Positive | None = None
+    from_ps: float | None = None
+    to_ps: float | None = None
+
+
 class Correction(_Table):
     """What is taken off or left out."""
 
@@ -102,6 +112,7 @@ class Timing(_Table):
     laser: Laser = Laser()
     irf: Irf = Irf()
     array: Array = Array()
+    lifetime: Lifetime = Lifetime()
     correction: Correction = Correction()
     folder: Path = Field(default=Path(), exclude=True)
 
@@ -223,6 +234,7 @@ TABLES: Final[Mapping[str, type[_Table]]] = {
     "laser": Laser,
     "irf": Irf,
     "array": Array,
+    "lifetime": Lifetime,
     "correction": Correction,
 }
 TABLE_OF: Final[Mapping[str, str]] = {

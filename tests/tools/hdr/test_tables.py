@@ -12,6 +12,8 @@ from torch import nn
 
 from camkit.export.parts import Parts
 from tests.tools.hdr.table_rig import Rig, rig, write_pictures
+from tools.comparison import equal_training
+from tools.comparison.equal_training import EqualTime
 from tools.hdr.table import measuring, restoring, scenes, training
 from tools.hdr.table.rows import ROWS, chosen_rows
 from tools.hdr.table.training import TrainSettings, recipe_text, train_rows
@@ -77,8 +79,8 @@ def test_networks_are_trained_once_and_measured(
     said = rig(*train)
     assert said.count("training for 15 CPU-minutes") == 2
     folder = runs / "streak-3.network-1"
-    assert not list(folder.glob(training.SAMPLES))
-    assert 'file = "streak-3"' in (folder / training.RECIPE).read_text(encoding="utf-8")
+    assert not list(folder.glob(equal_training.SAMPLES))
+    assert 'file = "streak-3"' in (folder / equal_training.RECIPE).read_text(encoding="utf-8")
     assert "training" not in rig(*train)
     record, _ = measured(rig, runs, out, *rows)
     assert len(packed) == 1
@@ -136,10 +138,10 @@ def test_a_training_that_was_stopped_goes_on(
     """The checkpoint is there and the word that it is done is not."""
     command = ("train", "--out-dir", tmp_path / "runs", "--workers", 0, "--rows")
     rig(*command, "streak-3.network")
-    (tmp_path / "runs" / "streak-3.network-1" / training.DONE).unlink()
+    (tmp_path / "runs" / "streak-3.network-1" / equal_training.DONE).unlink()
     seen = []
     monkeypatch.setattr(
-        training, "train", lambda path, options, **_: seen.append(options) or _stop(path)
+        equal_training, "train", lambda path, options, **_: seen.append(options) or _stop(path)
     )
     with pytest.raises(InterruptedError):
         rig(*command, "streak-3.network")
@@ -157,22 +159,25 @@ def test_weights_of_vgg_go_to_the_rows_that_look_through_them(
 ) -> None:
     """Without the file these rows are left out."""
     seen, told = [], []
-    monkeypatch.setattr(training, "_train", lambda run, _: seen.append(run) or _stop(run))
+    monkeypatch.setattr(training, "trained", lambda one, *_: seen.append(one) or _stop(one))
     rows = chosen_rows(["streak-cross.thesis"])
-    settings = TrainSettings(out_dir=tmp_path, pictures=None)
+    time = EqualTime(out_dir=tmp_path, pictures=None)
+    settings = TrainSettings(time=time)
     train_rows(rows, settings, told.append)
     assert told == [f"streak-cross.thesis-1: left out: {training.LACKS_VGG}"]
-    with_vgg = TrainSettings(out_dir=tmp_path, pictures=None, vgg=tmp_path / "vgg.pth")
+    with_vgg = TrainSettings(time=time, vgg=tmp_path / "vgg.pth")
     with pytest.raises(InterruptedError):
         train_rows(rows, with_vgg, told.append)
-    assert [run.name for run in seen] == ["streak-cross.thesis-1"]
+    assert [(one.name, one.vgg) for one in seen] == [
+        ("streak-cross.thesis-1", tmp_path / "vgg.pth")
+    ]
 
 
 def test_another_time_than_before_is_refused(rig: Rig, tmp_path: Path) -> None:
     folder = tmp_path / "streak-3.network-1"
     folder.mkdir()
     done = {"cpu_minutes": 2.0, "cpu_s": 120.0, "steps": 9, "valid_db": 40.0}
-    (folder / training.DONE).write_text(json.dumps(done), encoding="utf-8")
+    (folder / equal_training.DONE).write_text(json.dumps(done), encoding="utf-8")
     words = ("train", "--out-dir", tmp_path, "--rows", "streak-3.network")
     assert "9 steps, 120 CPU-s, 40.00 dB" in rig(*words, "--cpu-minutes", 2)
     with pytest.raises(SystemExit, match=r"for 2 CPU-minutes, not 15"):

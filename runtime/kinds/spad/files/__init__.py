@@ -13,4 +13,5 @@ sdt          Becker & Hickl histograms, by sdtfile
 spc          Becker & Hickl photon streams
 packed       members of a zip, unpacked under a cap
 open_counts  the reader of a file, by its type
+named        the bundle that a file names
 """

@@ -6,6 +6,7 @@ strips     in how many rows at once a capture is worked through
 depth      depth, time of flight, amplitude and what goes with them
 intensity  pictures and frames of counts
 transient  light in flight
+lifetime   how long fluorescence takes to fade
 archive    NAME.npz
 points     NAME.ply
 preview    NAME.png

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
+from camkit.runtime.kinds.spad.finer.depth import FineSharpener
 from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.points import write_points
@@ -15,6 +17,7 @@ from camkit.runtime.kinds.spad.products.preview import depth_picture, write_prev
 from camkit.runtime.kinds.spad.products.record import told_pulse, told_way
 from camkit.runtime.kinds.spad.products.strips import pieces
 from camkit.runtime.kinds.spad.products.survey import Survey
+from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, stacked
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
 from camkit.runtime.maker import Made, Making
@@ -39,17 +42,24 @@ def make_depth(making: Making, survey: Survey, began: float) -> Made:
     """
     pulse, guessed = survey.pulse()
     read_s = time.perf_counter() - began
-    sharpener = Sharpener(survey.an_axis, pulse, survey.settings.way)
-    found, blind, worst = _worked_through(making, survey, sharpener)
+    if survey.camera is None:
+        sharpener = Sharpener(survey.an_axis, pulse, survey.settings.way)
+        found, blind, worst = _worked_through(making, survey, sharpener)
+        told: Mapping[str, Any] = {}
+    else:
+        fine = fine_sharpener(survey, survey.camera, pulse)
+        sharpener = fine.sharpener
+        found, blind, worst, told = _made_finer(making, survey, fine)
     arrays = _arrays(found, survey)
     fit_s = time.perf_counter() - began - read_s
-    array = survey.timing.array
+    array, scale = survey.timing.array, 1 if survey.camera is None else survey.camera.scale
     is_known = array.pitch_um is not None and array.focal_length_mm is not None
     # where nothing is known of the lens, one whose focal length is the width of the array
     lens = {
-        "pitch_um": (array.pitch_um or 1.0) if is_known else 1.0,
+        "pitch_um": (array.pitch_um or 1.0) / scale if is_known else 1.0 / scale,
         "focal_length_mm": (array.focal_length_mm or 1.0) if is_known else survey.shape[1] * 1e-3,
     }
+    hot = _hot_places(found, scale)
     layers = arrays["depth_m"].reshape(found.valid.shape)
     return Made(
         arrays=arrays,
@@ -65,12 +75,13 @@ def make_depth(making: Making, survey: Survey, began: float) -> Made:
         record={
             "product": "depth",
             **told_way(survey.settings.way),
+            **told,
             **told_pulse(pulse, is_guessed=guessed is not None),
             "templates": len(sharpener.fitter.bank.mu_ps),
         },
         seconds={"read": read_s, "sharpen": fit_s},
-        warnings=_warnings(found, blind, survey, guessed, is_lens_known=is_known),
-        sections={"spad": _section(found, blind, worst)},
+        warnings=_warnings(found, blind, survey, guessed, hot, is_lens_known=is_known),
+        sections={"spad": _section(found, blind, worst, hot)},
     )
 
 
@@ -102,9 +113,43 @@ def _worked_through(
     return stacked(found), np.concatenate(blind), worst
 
 
+def _made_finer(
+    making: Making, survey: Survey, fine: FineSharpener
+) -> tuple[Sharpened, NDArray[np.bool_], float, Mapping[str, Any]]:
+    """Give the same on the fine grid of a bundle, and how it was found."""
+    check_cancelled(making.cancel)
+    strip = survey.rows.rows(0, survey.shape[0])
+    made = fine.cube(
+        strip.counts,
+        survey.timing.dark(survey.shape),
+        hot=survey.timing.hot(survey.shape),
+        blind=strip.blind,
+    )
+    if making.progress is not None:
+        making.progress(survey.shape[0], survey.shape[0])
+    told = {
+        "finer": "linear" if made.size is None else "net",
+        "size": made.size,
+        "signal_photons": round(made.photons, 2),
+    }
+    return made.found, strip.blind, strip.worst, told
+
+
+def fine_sharpener(survey: Survey, camera: FineCamera, pulse: Pulse) -> FineSharpener:
+    """Give what sharpens a capture behind the plate of its bundle."""
+    return FineSharpener(
+        camera,
+        survey.an_axis,
+        pulse,
+        survey.settings.way,
+        size=survey.size_of_pictures,
+        always=survey.settings.finer == "net",
+    )
+
+
 def _arrays(found: Sharpened, survey: Survey) -> dict[str, NDArray[Any]]:
     """Give the arrays of the archive; the leading axis goes where there is one return."""
-    dark = survey.timing.dark(survey.shape)
+    dark = survey.timing.dark(survey.shape) if survey.camera is None else 0.0
     depth = (found.time_of_flight_ps - survey.timing.correction.offset_ps) * LIGHT_M_PER_PS / 2
     arrays: dict[str, NDArray[Any]] = {
         "depth_m": np.where(found.valid, depth, np.nan),
@@ -122,12 +167,19 @@ def _arrays(found: Sharpened, survey: Survey) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _section(found: Sharpened, blind: NDArray[np.bool_], worst: float) -> Mapping[str, Any]:
+def _hot_places(found: Sharpened, scale: int) -> list[list[int]]:
+    """Name hot pixels of the array, (x, y)."""
+    return [[int(x), int(y)] for y, x in np.argwhere(found.hot[0][::scale, ::scale])]
+
+
+def _section(
+    found: Sharpened, blind: NDArray[np.bool_], worst: float, hot: list[list[int]]
+) -> Mapping[str, Any]:
     sides, counts = np.unique(found.pooled[found.valid], return_counts=True)
     return {
         "pixels": int(found.hot[0].size),
         "valid": [int(layer.sum()) for layer in found.valid],
-        "hot": [[int(x), int(y)] for y, x in np.argwhere(found.hot[0])],
+        "hot": hot,
         "blind": int(blind.sum()),
         "pile_up": round(worst, 4),
         "pooled": {str(s): int(n) for s, n in zip(sides.tolist(), counts.tolist(), strict=True)},
@@ -140,13 +192,13 @@ def _warnings(
     blind: NDArray[np.bool_],
     survey: Survey,
     guessed: str | None,
+    hot: list[list[int]],
     *,
     is_lens_known: bool,
 ) -> tuple[str, ...]:
     told = [] if guessed is None else [guessed]
-    hot = np.argwhere(found.hot[0])
-    if len(hot):
-        places = ", ".join(f"({x}, {y})" for y, x in hot[:NAMED_HOT])
+    if hot:
+        places = ", ".join(f"({x}, {y})" for x, y in hot[:NAMED_HOT])
         more = f" and {len(hot) - NAMED_HOT} more" if len(hot) > NAMED_HOT else ""
         told.append(f"hot pixels at {places}{more}: painted over and not valid")
     if blind.any():

@@ -3,9 +3,10 @@
 import time
 
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.photons import frames_of, sum_of
+from camkit.runtime.kinds.spad.products.photons import frames_of, made_finer, sum_of
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.preview import grey_picture, white_of, write_preview
+from camkit.runtime.kinds.spad.products.record import told_finer
 from camkit.runtime.kinds.spad.products.survey import Survey
 from camkit.runtime.kinds.spad.products.video import write_video
 from camkit.runtime.maker import Made, Making, Write
@@ -18,6 +19,7 @@ def make_intensity(making: Making, survey: Survey, began: float) -> Made:
     """
     is_film = survey.axis is None and survey.bins > 1
     frames = frames_of(making, survey) if survey.axis is None else sum_of(making, survey)
+    frames = made_finer(making, survey, frames)
     white = max(white_of(frame) for frame in frames)
     # one picture of a film: all its photons
     shown = frames.mean(axis=0) if is_film else frames[0]
@@ -35,7 +37,7 @@ def make_intensity(making: Making, survey: Survey, began: float) -> Made:
             "exr": (".exr", lambda path: write_exr(path, frames, "Y")),
             "tiff": (".tif", lambda path: write_tiff(path, frames)),
         },
-        record={"product": "intensity", "frames": len(frames)},
+        record={"product": "intensity", "frames": len(frames), **told_finer(survey)},
         seconds={"read": time.perf_counter() - began},
         warnings=survey.warnings(),
         sections={"spad": {"photons": float(frames.sum(dtype="float64").round(1))}},

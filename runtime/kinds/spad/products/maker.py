@@ -5,10 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.products.depth import make_depth
 from camkit.runtime.kinds.spad.products.intensity import make_intensity
+from camkit.runtime.kinds.spad.products.lifetime import make_lifetime
 from camkit.runtime.kinds.spad.products.record import told_axis, told_way
-from camkit.runtime.kinds.spad.products.settings import identity
+from camkit.runtime.kinds.spad.products.settings import FINER, identity
 from camkit.runtime.kinds.spad.products.survey import Survey, surveyed
 from camkit.runtime.kinds.spad.products.transient import make_transient
 from camkit.runtime.kinds.spad.sharpen import METHODS
@@ -19,11 +21,13 @@ MAKERS: Final = {
     "depth": make_depth,
     "intensity": make_intensity,
     "transient": make_transient,
+    "lifetime": make_lifetime,
 }
 BESIDE: Final[Mapping[str | None, tuple[str, ...]]] = {
     "depth": (".ply", ".png"),
     "intensity": (".png", ".mp4"),
     "transient": (".png", ".mp4"),
+    "lifetime": (".png",),
     None: (".ply", ".png", ".mp4"),
 }
 
@@ -104,7 +108,9 @@ MAKER: Final = Maker(
     suffix=".npz",
     beside=_beside,
     formats={"exr": ".exr", "tiff": ".tif"},
-    methods=METHODS,
+    methods=(*METHODS, *FINER),
+    with_bundle=frozenset({"size"}),
     identity=identity,
+    named=named_bundle,
     stem=stem,
 )

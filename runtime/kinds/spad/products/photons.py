@@ -8,6 +8,7 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.kinds.spad.finer.pictures import finer_frames
 from camkit.runtime.kinds.spad.hot_pixels import painted_over
 from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, pieces
 from camkit.runtime.kinds.spad.products.survey import Survey
@@ -38,6 +39,21 @@ def sum_of(making: Making, survey: Survey) -> FloatArray:
     for top, counts in _strips(making, survey, found.nbytes):
         found[0, top : top + len(counts)] = counts.sum(axis=2, dtype=np.float64)
     return _sound(found, survey)
+
+
+def made_finer(making: Making, survey: Survey, frames: FloatArray) -> FloatArray:
+    """Give pictures (n, h, w) on the fine grid of the bundle; without one as they are."""
+    if survey.camera is None:
+        return frames
+    of_frame = survey.bins if survey.axis is not None and len(frames) == 1 else 1
+    return finer_frames(
+        survey.camera,
+        frames,
+        survey.timing.dark(survey.shape) * of_frame,
+        survey.size_of_pictures,
+        progress=making.progress,
+        cancel=making.cancel,
+    )
 
 
 def _strips(making: Making, survey: Survey, held_bytes: int) -> Iterator[tuple[int, FloatArray]]:

@@ -18,6 +18,10 @@ SHOWN: Final = (2.0, 98.0)
 BRIGHTEST: Final = 99.5
 """Percentile of photons that is white."""
 GAMMA: Final = 2.2
+USUAL: Final = 95.0
+"""Percentile of frames whose white is that of a film of light in flight."""
+MOST_CLIPPED: Final = 30.0
+"""Of the brightest frame: so many times brighter than white it may be."""
 
 
 def depth_picture(depth_m: NDArray[np.float64]) -> Codes:
@@ -43,6 +47,16 @@ def grey_picture(photons: NDArray[np.floating], white: float) -> Codes:
 def white_of(photons: NDArray[np.floating]) -> float:
     """Give how many photons are shown white in a picture (h, w)."""
     return float(np.percentile(photons, BRIGHTEST)) if photons.size else 1.0
+
+
+def white_of_flight(frames: NDArray[np.floating]) -> float:
+    """Give how many photons are shown white in a film of light in flight (t, h, w).
+
+    The first surface may be hundreds of times brighter than what comes after it, in few frames:
+    these may clip, or nothing else would be seen.
+    """
+    whites = [white_of(frame) for frame in frames]
+    return max(float(np.percentile(whites, USUAL)), max(whites) / MOST_CLIPPED)
 
 
 def enlarged(codes: Codes, *, even: bool = False) -> Codes:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from camkit.runtime.kinds.spad.products.survey import Survey
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, GatedPulse, GaussianPulse, Pulse
 from camkit.runtime.kinds.spad.sharpen import Way
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
@@ -16,6 +17,14 @@ def told_way(way: Way) -> Mapping[str, Any]:
         "returns": way.returns,
         "false_alarms": way.false_alarms,
     }
+
+
+def told_finer(survey: Survey) -> Mapping[str, Any]:
+    """Say how pictures were made finer, as plain JSON values; nothing without a bundle."""
+    if survey.camera is None:
+        return {}
+    size = survey.size_of_pictures
+    return {"finer": "linear" if size is None else "net", "size": size}
 
 
 def told_axis(axis: TimeAxis) -> Mapping[str, Any]:

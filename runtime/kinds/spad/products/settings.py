@@ -12,7 +12,10 @@ from camkit.runtime.kinds.spad.sharpen import METHODS, Method, Way
 from camkit.runtime.kinds.spad.timing import Timing, read_timing
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
 
-Product = Literal["depth", "intensity", "transient"]
+Finer = Literal["net", "linear"]
+FINER: Final[tuple[Finer, ...]] = get_args(Finer)
+"""Ways to a finer grid, with a bundle."""
+Product = Literal["depth", "intensity", "transient", "lifetime"]
 PRODUCTS: Final[tuple[Product, ...]] = get_args(Product)
 
 
@@ -24,6 +27,8 @@ class Settings:
         product: None for what the capture is: depth of histograms, intensity of counts.
         way: How depth is fitted.
         chosen: Options of depth alone that were chosen.
+        finer: How pictures become finer behind a bundle's plate; None for what the plan says.
+        size: Of its network; None for the usual one.
         timing: What is known of times.
         max_mem_bytes: Memory that the process may take.
     """
@@ -33,6 +38,8 @@ class Settings:
     chosen: tuple[str, ...]
     timing: Timing
     max_mem_bytes: int
+    finer: Finer | None = None
+    size: str | None = None
 
     @classmethod
     def of(cls, options: Options) -> "Settings":
@@ -44,13 +51,18 @@ class Settings:
         named = options.chosen("timing")
         method: Method = next((m for m in METHODS if m == options.method), "log")
         pool: Pool = options.chosen("pool") or "auto"  # type: ignore[assignment]
+        finer: Finer | None = next((way for way in FINER if way == options.method), None)
         chosen = [name for name in ("pool", "returns") if options.chosen(name) is not None]
+        if options.method is not None and finer is None:
+            chosen.insert(0, "method")
         return cls(
             product=options.chosen("product"),  # type: ignore[arg-type]
             way=Way(method=method, pool=pool, returns=int(options.chosen("returns") or 1)),
-            chosen=(*["method"][: options.method is not None], *chosen),
+            chosen=tuple(chosen),
             timing=Timing() if named is None else read_timing(Path(named)),
             max_mem_bytes=options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES,
+            finer=finer,
+            size=options.size,
         )
 
     def product_of(self, *, is_histogram: bool) -> Product:

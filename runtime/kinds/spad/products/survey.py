@@ -9,10 +9,11 @@ from typing import Final
 import numpy as np
 
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError, UnsupportedError
+from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.corrected import CorrectedRows
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.guess_pulse import guess_pulse
 from camkit.runtime.kinds.spad.products.settings import Product, Settings
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, Pulse
@@ -35,6 +36,7 @@ class Survey:
         axis: Of its times; None for counts.
         rows: Its rows, pile-up undone.
         settings: What the caller chose.
+        camera: The array of a bundle, whose products lie on its fine grid; None without one.
     """
 
     file: CountsFile
@@ -43,6 +45,7 @@ class Survey:
     axis: TimeAxis | None
     rows: CorrectedRows
     settings: Settings
+    camera: FineCamera | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -64,6 +67,13 @@ class Survey:
         if self.axis is None:
             raise ContractError(f"{self.file.path.name} holds no times of photons")
         return self.axis
+
+    @property
+    def size_of_pictures(self) -> str | None:
+        """Give the network that makes pictures finer; None for the linear estimate."""
+        if self.camera is None or self.settings.finer == "linear" or not self.camera.sizes:
+            return None
+        return self.camera.size(self.settings.size)
 
     def pulse(self) -> tuple[Pulse, str | None]:
         """Give the pulse, and what the user should know if nobody stated it.
@@ -102,18 +112,18 @@ def surveyed(making: Making) -> Iterator[Survey]:
     Raises:
         DecodeError: If it cannot be read.
         ContractError: If capture and options do not fit each other.
-        UnsupportedError: If a bundle is given.
+        BundleError: If the bundle makes no picture of photons finer.
     """
-    if making.bundle is not None:
-        raise UnsupportedError(
-            f"this camkit sharpens counts without a bundle only; {making.bundle.manifest.name} "
-            "needs a newer one"
-        )
     settings = Settings.of(making.options)
+    camera = None if making.bundle is None else FineCamera.of(making.bundle, making.threads)
+    _check_finer(settings, camera)
     array = settings.timing.array
     hints = Hints(axes=array.axes, key=array.key, max_bytes=settings.max_mem_bytes // 4)
     with open_counts(Path(making.path), hints) as file:
         timing = settings.timing.with_stated(file.stated)
+        if camera is not None:
+            camera.check_shape((file.height, file.width))
+            timing = _with_bundle(timing, camera)
         product = settings.product_of(is_histogram=file.kind != "counts")
         axis = None if file.kind == "counts" else _axis(file, timing)
         yield Survey(
@@ -128,7 +138,39 @@ def surveyed(making: Making) -> Iterator[Survey]:
                 stamp_ps=timing.array.stamp_ps or 1.0,
             ),
             settings=settings,
+            camera=camera,
         )
+
+
+def _check_finer(settings: Settings, camera: FineCamera | None) -> None:
+    """Refuse what means nothing with a bundle, or without one.
+
+    Raises:
+        ContractError: Names it.
+    """
+    if camera is None and settings.finer is not None:
+        raise ContractError(
+            f"--method {settings.finer} makes pictures finer behind the plate of a bundle; say "
+            "--bundle too"
+        )
+    if camera is not None and settings.way.pool not in ("auto", "1"):
+        raise ContractError(
+            "--pool puts pixels of an array together; with a bundle the estimate of the fine grid "
+            "does so by itself: leave --pool out"
+        )
+    if camera is not None and (settings.size is not None or settings.finer == "net"):
+        camera.size(settings.size)
+
+
+def _with_bundle(timing: Timing, camera: FineCamera) -> Timing:
+    """Give what is known of times, with what the bundle says where nobody else does."""
+    stated = {"pitch_um": camera.sensor.pixel_pitch_um, **camera.stated_times()}
+    unwanted: set[str] = set()
+    if timing.timing.time_bin_ps is not None or timing.timing.bin_edges_ps is not None:
+        unwanted |= {"time_bin_ps", "first_ps"}
+    if timing.pulse() is not None:
+        unwanted |= {"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"}
+    return timing.with_stated({n: value for n, value in stated.items() if n not in unwanted})
 
 
 def _axis(file: CountsFile, timing: Timing) -> TimeAxis:

@@ -6,10 +6,15 @@ from typing import Any
 from numpy.typing import NDArray
 
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.photons import frames_of
+from camkit.runtime.kinds.spad.products.photons import frames_of, made_finer
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
-from camkit.runtime.kinds.spad.products.preview import grey_picture, white_of, write_preview
-from camkit.runtime.kinds.spad.products.record import told_axis
+from camkit.runtime.kinds.spad.products.preview import (
+    grey_picture,
+    white_of,
+    white_of_flight,
+    write_preview,
+)
+from camkit.runtime.kinds.spad.products.record import told_axis, told_finer
 from camkit.runtime.kinds.spad.products.survey import Survey
 from camkit.runtime.kinds.spad.products.video import write_video
 from camkit.runtime.maker import Made, Making
@@ -19,8 +24,9 @@ def make_transient(making: Making, survey: Survey, began: float) -> Made:
     """Give the photons of every pixel and bin; arguments and errors as of `make_depth`."""
     axis = survey.an_axis
     frames = frames_of(making, survey)
+    frames = made_finer(making, survey, frames)
     arrays: dict[str, NDArray[Any]] = {"transient": frames, "time_ps": axis.centres_ps}
-    white = max(white_of(frame) for frame in frames)
+    white = white_of_flight(frames)
     shown = frames.sum(axis=0)
     return Made(
         arrays=arrays,
@@ -33,7 +39,7 @@ def make_transient(making: Making, survey: Survey, began: float) -> Made:
             "exr": (".exr", lambda path: write_exr(path, frames, "Y")),
             "tiff": (".tif", lambda path: write_tiff(path, frames)),
         },
-        record={"product": "transient", **told_axis(axis)},
+        record={"product": "transient", **told_axis(axis), **told_finer(survey)},
         seconds={"read": time.perf_counter() - began},
         warnings=survey.warnings(),
         sections={"spad": {"photons": float(frames.sum(dtype="float64").round(1))}},

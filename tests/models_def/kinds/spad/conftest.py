@@ -20,6 +20,8 @@ width_px = 64
 height_px = 32
 pixel_pitch_um = 150.0
 fill_factor = 0.0314
+sub_pixels = 4
+phase = 2
 
 [sampling]
 mode = "gaussian"

@@ -28,7 +28,7 @@ def test_shipped_recipes_are_of_one_array(name: str, role: str, sizes: set[str])
     assert set(recipe.networks[role]) == sizes
     sensor = recipe.sensor
     assert (sensor.width_px, sensor.height_px, sensor.pixel_pitch_um) == (64, 32, 150)
-    assert recipe.sampling.phase == 2
+    assert (recipe.sensor.sub_pixels, recipe.sensor.phase) == (4, 2)
     assert recipe.data.told
 
 
@@ -45,7 +45,8 @@ def test_a_network_without_role_makes_pictures_finer(tiny: SpadRecipe) -> None:
         ({"sampling__mode": "learned"}, "sampling.psf belongs to the mode learned"),
         ({"sampling__psf": "x.pt"}, "sampling.psf belongs to the mode learned"),
         ({"sampling__mode": "low_fill", "sampling__sigma": 2.0}, "sampling.sigma belongs"),
-        ({"sampling__phase": 4}, r"sampling.phase must be one of 0\.\.3"),
+        ({"sensor__phase": 4}, r"phase must be one of the sub-pixels 0\.\.3"),
+        ({"sensor__sub_pixels": 5}, r"sensor.sub_pixels must be 4, got 5"),
         ({"sampling__side": 4}, "sampling: unknown key 'side'"),
         ({"data__photons_min": 0.0}, "data.photons_min"),
         ({"data__photons_min": 1e9}, "data.photons_min"),

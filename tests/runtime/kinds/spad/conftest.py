@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from camkit.bundle.reader import Bundle
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
+from tests.spad_bundle import write_spad_bundle
 
 Draw = Callable[..., NDArray[np.float32]]
 
@@ -38,3 +41,13 @@ def draw(pulse: GatedPulse) -> Draw:
         return np.random.default_rng(seed).poisson(mean).astype(np.float32)
 
     return drawn
+
+
+@pytest.fixture(scope="session")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    return write_spad_bundle(tmp_path_factory.mktemp("spad-bundle"))
+
+
+@pytest.fixture(scope="session")
+def camera(bundle: Bundle) -> FineCamera:
+    return FineCamera.of(bundle)

@@ -81,10 +81,18 @@ def test_background_alone_is_believed_no_more_often_than_stated(  # type: ignore
     length = search_length(fitter.bank)
     threshold = threshold_for(1e-3, length)
     for even in (0.02, 0.2, 2.0, 50.0):
-        found = fitter.fit(draw(axis, np.zeros(20_000), 0.0, even, seed=3))
-        assert np.mean(found.evidence > threshold) <= 2e-3
+        counts = np.random.default_rng(3).poisson(even, (100_000, axis.bins))
+        found = fitter.fit(counts.astype(np.float32))
+        assert np.mean(found.evidence > threshold) <= 1e-3
     found = fitter.fit(draw(axis, _times(), 60.0, 0.1))
     assert (found.evidence > threshold).all()
+
+
+def test_much_background_costs_no_evidence(fitter: Fitter, axis: TimeAxis, draw) -> None:  # type: ignore[no-untyped-def]
+    counts = draw(axis, _times(), 100.0, 100 / 0.03 / axis.bins)
+    threshold = threshold_for(1e-3, fitter.search_length)
+    # the nearest ratio of the table alone believes 30 % of these
+    assert np.mean(fitter.fit(counts).evidence > threshold) > 0.6
 
 
 def test_threshold_and_rate_are_inverse() -> None:

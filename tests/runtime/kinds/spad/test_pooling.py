@@ -86,6 +86,32 @@ def test_surfaces_grow_little_over_their_edges(  # type: ignore[no-untyped-def]
     assert np.mean(grown) < 0.2
 
 
+def test_silence_in_a_chosen_square_refutes_bright_surfaces_only(  # type: ignore[no-untyped-def]
+    fitter: Fitter, axis: TimeAxis, draw
+) -> None:
+    cube = _cube(draw, axis, 2, 0.002)
+    # pixels of a dim surface from which nothing came have what their square shows
+    assert fit_pooled(fitter, cube, pool="5").valid.mean() > 0.95
+    assert fit_pooled(fitter, cube, pool="auto").valid.mean() < 0.9
+    bright = _cube(draw, axis, 30, 0.002)
+    bright[:, SIDE // 2 :] = 0
+    valid = fit_pooled(fitter, bright, pool="5").valid.reshape(SIDE, SIDE)
+    assert valid[:, : SIDE // 2].mean() > 0.99
+    assert not valid[:, SIDE // 2 :].any()
+
+
+def test_photons_of_another_time_refute_a_chosen_square(  # type: ignore[no-untyped-def]
+    fitter: Fitter, axis: TimeAxis, draw
+) -> None:
+    cube = _cube(draw, axis, 8, 0.002)
+    apart = draw(axis, np.full(9, 1900.0), 8, 0.002, seed=4)
+    cube[5:35:12, 5:35:12] = apart.reshape(3, 3, -1)
+    found = fit_pooled(fitter, cube, pool="5")
+    at = found.valid.reshape(SIDE, SIDE)[5:35:12, 5:35:12]
+    assert at.mean() < 0.2
+    assert found.valid.mean() > 0.95
+
+
 def test_impossible_wishes_are_refused(fitter: Fitter, axis: TimeAxis) -> None:
     cube = np.zeros((2, 2, axis.bins), np.float32)
     with pytest.raises(ContractError, match="pool must be one of auto, 1, 3, 5; got '2'"):

@@ -20,6 +20,7 @@ from camkit.runtime.kinds.spad.products.preview import (
     enlarged,
     grey_picture,
     white_of,
+    white_of_flight,
     write_preview,
 )
 from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, pieces
@@ -35,6 +36,17 @@ def test_an_archive_is_numpys_and_equal_arrays_give_equal_bytes(tmp_path: Path) 
             np.testing.assert_array_equal(found[name], values)
             assert found[name].dtype == values.dtype
     assert (tmp_path / "a.part").read_bytes() == (tmp_path / "b.part").read_bytes()
+
+
+def test_a_bright_first_surface_does_not_darken_a_film() -> None:
+    frames = np.full((200, 8, 8), 10.0)
+    assert white_of_flight(frames) == 10.0
+    frames[:4] = 200.0
+    assert white_of_flight(frames) == 10.0
+    frames[:4] = 3000.0
+    assert white_of_flight(frames) == 100.0
+    # light in few frames alone is not blown up beyond all bounds
+    assert white_of_flight(np.where(np.arange(200)[:, None, None] < 4, frames, 0.0)) == 100.0
 
 
 def _read_ply(path: Path) -> np.ndarray:

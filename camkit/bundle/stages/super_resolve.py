@@ -1,0 +1,87 @@
+"""Photons of an array behind a plate on a finer grid: linearly, or by a network."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from camkit.bundle.entry import Positive, Word
+from camkit.bundle.plane import Plane
+from camkit.bundle.sensor import SpadSensor
+from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_count, need_domain
+
+PORTS = (1, 1)
+"""Channels of a network: light, and what is told of its noise."""
+Sampled = Literal["plate", "low_fill", "full_fill", "gaussian"]
+
+
+class SuperResolve(StageEntry):
+    """Every pixel becomes the sub-pixels that its sensor names (format 2.3).
+
+    What a linear estimate takes for granted of pictures is their covariance
+    C(d) = contrast^2 mean^2 exp(-(d / reach)^exponent) at a distance d.
+
+    Attributes:
+        role: Key of `networks` in the manifest.
+        contrast: Standard deviation of light over its mean.
+        reach: Distance in sub-pixels at which the covariance has fallen to 1 / e.
+        exponent: How it falls.
+        network_from_photons: Signal photons of a pixel, on average, from which on depth is read
+            behind the network; below, the linear estimate is nearer to the truth.
+        sampling: What its pixels see through: the plate of the optics; nothing (low_fill); all
+            sub-pixels of a pixel at once (full_fill); a Gaussian diffuser.
+        sigma: Of a Gaussian, in sub-pixels; of it alone.
+    """
+
+    type: Literal["super_resolve"] = "super_resolve"
+    takes: tuple[Word, ...] = ("photons",)
+    gives: tuple[Word, ...] = ("fine",)
+    role: Word = "upscale"
+    contrast: Positive = 0.634
+    reach: Positive = 129.0
+    exponent: Annotated[float, Field(gt=0, le=2)] = 0.52
+    network_from_photons: Positive = 80.0
+    sampling: Sampled = "plate"
+    sigma: Positive | None = None
+
+    @model_validator(mode="after")
+    def _check_sigma(self) -> Self:
+        if (self.sigma is not None) != (self.sampling == "gaussian"):
+            raise ValueError("sigma belongs to the sampling gaussian, and to it alone")
+        return self
+
+    def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
+        """Give the photons on the fine grid."""
+        need_count(taken, 1)
+        need_domain(taken[0], "counts")
+        sensor, optics = parts.sensor, parts.need_optics("it undoes their blur")
+        if not isinstance(sensor, SpadSensor) or sensor.sub_pixels < 2:
+            raise JoinError("it takes an array that counts photons and states its sub_pixels")
+        if optics.symmetry != "uniform" or optics.type != "frozen_psf":
+            raise JoinError("it takes one kernel for the whole array: symmetry uniform")
+        pitch_um = sensor.pixel_pitch_um / sensor.sub_pixels
+        if abs(optics.pixel_pitch_um - pitch_um) > 1e-6 * pitch_um:
+            raise JoinError(
+                f"its kernel must have samples of {pitch_um:g} um, one for each sub-pixel; got "
+                f"{optics.pixel_pitch_um:g}"
+            )
+        for size, facts in parts.networks.get(self.role, {}).items():
+            ports = tuple(port.channels for port in facts.inputs)
+            if ports != PORTS or [port.channels for port in facts.outputs] != [1]:
+                raise JoinError(f"its network of size {size} must take light and noise, give light")
+            if facts.output_scale != sensor.sub_pixels:
+                raise JoinError(
+                    f"its network of size {size} makes {facts.output_scale} samples of a pixel, "
+                    f"the sensor has {sensor.sub_pixels} sub-pixels"
+                )
+        plane = taken[0]
+        share = 1 / sensor.sub_pixels
+        x, y = plane.grid.origin_px
+        shift = sensor.phase * plane.grid.pitch_ratio * share
+        grid = plane.grid.model_copy(
+            update={
+                "pitch_ratio": plane.grid.pitch_ratio * share,
+                "origin_px": (x - shift, y - shift),
+            }
+        )
+        return (plane.model_copy(update={"type": "float32", "grid": grid}),)

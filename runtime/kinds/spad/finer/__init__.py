@@ -1,0 +1,9 @@
+"""Photons on a grid finer than the array's, behind a plate that is known.
+
+covariance   what is taken for granted of pictures
+linear       the best linear estimate at a level of light, with what it makes of noise
+sampling     what a pixel sees through: the plate, nothing, all of itself, a diffuser
+camera       a bundle's array: its linear estimates, its networks
+depth        bins made finer, then fitted
+pictures     frames and light in flight made finer
+"""

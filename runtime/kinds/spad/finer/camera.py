@@ -1,0 +1,225 @@
+"""The array of a bundle: its photons on the fine grid, linearly or by its network.
+
+    photons (n, h, w) -- linear estimate at their level of light --> (n, m h, m w)
+                      -- light and 3 sigma, white = 1 -- network --> (n, m h, m w)
+
+With c counts, d of them dark, a network is given (c - d) / N and 3 sqrt(c + 1) / N, N the photons
+of white, as it was in training. Whatever N is, what it gives is photons again.
+"""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.bundle.reader import Bundle
+from camkit.bundle.sensor import SpadSensor
+from camkit.bundle.stages import Sharpen, SuperResolve
+from camkit.contracts import FloatArray
+from camkit.errors import BundleError, ContractError
+from camkit.runtime.cancel import Cancel
+from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
+from camkit.runtime.kinds.spad.finer.linear import Grid, LinearEstimate, linear_estimate
+from camkit.runtime.kinds.spad.finer.sampling import sampling_kernel
+from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.network.graph import check_graph
+
+TOLD: Final = 3.0
+"""Deviations in the plane that tells a network of noise."""
+WHITE_PERCENTILE: Final = 99.5
+"""Of the photons of a picture that are taken for white where nobody says."""
+LEAST_WHITE: Final = 4.0
+"""Photons: below, chance alone makes the brightest pixel."""
+DEFAULT_SIZE: Final = "M"
+
+
+def network_planes(photons: FloatArray, white: float, dark: FloatArray | float = 0.0) -> FloatArray:
+    """Give what a network is given of a picture, (2, h, w): light, and 3 sigma of it.
+
+    Args:
+        photons: (h, w), without dark counts.
+        white: Photons of white.
+        dark: Dark counts that were taken off, (h, w) or one number.
+    """
+    noise = TOLD * np.sqrt(np.maximum(photons + dark, 0) + 1)
+    return np.stack([photons, noise]).astype(np.float32) / np.float32(white)
+
+
+def white_of(photons: FloatArray) -> float:
+    """Give the photons that are taken for white in pictures (..., h, w)."""
+    return max(float(np.percentile(photons, WHITE_PERCENTILE)), LEAST_WHITE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FineCamera:
+    """The array of a bundle; safe to share between threads.
+
+    Attributes:
+        bundle: The camera.
+        stage: How it makes pictures finer.
+        sharpen: Times that it takes captures to have which state none.
+        threads: Of its networks.
+    """
+
+    bundle: Bundle
+    stage: SuperResolve
+    sharpen: Sharpen | None
+    threads: int = 1
+    _engines: dict[str, NetworkEngine] = field(default_factory=dict, repr=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    @classmethod
+    def of(cls, bundle: Bundle, threads: int = 1, *, role: str | None = None) -> "FineCamera":
+        """Look at a bundle.
+
+        Args:
+            bundle: The camera.
+            threads: Of its networks.
+            role: Of the networks that make pictures finer; None for those of its first stage.
+
+        Raises:
+            BundleError: If it makes no picture of photons finer, or has no such role.
+        """
+        manifest = bundle.manifest
+        stages = manifest.stages_of(SuperResolve)
+        stage = next((s for s in stages if role is None or s.role == role), None)
+        if stage is None and stages:
+            known = ", ".join(s.role for s in stages)
+            raise BundleError(f"bundle {manifest.name} has no role {role!r}; it has {known}")
+        if stage is None or not isinstance(manifest.sensor, SpadSensor):
+            raise BundleError(
+                f"bundle {manifest.name} has no stage super_resolve; captures of single photons "
+                "are sharpened with --bundle none"
+            )
+        return cls(bundle=bundle, stage=stage, sharpen=manifest.stage(Sharpen), threads=threads)
+
+    @property
+    def sensor(self) -> SpadSensor:
+        """Give its array."""
+        sensor = self.bundle.manifest.sensor
+        assert isinstance(sensor, SpadSensor)
+        return sensor
+
+    @property
+    def scale(self) -> int:
+        """Give the sub-pixels along a side of a pixel."""
+        return self.sensor.sub_pixels
+
+    @property
+    def grid(self) -> Grid:
+        """Give where a pixel sees."""
+        return Grid(scale=self.sensor.sub_pixels, phase=self.sensor.phase)
+
+    @property
+    def kernel(self) -> FloatArray:
+        """Give the light of a point on the fine grid, (n, n)."""
+        return sampling_kernel(self.stage, np.array(self.bundle.psf.kernels[0, 0, 0]), self.grid)
+
+    @property
+    def sizes(self) -> Mapping[str, object]:
+        """Give its networks by size."""
+        return self.bundle.manifest.networks.get(self.stage.role, {})
+
+    def size(self, asked: str | None) -> str:
+        """Give the size of network to run: the one asked for, else M.
+
+        Raises:
+            ContractError: If there is none.
+        """
+        sizes = self.sizes
+        if not sizes or (asked is not None and asked not in sizes):
+            have = ", ".join(sizes) or "none"
+            raise ContractError(
+                f"bundle {self.bundle.manifest.name} holds size(s) {have}; asked for "
+                f"{asked or 'a network'}; --method linear needs none"
+            )
+        return asked or (DEFAULT_SIZE if DEFAULT_SIZE in sizes else next(iter(sizes)))
+
+    def stated_times(self) -> dict[str, Any]:
+        """Give what the bundle says of times and pulse, by the names of a timing file."""
+        usual, sensor = self.sharpen, self.sensor
+        if usual is None:
+            return {}
+        stated = {
+            "orientation": usual.orientation,
+            "time_bin_ps": sensor.time_bin_ps,
+            "first_ps": usual.first_ps,
+            "width_ps": usual.gate_width_ps,
+            "rc_ps": usual.gate_rc_ps,
+            "jitter_ps": usual.jitter_ps,
+            "fwhm_ps": usual.laser_fwhm_ps,
+            "wavelength_nm": usual.laser_wavelength_nm,
+        }
+        return {name: value for name, value in stated.items() if value is not None}
+
+    def check_shape(self, shape: tuple[int, int]) -> None:
+        """Refuse captures of another array, (h, w).
+
+        Raises:
+            ContractError: Names both sides.
+        """
+        own = (self.sensor.height_px, self.sensor.width_px)
+        if shape != own:
+            raise ContractError(
+                f"the capture has {shape[1]}x{shape[0]} pixels, the array of bundle "
+                f"{self.bundle.manifest.name} {own[1]}x{own[0]}; say --bundle none"
+            )
+
+    def linear(self, photons: float) -> LinearEstimate:
+        """Give the linear estimate at a level of light, photons of a pixel on average."""
+        stage = self.stage
+        return linear_estimate(
+            self.kernel,
+            self.grid,
+            PictureCovariance(contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent),
+            photons,
+        )
+
+    def network(self, size: str) -> NetworkEngine:
+        """Give the network of a size, made when first asked for.
+
+        Raises:
+            BundleError: If there is none, or its graph is not what the bundle says.
+        """
+        with self._lock:
+            if size not in self._engines:
+                facts = self.bundle.network_facts(self.stage.role, size)
+                data = self.bundle.network_bytes(self.stage.role, size)
+                check_graph(data, facts)
+                self._engines[size] = NetworkEngine(
+                    data, threads=self.threads, scale=facts.output_scale
+                )
+            return self._engines[size]
+
+    def by_network(
+        self,
+        frames: FloatArray,
+        size: str,
+        *,
+        white: float,
+        dark: FloatArray | float = 0.0,
+        cancel: Cancel | None = None,
+    ) -> FloatArray:
+        """Give pictures (n, m h, m w) of photons (n, h, w) by the network of a size.
+
+        Args:
+            frames: Photons without dark counts.
+            size: Of the network.
+            white: Photons of white in all of them.
+            dark: Dark counts that were taken off, (h, w) or one number.
+            cancel: Asked while the network runs.
+
+        Raises:
+            Cancelled: If `cancel` said so.
+        """
+        engine, scale = self.network(size), self.scale
+        count, height, width = frames.shape
+        found = np.empty((count, scale * height, scale * width), np.float32)
+        for frame, out in zip(frames, found, strict=True):
+            planes = network_planes(frame, white, dark)[None]
+            engine.run(planes, out[None, None], cancel=cancel)
+        np.maximum(found, 0, out=found)
+        found *= np.float32(white)
+        return found

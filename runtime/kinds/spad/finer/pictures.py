@@ -1,0 +1,60 @@
+"""Pictures of photons on the fine grid: by a network, or linearly at their level of light."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.runtime.cancel import Cancel, check_cancelled
+from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
+
+EMPTY: Final = 0.0
+"""Photons of a frame, dark counts taken off: with fewer there is nothing to see."""
+
+Step = Callable[[int, int], None]
+
+
+def finer_frames(
+    camera: FineCamera,
+    frames: FloatArray,
+    dark: NDArray[np.floating] | float,
+    size: str | None,
+    *,
+    white: float | None = None,
+    progress: Step | None = None,
+    cancel: Cancel | None = None,
+) -> FloatArray:
+    """Give pictures (n, m h, m w) of photons (n, h, w), >= 0.
+
+    Frames without photons stay dark and take no time.
+
+    Args:
+        camera: The array.
+        frames: Photons of a pixel, without dark counts.
+        dark: Dark counts that were taken off, (h, w) or one number.
+        size: Of the network; None for the linear estimate.
+        white: Photons of white, for networks; None for what the frames show.
+        progress: Called with (frames done, frames in all).
+        cancel: Asked between frames.
+
+    Raises:
+        Cancelled: If `cancel` said so.
+    """
+    scale, (count, height, width) = camera.scale, frames.shape
+    found = np.zeros((count, scale * height, scale * width), np.float32)
+    white = white_of(frames) if white is None else white
+    for number, frame in enumerate(frames):
+        check_cancelled(cancel)
+        photons = float(frame.sum(dtype=np.float64))
+        if photons > EMPTY:
+            one = frame[None]
+            found[number] = (
+                camera.linear(photons / frame.size)(one)[0]
+                if size is None
+                else camera.by_network(one, size, white=white, dark=dark, cancel=cancel)[0]
+            )
+        if progress is not None:
+            progress(number + 1, count)
+    return np.maximum(found, 0, out=found)

@@ -1,0 +1,62 @@
+"""Where fits of lifetimes begin: the best of a coarse bank over lifetimes and times.
+
+A look that assumes too little background takes it for a slow decay, so there are several looks.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.runtime.kinds.spad.lifetime.decay import Decay, Floats
+
+APART: Final = 1.7
+"""Factor between two lifetimes."""
+STEP_SIGMAS: Final = 2.0
+"""Of the pulse's edge: between two times, a bin at least."""
+MOST_TIMES: Final = 400
+DARK_SHARES: Final = (0.1, 0.5, 0.9)
+"""Of the photons: background that looks assume."""
+
+
+class Starts:
+    """A coarse bank.
+
+    Attributes:
+        mu_ps: (m,) times of its templates.
+        lifetime_ps: (m,) their lifetimes.
+        shares: (m, bins).
+        length: How far normed templates turn along time, all lifetimes together: how much there is
+            to search, see `camkit.runtime.kinds.spad.evidence`.
+    """
+
+    def __init__(self, decay: Decay, least_ps: float, most_ps: float) -> None:
+        """Lay templates over an axis, for lifetimes between two limits."""
+        axis = decay.axis
+        count = max(2, int(np.ceil(np.log(most_ps / least_ps) / np.log(APART))) + 1)
+        lifetimes = np.geomspace(least_ps, most_ps, count)
+        span = float(axis.centres_ps[-1] - axis.centres_ps[0])
+        step = max(STEP_SIGMAS * decay.pulse.finest_ps, axis.step_ps, span / MOST_TIMES)
+        times = axis.centres_ps[0] - decay.pulse.mean_ps + np.arange(0, span, step)
+        self.mu_ps = np.tile(times, count)
+        self.lifetime_ps = np.repeat(lifetimes, len(times))
+        self.shares = np.concatenate(
+            [decay.shapes(times, np.full(len(times), tau)).shares for tau in lifetimes]
+        )
+        seen = np.maximum(self.shares.sum(axis=1, keepdims=True), 1e-9)
+        self._logs = [
+            np.log((1 - dark) * self.shares / seen + dark / axis.bins).T.astype(np.float32)
+            for dark in DARK_SHARES
+        ]
+        self.length = sum(_turned(part) for part in np.split(self.shares, count))
+
+    def best(self, counts: FloatArray) -> list[NDArray[np.int64]]:
+        """Give the likeliest template of every pixel, by every look."""
+        return [(counts @ logs).argmax(axis=1) for logs in self._logs]
+
+
+def _turned(shares: Floats) -> float:
+    centred = shares - shares.mean(axis=1, keepdims=True)
+    normed = centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-300)
+    return float(np.arccos(np.clip((normed[1:] * normed[:-1]).sum(axis=1), -1, 1)).sum())

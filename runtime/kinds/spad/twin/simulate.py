@@ -1,0 +1,178 @@
+"""A scene recorded by the array of a bundle.
+
+a picture                       counts (h, w)
+an NPZ of depth_m and albedo    histogram (bins, h, w)
+an NPZ of transient             the same, of light in flight
+"""
+
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.reader import Bundle
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kind_parts.recording import Recorded, RecordingOptions
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
+from camkit.runtime.kinds.spad.finer.linear import Grid
+from camkit.runtime.kinds.spad.pulse import Pulse
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
+from camkit.runtime.kinds.spad.timing import Timing
+from camkit.runtime.kinds.spad.twin.array import see_through
+from camkit.runtime.kinds.spad.twin.counting import (
+    Disturbances,
+    count_frames,
+    count_times,
+    scaled_to,
+)
+from camkit.runtime.kinds.spad.twin.scene import light_in_flight, light_of_depth
+from camkit.runtime.kinds.spad.twin.working import WORKING_POINTS
+from camkit.runtime.twin.light import LUMINANCE
+
+SCENE_SUFFIX: Final = ".npz"
+MOST_BYTES: Final = 2_000_000_000
+
+
+def record(scene: FloatArray | Path, bundle: Bundle, options: RecordingOptions) -> Recorded:
+    """Record a scene.
+
+    Args:
+        scene: (3, h, w) linear Rec.709, white = 1, of any size: it is fitted to the fine grid; or
+            the NPZ of a scene on it.
+        bundle: The camera.
+        options: How much light there is.
+
+    Raises:
+        DecodeError: If the NPZ cannot be read.
+        ContractError: If it holds no scene of this array.
+        BundleError: If the bundle has no such array.
+    """
+    camera = FineCamera.of(bundle)
+    rng = np.random.default_rng(options.seed)
+    if not isinstance(scene, Path):
+        light = fitted(luminance(scene), camera)
+        return _counted(camera, light, options, rng)
+    arrays = read_scene(scene)
+    axis, pulse = times_of(camera)
+    if "transient" in arrays:
+        light = light_in_flight(arrays["transient"], axis.bins)
+    elif {"depth_m", "albedo"} <= arrays.keys():
+        light = light_of_depth(arrays["depth_m"], arrays["albedo"], axis, pulse)
+    else:
+        raise ContractError(
+            f"{scene.name} holds {', '.join(arrays) or 'nothing'}; a scene has depth_m and albedo, "
+            "or transient"
+        )
+    return _timed(camera, light, axis, options, rng)
+
+
+def luminance(picture: FloatArray) -> FloatArray:
+    """Give the luminance (h, w) of linear Rec.709 (3, h, w)."""
+    return np.tensordot(np.array(LUMINANCE, np.float32), np.maximum(picture, 0), axes=1)
+
+
+def fitted(light: FloatArray, camera: FineCamera) -> FloatArray:
+    """Give the middle of a picture (h, w), on the fine grid of an array."""
+    height, width = _fine_shape(camera)
+    if light.shape == (height, width):
+        return light
+    share = max(height / light.shape[0], width / light.shape[1])
+    tall = max(round(light.shape[0] * share), height)
+    wide = max(round(light.shape[1] * share), width)
+    way = cv2.INTER_AREA if share < 1 else cv2.INTER_CUBIC
+    sized = np.maximum(cv2.resize(light, (wide, tall), interpolation=way), 0)
+    top, left = (tall - height) // 2, (wide - width) // 2
+    return np.ascontiguousarray(sized[top : top + height, left : left + width], np.float32)
+
+
+def times_of(camera: FineCamera) -> tuple[TimeAxis, Pulse]:
+    """Give the time bins of an array, and the pulse that it sees.
+
+    Raises:
+        ContractError: If its bundle states none.
+    """
+    timing = Timing().with_stated(camera.stated_times())
+    pulse = timing.pulse()
+    if camera.sensor.time_bins == 0 or pulse is None:
+        raise ContractError(
+            f"bundle {camera.bundle.manifest.name} states no time bins and pulse: its array counts "
+            "pictures only"
+        )
+    return timing.axis(bins=camera.sensor.time_bins), pulse
+
+
+def read_scene(path: Path) -> dict[str, NDArray[Any]]:
+    """Read the arrays of a scene.
+
+    Raises:
+        DecodeError: If the file is no NPZ of numbers, or too large.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(info.file_size for info in archive.infolist())
+        if size > MOST_BYTES:
+            raise DecodeError(f"{path.name} unpacks to {size / 1e9:.1f} GB; that is no scene")
+        with np.load(path, allow_pickle=False) as file:
+            return {name: np.asarray(file[name]) for name in file.files}
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        raise DecodeError(f"cannot read the scene {path}: {error}") from error
+
+
+def _fine_shape(camera: FineCamera) -> tuple[int, int]:
+    return camera.scale * camera.sensor.height_px, camera.scale * camera.sensor.width_px
+
+
+def seen_by(camera: FineCamera, light: FloatArray) -> FloatArray:
+    """Give the light of every pixel (n, h, w) from that of the fine grid (n, m h, m w).
+
+    Raises:
+        ContractError: If it is not of this array.
+    """
+    shape = _fine_shape(camera)
+    if light.shape[1:] != shape:
+        raise ContractError(
+            f"a scene of bundle {camera.bundle.manifest.name} has {shape[1]}x{shape[0]} sub-pixels;"
+            f" got {light.shape[2]}x{light.shape[1]}"
+        )
+    sensor = camera.sensor
+    return see_through(light, camera.kernel, Grid(scale=sensor.sub_pixels, phase=sensor.phase))
+
+
+def dark_counts(camera: FineCamera, point: str) -> float:
+    """Give the dark counts of a pixel in a picture, or a step, of a working point."""
+    return camera.sensor.dark_count_rate_hz * WORKING_POINTS[point].time_s
+
+
+def _counted(
+    camera: FineCamera, light: FloatArray, options: RecordingOptions, rng: np.random.Generator
+) -> Recorded:
+    mean = seen_by(camera, light[None]).astype(np.float64) * options.photons
+    if np.isfinite(options.sbr):
+        mean += mean.mean() / options.sbr
+    dark = dark_counts(camera, "intensity")
+    counts = count_frames(mean, Disturbances(dark=dark), rng)[0]
+    return Recorded(name="counts", values=counts, stated=_stated(camera))
+
+
+def _timed(
+    camera: FineCamera,
+    light: FloatArray,
+    axis: TimeAxis,
+    options: RecordingOptions,
+    rng: np.random.Generator,
+) -> Recorded:
+    mean = scaled_to(seen_by(camera, light), options.photons)
+    mean += options.photons / options.sbr / axis.bins
+    dark = dark_counts(camera, "depth")
+    counts = count_times(mean, axis.orientation, Disturbances(dark=dark), rng)
+    stated = {**_stated(camera), **camera.stated_times()}
+    return Recorded(name="histogram", values=counts, stated=stated)
+
+
+def _stated(camera: FineCamera) -> Mapping[str, Any]:
+    return {"pitch_um": camera.sensor.pixel_pitch_um, "bundle": camera.bundle.manifest.name}

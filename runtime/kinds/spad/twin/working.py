@@ -1,0 +1,42 @@
+"""The working points of the prototype, a 64x32 gated array of 150 um pixels.
+
+References: Sun 2021, section 4.5; Sun, Fu, Dun, Zheng, Heidrich 2020.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkingPoint:
+    """How long the array counts.
+
+    Attributes:
+        frames: Put together to one picture, or to one step of the gate.
+        frame_us: Time of each.
+        step_ps: From one delay of the gate to the next; None without a gate.
+        gate_width_ps: Width of the gate; None without one.
+    """
+
+    frames: int
+    frame_us: float
+    step_ps: float | None = None
+    gate_width_ps: float | None = None
+
+    @property
+    def time_s(self) -> float:
+        """Give the time for which a picture, or a step, is counted."""
+        return self.frames * self.frame_us * 1e-6
+
+    @property
+    def rate_hz(self) -> float:
+        """Give the pictures, or steps, of a second."""
+        return 1 / self.time_s
+
+
+WORKING_POINTS: Final = {
+    "intensity": WorkingPoint(frames=100, frame_us=52.0),
+    "high_speed": WorkingPoint(frames=10, frame_us=80.0),
+    "depth": WorkingPoint(frames=1500, frame_us=52.0, step_ps=20.0, gate_width_ps=200.0),
+}
+"""High speed gives 1,250 pictures a second."""

@@ -1,0 +1,197 @@
+"""A scene through `camkit simulate` into every type of file, and back by `camkit process`."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import camkit
+from camkit.bundle.reader import Bundle
+from camkit.cli.app import run
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kind_parts.recording import RecordingOptions
+from camkit.runtime.kinds.spad.files.named import named_bundle
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
+from camkit.runtime.kinds.spad.proving import stage_set
+from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
+from camkit.runtime.kinds.spad.twin.scene import light_in_flight, light_of_depth
+from camkit.runtime.kinds.spad.twin.simulate import record, times_of
+from camkit.runtime.kinds.spad.twin.working import WORKING_POINTS
+from tests.spad_bundle import BINS, HEIGHT, SCALE, WIDTH
+
+FINE = (SCALE * HEIGHT, SCALE * WIDTH)
+
+
+@pytest.fixture
+def scene(tmp_path: Path, camera: FineCamera) -> Path:
+    path = tmp_path / "scene.npz"
+    albedo = np.full(FINE, 0.8)
+    np.savez(path, depth_m=stage_set(camera, 5), albedo=albedo)
+    return path
+
+
+def _simulate(*words: object) -> int:
+    return run(["simulate", *map(str, words)])
+
+
+@pytest.mark.parametrize("suffix", ["npz", "h5", "tif", "mat", "ptu"])
+def test_times_come_back_from_every_type_of_file(
+    scene: Path,
+    bundle: Bundle,
+    camera: FineCamera,
+    tmp_path: Path,
+    suffix: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / f"scan.{suffix}"
+    words = (scene, "--bundle", bundle.path, "-o", out, "--photons", 400, "--sbr", 10, "--json")
+    assert _simulate(*words) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["array"], said["shape"]) == ("histogram", [BINS, HEIGHT, WIDTH])
+    chosen = {"timing": said["files"][1]} if len(said["files"]) > 1 else {}
+    made = camkit.load(str(bundle.path), **chosen).make(out)
+    depth = stage_set(camera, 5)
+    error = np.abs(made.arrays["depth_m"] - depth)
+    assert made.arrays["depth_m"].shape == FINE
+    assert np.nanmedian(error) < 0.003
+    assert made.record["finer"] == "net"
+
+
+def test_a_picture_gives_counts_that_name_their_bundle(
+    bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for suffix in ("npz", "h5"):
+        out = tmp_path / f"counts.{suffix}"
+        words = ("procedural:3", "--bundle", bundle.path, "-o", out, "--photons", 900)
+        assert _simulate(*words) == 0
+        assert "counts 16x24" in capsys.readouterr().out
+        assert named_bundle(out) == "tiny-spad"
+    made = camkit.load(str(bundle.path)).make(tmp_path / "counts.npz")
+    with np.load(tmp_path / "counts.npz") as file:
+        counts = file["counts"]
+    assert made.arrays["intensity"].shape == FINE
+    assert made.arrays["intensity"].mean() == pytest.approx(counts.mean(), rel=0.05)
+    linear = camkit.load(str(bundle.path), method="linear").make(tmp_path / "counts.npz")
+    assert (linear.record["finer"], made.record["size"]) == ("linear", "S")
+
+
+def test_the_same_seed_gives_the_same_counts(bundle: Bundle) -> None:
+    picture = np.random.default_rng(0).random((3, *FINE)).astype(np.float32)
+    first, again, other = (
+        record(picture, bundle, RecordingOptions(photons=50, seed=seed)).values
+        for seed in (1, 1, 2)
+    )
+    assert (first == again).all()
+    assert (first != other).any()
+    assert first.mean() == pytest.approx(25.0, rel=0.1)
+
+
+def test_light_in_flight_becomes_frames(bundle: Bundle, tmp_path: Path) -> None:
+    frames = np.zeros((BINS, *FINE), np.float32)
+    for t in range(BINS):
+        frames[t, :, t] = 1.0
+    np.savez(tmp_path / "light.npz", transient=frames)
+    out = tmp_path / "flight.npz"
+    words = (tmp_path / "light.npz", "--bundle", bundle.path, "-o", out, "--photons", 300)
+    assert _simulate(*words) == 0
+    made = camkit.load(str(bundle.path), product="transient").make(out)
+    film = made.arrays["transient"]
+    assert film.shape == (BINS, *FINE)
+    brightest = film.sum(axis=1).argmax(axis=1)
+    np.testing.assert_allclose(brightest[8:72], np.arange(8, 72), atol=2)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("-o", "x.png"), "is a file in .npz, .h5, .tif, .mat, .ptu"),
+        (("-o", "x.npz", "--iso", "200"), "--iso means nothing to bundle tiny-spad"),
+        (("-o", "x.npz", "--photons", "0"), "photons must be a number > 0"),
+        (("-o", "x.ptu"), "a PTU holds times of photons"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said_in_one_line(
+    bundle: Bundle,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: tuple[str, ...],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert _simulate("procedural:1", "--bundle", bundle.path, *words) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_files_that_exist_are_kept(
+    bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "c.tif"
+    (tmp_path / "c.tif.toml").write_text("mine", encoding="utf-8")
+    assert _simulate("procedural:1", "--bundle", bundle.path, "-o", out) == 2
+    assert "c.tif.toml exists; say --overwrite" in capsys.readouterr().err
+    assert _simulate("procedural:1", "--bundle", bundle.path, "-o", out, "--overwrite") == 0
+
+
+def test_photons_mean_nothing_to_a_camera_of_photographs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = ("procedural:1", "--bundle", "duet", "-o", tmp_path / "a.dng", "--photons", "9")
+    assert _simulate(*words) == 2
+    assert "--photons means nothing to bundle duet" in capsys.readouterr().err
+
+
+def test_scenes_of_another_array_or_of_nothing_are_refused(bundle: Bundle, tmp_path: Path) -> None:
+    options = RecordingOptions(photons=10)
+    small = tmp_path / "small.npz"
+    np.savez(small, depth_m=np.full((8, 8), 0.1), albedo=np.ones((8, 8)))
+    with pytest.raises(ContractError, match="has 96x64 sub-pixels; got 8x8"):
+        record(small, bundle, options)
+    other = tmp_path / "other.npz"
+    np.savez(other, depth=np.ones((8, 8)))
+    with pytest.raises(ContractError, match="holds depth; a scene has depth_m and albedo"):
+        record(other, bundle, options)
+    (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
+    with pytest.raises(DecodeError, match="cannot read the scene"):
+        record(tmp_path / "broken.npz", bundle, options)
+
+
+def test_light_of_a_surface_is_its_albedo_at_its_time(camera: FineCamera) -> None:
+    axis, pulse = times_of(camera)
+    depth = np.array([[0.10, 0.12], [np.nan, 0.14]])
+    light = light_of_depth(depth, np.array([[1.0, 0.5], [1.0, 2.0]]), axis, pulse)
+    np.testing.assert_allclose(light.sum(axis=0), [[1.0, 0.5], [0.0, 2.0]], rtol=1e-3)
+    late = (light[:, 1, 1] * axis.centres_ps).sum() / light[:, 1, 1].sum()
+    early = (light[:, 0, 0] * axis.centres_ps).sum() / light[:, 0, 0].sum()
+    assert late - early == pytest.approx(0.08 / LIGHT_M_PER_PS, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("depth", "albedo", "message"),
+    [
+        (np.ones((2, 2)), np.ones((2, 3)), "one .h, w."),
+        (np.ones((2, 2)), -np.ones((2, 2)), "albedo must be finite and >= 0"),
+        (-np.ones((2, 2)), np.ones((2, 2)), "depth_m must be >= 0"),
+    ],
+)
+def test_surfaces_that_cannot_be_are_refused(
+    camera: FineCamera, depth: np.ndarray, albedo: np.ndarray, message: str
+) -> None:
+    axis, pulse = times_of(camera)
+    with pytest.raises(ContractError, match=message):
+        light_of_depth(depth, albedo, axis, pulse)
+
+
+def test_light_in_flight_of_other_times_is_refused() -> None:
+    with pytest.raises(ContractError, match=r"with 5 frames; got \(4, 2, 2\)"):
+        light_in_flight(np.ones((4, 2, 2)), 5)
+    with pytest.raises(ContractError, match="finite and >= 0"):
+        light_in_flight(-np.ones((5, 2, 2)), 5)
+
+
+def test_the_working_points_are_those_of_the_prototype() -> None:
+    assert WORKING_POINTS["high_speed"].rate_hz == pytest.approx(1250)
+    assert WORKING_POINTS["intensity"].time_s == pytest.approx(5.2e-3)
+    assert WORKING_POINTS["depth"].time_s == pytest.approx(0.078)

@@ -1,0 +1,7 @@
+"""Tables 4.1 and 4.2: how an array samples, and what makes a picture of it.
+
+rows       what is compared
+training   its networks, each for the same CPU time
+measuring  every row on the test sets, at every level of light
+text       the tables
+"""
