@@ -1,7 +1,7 @@
 """A tower 9.8 km away, 3.7 photons a pixel: two random halves of the photons against each other.
 
-The rule for chosen squares (`camkit.runtime.kinds.spad.pooling`) was chosen with the split of seed 0
-in sight, which therefore shows pictures alone; what is claimed is the mean of other splits. They
+The rule for chosen squares (`camkit.runtime.kinds.spad.pooling`) was chosen with the split of seed
+0 in sight, which therefore shows pictures alone; what is claimed is the mean of other splits. They
 hold the same photons: no second capture of the kind is at hand.
 """
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from camkit.runtime.kinds.spad.files.named import named_bundle
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.products.depth import make_depth
 from camkit.runtime.kinds.spad.products.intensity import make_intensity
 from camkit.runtime.kinds.spad.products.lifetime import make_lifetime
@@ -78,18 +79,51 @@ def _decisions(survey: Survey) -> list[dict[str, Any]]:
         found += [
             ("pulse", "stated" if "a pulse" in pulse else "estimated", pulse),
             ("method", way.method, "asked" if "method" in survey.settings.chosen else "default"),
+            ("neighbours", *_neighbours(survey)),
             (
-                "neighbours",
-                way.pool,
-                "only where one pixel has too few photons" if way.pool == "auto" else "asked",
+                "second return",
+                "sought" if way.returns == 2 else "left out",
+                "only where the residual of one asks for it" if way.returns == 2 else "not asked",
             ),
         ]
+    if survey.camera is not None:
+        found += _finer(survey, survey.camera)
     cycles = survey.timing.timing.cycles
     reason = f"{cycles} cycles are stated" if cycles else "no cycles are stated"
     found.append(("pile-up", "corrected" if cycles else "left as it is", reason))
     return [
         {"what": what, "choice": choice, "reason": reason, "saving_s": 0.0, "cost_db": 0.0}
         for what, choice, reason in found
+    ]
+
+
+def _neighbours(survey: Survey) -> tuple[str, str]:
+    pool = survey.settings.way.pool
+    if survey.camera is not None:
+        return "weighed", "the estimate of the fine grid takes as many as the light demands"
+    return pool, "only where one pixel has too few photons" if pool == "auto" else "asked"
+
+
+def _finer(survey: Survey, camera: FineCamera) -> list[tuple[str, str, str]]:
+    """Say how pictures become finer behind a plate, as the capture's light will decide."""
+    size, asked = survey.size_of_pictures, survey.settings.finer is not None
+    network = "linear" if size is None else f"network {size}"
+    if asked or size is None:
+        reason = "asked" if asked else "the bundle holds no network"
+        return [("finer", network, reason)]
+    if survey.product == "depth":
+        least = camera.stage.network_from_photons
+        return [
+            (
+                "finer",
+                f"{network} or linear",
+                f"the network from {least:g} signal photons of a pixel on, nearer to the truth "
+                "there; below, the linear estimate",
+            )
+        ]
+    return [
+        ("finer", network, "the best that the bundle has"),
+        ("empty frames", "skipped", "a frame without photons stays dark"),
     ]
 
 
