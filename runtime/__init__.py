@@ -14,8 +14,9 @@
     options, job/                      one capture: what is decided, then the stages joined
     pipeline, development, batch       one capture in memory, one file, many files
     merging/, calibration/             brackets to one picture; what a camera is, measured
-    check, proofs, golden_run          a bundle proves itself
-    simulate                           the digital twin: a scene becomes a RAW file
+    proof/                             a bundle proves itself
+    twin/                              the digital twin: a scene becomes a RAW file
+    kind, kinds/, maker, kind_parts/   what a kind of camera brings: readers, products, proofs
 
 `runtime` and `models_def` never import each other.
 """

@@ -16,28 +16,17 @@ to ten a bin, single pixels and `--pool auto`. What was aimed at is printed with
 import argparse
 import json
 import sys
-import time
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import curve_fit
 
-from camkit.contracts import FloatArray
 from camkit.report.bench.machine import describe_machine
-from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
-from tools.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
+from camkit.report.kinds.spad.synthetic import Light
+from camkit.report.kinds.spad.timing import METHODS, PHOTONS, SBRS, SHAPE, false_alarms, measure
 
-SHAPE: Final = (128, 256)
-PHOTONS: Final = (10.0, 20.0, 30.0, 50.0, 100.0, 300.0, 1000.0, 10_000.0)
-SBRS: Final = (np.inf, 3.0, 1.0, 0.3, 0.1)
-FITTED: Final = 300
-SPAN_PS: Final = (400.0, 2100.0)
 TURNS: Final = 5
-METHODS: Final = ("log", "lsq", "argmax", "curve_fit")
 BACKGROUNDS: Final = (0.005, 0.02, 0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 """Counts of a bin."""
 ALARM_PIXELS: Final = 262_144
@@ -70,61 +59,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     chart(rows, options.out_dir / "depth-accuracy.png")
     return 0
-
-
-def measure(light: Light, pixels: int, turns: int) -> list[dict[str, Any]]:
-    """Give the rows of all methods at one level of light."""
-    rng = np.random.default_rng([int(light.photons), int(1000 / light.sbr)])
-    times = rng.uniform(*SPAN_PS, pixels)
-    counts, empty = draw(times, light, rng), draw(times, light, rng, empty=True)
-    bounds = bound_ps(times, light)
-    methods: dict[str, Callable[[FloatArray], Found]] = {
-        "log": _by_camkit("log"),
-        "lsq": _by_camkit("lsq"),
-        "argmax": _by_argmax,
-    }
-    seconds: dict[str, list[float]] = {name: [] for name in METHODS}
-    found: dict[str, Found] = {}
-    for _ in range(turns):
-        for name, fit in methods.items():
-            began = time.process_time()
-            found[name] = fit(counts)
-            seconds[name].append(time.process_time() - began)
-    some = slice(0, min(FITTED, pixels))
-    began = time.process_time()
-    found["curve_fit"] = _by_curve_fit(counts[some])
-    seconds["curve_fit"].append((time.process_time() - began) * pixels / (some.stop))
-    rows = []
-    for name in METHODS:
-        part = some if name == "curve_fit" else slice(None)
-        row = _judged(found[name], times[part], bounds[part])
-        is_judged = name in {"log", "lsq"} and light.background > 0
-        alarms = float(methods[name](empty)[2].mean()) if is_judged else None
-        rows.append(
-            {
-                "method": name,
-                "photons": light.photons,
-                "sbr": None if np.isinf(light.sbr) else light.sbr,
-                **row,
-                "false_alarms": alarms,
-                "cpu_seconds": round(float(np.median(seconds[name])), 4),
-            }
-        )
-    return rows
-
-
-def false_alarms(background: float, pixels: int) -> dict[str, Any]:
-    """Give the share of pixels of background alone that are believed, alone and pooled."""
-    rng = np.random.default_rng(int(1000 * background))
-    rates: dict[str, list[float]] = {"1": [], "auto": []}
-    ways = {pool: Sharpener(AXIS, PULSE, Way(pool=pool)) for pool in ("1", "auto")}
-    size = SHAPE[0] * SHAPE[1]
-    for _ in range(max(1, pixels // size)):
-        cube = rng.poisson(background, (*SHAPE, AXIS.bins)).astype(np.float32)
-        for pool, sharpener in ways.items():
-            rates[pool].append(float(sharpener.strip(cube).valid.mean()))
-    told = {f"pool_{pool}": round(float(np.mean(found)), 6) for pool, found in rates.items()}
-    return {"background": background, **told}
 
 
 def verdicts(
@@ -169,65 +103,6 @@ def verdicts(
         }
         for what, value, least, most in judged
     ]
-
-
-Found = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.bool_]]
-"""Times, their sigmas, and whether they are believed."""
-
-
-def _by_camkit(method: str) -> Callable[[FloatArray], Found]:
-    def fit(counts: FloatArray) -> Found:
-        sharpener = Sharpener(AXIS, PULSE, Way(method=method, pool="1"))  # type: ignore[arg-type]
-        found = sharpener.strip(counts.reshape(-1, min(SHAPE[1], len(counts)), AXIS.bins))
-        return found.time_of_flight_ps.ravel(), found.sigma_ps.ravel(), found.valid.ravel()
-
-    return fit
-
-
-def _by_argmax(counts: FloatArray) -> Found:
-    brightest = AXIS.centres_ps[counts.argmax(axis=1)]
-    # where the pulse is brightest, relative to its time of flight
-    u = np.arange(PULSE.start_ps, PULSE.end_ps)
-    times = brightest + u[PULSE.density(u).argmax()]
-    return times, None, np.ones(len(counts), bool)
-
-
-def _by_curve_fit(counts: FloatArray) -> Found:
-    start = _by_argmax(counts)[0]
-    times, good = start.copy(), np.zeros(len(counts), bool)
-    every = np.arange(AXIS.bins)[None]
-
-    def model(_: Any, mu: float, a: float, b: float) -> NDArray[np.float64]:
-        return np.asarray(a * AXIS.shares(PULSE, np.array([mu]), every)[0] + b)
-
-    for i, n in enumerate(counts):
-        first = (start[i], max(float(n.sum()) * 0.7, 1.0), 0.3 * float(n.mean()))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            try:
-                times[i] = curve_fit(model, AXIS.centres_ps, n, first, maxfev=400)[0][0]
-                good[i] = True
-            except RuntimeError:
-                continue
-    return times, None, good
-
-
-def _judged(
-    found: Found, times: NDArray[np.float64], bounds: NDArray[np.float64]
-) -> dict[str, Any]:
-    fitted, sigmas, valid = found
-    errors = fitted - times
-    kept = valid & (np.abs(errors) < PULSE.width_ps)
-    if not kept.any():
-        return {"rmse_over_crb": None, "sigma_68": None, "accepted": 0.0, "lost": None}
-    ratio = np.sqrt(np.mean((errors[kept] / bounds[kept]) ** 2))
-    share = None if sigmas is None else np.quantile(np.abs(errors / sigmas)[kept], 0.6827)
-    return {
-        "rmse_over_crb": round(float(ratio), 4),
-        "sigma_68": None if share is None else round(float(share), 4),
-        "accepted": round(float(valid.mean()), 4),
-        "lost": round(float((valid & ~kept).sum() / max(valid.sum(), 1)), 5),
-    }
 
 
 def chart(rows: Sequence[dict[str, Any]], path: Path) -> None:

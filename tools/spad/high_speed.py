@@ -38,7 +38,7 @@ from tools.spad.fan import Fan
 from tools.spad.strip import write_film, write_strip
 
 TURNS_PER_MINUTE: Final = 3750.0
-PHOTONS: Final = (10_000.0, 1000.0, 100.0)
+PHOTONS: Final = (10_000.0, 1000.0, 100.0, 30.0, 10.0)
 """Of white in a frame."""
 SHOWN: Final = 1000.0
 FRAMES: Final = 40

@@ -41,9 +41,9 @@ def write_strip(
             shown = np.clip(film[frame] / white, 0, 1) ** (1 / 2.2)
             axis.imshow(shown, cmap="gray", vmin=0, vmax=1, interpolation="nearest")
             axis.set(xticks=[], yticks=[])
-            if row is axes[0]:
-                axis.set_title(titles[frame], fontsize=8)
         row[0].set_ylabel(name, fontsize=8)
+    for axis, frame in zip(axes[0], frames, strict=True):
+        axis.set_title(titles[frame], fontsize=8)
     figure.savefig(path, dpi=INCH_PX)
 
 
@@ -54,7 +54,8 @@ def write_film(path: Path, films: Mapping[str, FloatArray], white: float) -> Non
         UnsupportedError: If this machine's OpenCV has no encoder for it.
     """
     size = max(film.shape[1:] for film in films.values())
-    large = [np.pad(_as_large(film, size), _gap(), constant_values=white) for film in films.values()]
+    gap = ((0, 0), (0, GAP_PX), (0, GAP_PX))
+    large = [np.pad(_as_large(film, size), gap, constant_values=white) for film in films.values()]
     large += [np.zeros_like(large[0])] * (-len(large) % COLUMNS)
     rows = [
         np.concatenate(large[first : first + COLUMNS], axis=2)
@@ -66,7 +67,3 @@ def write_film(path: Path, films: Mapping[str, FloatArray], white: float) -> Non
 def _as_large(film: FloatArray, size: tuple[int, int]) -> NDArray[np.floating]:
     times = size[0] // film.shape[1]
     return film.repeat(times, axis=1).repeat(times, axis=2)
-
-
-def _gap() -> tuple[tuple[int, int], ...]:
-    return (0, 0), (0, GAP_PX), (0, GAP_PX)

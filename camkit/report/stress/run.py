@@ -120,7 +120,9 @@ def run_stress(
         points.append(point)
         if progress is not None:
             progress(point.scenario, len(points), total)
-    curves = tuple(curve_of(scenario, points, judge.rivals) for scenario in taken)
+    curves = tuple(
+        curve_of(scenario, points, scenario.rivals or judge.rivals) for scenario in taken
+    )
     breaks = {c.scenario.name: breaks_of(c) for c in curves}
     rows = [scenario_json(c, breaks[c.scenario.name], bundle, primary) for c in curves]
     rows += [

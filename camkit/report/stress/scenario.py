@@ -71,6 +71,7 @@ class Scenario:
         applies: Says why a bundle cannot take part; None if it can.
         fit: Gives the scenario with the values of a bundle, where they depend on it.
         rival: Whether being below the methods without networks breaks a method here.
+        rivals: The methods that others must not fall behind here; empty for those of the examiner.
         note: What a reader of the page should know.
     """
 
@@ -89,6 +90,7 @@ class Scenario:
     applies: Applies = photographs
     fit: Callable[[Bundle], "Scenario"] | None = None
     rival: bool = True
+    rivals: tuple[str, ...] = ()
     note: str = ""
 
     def __post_init__(self) -> None:

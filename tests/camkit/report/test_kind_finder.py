@@ -1,5 +1,6 @@
 """What a tool asks of a kind is found in its PART, and its absence is said by name."""
 
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -14,11 +15,16 @@ from camkit.report.stress.part import StressPart
 from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.verdict import Outcome, Verdict
+from camkit.runtime.kind import runtime_part
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_camkit_has_its_parts(kind: str) -> None:
-    assert isinstance(find_part(kind, "bench", BenchPart), BenchPart)
+    part = find_part(kind, "bench", BenchPart)
+    # a kind whose captures are no photographs measures itself
+    makes_products = runtime_part(kind).maker is not None
+    assert (part.measure is not None) == makes_products
+    assert (part.photograph is not BenchPart().photograph) != makes_products
     assert isinstance(find_part(kind, "stress", StressPart), StressPart)
 
 
@@ -87,6 +93,41 @@ def test_a_kind_may_bring_scenes_and_an_examiner_of_another_sort(
     assert row["psnr_db"] == {"guess": [20, 20, 20], "count": [30, 22, 14]}
     assert row["break_point"] == pytest.approx(8 + 8 * 2.05 / 8)
     assert row["break_reason"] == "below guess"
+
+
+def test_a_scenario_may_name_rivals_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from camkit.bundle.reader import open_bundle
+    from tests.bundle_factory import write_tiny_bundle
+
+    part = ReportPart(
+        bench=find_part("bayer", "bench", BenchPart),
+        stress=StressPart(
+            scenes=lambda _bundle, _count, _folder: (_Named(),),
+            examiner=lambda _bundle, _sizes, _before: _Counter(),  # type: ignore[arg-type, return-value]
+        ),
+    )
+    module = ModuleType("counting")
+    module.PART = part  # type: ignore[attr-defined]
+    monkeypatch.setattr(Kind, "part", lambda *_: module)
+    rate = Scenario(
+        name="rate",
+        title="Rate",
+        knob="rate",
+        unit="Hz",
+        values=(0.0, 16.0),
+        nominal=0.0,
+        quick=(0.0,),
+        shoot=lambda _judge, _scene, value: int(value),
+        applies=lambda _bundle: None,
+        rivals=("count",),
+    )
+    bundle = open_bundle(write_tiny_bundle(tmp_path))
+    (row,) = run_stress(bundle, StressOptions(scenarios=(rate,))).rows
+    assert [(found["method"], found["reason"]) for found in row["breaks"]] == [
+        ("guess", "below count")
+    ]
 
 
 def test_built_in_bundles_are_of_a_kind_that_reports_know() -> None:

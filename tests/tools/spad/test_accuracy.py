@@ -5,14 +5,15 @@ from pathlib import Path
 
 import pytest
 
+from camkit.report.kinds.spad import timing
 from tools.spad import accuracy
 
 
 def test_a_small_run_has_a_row_for_every_method(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(accuracy, "FITTED", 5)
-    monkeypatch.setattr(accuracy, "SHAPE", (8, 64))
+    monkeypatch.setattr(timing, "FITTED", 5)
+    monkeypatch.setattr(timing, "SHAPE", (8, 64))
     monkeypatch.setattr(accuracy, "BACKGROUNDS", (0.1,))
     arguments = ["--out-dir", str(tmp_path), "--photons", "100", "1000", "--sbr", "inf", "1"]
     arguments += ["--pixels", "512", "--turns", "1", "--alarm-pixels", "512"]

@@ -12,7 +12,7 @@ from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from tests.spad_bundle import write_spad_bundle
 from tools.spad import high_speed
 from tools.spad.fan import Fan
-from tools.spad.high_speed import fan_before, main
+from tools.spad.high_speed import fan_before, main, ways_of
 
 FAN = Fan(size_px=(128, 256))
 
@@ -53,6 +53,13 @@ def test_every_way_is_told_of_and_shown(tmp_path: Path, monkeypatch: pytest.Monk
     assert record["frames_per_second"] == 1250
     assert cv2.imread(str(out / "high-speed.png")) is not None
     assert cv2.VideoCapture(str(out / "high-speed.mp4")).get(cv2.CAP_PROP_FRAME_COUNT) == 3
+
+
+def test_a_network_without_a_plate_stands_beside_the_others(tmp_path: Path) -> None:
+    camera = FineCamera.of(write_spad_bundle(tmp_path))
+    told = [(way.plate, way.method) for way in ways_of(camera, camera)]
+    assert (False, "net S") in told
+    assert len(told) == 5
 
 
 def test_a_bundle_without_a_network_for_no_plate_is_refused(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from tools.spad.synthetic import PULSE
+from camkit.report.kinds.spad.synthetic import PULSE
 
 Floats = NDArray[np.float64]
 MOST_RMSE: Final = 1.5

@@ -4,9 +4,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.report.kinds.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 from tools.spad.limit.judged import Sweep, judged, swept
-from tools.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
 
 PHOTONS: Final = (10_000, 3000, 1000, 300, 100, 50, 30, 20, 15, 10, 7, 5, 3, 2, 1)
 SBRS: Final = (10, 3, 1, 0.5, 0.3, 0.2, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01)

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
+from camkit.report.kinds.spad.synthetic import PULSE
 from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.bound import information
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 from camkit.runtime.kinds.spad.time_axis import Orientation, TimeAxis
 from tools.spad.limit.judged import Sweep, judged, swept
-from tools.spad.synthetic import PULSE
 
 CHANCES: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85, 0.95)
 CYCLES: Final = 1000

@@ -4,9 +4,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.report.kinds.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 from tools.spad.limit.judged import Sweep, judged, swept
-from tools.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
 
 DARK: Final = (0.001, 0.01, 0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 100.0)
 HOT: Final = (0.001, 0.01, 0.03, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5)

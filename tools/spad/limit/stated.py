@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.report.kinds.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 from tools.spad.limit.judged import Sweep, judged, swept
-from tools.spad.synthetic import AXIS, PULSE, Light, bound_ps, draw
 
 WIDTHS: Final = (1.0, 0.95, 1.05, 0.9, 1.1, 0.8, 1.25, 0.65, 1.5, 0.5, 2.0)
 TIMES: Final = (1.0, 0.8, 1.25, 0.65, 1.5, 0.5, 2.0, 0.25, 4.0, 0.1)

@@ -48,8 +48,12 @@ def network_planes(photons: FloatArray, white: float, dark: FloatArray | float =
 
 
 def white_of(photons: FloatArray) -> float:
-    """Give the photons that are taken for white in pictures (..., h, w)."""
-    return max(float(np.percentile(photons, WHITE_PERCENTILE)), LEAST_WHITE)
+    """Give the photons that are taken for white in a picture (h, w), or in several (n, h, w).
+
+    Of several, that of the brightest: most bins of light in flight are dark.
+    """
+    each = np.percentile(photons, WHITE_PERCENTILE, axis=(-2, -1))
+    return max(float(np.max(each, initial=0.0)), LEAST_WHITE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -32,7 +32,7 @@ SHARPER: Final = 20.0
 """Times the photons of a bin at which the estimate is taken."""
 SLOPE_SHARE: Final = 0.25
 """Sub-pixels of slope that sigma takes in."""
-BY_NETWORK: Final = (0.58, 0.1, 0.035)
+BY_NETWORK: Final = (0.525, 0.1, 0.035)
 """Behind a network: of the linear sigma, of the slope, of a bin."""
 PER_PIXEL: Final = ("amplitude", "background", "intensity")
 """What is photons, and so is multiplied back."""

@@ -16,6 +16,16 @@ EMPTY: Final = 0.0
 Step = Callable[[int, int], None]
 
 
+def where_light_is(frame: FloatArray) -> float:
+    """Give the photons of a pixel (h, w) where photons are: their mean, weighed by themselves.
+
+    Chance alone adds one photon to that, which is taken off.
+    """
+    counts = np.asarray(frame, np.float64)
+    total = max(float(counts.sum()), 1e-12)
+    return max(float(np.square(counts).sum()) / total - 1, total / counts.size)
+
+
 def finer_frames(
     camera: FineCamera,
     frames: FloatArray,
@@ -51,7 +61,7 @@ def finer_frames(
         if photons > EMPTY:
             one = frame[None]
             found[number] = (
-                camera.linear(photons / frame.size)(one)[0]
+                camera.linear(where_light_is(frame))(one)[0]
                 if size is None
                 else camera.by_network(one, size, white=white, dark=dark, cancel=cancel)[0]
             )

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from camkit.bundle.reader import Bundle
-from camkit.report.stress.scenario import Scenario
+from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scenarios.lens import depth
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge, see
@@ -13,6 +13,9 @@ from camkit.units import MM_PER_M
 
 
 def _applies(bundle: Bundle) -> str | None:
+    reason = photographs(bundle)
+    if reason is not None:
+        return reason
     if "depth_m" not in known_options(bundle.manifest.stages):
         return "no stage of it asks for a depth"
     return depth.SCENARIO.applies(bundle)

@@ -1,0 +1,86 @@
+"""All rows of a bundle of single photons: pictures, times of flight, seconds."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from camkit.bundle.reader import Bundle
+from camkit.errors import ContractError
+from camkit.report.bench.part import OwnRows, OwnSettings, Tell
+from camkit.report.bench.trial import Skip
+from camkit.report.kinds.spad.pictures import LEVELS, QUICK_LEVELS, picture_rows
+from camkit.report.kinds.spad.scenes import drawn_pictures, read_pictures
+from camkit.report.kinds.spad.seconds import seconds_rows
+from camkit.report.kinds.spad.timing import timing_rows
+from camkit.report.kinds.spad.ways import Baselines, read_baselines, ways_of
+from camkit.runtime.kinds.spad.finer.camera import FineCamera
+
+QUICK_IMAGES: Final = 2
+
+
+def measure(bundle: Bundle, settings: OwnSettings, tell: Tell) -> OwnRows:
+    """Measure a bundle.
+
+    Raises:
+        ContractError: If there are no pictures in the folder, none of the sizes asked for, or the
+            bundle is one of baselines.
+        DecodeError: If a picture is damaged.
+        BundleError: If the bundle makes no picture of photons finer.
+    """
+    name = bundle.manifest.name
+    camera = FineCamera.of(bundle)
+    if camera.stage.sampling != "plate":
+        raise ContractError(
+            f"bundle {name} sees through no plate: its networks stand beside those of a camera "
+            "that does; bench that one"
+        )
+    sizes, skips = _sizes(camera, settings.sizes)
+    images = settings.images
+    if images is None and settings.quick:
+        images = QUICK_IMAGES
+    pictures = (
+        drawn_pictures(camera, images)
+        if settings.data is None
+        else read_pictures(settings.data, images, camera.scale)
+    )
+    baselines = _baselines(camera, quick=settings.quick)
+    skips += baselines.skips
+    ways = ways_of(bundle, sizes, baselines.cameras)
+    levels = QUICK_LEVELS if settings.quick else LEVELS
+
+    def told(text: str) -> None:
+        tell(f"{name}: {text}")
+
+    rows = list(picture_rows(pictures, ways, camera.grid, levels, told))
+    if camera.sensor.time_bins:
+        rows += timing_rows(settings.repeat, told, quick=settings.quick)
+    else:
+        skips.append(Skip(what="times of flight", reason="the array has no time bins"))
+    for found in seconds_rows(bundle, sizes, settings.repeat, told):
+        if isinstance(found, Skip):
+            skips.append(found)
+        else:
+            rows.append(found)
+    return OwnRows(rows=rows, skips=skips)
+
+
+def _sizes(camera: FineCamera, asked: Sequence[str] | None) -> tuple[tuple[str, ...], list[Skip]]:
+    """Give the sizes to measure, and those that are not there.
+
+    Raises:
+        ContractError: If none of those asked for is there.
+    """
+    held, name = tuple(camera.sizes), camera.bundle.manifest.name
+    wanted = held if asked is None else tuple(asked)
+    have = ", ".join(held) or "none"
+    found = tuple(size for size in held if size in wanted)
+    if asked is not None and not found:
+        raise ContractError(f"bundle {name} holds size(s) {have}; got {', '.join(asked)}")
+    missing = [size for size in wanted if size not in held]
+    return found, [Skip(what=f"{name} {m}", reason=f"the bundle holds {have}") for m in missing]
+
+
+def _baselines(camera: FineCamera, *, quick: bool) -> Baselines:
+    if quick:
+        left_out = Skip(what="networks of the baselines", reason="left out by --quick")
+        return Baselines(skips=(left_out,))
+    return read_baselines(camera)

@@ -1,0 +1,100 @@
+"""The ways of a bundle to the fine grid, and what they are held against.
+
+bare      the array without its plate, by its own linear estimate; of pictures alone
+bare net  the same by a network that was trained without a plate, where the baselines hold one
+bicubic   the array's pixels, interpolated; of depth, times that were fitted on them
+linear    the bundle's linear estimate; of depth, of every bin before the fit
+S, M      its networks, however few photons there are; "S before" is that of another bundle
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.report.kinds.spad.bicubic import bicubic
+from camkit.report.kinds.spad.stress.shot import DepthShot, PictureShot
+from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
+from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
+from camkit.runtime.kinds.spad.finer.depth import FineSharpener
+from camkit.runtime.kinds.spad.finer.linear import linear_estimate
+from camkit.runtime.kinds.spad.finer.pictures import finer_frames
+from camkit.runtime.kinds.spad.finer.sampling import point_kernel
+from camkit.runtime.kinds.spad.hot_pixels import painted_over
+from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, Way
+
+BARE: Final = "bare"
+BARE_NET: Final = "bare net"
+BICUBIC: Final = "bicubic"
+LINEAR: Final = "linear"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ways:
+    """What makes pictures and depth of captures.
+
+    Attributes:
+        camera: The array of the bundle.
+        networks: Name -> whose network, and its size.
+        plain: The array without a plate, with its network; None where there is none.
+    """
+
+    camera: FineCamera
+    networks: dict[str, tuple[FineCamera, str]]
+    plain: FineCamera | None = None
+
+    def pictures(self, shot: PictureShot) -> dict[str, FloatArray]:
+        """Give way -> (m h, m w), white = 1."""
+        grid, (bare, through) = self.camera.grid, shot.photons
+        frame = self._sound(shot.counts, shot)
+        white = white_of(frame) * shot.told
+        plain = self._sound(shot.bare, shot)
+        found = {BARE: self._bare(plain) / bare}
+        if self.plain is not None:
+            size = self.plain.size(None)
+            found[BARE_NET] = finer_frames(self.plain, plain[None], shot.dark, size)[0] / bare
+        found[BICUBIC] = bicubic(frame, grid) / through
+        found[LINEAR] = finer_frames(self.camera, frame[None], shot.dark, None)[0] / through
+        for name, (camera, size) in self.networks.items():
+            made = finer_frames(camera, frame[None], shot.dark, size, white=white)
+            found[name] = made[0] / through
+        return {name: np.asarray(picture, np.float32) for name, picture in found.items()}
+
+    def depths(self, shot: DepthShot) -> dict[str, Sharpened]:
+        """Give way -> what it found of every sub-pixel."""
+        way = Way(returns=len(shot.times_ps))
+        nothing, no_dark = np.zeros_like(shot.blind), np.zeros(shot.blind.shape)
+
+        def finer(camera: FineCamera, size: str | None) -> Sharpened:
+            fine = FineSharpener(camera, shot.axis, shot.pulse, way, size=size, always=True)
+            return fine.cube(shot.counts, no_dark, hot=nothing, blind=shot.blind).found
+
+        alone = Sharpener(shot.axis, shot.pulse, way).strip(shot.counts, blind=shot.blind)
+        found = {BICUBIC: self._upsampled(alone), LINEAR: finer(self.camera, None)}
+        return found | {name: finer(*network) for name, network in self.networks.items()}
+
+    def _sound(self, counts: FloatArray, shot: PictureShot) -> FloatArray:
+        frame = np.asarray(counts - shot.dark, np.float32)
+        return painted_over(frame, shot.hot) if shot.hot.any() else frame
+
+    def _bare(self, frame: FloatArray) -> FloatArray:
+        stage = self.camera.stage
+        covariance = PictureCovariance(
+            contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent
+        )
+        photons = max(float(frame.mean(dtype=np.float64)), 0.0)
+        side = self.camera.kernel.shape[0]
+        estimate = linear_estimate(point_kernel(side), self.camera.grid, covariance, photons)
+        return np.asarray(np.maximum(estimate(frame[None])[0], 0), np.float32)
+
+    def _upsampled(self, found: Sharpened) -> Sharpened:
+        scale = self.camera.scale
+        layers = np.asarray(found.time_of_flight_ps, np.float32)
+        times = np.stack([bicubic(layer, self.camera.grid) for layer in layers])
+        return replace(
+            found,
+            time_of_flight_ps=times.astype(np.float64),
+            sigma_ps=found.sigma_ps.repeat(scale, axis=1).repeat(scale, axis=2),
+            valid=found.valid.repeat(scale, axis=1).repeat(scale, axis=2),
+        )

@@ -1,0 +1,137 @@
+"""The tables of arrays of single photons made so small that all of them take seconds."""
+
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from camkit.models_def.kinds.spad import validation
+from camkit.models_def.kinds.spad.networks import build_spad_network
+from camkit.models_def.kinds.spad.plate_psf import write_plate_psf
+from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
+from camkit.models_def.training.kind import to_recipe
+from camkit.scenes import procedural_scene
+from tests.spad_bundle import leaning_kernel
+from tools.comparison import equal_training
+from tools.spad import tables
+from tools.spad.table import measuring, training
+from tools.spad.table.rows import chosen_runs
+
+RECIPE = """
+name = "spad-sr"
+kind = "spad"
+
+[sensor]
+type = "spad"
+width_px = 16
+height_px = 12
+pixel_pitch_um = 150.0
+sub_pixels = 4
+phase = 2
+
+[sampling]
+mode = "learned"
+psf = "plate.safetensors"
+
+[data]
+procedural_scenes = 2
+scene_px = 256
+sample_px = 16
+first_samples = 4
+pool_samples = 40
+steps_per_sample = 2
+
+[schedule]
+batch = 2
+patch_px = 8
+loss = "mse"
+
+[networks.S]
+network = "sub_pixel_s"
+config = { width = 16, blocks = 1 }
+
+[networks.M]
+network = "sub_pixel_m"
+config = { width = 16, blocks = 1 }
+
+[networks.srcnn]
+network = "srcnn"
+config = { in_channels = 2, kernels_px = [3, 1, 3] }
+"""
+SIGMA = 1.7
+Rig = Callable[..., str]
+
+
+@pytest.fixture
+def rig(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Rig]:
+    """Give the command, with a small recipe; its answer is what it prints."""
+    recipes = tmp_path / "recipes"
+    recipes.mkdir()
+    (recipes / training.RECIPE).write_text(RECIPE, encoding="utf-8")
+    write_plate_psf(recipes / "plate.safetensors", leaning_kernel())
+    monkeypatch.setattr(training, "RECIPES", recipes)
+    for module in (training, measuring):
+        monkeypatch.setattr(module, "level_sigma", lambda _: SIGMA)
+    monkeypatch.setattr(validation, "CROPS", 1)
+    monkeypatch.setattr(validation, "CROP_PX", 96)
+    before = torch.get_num_threads()
+
+    def command(*words: Any) -> str:
+        tables.main([str(word) for word in words])
+        return capsys.readouterr().out
+
+    yield command
+    torch.set_num_threads(before)
+
+
+def write_run(runs: Path, name: str) -> None:
+    """Write what a training leaves, of a network that was not trained at all."""
+    ((row, seed),) = chosen_runs([name])
+    text = training.recipe_text(row, seed, None)
+    recipe = to_recipe(tomllib.loads(text))
+    chosen = recipe.network(row.size, training.ROLE)
+    torch.manual_seed(seed)
+    network = build_spad_network(chosen.network, **chosen.config)
+    with torch.no_grad():
+        # a new one is the same whatever its seed
+        for values in network.parameters():
+            values.add_(torch.randn_like(values), alpha=0.002)
+    folder = runs / name
+    folder.mkdir(parents=True)
+    (folder / equal_training.RECIPE).write_text(text, encoding="utf-8")
+    (folder / equal_training.DONE).write_text('{"cpu_minutes": 15}', encoding="utf-8")
+    checkpoint = Checkpoint(
+        recipe_toml=text,
+        size=row.size,
+        network=chosen.network,
+        config=dict(chosen.config),
+        bank_digest="",
+        training_data="nothing",
+        step=0,
+        elapsed_s=0.0,
+        cpu_s=0.0,
+        valid_db=None,
+        weights=network.state_dict(),
+        average=network.state_dict(),
+        optimizer={},
+        role=training.ROLE,
+    )
+    write_checkpoint(training.checkpoint_of(runs, row, seed), checkpoint)
+
+
+def write_sets(folder: Path) -> Path:
+    """Write a picture of Set5 and two of Set14."""
+    for name, seeds in {"set5": (1,), "set14": (2, 3)}.items():
+        (folder / name).mkdir(parents=True)
+        for seed in seeds:
+            scene = np.clip(procedural_scene(seed, 50, 61), 0, 1) ** (1 / 2.4)
+            values = np.rint(255 * scene[::-1].transpose(1, 2, 0)).astype(np.uint8)
+            assert cv2.imwrite(str(folder / name / f"{seed}.png"), values)
+    return folder

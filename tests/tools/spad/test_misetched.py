@@ -1,0 +1,231 @@
+"""A mis-etched plate in small: what is measured wins back, and every method is told of."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from camkit.errors import ContractError
+from camkit.models_def.kinds.spad.networks import build_spad_network
+from camkit.models_def.kinds.spad.plate_psf import read_plate_psf, write_plate_psf
+from camkit.models_def.kinds.spad.sampling import gaussian_psf
+from camkit.models_def.kinds.spad.training import SpadMaterial
+from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from camkit.models_def.training.trainer import TrainOptions
+from tools.spad import misetched
+from tools.spad.misetch import tuning
+from tools.spad.misetch.tuning import recipe_text
+from tools.spad.misetched import main
+
+SMALL = ["--cells", "33", "--tiles", "8"]
+CONFIG = {"width": 16, "blocks": 1}
+LEAN = np.linspace(0.5, 1.5, 11)
+RECIPE = """
+name = "tiny"
+kind = "spad"
+
+[sensor]
+type = "spad"
+width_px = 64
+height_px = 32
+pixel_pitch_um = 150.0
+fill_factor = 0.0314
+sub_pixels = 4
+phase = 2
+
+[sampling]
+mode = "learned"
+psf = "design.safetensors"
+
+[schedule]
+steps = 4
+learning_rate = 2e-3
+batch = 2
+patch_px = 8
+
+[networks.S]
+network = "sub_pixel_s"
+config = { width = 16, blocks = 1 }
+"""
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture
+def design(tmp_path: Path) -> Path:
+    """Give a PSF that leans."""
+    kernel = gaussian_psf(1.6) * np.outer(LEAN, LEAN**2)
+    path = tmp_path / "design.safetensors"
+    write_plate_psf(path, np.asarray(kernel / kernel.sum(), np.float32))
+    return path
+
+
+@pytest.fixture
+def checkpoint(tmp_path: Path, design: Path) -> Path:
+    """Give an untrained network behind that PSF."""
+    torch.manual_seed(3)
+    weights = build_spad_network("sub_pixel_s", **CONFIG).state_dict()
+    path = tmp_path / "start.pt"
+    written = Checkpoint(
+        recipe_toml=RECIPE,
+        role="upscale",
+        size="S",
+        network="sub_pixel_s",
+        config=CONFIG,
+        bank_digest=SpadMaterial(kernel=read_plate_psf(design)).digest(),
+        training_data="none",
+        step=0,
+        elapsed_s=0.0,
+        cpu_s=0.0,
+        valid_db=None,
+        weights=weights,
+        average=weights,
+        optimizer={},
+    )
+    write_checkpoint(path, written)
+    return path
+
+
+@pytest.fixture
+def tests_folder(tmp_path: Path) -> Path:
+    """Give one test set of one picture with edges of all kinds."""
+    folder = tmp_path / "tests" / "set5"
+    folder.mkdir(parents=True)
+    picture = np.zeros((96, 96, 3), np.uint8)
+    cv2.circle(picture, (50, 45), 30, (200, 180, 220), -1)
+    cv2.line(picture, (5, 90), (90, 60), (90, 120, 60), 5)
+    assert cv2.imwrite(str(folder / "one.png"), picture)
+    return folder.parent
+
+
+@pytest.fixture
+def trainings(monkeypatch: pytest.MonkeyPatch) -> list[tuple[TrainOptions, SpadMaterial]]:
+    """Give what trainings were asked for; each leaves the weights it began with."""
+    asked: list[tuple[TrainOptions, SpadMaterial]] = []
+
+    def train(recipe: Path, options: TrainOptions, *, material: SpadMaterial) -> Any:
+        asked.append((options, material))
+        out = options.out_dir / "tiny_upscale_S.pt"
+        if options.start is not None:
+            text = recipe.read_text(encoding="utf-8")
+            write_checkpoint(out, replace(read_checkpoint(options.start), recipe_toml=text))
+        (options.out_dir / "samples_upscale_S").mkdir()
+        return SimpleNamespace(cpu_s=6.0, steps=2, valid_db=20.0)
+
+    monkeypatch.setattr(tuning, "train", train)
+    return asked
+
+
+def test_every_method_is_judged_behind_the_plate_that_is(
+    tmp_path: Path,
+    design: Path,
+    checkpoint: Path,
+    tests_folder: Path,
+    trainings: list[tuple[TrainOptions, SpadMaterial]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(misetched, "SCAN", (0.0, 0.08))
+    out = tmp_path / "out"
+    asked = ["--checkpoint", checkpoint, "--psf", design, "--test", tests_folder]
+    asked += ["--out-dir", out, "--cpu-minutes", "0.1", "--depth-error", "0.08", "--control"]
+    assert main([*map(str, asked), *SMALL]) == 0
+    record = json.loads((out / "misetched.json").read_text(encoding="utf-8"))
+    # the measured PSF is far nearer to the plate than the plate to its design
+    assert record["as_etched"]["rmse"] > 2 * record["as_designed"]["rmse"]
+    assert record["as_etched"]["rmse"] > 5 * record["measured"]["rmse"]
+    scores = {(row["plate"], row["method"]): row["scores"] for row in record["rows"]}
+    assert list(scores) == [
+        ("designed", "network"),
+        ("designed", "linear, told the design PSF"),
+        ("etched", "network"),
+        ("etched", "linear, told the design PSF"),
+        ("etched", "linear, told the measured PSF"),
+        ("etched", "linear, told the true PSF"),
+        ("etched", "network, trained on with the measured PSF"),
+        ("etched", "network, trained on with the design PSF"),
+    ]
+    linear = {
+        name: scores["etched", f"linear, told the {name} PSF"]["no noise"]["set5"]["psnr_db"]
+        for name in ("design", "measured", "true")
+    }
+    assert linear["design"] < linear["measured"]
+    assert linear["measured"] == pytest.approx(linear["true"], abs=0.2)
+    # weights that are not changed are judged behind the plate as etched, whatever they were told
+    as_it_is = scores["etched", "network"]
+    assert scores["etched", "network, trained on with the measured PSF"] == as_it_is
+    assert as_it_is != scores["designed", "network"]
+    right, wrong = record["scan"]
+    assert right["network"] == scores["designed", "network"]["no noise"]
+    assert wrong["linear_design"] == scores["etched", "linear, told the design PSF"]["no noise"]
+    told = capsys.readouterr().out
+    assert "every mask +8%" in told
+    assert "| etched | network, trained on with the measured PSF |" in told
+
+
+def test_a_network_is_trained_on_with_what_was_measured(
+    tmp_path: Path,
+    checkpoint: Path,
+    design: Path,
+    trainings: list[tuple[TrainOptions, SpadMaterial]],
+) -> None:
+    psf = tmp_path / "other" / "measured.safetensors"
+    psf.parent.mkdir()
+    write_plate_psf(psf, gaussian_psf(1.5))
+    start = read_checkpoint(checkpoint)
+    settings = tuning.Tuning(cpu_minutes=0.1)
+    out, ended = tuning.tuned(checkpoint, start, psf, gaussian_psf(1.5), settings)
+    assert ended == {"cpu_s": 6.0, "steps": 2, "valid_db": 20.0}
+    assert 'psf = "measured.safetensors"' in read_checkpoint(out).recipe_toml
+    assert [path.name for path in psf.parent.glob("samples_*")] == []
+    # again: what began goes on where it was
+    tuning.tuned(checkpoint, start, psf, gaussian_psf(1.5), settings)
+    (first, material), (second, _) = trainings
+    assert (first.start, first.resume) == (checkpoint, False)
+    assert (second.start, second.resume) == (None, True)
+    assert first.max_cpu_minutes == pytest.approx(0.1)
+    np.testing.assert_allclose(material.kernel, gaussian_psf(1.5))
+
+
+def test_the_recipe_changes_by_its_psf_and_its_rate() -> None:
+    text = recipe_text(RECIPE, "measured.safetensors")
+    changed = set(text.splitlines()) - set(RECIPE.splitlines())
+    assert changed == {'psf = "measured.safetensors"', "learning_rate = 0.0005"}
+    with pytest.raises(ContractError, match="must have one line"):
+        recipe_text(RECIPE.replace("psf =", "# psf ="), "measured.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"--psf": None}, "was not trained behind the PSF"),
+        ({"--test": "none"}, "holds none of the folders set5"),
+        ({"--depth-error": "1.5"}, "is a share of a depth; got 1.5"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_line(
+    changed: dict[str, str | None],
+    told: str,
+    tmp_path: Path,
+    checkpoint: Path,
+    design: Path,
+    tests_folder: Path,
+) -> None:
+    asked: dict[str, Path | str | None]
+    asked = {"--checkpoint": checkpoint, "--psf": design, "--test": tests_folder}
+    asked = {**asked, "--out-dir": tmp_path / "out", **changed}
+    words = [str(part) for pair in asked.items() if pair[1] is not None for part in pair]
+    with pytest.raises(SystemExit, match=told):
+        main([*words, *SMALL])
