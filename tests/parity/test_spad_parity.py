@@ -1,89 +1,115 @@
-"""Single photons in numpy and in torch: the same array, the same planes, the same theory."""
+"""Arrays of single photons in reports and runtime (numpy) and at training time (torch)."""
+
+import math
 
 import numpy as np
 import pytest
 import torch
 
-from camkit.models_def.kinds.spad.counting import Exposure, told_planes
-from camkit.models_def.kinds.spad.sampling import see_through as see_in_torch
-from camkit.models_def.kinds.spad.theory import LAGS, Covariance, wiener_error
-from camkit.runtime.kinds.spad.finer.camera import network_planes
-from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
-from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
-from camkit.runtime.kinds.spad.twin.array import see_through
+from camkit.bundle.stages import SuperResolve
+from camkit.colorimetry import encode_srgb
+from camkit.contracts import FloatArray
+from camkit.models_def.kinds.spad import sampling as trained
+from camkit.models_def.kinds.spad.counting import Exposure
+from camkit.models_def.kinds.spad.evaluation import bicubic as trained_bicubic
+from camkit.models_def.kinds.spad.evaluation import evaluate_each
+from camkit.models_def.kinds.spad.samples import luminance
+from camkit.models_def.networks.bicubic import PHASE, SCALE, Bicubic
+from camkit.models_def.training.similarity import ssim as trained_ssim
+from camkit.report.kinds.spad.bicubic import bicubic
+from camkit.report.kinds.spad.pictures import SEED, count_picture, picture_rows
+from camkit.report.kinds.spad.scenes import coded_luminance
+from camkit.report.kinds.spad.score import psnr_db, ssim
+from camkit.report.kinds.spad.ways import Method, Way
+from camkit.runtime.kinds.spad.finer.linear import Grid
+from camkit.runtime.kinds.spad.finer.sampling import light_of, sampling_kernel
+from camkit.scenes import procedural_scene
 from tests.spad_bundle import leaning_kernel
 
-
-@pytest.mark.parametrize("phase", range(4))
-def test_the_array_sees_the_same_light(phase: int) -> None:
-    fine = np.random.default_rng(phase).random((3, 32, 48)).astype(np.float32)
-    own = see_through(fine, leaning_kernel(), Grid(scale=4, phase=phase))
-    kernel = torch.from_numpy(leaning_kernel())
-    other = see_in_torch(torch.from_numpy(fine)[:, None], kernel, phase)[:, 0].numpy()
-    np.testing.assert_allclose(own, other, atol=1e-6)
-
-
-def test_a_network_is_given_what_it_was_trained_with() -> None:
-    exposure = Exposure(photons=40.0, dark_counts=3.0)
-    counts = np.random.default_rng(0).poisson(20.0, (1, 1, 6, 7)).astype(np.float32)
-    other = told_planes(torch.from_numpy(counts), exposure)[0].numpy()
-    own = network_planes(counts[0, 0] - 3, 40.0, 3.0)
-    np.testing.assert_allclose(own, other, rtol=1e-6)
+FLOAT32 = 1e-6
+SIMILARITY = 1e-4
+PSNR_DB = 1e-3
+NOISE_DB = 0.05
+"""A rounding of the light may draw other photons from there on."""
+GRID = Grid(scale=SCALE, phase=PHASE)
+SCENES = tuple(procedural_scene(seed, 96, 128) for seed in (3, 4))
+PICTURES = tuple(coded_luminance(scene) for scene in SCENES)
 
 
-@pytest.mark.parametrize("photons", [20.0, 2000.0])
-def test_the_linear_estimate_errs_as_theory_says(photons: float) -> None:
-    """Theory knows the mean of pictures, the estimate does not: it may err a little more."""
-    mean, reach = 0.4, 25.0
-    covariance = PictureCovariance(contrast=0.6, reach=reach, exponent=1.0)
-    values = torch.from_numpy(covariance.lags(LAGS) * mean**2)
-    theory = float(
-        wiener_error(
-            torch.from_numpy(leaning_kernel()), Covariance(values=values, mean=mean), photons
-        )
-    )
-    grid = Grid(scale=4, phase=2)
-    weights = linear_estimate(leaning_kernel(), grid, covariance, photons * mean).weights
-    # the error of weights w is w' A w - 2 w' b + C(0): by the same moments, explicitly
-    found = _error_of(weights.astype(np.float64), covariance, mean, photons)
-    assert theory * (1 - 1e-4) <= found <= theory * 1.03
+def _sampling(mode: str) -> trained.Sampling:
+    return trained.make_sampling(mode, kernel=leaning_kernel() if mode == "learned" else None)
 
 
-def _error_of(
-    weights: np.ndarray, covariance: PictureCovariance, mean: float, photons: float
-) -> float:
-    lags = covariance.lags(50) * mean**2
-    kernel = leaning_kernel().astype(np.float64)
-    taps = [(dy - 5, dx - 5, share) for (dy, dx), share in np.ndenumerate(kernel)]
-    at = [(4 * k, 4 * j) for k in range(-3, 4) for j in range(-3, 4)]
+def _way(mode: str) -> Way:
+    sampling = _sampling(mode)
+    method = Method(name="bicubic", restore=lambda planes, _: bicubic(planes[0], GRID))
+    return Way(sampling=mode, kernel=sampling.kernel, light=sampling.light, methods=(method,))
 
-    def common(dy: np.ndarray, dx: np.ndarray) -> np.ndarray:
-        return np.asarray(lags[50 + dy, 50 + dx])
 
-    moves = np.array([(y, x) for y, x, _ in taps])
-    shares = np.array([share for _, _, share in taps])
-    pair_y, pair_x = moves[:, None].transpose(2, 0, 1) - moves[None].transpose(2, 0, 1)
-    both = shares[:, None] * shares
-    matrix = (
-        np.array(
-            [
-                [
-                    float((both * common(a[0] - b[0] - pair_y, a[1] - b[1] - pair_x)).sum())
-                    for b in at
-                ]
-                for a in at
-            ]
-        )
-        + np.eye(49) * mean / photons
-    )
-    errors = []
-    for sub_pixel, own in enumerate(weights.reshape(16, 49)):
-        fine = sub_pixel // 4 - 2, sub_pixel % 4 - 2
-        cross = np.array(
-            [
-                float((shares * common(fine[0] - y + moves[:, 0], fine[1] - x + moves[:, 1])).sum())
-                for y, x in at
-            ]
-        )
-        errors.append(own @ matrix @ own - 2 * own @ cross + lags[50, 50])
-    return float(np.mean(errors))
+def _noisy(picture: FloatArray) -> FloatArray:
+    noise = np.random.default_rng(1).normal(0, 0.05, picture.shape)
+    return np.clip(picture + noise, 0, 1).astype(np.float32)
+
+
+@pytest.mark.parametrize("phase", range(SCALE))
+def test_bicubic_interpolation_is_that_of_training(phase: int) -> None:
+    light = np.random.default_rng(2).random((9, 14), dtype=np.float32)
+    found = bicubic(light, Grid(scale=SCALE, phase=phase))
+    wanted = Bicubic(SCALE, phase)(torch.from_numpy(light)[None, None])[0, 0].numpy()
+    assert found == pytest.approx(wanted, abs=FLOAT32)
+
+
+@pytest.mark.parametrize(
+    ("stated", "mode"),
+    [
+        ({}, "learned"),
+        ({"sampling": "low_fill"}, "low_fill"),
+        ({"sampling": "full_fill"}, "full_fill"),
+        ({"sampling": "gaussian", "sigma": trained.GAUSSIAN_SIGMA}, "gaussian"),
+    ],
+)
+def test_samplings_of_a_stage_are_those_of_training(stated: dict[str, object], mode: str) -> None:
+    stage = SuperResolve.model_validate(stated)
+    wanted = _sampling(mode)
+    assert (sampling_kernel(stage, leaning_kernel(), GRID) == wanted.kernel).all()
+    assert light_of(stage, GRID) == wanted.light
+
+
+def test_scores_are_those_of_training() -> None:
+    picture = PICTURES[0]
+    noisy = _noisy(picture)
+    pair = (torch.from_numpy(noisy)[None, None], torch.from_numpy(picture)[None, None])
+    assert ssim(noisy, picture) == pytest.approx(float(trained_ssim(*pair)), abs=SIMILARITY)
+    mse = float(((noisy.astype(np.float64) - picture) ** 2).mean())
+    assert psnr_db(noisy, picture) == pytest.approx(-10 * math.log10(mse))
+    assert psnr_db(picture, picture) == 100
+
+
+def test_luminance_is_that_of_training() -> None:
+    assert (PICTURES[0] == luminance(encode_srgb(SCENES[0]))).all()
+
+
+@pytest.mark.parametrize("mode", trained.MODES)
+def test_what_an_array_counts_is_what_training_counted(mode: str) -> None:
+    """The same photons of the same seed, as the light is the same but for its rounding."""
+    from camkit.models_def.kinds.spad.samples import photograph
+
+    fine = torch.from_numpy(PICTURES[0])[None, None]
+    rng = np.random.default_rng((SEED, 0))
+    wanted = photograph(fine, _sampling(mode), Exposure(photons=300.0), rng)[0].numpy()
+    found = count_picture(PICTURES[0], _way(mode), GRID, 300.0, (SEED, 0)).planes
+    assert np.mean(np.abs(found - wanted) < FLOAT32) > 0.99
+
+
+@pytest.mark.parametrize("mode", trained.MODES)
+@pytest.mark.parametrize(("photons", "within_db"), [(None, PSNR_DB), (1000.0, NOISE_DB)])
+def test_rows_of_the_bench_are_those_of_the_tables(
+    mode: str, photons: float | None, within_db: float
+) -> None:
+    sampling = _sampling(mode)
+    exposure = Exposure(photons=math.inf if photons is None else photons)
+    each = evaluate_each(PICTURES, sampling, exposure, trained_bicubic(sampling))
+    row, *_ = picture_rows(PICTURES, (_way(mode),), GRID, (photons,), lambda _: None)
+    wanted_db, alike = np.mean(each, axis=0)
+    assert row["psnr_db"] == pytest.approx(wanted_db, abs=within_db)
+    assert row["ssim"] == pytest.approx(alike, abs=SIMILARITY if photons is None else 2e-3)

@@ -23,7 +23,7 @@ def bench(
         list[str] | None, typer.Argument(help="Bundle NAMEs or PATHs.", metavar="[BUNDLE]...")
     ] = None,
     all_: Annotated[
-        bool, typer.Option("--all", help="All built-in cameras of a stated size.")
+        bool, typer.Option("--all", help="All built-in cameras that photograph, of a stated size.")
     ] = False,
     data: Annotated[
         Path | None,
@@ -118,18 +118,23 @@ def bench(
 
 
 def _cameras() -> list[str]:
-    """Name the built-in bundles that can be simulated: those that state a sensor's size."""
+    """Name the built-in bundles that photograph and state a sensor's size."""
     from camkit.bundle.reader import built_in_bundles, open_bundle
+    from camkit.report.bench.part import BenchPart
+    from camkit.report.kind_finder import find_part
 
+    manifests = {name: open_bundle(path).manifest for name, path in built_in_bundles().items()}
     return [
         name
-        for name, path in built_in_bundles().items()
-        if open_bundle(path).manifest.sensor.extent is not None
+        for name, manifest in manifests.items()
+        if manifest.sensor.extent is not None
+        and find_part(manifest.kind, "bench", BenchPart).measure is None
     ]
 
 
 def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
     from camkit.report.bench.output import write_bench
+    from camkit.report.bench.own.table import own_lines
     from camkit.report.bench.run import run_bench
 
     tell = _teller()
@@ -139,7 +144,8 @@ def _run(settings: "Settings", out_dir: Path, *, as_json: bool) -> None:
     if as_json:
         say(json.dumps(result.report, allow_nan=False))
         return
-    for line in _lines(result.report["rows"]):
+    rows = result.report["rows"]
+    for line in own_lines(rows) if result.own else _lines(rows):
         say(line)
     for skip in result.report["skipped"]:
         say(f"camkit: not measured: {skip['what']}: {skip['reason']}", err=True)

@@ -6,6 +6,7 @@ row_maker       what makes the rows of one sort
 one_method      the rows of a single method that a bundle offers
 rows/           which trials a bundle gives; a new sort of row is one new file
 part            what a kind of camera brings: how it photographs, rows, metrics
+own/            kinds that measure themselves: their rows in one report
 line_up         the makers and metrics of a camera, and all trials
 timed/          one capture through fresh processes, watched: seconds, memory, noise
 machine, gemm   what the machine is, and the fastest it multiplies
@@ -13,6 +14,7 @@ known_captures  captures with a known truth
 metric          the type of a metric
 metrics/        what is measured on a result; a new metric is one new file
 accuracy        every method on every known capture
+edge            how sharp captures and pictures are, by one slanted edge
 crops           the same patch of every method
 row             all that is known about a trial as one flat record
 run             the whole bench

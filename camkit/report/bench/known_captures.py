@@ -162,7 +162,7 @@ def _photographed(
                     psf=psf,
                 )
                 kernels = lens(shot.fabrication_seed) if psf == "fresh" else bundle.psf
-                yield _known(shot, part.photograph(shot, scene, bundle, kernels))
+                yield known_capture(shot, part.photograph(shot, scene, bundle, kernels))
 
 
 def bench_scene(path: Path, bundle: Bundle, saturate: float | None = None) -> FloatArray:
@@ -216,7 +216,8 @@ def _whole_pixels(scene: FloatArray, scale: int) -> FloatArray:
     return np.ascontiguousarray(scene[:, :height, :width])
 
 
-def _known(shot: Shot, exposed: Exposed) -> KnownCapture:
+def known_capture(shot: Shot, exposed: Exposed) -> KnownCapture:
+    """Give what was photographed as a capture with a known truth, in sensor geometry."""
     simulation, share = exposed.simulation, FIELD_SHARES[shot.position]
     x, y = (int(v) for v in simulation.window.origin_px)
     return KnownCapture(

@@ -18,7 +18,8 @@ def write_bench(result: Result, folder: Path) -> list[Path]:
     """Write everything; an earlier bench in the folder is replaced.
 
     Returns:
-        The files; without matplotlib or without PSNR there is no chart.
+        The files; without matplotlib or without PSNR there is no chart, and of kinds that measure
+        themselves neither chart nor page.
     """
     folder.mkdir(parents=True, exist_ok=True)
     paths = {
@@ -27,6 +28,10 @@ def write_bench(result: Result, folder: Path) -> list[Path]:
     text = json.dumps(result.report, indent=1, allow_nan=False)
     paths["json"].write_text(text + "\n", encoding="utf-8")
     write_csv(paths["csv"], result.report["rows"])
+    if result.own:
+        for suffix in ("svg", "png", "html"):
+            paths.pop(suffix).unlink(missing_ok=True)
+        return list(paths.values())
     drawn = draw_chart(result.report, svg=paths["svg"], png=paths["png"])
     if not drawn:
         for suffix in ("svg", "png"):
@@ -49,4 +54,4 @@ def write_csv(path: Path, rows: list[Row]) -> None:
 def flatten(row: Row) -> dict[str, Any]:
     """Give a row without nesting: `stages` becomes columns `stage_NAME_s`, `pictures` goes."""
     flat = {name: value for name, value in row.items() if name not in ("stages", "pictures")}
-    return flat | {f"stage_{name}_s": value for name, value in row["stages"].items()}
+    return flat | {f"stage_{name}_s": value for name, value in row.get("stages", {}).items()}

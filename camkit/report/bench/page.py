@@ -25,6 +25,8 @@ COLUMNS: Final = (
     Shown("method", "label", "", "a size of network, or the name of a method"),
     Shown("PSNR dB", "psnr_db", ".2f", "mean over pictures, on sRGB values"),
     Shown("SSIM", "ssim", ".3f", "mean over pictures, on sRGB values"),
+    Shown("MTF 0.25", "mtf_025", ".2f", "of an edge on the axis, at 0.25 cycles per pixel"),
+    Shown("MTF 0.5", "mtf_050", ".2f", "likewise at 0.5, the finest that pixels can show"),
     Shown(
         "over base dB", "over_base_psnr_db", "+.2f", "mean over pictures of the gain over size M"
     ),

@@ -1,13 +1,62 @@
-"""What `camkit bench` asks of a kind of camera."""
+"""What `camkit bench` asks of a kind of camera.
 
-from collections.abc import Callable
+A kind either photographs pictures, and is timed and judged by the bench; or its captures are no
+photographs, and it measures itself.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
 
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray, FrozenPsf
+from camkit.errors import UnsupportedError
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.row_maker import RowMaker
+from camkit.report.bench.trial import Skip
 from camkit.report.quality import FIELD_SHARES, Exposed, Shot
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnSettings:
+    """What a kind that measures itself is asked for.
+
+    Attributes:
+        data: Folder of pictures to measure accuracy on; None for scenes of the kind's own.
+        images: Only the first N of them; None for all.
+        sizes: Of networks; None for all that the bundle holds.
+        quick: Whether a rough picture in little time will do.
+        repeat: How often seconds are taken; the median is told.
+    """
+
+    data: Path | None = None
+    images: int | None = None
+    sizes: tuple[str, ...] | None = None
+    quick: bool = False
+    repeat: int = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnRows:
+    """What a kind measured of a bundle.
+
+    Attributes:
+        rows: Plain JSON values, each row with the columns of its sort.
+        skips: What was asked for, or is usual, and could not be measured.
+    """
+
+    rows: Sequence[Mapping[str, Any]]
+    skips: Sequence[Skip] = ()
+
+
+Measure = Callable[[Bundle, OwnSettings, Tell], OwnRows]
+
+
+def _no_photograph(*_: object) -> NoReturn:
+    raise UnsupportedError("captures of this kind are no photographs; it measures itself")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,11 +71,13 @@ class BenchPart:
         metrics: Of its own, beside the common ones; the kind names those that count.
         source: Of the register of scenes (`camkit.scenes.named`): its scenes are photographed
             where there is no folder of pictures; None takes the golden cases.
+        measure: Measures a bundle in place of all that; None for photographs.
     """
 
-    photograph: Callable[[Shot, FloatArray, Bundle, FrozenPsf], Exposed]
+    photograph: Callable[[Shot, FloatArray, Bundle, FrozenPsf], Exposed] = _no_photograph
     positions: tuple[int, ...] = tuple(range(len(FIELD_SHARES)))
     isos: tuple[float, ...] = (100.0, 1600.0)
     rows: tuple[RowMaker, ...] = ()
     metrics: tuple[Metric, ...] = ()
     source: str | None = None
+    measure: Measure | None = None

@@ -1,7 +1,7 @@
 """All that is known about a trial as one flat record; unknown values are None."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from camkit.report.bench.accuracy import (
@@ -14,6 +14,7 @@ from camkit.report.bench.accuracy import (
     score_key,
     standard_error_of_gain,
 )
+from camkit.report.bench.edge import Edges
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.timed.process_run import Run
 from camkit.report.bench.timed.timing import Spread, is_noisy, paired_ratio, quantile, spread_of
@@ -35,6 +36,7 @@ class Facts:
         gemm_gmac_per_s: Peak of the machine at the trial's threads.
         scores: Of all methods of the trial's camera.
         metrics: Of that camera.
+        edges: What an edge says of that camera.
         base: Runs of the trial that others are compared with.
         base_label: Its label.
         base_key: Key of its scores.
@@ -48,6 +50,7 @@ class Facts:
     base: Sequence[Run]
     base_label: str
     base_key: Key
+    edges: Edges = field(default_factory=Edges)
 
 
 def make_row(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
@@ -77,6 +80,7 @@ def make_row(trial: Trial, runs: Sequence[Run], facts: Facts) -> Row:
         **_seconds(runs, facts, width * height / 1e6),
         **_network_share(trial, runs, facts),
         **_accuracy(trial, facts),
+        **facts.edges.columns(score_key(trial)),
     }
     failed = next((run.error for run in runs if run.error is not None), None)
     scores = facts.scores.get(score_key(trial))

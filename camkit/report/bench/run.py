@@ -2,7 +2,7 @@
 
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -11,6 +11,7 @@ from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy, score_key
 from camkit.report.bench.crops import MOST_CAPTURES, CropCollector, Patch
+from camkit.report.bench.edge import Edges, measure_edges
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
 from camkit.report.bench.known_captures import (
     SCENES,
@@ -23,7 +24,8 @@ from camkit.report.bench.known_captures import (
 from camkit.report.bench.line_up import make_trials, metrics_of
 from camkit.report.bench.machine import describe_machine, free_memory_bytes
 from camkit.report.bench.metric import Metric
-from camkit.report.bench.part import BenchPart
+from camkit.report.bench.own.measuring import measure_own, measures_of
+from camkit.report.bench.part import BenchPart, Tell
 from camkit.report.bench.row import Facts, Row, make_row
 from camkit.report.bench.settings import QUICK_SIZE_PX, Settings
 from camkit.report.bench.timed.capture import SCENE_TEXT, timed_capture
@@ -37,7 +39,6 @@ from camkit.runtime.network.engine import available_threads, usable_providers
 from camkit.runtime.plan.ways import offered_methods
 
 REPORT_VERSION: Final = 1
-Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,11 +64,13 @@ class Result:
 
     Attributes:
         report: Plain JSON values: machine, settings, cameras, rows, skipped.
+        own: Whether its kinds measured themselves, so that rows have columns of their own.
         patches: Camera -> the same patches of every method, by `Trial.accuracy_key`.
         names: `Trial.accuracy_key` -> label.
     """
 
     report: dict[str, Any]
+    own: bool = False
     patches: dict[str, list[Patch]] = field(default_factory=dict)
     names: dict[Key, str] = field(default_factory=dict)
 
@@ -84,8 +87,11 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
         BundleError: If a bundle is refused.
         DecodeError: If the given capture or a file of linear light cannot be read.
     """
-    folder = settings.folder()
     entrants = open_entrants(settings.bundles, settings.references)
+    if measures := measures_of([entrant.bundle for entrant in entrants]):
+        own = [entrant.bundle for entrant in entrants]
+        return Result(report=measure_own(settings, own, measures, tell), own=True)
+    folder = settings.folder()
     _check(settings, [e.bundle for e in entrants if not e.is_reference])
     ground = Ground(
         threads=available_threads(None),
@@ -110,6 +116,7 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
         for label, found in judged.items()
         if found.error is not None
     ]
+    skips += [skip for found in judged.values() for skip in found.edges.skips]
     return _join(trials, runs, cameras, judged, _Found(settings, machine, peaks, skips, entrants))
 
 
@@ -233,6 +240,7 @@ class _Judged:
     patches: list[Patch]
     metrics: tuple[Metric, ...]
     text: str
+    edges: Edges = field(default_factory=Edges)
     error: str | None = None
 
 
@@ -260,7 +268,14 @@ def _judge(
     except CamkitError as error:
         text = f"not measured: {error}"
         return _Judged(scores={}, patches=[], metrics=metrics, text=text, error=str(error))
-    return _Judged(scores=scores, patches=collector.patches, metrics=metrics, text=text)
+    tell(f"{label}: judging an edge")
+    return _Judged(
+        scores=scores,
+        patches=collector.patches,
+        metrics=metrics,
+        text=text,
+        edges=measure_edges(bundle, own, restorers),
+    )
 
 
 def _known_captures(
@@ -318,6 +333,7 @@ def _join(
             gemm_gmac_per_s=found.peaks[trial.threads],
             scores=judged[trial.camera].scores,
             metrics=judged[trial.camera].metrics,
+            edges=judged[trial.camera].edges,
             base=runs[base],
             base_label=base.label,
             base_key=score_key(base),

@@ -91,12 +91,24 @@ def evaluate(
         restore: (1, 2, h, w) light and noise -> (1, 1, 4 h, 4 w).
         seed: Of the noise; every picture has its own.
     """
-    scores = [
-        _compare(torch.from_numpy(picture)[None, None], sampling, exposure, restore, (seed, i))
-        for i, picture in enumerate(pictures)
-    ]
+    scores = evaluate_each(pictures, sampling, exposure, restore, seed=seed)
     found, alike = np.mean(scores, axis=0)
     return PictureScore(psnr_db=float(found), ssim=float(alike), pictures=len(scores))
+
+
+def evaluate_each(
+    pictures: Sequence[FloatArray],
+    sampling: Sampling,
+    exposure: Exposure,
+    restore: Restorer,
+    *,
+    seed: int = SEED,
+) -> tuple[tuple[float, float], ...]:
+    """Give PSNR in dB and SSIM of every picture; arguments as of `evaluate`."""
+    return tuple(
+        _compare(torch.from_numpy(picture)[None, None], sampling, exposure, restore, (seed, i))
+        for i, picture in enumerate(pictures)
+    )
 
 
 def evaluate_sets(

@@ -1,6 +1,6 @@
 """The record as tables in Markdown: every method at every level, then the scan of errors."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 Record = Mapping[str, Any]
@@ -8,43 +8,32 @@ Record = Mapping[str, Any]
 
 def misetched_text(record: Record) -> str:
     """Give both tables."""
-    sets = list(record["pictures"])
-    lines = [
-        f"every mask {record['depth_error']:+.0%}; PSNR in dB, {' / '.join(sets)}",
-        "",
-        *_table(["plate", "method", *record["photons"]], _methods(record)),
-        "",
-        f"without noise, {' / '.join(sets)}",
-        "",
-        *_table(
-            ["every mask", "RMSE to the design", "network", "linear, design", "linear, true"],
-            _scan(record),
-        ),
-    ]
-    return "\n".join(lines) + "\n"
+    sets = " / ".join(record["pictures"])
+    methods = [["every mask", "method", *record["photons"]], *_methods(record)]
+    errors = [["every mask", "RMSE to the design", *record["scan"][0]["methods"]], *_scan(record)]
+    return (
+        f"PSNR in dB, {sets}\n\n{_table(methods)}\n\n"
+        f"without noise, PSNR in dB, {sets}\n\n{_table(errors)}\n"
+    )
 
 
-def _methods(record: Record) -> Iterable[list[str]]:
-    for row in record["rows"]:
-        scores = row["scores"]
-        yield [row["plate"], row["method"], *(_sets(scores[n]) for n in record["photons"])]
+def _methods(record: Record) -> Iterator[list[str]]:
+    for plate in (record["designed"], *record["etched"]):
+        error = f"{plate['depth_error']:+.0%}" if "depth_error" in plate else "as designed"
+        for name, scores in plate["methods"].items():
+            yield [error, name, *(_sets(scores[level]) for level in record["photons"])]
 
 
-def _scan(record: Record) -> Iterable[list[str]]:
-    for row in record["scan"]:
-        found = (_sets(row[name]) for name in ("network", "linear_design", "linear_true"))
-        yield [f"{row['depth_error']:+.0%}", f"{row['like_design']['rmse']:.4f}", *found]
+def _scan(record: Record) -> Iterator[list[str]]:
+    for plate in record["scan"]:
+        found = map(_sets, plate["methods"].values())
+        yield [f"{plate['depth_error']:+.0%}", f"{plate['like_design']['rmse']:.4f}", *found]
 
 
 def _sets(scores: Record) -> str:
     return " / ".join(f"{score['psnr_db']:.2f}" for score in scores.values())
 
 
-def _table(heads: list[str], rows: Iterable[list[str]]) -> Iterable[str]:
-    yield _line(heads)
-    yield "|---" * len(heads) + "|"
-    yield from map(_line, rows)
-
-
-def _line(cells: list[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
+def _table(rows: list[list[str]]) -> str:
+    head, *body = ["| " + " | ".join(cells) + " |" for cells in rows]
+    return "\n".join([head, "|---" * len(rows[0]) + "|", *body])

@@ -12,7 +12,7 @@ from typing import Any, Final
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.training import SpadMaterial
-from camkit.models_def.training.checkpoint import Checkpoint
+from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint
 from camkit.models_def.training.kind import read_recipe
 from camkit.models_def.training.trainer import TrainOptions, checkpoint_path, train
 from camkit.runtime.output.part_file import atomic_output
@@ -43,7 +43,7 @@ class Tuning:
 
 def tuned(
     start: Path, checkpoint: Checkpoint, psf: Path, kernel: FloatArray, tuning: Tuning
-) -> tuple[Path, dict[str, Any]]:
+) -> Checkpoint:
     """Train a network on, in the folder of a PSF file.
 
     Args:
@@ -53,17 +53,18 @@ def tuned(
         kernel: (11, 11), what that file holds.
         tuning: How.
 
-    Returns:
-        The checkpoint that was written, and how the training ended.
-
     Raises:
         ContractError: If the recipe names no PSF, or another was trained with there.
     """
     folder, recipe = psf.parent, psf.with_suffix(".toml")
     with atomic_output(recipe) as part:
         part.write_text(recipe_text(checkpoint.recipe_toml, psf.name), encoding="utf-8")
+    material = SpadMaterial(kernel=kernel)
     options = TrainOptions(out_dir=folder, size=checkpoint.size, role=checkpoint.role)
     out = checkpoint_path(read_recipe(recipe), options, None)
+    known = read_checkpoint(out) if out.exists() else None
+    if known is not None and _is_done(known, material, tuning):
+        return known
     options = TrainOptions(
         out_dir=folder,
         size=checkpoint.size,
@@ -72,17 +73,27 @@ def tuned(
         valid_folder=tuning.valid,
         steps=tuning.steps,
         max_cpu_minutes=tuning.cpu_minutes,
-        start=None if out.exists() else start,
-        resume=out.exists(),
+        start=None if known else start,
+        resume=known is not None,
         validate_s=AT_THE_END_S,
     )
-    result = train(recipe, options, material=SpadMaterial(kernel=kernel))
+    train(recipe, options, material=material)
     for samples in folder.glob("samples_*"):
         shutil.rmtree(samples)
-    return out, {
-        "cpu_s": round(result.cpu_s, 1),
-        "steps": result.steps,
-        "valid_db": round(result.valid_db, 3),
+    return read_checkpoint(out)
+
+
+def _is_done(known: Checkpoint, material: SpadMaterial, tuning: Tuning) -> bool:
+    had_its_time = known.cpu_s >= 60 * tuning.cpu_minutes
+    return had_its_time and known.bank_digest == material.digest()
+
+
+def ending(checkpoint: Checkpoint) -> dict[str, Any]:
+    """Give how a training ended, as plain values."""
+    return {
+        "cpu_s": round(checkpoint.cpu_s, 1),
+        "steps": checkpoint.step,
+        "valid_db": None if checkpoint.valid_db is None else round(checkpoint.valid_db, 3),
     }
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from camkit.bundle.reader import built_in_bundles
 from camkit.cli.exit_code import ExitCode
+from tests.spad_bundle import write_spad_bundle
 from tests.wide_bundle import write_wide_bundle
 
 
@@ -70,3 +71,17 @@ def test_people_get_a_table_and_reasons(tmp_path: Path, camkit_command) -> None:
     assert row.split()[:2] == ["tiny", "develop"]
     assert "bench.html" in written
     assert "not measured: tiny L: the bundle holds M" in outcome.err
+
+
+def test_an_array_of_single_photons_measures_itself(tmp_path: Path, camkit_command) -> None:
+    bundle, out = write_spad_bundle(tmp_path), tmp_path / "out"
+    words = ("bench", bundle.path, "--quick", "--images", "1", "--repeat", "1", "--out-dir", out)
+    outcome = camkit_command(*words, "--json")
+    assert outcome.code == 0, outcome.err
+    report = json.loads(outcome.out)
+    assert {"machine", "settings", "rows", "skipped"} <= report.keys()
+    assert {row["sort"] for row in report["rows"]} == {"picture", "timing", "seconds"}
+    assert {path.name for path in out.iterdir()} == {"bench.json", "bench.csv"}
+    refused = camkit_command(*words, "--methods", "net")
+    assert refused.code == ExitCode.USAGE
+    assert "--methods means nothing to it" in refused.err
