@@ -9,13 +9,17 @@ import pytest
 from camkit.bundle import stages as entries
 from camkit.bundle.stages import Linearise, Network, Stage, Wiener
 from camkit.errors import UnsupportedError
+from camkit.kinds import KINDS
 from camkit.runtime import stages
+from camkit.runtime.kind import runtime_part
 from camkit.runtime.options import Options
 from camkit.runtime.stage_finder import methods_of, stage_keys, stage_module
 from tests.bundle_factory import tiny_stages
 
 UNION = get_args(Stage)[0]
-TYPES = sorted(entry.model_fields["type"].default for entry in get_args(UNION))
+MADE = {stage for kind in KINDS.values() if runtime_part(kind.name).maker for stage in kind.stages}
+"""Stages of kinds that make products: the kind does them, nobody walks them."""
+TYPES = sorted({entry.model_fields["type"].default for entry in get_args(UNION)} - MADE)
 
 
 @pytest.mark.parametrize("name", TYPES)

@@ -4,8 +4,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -115,14 +113,19 @@ def trainings(monkeypatch: pytest.MonkeyPatch) -> list[tuple[TrainOptions, SpadM
     """Give what trainings were asked for; each leaves the weights it began with."""
     asked: list[tuple[TrainOptions, SpadMaterial]] = []
 
-    def train(recipe: Path, options: TrainOptions, *, material: SpadMaterial) -> Any:
+    def train(recipe: Path, options: TrainOptions, *, material: SpadMaterial) -> None:
         asked.append((options, material))
-        out = options.out_dir / "tiny_upscale_S.pt"
         if options.start is not None:
-            text = recipe.read_text(encoding="utf-8")
-            write_checkpoint(out, replace(read_checkpoint(options.start), recipe_toml=text))
+            done = replace(
+                read_checkpoint(options.start),
+                recipe_toml=recipe.read_text(encoding="utf-8"),
+                bank_digest=material.digest(),
+                cpu_s=6.0,
+                step=2,
+                valid_db=20.0,
+            )
+            write_checkpoint(options.out_dir / "tiny_upscale_S.pt", done)
         (options.out_dir / "samples_upscale_S").mkdir()
-        return SimpleNamespace(cpu_s=6.0, steps=2, valid_db=20.0)
 
     monkeypatch.setattr(tuning, "train", train)
     return asked
@@ -137,42 +140,39 @@ def test_every_method_is_judged_behind_the_plate_that_is(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(misetched, "SCAN", (0.0, 0.08))
+    monkeypatch.setattr(misetched, "SCAN", (0.0, 0.3))
     out = tmp_path / "out"
     asked = ["--checkpoint", checkpoint, "--psf", design, "--test", tests_folder]
-    asked += ["--out-dir", out, "--cpu-minutes", "0.1", "--depth-error", "0.08", "--control"]
+    asked += ["--out-dir", out, "--cpu-minutes", "0.1", "--depth-error", "0.3", "--control"]
     assert main([*map(str, asked), *SMALL]) == 0
     record = json.loads((out / "misetched.json").read_text(encoding="utf-8"))
+    right, (wrong,) = record["designed"], record["etched"]
     # the measured PSF is far nearer to the plate than the plate to its design
-    assert record["as_etched"]["rmse"] > 2 * record["as_designed"]["rmse"]
-    assert record["as_etched"]["rmse"] > 5 * record["measured"]["rmse"]
-    scores = {(row["plate"], row["method"]): row["scores"] for row in record["rows"]}
-    assert list(scores) == [
-        ("designed", "network"),
-        ("designed", "linear, told the design PSF"),
-        ("etched", "network"),
-        ("etched", "linear, told the design PSF"),
-        ("etched", "linear, told the measured PSF"),
-        ("etched", "linear, told the true PSF"),
-        ("etched", "network, trained on with the measured PSF"),
-        ("etched", "network, trained on with the design PSF"),
-    ]
-    linear = {
-        name: scores["etched", f"linear, told the {name} PSF"]["no noise"]["set5"]["psnr_db"]
-        for name in ("design", "measured", "true")
+    assert wrong["like_design"]["rmse"] > 5 * right["like_design"]["rmse"]
+    assert wrong["like_design"]["rmse"] > 10 * wrong["measured"]["rmse"]
+    assert wrong["training"] == {"cpu_s": 6.0, "steps": 2, "valid_db": 20.0}
+    db = {name: scores["no noise"]["set5"]["psnr_db"] for name, scores in wrong["methods"].items()}
+    assert set(db) == {
+        "network",
+        "network trained on, measured PSF",
+        "network trained on, design PSF",
+        "linear, design PSF",
+        "linear, measured PSF",
+        "linear, true PSF",
     }
-    assert linear["design"] < linear["measured"]
-    assert linear["measured"] == pytest.approx(linear["true"], abs=0.2)
+    assert db["linear, design PSF"] < db["linear, measured PSF"] - 0.02
+    assert db["linear, measured PSF"] == pytest.approx(db["linear, true PSF"], abs=0.02)
     # weights that are not changed are judged behind the plate as etched, whatever they were told
-    as_it_is = scores["etched", "network"]
-    assert scores["etched", "network, trained on with the measured PSF"] == as_it_is
-    assert as_it_is != scores["designed", "network"]
-    right, wrong = record["scan"]
-    assert right["network"] == scores["designed", "network"]["no noise"]
-    assert wrong["linear_design"] == scores["etched", "linear, told the design PSF"]["no noise"]
+    assert db["network trained on, measured PSF"] == db["network trained on, design PSF"]
+    assert db["network"] == db["network trained on, measured PSF"]
+    assert wrong["methods"]["network"] != right["methods"]["network"]
+    scanned = [row["methods"] for row in record["scan"]]
+    for found, plate in zip(scanned, (right, wrong), strict=True):
+        for name in ("network", "linear, design PSF"):
+            assert found[name] == plate["methods"][name]["no noise"]
     told = capsys.readouterr().out
-    assert "every mask +8%" in told
-    assert "| etched | network, trained on with the measured PSF |" in told
+    assert "| +30% | network trained on, measured PSF |" in told
+    assert "| as designed | network |" in told
 
 
 def test_a_network_is_trained_on_with_what_was_measured(
@@ -185,13 +185,17 @@ def test_a_network_is_trained_on_with_what_was_measured(
     psf.parent.mkdir()
     write_plate_psf(psf, gaussian_psf(1.5))
     start = read_checkpoint(checkpoint)
-    settings = tuning.Tuning(cpu_minutes=0.1)
-    out, ended = tuning.tuned(checkpoint, start, psf, gaussian_psf(1.5), settings)
-    assert ended == {"cpu_s": 6.0, "steps": 2, "valid_db": 20.0}
-    assert 'psf = "measured.safetensors"' in read_checkpoint(out).recipe_toml
+
+    def tuned(cpu_minutes: float) -> Checkpoint:
+        settings = tuning.Tuning(cpu_minutes=cpu_minutes)
+        return tuning.tuned(checkpoint, start, psf, gaussian_psf(1.5), settings)
+
+    found = tuned(0.1)
+    assert 'psf = "measured.safetensors"' in found.recipe_toml
     assert [path.name for path in psf.parent.glob("samples_*")] == []
-    # again: what began goes on where it was
-    tuning.tuned(checkpoint, start, psf, gaussian_psf(1.5), settings)
+    # what is done is not done again, but longer it goes on where it was
+    tuned(0.1)
+    tuned(0.2)
     (first, material), (second, _) = trainings
     assert (first.start, first.resume) == (checkpoint, False)
     assert (second.start, second.resume) == (None, True)

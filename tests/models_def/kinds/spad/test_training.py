@@ -35,9 +35,19 @@ def test_the_kind_is_found_by_its_name() -> None:
     assert training_kind("spad") is PART
 
 
-def test_no_bundle_is_promised(tiny: SpadRecipe) -> None:
-    with pytest.raises(UnsupportedError, match="no bundle can be made of tiny-spad"):
-        PART.design(tiny)
+def test_a_bundle_makes_pictures_and_depth_where_there_are_time_bins(tiny: SpadRecipe) -> None:
+    counting = PART.design(tiny)
+    assert [stage.type for stage in counting.stages] == ["correct", "super_resolve"]
+    assert counting.products == {"image": "fine"}
+    timed = replace(
+        tiny, sensor=tiny.sensor.model_copy(update={"time_bins": 16, "time_bin_ps": 20.0})
+    )
+    design = PART.design(timed)
+    assert [stage.type for stage in design.stages] == ["correct", "super_resolve", "sharpen"]
+    assert design.products == {"image": "fine", "depth_m": "depth"}
+    blind = replace(tiny, data=replace(tiny.data, told=False))
+    with pytest.raises(UnsupportedError, match=r"train them with data\.told"):
+        PART.design(blind)
     assert set(PART.camera_parts) >= {"sensor", "sampling"}
     assert PART.roles == ("upscale",)
 
