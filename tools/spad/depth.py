@@ -38,7 +38,7 @@ from tools.comparison.compact_json import to_compact_json
 
 LIGHTS: Final = ((30.0, 3.0), (100.0, 3.0), (300.0, 3.0), (1000.0, 3.0), (10_000.0, 10.0))
 """Signal photons of a pixel, on average, and their ratio to those of the background."""
-FIRST_SEED: Final = 300
+FIRST_SEED: Final = 400
 FAR_MM: Final = 15.0
 MM: Final = 1000.0
 DIGITS: Final = 5

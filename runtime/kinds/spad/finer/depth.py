@@ -34,6 +34,8 @@ SLOPE_SHARE: Final = 0.25
 """Sub-pixels of slope that sigma takes in."""
 BY_NETWORK: Final = (0.525, 0.1, 0.035)
 """Behind a network: of the linear sigma, of the slope, of a bin."""
+FAINT: Final = 15.0
+"""Signal photons of a pixel at which the first of them is twice as large."""
 PER_PIXEL: Final = ("amplitude", "background", "intensity")
 """What is photons, and so is multiplied back."""
 
@@ -123,19 +125,29 @@ class FineSharpener:
         found = self.sharpener.strip(even)
         less = np.tile(np.sqrt(gain / share), counts.shape[:2])
         found = self._told(found, everywhere, is_hot, is_hot | blind)
-        sigma = self._sigma(found.sigma_ps * less, found.time_of_flight_ps, size)
-        return FineDepth(found=replace(found, sigma_ps=sigma), size=size, photons=photons)
+        linear_ps = found.sigma_ps * less
+        sigma_ps = (
+            self._sigma(linear_ps, found.time_of_flight_ps)
+            if size is None
+            else self._sigma_by_network(linear_ps, found.time_of_flight_ps, photons)
+        )
+        return FineDepth(found=replace(found, sigma_ps=sigma_ps), size=size, photons=photons)
 
     def _by_network(self, frames: FloatArray, size: str, dark: NDArray[np.floating]) -> FloatArray:
         return self.camera.by_network(frames, size, white=white_of(frames), dark=np.asarray(dark))
 
+    @staticmethod
     def _sigma(
-        self, linear_ps: NDArray[np.float64], times_ps: NDArray[np.float64], size: str | None
+        linear_ps: NDArray[np.float64], times_ps: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        slope = np.stack([_slope(times) for times in times_ps])
-        if size is None:
-            return np.asarray(np.hypot(linear_ps, SLOPE_SHARE * slope))
+        return np.asarray(np.hypot(linear_ps, SLOPE_SHARE * _slopes(times_ps)))
+
+    def _sigma_by_network(
+        self, linear_ps: NDArray[np.float64], times_ps: NDArray[np.float64], photons: float
+    ) -> NDArray[np.float64]:
+        slope = _slopes(times_ps)
         of_linear, of_slope, of_bin = BY_NETWORK
+        of_linear *= 1 + FAINT / max(photons, 1.0)
         least = of_bin * self.sharpener.fitter.bank.axis.step_ps
         return np.asarray(np.hypot(np.hypot(of_linear * linear_ps, of_slope * slope), least))
 
@@ -160,6 +172,10 @@ class FineSharpener:
 
 def _finer(flags: NDArray[np.bool_], scale: int) -> NDArray[np.bool_]:
     return flags.repeat(scale, axis=0).repeat(scale, axis=1)
+
+
+def _slopes(times_ps: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([_slope(times) for times in times_ps])
 
 
 def _slope(times_ps: NDArray[np.float64]) -> NDArray[np.float64]:
