@@ -177,7 +177,8 @@ def test_the_command_tells_break_points_and_writes_its_page(
     arguments += ["--scenarios", "photons,plate_rotation,depth_sbr", "--out-dir", str(tmp_path)]
     assert run(arguments) == 0
     photons, rotation, depth = json.loads(capsys.readouterr().out)
-    assert set(photons["psnr_db"]) == {"bare", "bicubic", "linear", "S"}
+    # the network without a plate is that of the built-in baselines
+    assert set(photons["psnr_db"]) == {"bare", "bare net", "bicubic", "linear", "S"}
     assert rotation["chi2"]["S"][0] == pytest.approx(1)
     assert set(depth["extra"]) == {"mean_error_mm", "bias_mm", "far_share", "valid_share"}
     assert "bare" in (tmp_path / "stress.html").read_text(encoding="utf-8")
@@ -190,7 +191,7 @@ def test_the_command_tells_break_points_and_writes_its_page(
 
 def test_the_bundle_may_be_compared_with_another_of_its_camera(bundle: Bundle) -> None:
     judge = STRESS.examiner(bundle, ("S",), bundle)
-    assert judge.methods == ("bare", "bicubic", "linear", "S", "S before")
+    assert judge.methods == ("bare", "bare net", "bicubic", "linear", "S", "S before")
     assert judge.primary == "S"
     assert judge.identity != STRESS.examiner(bundle, ("S",), None).identity
 
@@ -203,13 +204,14 @@ def test_a_network_without_a_plate_is_a_rival_where_the_baselines_hold_one(
     assert set(beside.rivals) - {"bicubic"} == set(OWN["photons"].rivals)
     verdict = beside.score(beside.shoot(scene, PictureSetting()))
     assert tuple(verdict.outcomes) == beside.methods
-    assert beside.identity != judge.identity
+    alone = SpadJudge(judge.studio, replace(judge.ways, plain=None))
+    assert beside.identity != alone.identity
 
 
 def test_without_a_network_the_linear_estimate_is_judged(
     judge: SpadJudge, scene: SpadScene
 ) -> None:
-    alone = SpadJudge(judge.studio, replace(judge.ways, networks={}))
+    alone = SpadJudge(judge.studio, replace(judge.ways, networks={}, plain=None))
     assert alone.primary == "linear"
     verdict = alone.score(alone.shoot(scene, PictureSetting()))
     assert set(verdict.outcomes) == {"bare", "bicubic", "linear"}
