@@ -52,7 +52,7 @@ def main(words: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--bundle", default="spad-sr", help="NAME or PATH")
-    parser.add_argument("--scenes", type=int, default=4)
+    parser.add_argument("--scenes", type=int, default=12)
     parser.add_argument("-o", "--output", type=Path, required=True)
     arguments = parser.parse_args(words)
     camera = FineCamera.of(open_bundle(find_bundle(arguments.bundle)))
@@ -130,7 +130,7 @@ def _ways(camera: FineCamera) -> dict[str, Any]:
         "linear": fine(None),
     }
     ways |= {size: fine(size) for size in camera.sizes}
-    return ways | {"auto": fine(camera.size(None), always=False)}
+    return ways | {"auto": fine(camera.size_of_bins(None), always=False)}
 
 
 def _enlarged(found: Sharpened, camera: FineCamera) -> Any:

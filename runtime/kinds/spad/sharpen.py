@@ -9,7 +9,7 @@ some of its bins) is fitted and not believed.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -26,6 +26,8 @@ from camkit.runtime.kinds.spad.second_return import SecondReturns
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
 Method = Literal["log", "lsq"]
+PER_PIXEL: Final = ("amplitude", "background", "intensity")
+"""What is photons of a pixel."""
 METHODS: Final[tuple[Method, ...]] = ("log", "lsq")
 
 
@@ -81,6 +83,12 @@ class Sharpened:
     hot: NDArray[np.bool_]
 
 
+def times_photons(found: Sharpened, factor: NDArray[np.float64]) -> Sharpened:
+    """Give it with more photons, (h, w) times as many."""
+    changed: dict[str, Any] = {name: getattr(found, name) * factor for name in PER_PIXEL}
+    return replace(found, **changed)
+
+
 def stacked(strips: Sequence[Sharpened]) -> Sharpened:
     """Give strips, from top to bottom, as one."""
     names = [field.name for field in fields(Sharpened)]
@@ -118,6 +126,7 @@ class Sharpener:
         hot: NDArray[np.bool_] | None = None,
         blind: NDArray[np.bool_] | None = None,
         core: slice | None = None,
+        growth: NDArray[np.float64] | None = None,
     ) -> Sharpened:
         """Fit the pixels of some rows.
 
@@ -126,6 +135,7 @@ class Sharpener:
             hot: (h, w) pixels that are known to be hot; others are found.
             blind: (h, w) pixels that pile-up left no counts in some bins.
             core: Rows that are asked for; None for all.
+            growth: (h, w) variance over mean of the counts, where pile-up was taken out of them.
 
         Returns:
             Of the core rows.
@@ -133,6 +143,10 @@ class Sharpener:
         Raises:
             ContractError: If more than half of the pixels are hot.
         """
+        if growth is not None:
+            even = np.divide(cube, growth[:, :, None], dtype=np.float32)
+            fitted = self.strip(even, hot=hot, blind=blind, core=core)
+            return times_photons(fitted, growth[core or slice(None)])
         shape, bins = cube.shape[:2], cube.shape[2]
         alone = self._fit(cube.reshape(-1, bins))
         photons = cube.sum(axis=2, dtype=np.float64)

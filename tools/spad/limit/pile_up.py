@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.report.kinds.spad.synthetic import PULSE
-from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.bound import information
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
+from camkit.runtime.kinds.spad.scatter import growth
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
 from camkit.runtime.kinds.spad.time_axis import Orientation, TimeAxis
 from tools.spad.limit.judged import Sweep, judged, swept
@@ -52,14 +52,16 @@ def _point(chance: float, orientation: Orientation, *, corrected: bool) -> dict[
     rates = top * (shares / shares.max() + DARK_SHARE)
     counts = _seen(rates, orientation, rng)
     photons, even = CYCLES * top / shares.max(), CYCLES * top * DARK_SHARE
-    blind = np.zeros(len(times), bool)
+    blind, grown = np.zeros(len(times), bool), None
+    sharpener = Sharpener(axis, PULSE, Way(pool="1"))
     if corrected:
         undone = without_pile_up(counts, CYCLES, orientation)
         counts, blind = undone.counts, undone.blind
-    found = Sharpener(axis, PULSE, Way(pool="1")).strip(
-        counts.reshape(*SHAPE, axis.bins), blind=blind.reshape(SHAPE)
+        grown = growth(sharpener.fitter, counts, CYCLES).reshape(SHAPE)
+    found = sharpener.strip(
+        counts.reshape(*SHAPE, axis.bins), blind=blind.reshape(SHAPE), growth=grown
     )
-    bank = make_bank(axis, PULSE)
+    bank = sharpener.fitter.bank
     bounds = 1 / np.sqrt(photons * np.interp(times, bank.mu_ps, information(bank, even / photons)))
     errors = found.time_of_flight_ps.ravel() - times
     return judged(
@@ -67,6 +69,7 @@ def _point(chance: float, orientation: Orientation, *, corrected: bool) -> dict[
         errors,
         bounds,
         found.valid.ravel(),
+        sigma_68=float(np.quantile(np.abs(errors) / found.sigma_ps.ravel(), 0.6827)),
         bias_ps=float(np.median(errors)),
         amplitude=float(np.median(found.amplitude) / photons),
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.kinds.spad.corrected import Strip
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
 from camkit.runtime.kinds.spad.products.archive import write_archive
@@ -18,10 +19,13 @@ from camkit.runtime.kinds.spad.products.record import told_pulse, told_way
 from camkit.runtime.kinds.spad.products.strips import pieces
 from camkit.runtime.kinds.spad.products.survey import Survey
 from camkit.runtime.kinds.spad.pulse import Pulse
+from camkit.runtime.kinds.spad.scatter import growth
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, stacked
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
 from camkit.runtime.maker import Made, Making
 
+LITTLE_LOST: Final = 0.02
+"""Of the cycles: a pixel that lost less to pile-up scatters as Poisson counts do, within 1 %."""
 PIXEL_BYTES: Final = 150
 """Of all arrays of one return."""
 NAMED_HOT: Final = 10
@@ -104,7 +108,13 @@ def _worked_through(
         strip = survey.rows.rows(piece.first, piece.end)
         rows = slice(piece.first, piece.end)
         found.append(
-            sharpener.strip(strip.counts, hot=hot[rows], blind=strip.blind, core=piece.core)
+            sharpener.strip(
+                strip.counts,
+                hot=hot[rows],
+                blind=strip.blind,
+                core=piece.core,
+                growth=_growth(survey, sharpener, strip),
+            )
         )
         blind.append(strip.blind[piece.core])
         worst = max(worst, strip.worst)
@@ -124,6 +134,7 @@ def _made_finer(
         survey.timing.dark(survey.shape),
         hot=survey.timing.hot(survey.shape),
         blind=strip.blind,
+        growth=_growth(survey, fine.sharpener, strip),
     )
     if making.progress is not None:
         making.progress(survey.shape[0], survey.shape[0])
@@ -133,6 +144,15 @@ def _made_finer(
         "signal_photons": round(made.photons, 2),
     }
     return made.found, strip.blind, strip.worst, told
+
+
+def _growth(survey: Survey, sharpener: Sharpener, strip: Strip) -> NDArray[np.float64] | None:
+    """Give how much more the counts of every pixel scatter for pile-up; None where it is little."""
+    if strip.worst < LITTLE_LOST:
+        return None
+    flat = strip.counts.reshape(-1, strip.counts.shape[2])
+    grown = growth(sharpener.fitter, flat, survey.timing.timing.cycles)
+    return grown.reshape(strip.counts.shape[:2])
 
 
 def fine_sharpener(survey: Survey, camera: FineCamera, pulse: Pulse) -> FineSharpener:

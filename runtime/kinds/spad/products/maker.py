@@ -118,7 +118,7 @@ def _finer(survey: Survey, camera: FineCamera) -> list[tuple[str, str, str]]:
                 "finer",
                 f"{network} or linear",
                 f"the network from {least:g} signal photons of a pixel on, nearer to the truth "
-                "there; below, the linear estimate",
+                "there; below, the linear estimate; a larger network brings times little nearer",
             )
         ]
     return [

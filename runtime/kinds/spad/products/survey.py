@@ -73,7 +73,10 @@ class Survey:
         """Give the network that makes pictures finer; None for the linear estimate."""
         if self.camera is None or self.settings.finer == "linear" or not self.camera.sizes:
             return None
-        return self.camera.size(self.settings.size)
+        asked = self.settings.size
+        if self.product == "depth":
+            return self.camera.size_of_bins(asked)
+        return self.camera.size(asked)
 
     def pulse(self) -> tuple[Pulse, str | None]:
         """Give the pulse, and what the user should know if nobody stated it.
