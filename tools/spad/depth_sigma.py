@@ -94,11 +94,9 @@ def main(words: Sequence[str] | None = None) -> None:
     print(json.dumps(found, indent=1))
 
 
-def constants(
-    camera: FineCamera, scenes: int, lights: Sequence[tuple[float, float]] = LIGHTS
-) -> dict[str, Any]:
+def constants(camera: FineCamera, scenes: int) -> dict[str, Any]:
     """Give all constants, with what they were chosen by."""
-    least = camera.stage.network_from_photons
+    least, lights = camera.stage.network_from_photons, LIGHTS
     sizes = tuple(camera.sizes)
     linear = {light: _errors(camera, *light, None, scenes) for light in lights}
     network = {

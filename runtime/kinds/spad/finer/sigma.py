@@ -53,8 +53,8 @@ class SigmaShares:
         return np.asarray(np.hypot(missed, self.of_bin * bin_ps))
 
 
-OF_LINEAR: Final = SigmaShares(slope=0.25)
-OF_NETWORK: Final = SigmaShares(noise=0.525, faint=15.0, slope=0.1, of_bin=0.035)
+OF_LINEAR: Final = SigmaShares(slope=0.1)
+OF_NETWORK: Final = SigmaShares(noise=0.48, faint=28.0, slope=0.155, of_bin=0.039)
 
 
 def slopes(times_ps: NDArray[np.float64]) -> NDArray[np.float64]:
