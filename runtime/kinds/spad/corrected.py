@@ -45,6 +45,7 @@ class CorrectedRows:
             stamp_ps: Unit of its time stamps, if it has those.
         """
         self._file, self._cycles = file, cycles
+        self._blind: dict[int, int] = {}
         # every frame of counts is a gate of its own
         self._orientation: Orientation = "gate" if axis is None else axis.orientation
         self._edges: NDArray[np.float64] | None = None
@@ -69,4 +70,10 @@ class CorrectedRows:
                 found = without_pile_up(flat[part], self._cycles, self._orientation)
                 flat[part], told[part] = found.counts, found.blind
                 worst = max(worst, float(found.worst.max(initial=0.0)))
+        self._blind |= dict(enumerate(blind.sum(axis=1).tolist(), top))
         return Strip(counts=counts, blind=blind, worst=worst)
+
+    @property
+    def blind_pixels(self) -> int:
+        """Give how many pixels of the rows read so far lost bins to pile-up."""
+        return sum(self._blind.values())

@@ -189,6 +189,8 @@ def evidence_at(
     template: NDArray[np.int64],
     amplitude: NDArray[np.float64],
     background: NDArray[np.float64],
+    *,
+    least: NDArray[np.float64] | float = LEAST_RATE,
 ) -> NDArray[np.float64]:
     """Give twice the log likelihood over background alone, at what was found of some pixels.
 
@@ -198,12 +200,14 @@ def evidence_at(
         template: (p,) the template of every pixel.
         amplitude: (p,) signal photons.
         background: (p,) counts of a bin.
+        least: (p,) or for all, that background alone is known to give.
     """
     s = bank.shares[template]
     near = np.where(s > 0, np.take_along_axis(counts, bank.bins[template], axis=1), 0.0)
     photons = counts.sum(axis=1, dtype=np.float64)
-    dark = np.maximum(background, LEAST_RATE)
-    even = np.maximum(photons / bank.axis.bins, LEAST_RATE)
+    dark = np.maximum(np.maximum(background, least), LEAST_RATE)
+    even = np.maximum(np.maximum(photons / bank.axis.bins, least), LEAST_RATE)
+    photons = np.maximum(photons, least * bank.axis.bins)
     gained = (near * np.log1p(amplitude[:, None] * s / dark[:, None])).sum(axis=1)
     gained += photons * np.log(dark / even)
     gained -= amplitude * s.sum(axis=1) + (dark - even) * bank.axis.bins

@@ -6,7 +6,7 @@ pulse, but never above its own signal. And it counts at all times: a second surf
 return takes for background, counts at its own time alone.
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,25 +50,35 @@ def find_hot(background: NDArray[np.float64], cube: FloatArray) -> NDArray[np.bo
     return np.asarray(excess & (dark > TIMES * expected) & (dark > SHARE * photons))
 
 
-def painted_over(cube: FloatArray, hot: NDArray[np.bool_]) -> FloatArray:
+def check_map(hot: NDArray[np.bool_]) -> None:
+    """Refuse a map (h, w) of a whole array that is a map of something else.
+
+    Raises:
+        ContractError: If more than half of all pixels are hot.
+    """
+    if hot.mean() > MOST_DEAD:
+        raise ContractError(
+            f"{hot.mean():.0%} of the pixels are hot: more than half cannot be painted over"
+        )
+
+
+def painted_over(cube: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:
     """Give a cube whose hot pixels are the means of those around them that are not.
 
     Args:
         cube: (h, w, bins) or (h, w) counts.
-        hot: (h, w).
+        hot: (h, w), not all.
 
     Raises:
-        ContractError: If more than half of all pixels are hot: that is a map of something else.
+        ContractError: If the map has another shape, or nothing is left to paint with.
     """
     if hot.shape != cube.shape[:2]:
         raise ContractError(
             f"the map of hot pixels is {hot.shape[1]}x{hot.shape[0]}, the picture "
             f"{cube.shape[1]}x{cube.shape[0]}"
         )
-    if hot.mean() > MOST_DEAD:
-        raise ContractError(
-            f"{hot.mean():.0%} of the pixels are hot: more than half cannot be painted over"
-        )
+    if hot.all():
+        raise ContractError("every pixel is hot: there is nothing to paint them over with")
     found = cube.copy()
     for y, x in np.argwhere(hot):
         reach = 1

@@ -30,7 +30,8 @@ class PileUp:
 
     Attributes:
         counts: (p, bins) float32, photons that came in all cycles.
-        blind: (p,) whether some bins told nothing; they hold 0.
+        blind: (p,) whether some bins were full, and hold the most that can be told, or told
+            nothing, and hold 0.
         worst: (p,) the largest share of cycles that a bin lost, or a gate used.
     """
 
@@ -64,7 +65,8 @@ def without_pile_up(counts: FloatArray, cycles: int, orientation: Orientation) -
             "correct cycles, or say 0 where they are not known"
         )
     told = left - seen >= LEAST_LEFT * cycles
-    chance = np.where(told, seen / np.maximum(left, 1.0), 0.0)
+    most_told = np.maximum(1 - LEAST_LEFT * cycles / np.maximum(left, 1e-9), 0.0)
+    chance = np.minimum(seen / np.maximum(left, 1.0), most_told)
     return PileUp(
         counts=(-cycles * np.log1p(-chance)).astype(np.float32),
         blind=np.asarray(~told.all(axis=1)),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
-from camkit.runtime.kinds.spad.hot_pixels import AROUND, find_hot, painted_over
+from camkit.runtime.kinds.spad.hot_pixels import AROUND, check_map, find_hot, painted_over
 from camkit.runtime.kinds.spad.least_squares import LeastSquares
 from camkit.runtime.kinds.spad.pooling import FALSE_ALARMS, SIDES, Pool, Pooled, fit_pooled
 from camkit.runtime.kinds.spad.pulse import Pulse
@@ -146,7 +146,8 @@ class Sharpener:
         if growth is not None:
             even = np.divide(cube, growth[:, :, None], dtype=np.float32)
             fitted = self.strip(even, hot=hot, blind=blind, core=core)
-            return times_photons(fitted, growth[core or slice(None)])
+            # what was painted over is of the pixels around
+            return times_photons(fitted, _painted(growth[core or slice(None)], fitted.hot[0]))
         shape, bins = cube.shape[:2], cube.shape[2]
         alone = self._fit(cube.reshape(-1, bins))
         photons = cube.sum(axis=2, dtype=np.float64)
@@ -155,6 +156,9 @@ class Sharpener:
             is_hot = find_hot(alone.background.reshape(shape), cube)
         if hot is not None:
             is_hot |= hot
+        if core is None:
+            check_map(is_hot)
+        doubtful = is_hot if blind is None else is_hot | blind
         pooled = fit_pooled(
             self.fitter,
             cube,
@@ -162,15 +166,14 @@ class Sharpener:
             alone=alone,
             pool=self.way.pool,
             false_alarms=self.way.false_alarms,
-            sound=~is_hot,
+            sound=~doubtful,
             core=core,
         )
-        doubtful = is_hot if blind is None else is_hot | blind
         found = self._arrays(pooled, photons, doubtful, is_hot)
         if self.way.returns == 2:
-            found = self._second.added(found, pooled, cube, ~is_hot, self.way.false_alarms)
+            found = self._second.added(found, pooled, cube, ~doubtful, self.way.false_alarms)
         if is_hot[core or slice(None)].any():
-            painted = painted_over(cube, is_hot)
+            painted = _painted(cube, is_hot)
             self._put(found, self._fit(painted[is_hot]), is_hot)
             found["intensity"][:, is_hot] = painted[is_hot].sum(axis=1, dtype=np.float64)
         return Sharpened(**{name: a[:, core or slice(None)] for name, a in found.items()})
@@ -198,7 +201,15 @@ class Sharpener:
     def _put(found: dict[str, NDArray[Any]], fit: Fit, where: NDArray[np.bool_]) -> None:
         for name in FITTED:
             found[name] = found[name].copy()
-            found[name][:, where] = getattr(fit, name)
+            layers = slice(None) if name in OF_BOTH else slice(1)
+            found[name][layers, where] = getattr(fit, name)
+
+
+def _painted(values: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:
+    """Give them with hot pixels painted over, where any pixel is sound."""
+    return painted_over(values, hot) if hot.any() and not hot.all() else values
 
 
 FITTED: Final = ("time_of_flight_ps", "amplitude", "background", "sigma_ps", "evidence")
+OF_BOTH: Final = ("time_of_flight_ps", "background", "sigma_ps")
+"""What a second return that is none has of the first."""

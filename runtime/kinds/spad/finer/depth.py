@@ -17,17 +17,27 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from camkit.contracts import FloatArray
+from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
+from camkit.runtime.kinds.spad.finer.linear import REACH
 from camkit.runtime.kinds.spad.finer.sigma import OF_LINEAR, OF_NETWORK, SigmaShares, slopes
-from camkit.runtime.kinds.spad.hot_pixels import painted_over
+from camkit.runtime.kinds.spad.fit import evidence_at
+from camkit.runtime.kinds.spad.hot_pixels import MOST_DEAD, painted_over
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, Way, times_photons
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
 SHARPER: Final = 20.0
 """Times the photons of a bin at which the estimate is taken (`tools.spad.depth_sigma`)."""
+
+
+def _lit(coarse: Sharpened) -> float:
+    """Give the signal photons of a pixel, on average over those that show a surface."""
+    valid = coarse.valid[0]
+    return float(coarse.amplitude[0][valid].mean()) if valid.any() else 0.0
 
 
 def bright_bin(frames: FloatArray) -> float:
@@ -106,21 +116,24 @@ class FineSharpener:
             blind: (h, w) pixels that pile-up left no counts in some bins.
             growth: (h, w) variance over mean of the counts, where pile-up was taken out of them.
         """
-        coarse = self._coarse.strip(counts, hot=hot)
-        is_hot, photons = coarse.hot[0], float(coarse.amplitude[0].mean())
-        sound = painted_over(counts, is_hot) if is_hot.any() else counts
+        coarse = self._coarse.strip(counts, hot=hot, blind=blind)
+        is_hot, photons = coarse.hot[0], _lit(coarse)
+        lost = is_hot | blind if (is_hot | blind).mean() <= MOST_DEAD else is_hot
+        sound = painted_over(counts, lost) if lost.any() else counts
         frames = np.ascontiguousarray(sound.transpose(2, 0, 1)) - dark.astype(np.float32)
         enough = self._always or photons >= self.camera.stage.network_from_photons
         size = self._size if enough else None
         estimate = self.camera.linear(self.sharper * bright_bin(frames))
         fine = estimate(frames) if size is None else self._by_network(frames, size, dark)
+        # dark counts scatter too: what is fitted holds them, as evidence and sigma must
+        fine += self._finer(dark).astype(np.float32)
         gain = estimate.noise_gain.astype(np.float64) ** 2
         share = np.maximum(gain, estimate.largest)
         everywhere = np.tile(share, counts.shape[:2])
         if growth is not None:
-            everywhere = everywhere * _finer(growth, self.camera.scale)
+            everywhere = everywhere * self._finer(growth)
         even = np.ascontiguousarray((fine / everywhere).transpose(1, 2, 0), dtype=np.float32)
-        found = self.sharpener.strip(even)
+        found = self._proved(even, self.sharpener.strip(even), coarse, everywhere)
         less = np.tile(np.sqrt(gain / share), counts.shape[:2])
         found = self._told(found, everywhere, is_hot, is_hot | blind)
         sigma_ps = self.shares[size is not None].sigma_ps(
@@ -133,6 +146,48 @@ class FineSharpener:
 
     def _by_network(self, frames: FloatArray, size: str, dark: NDArray[np.floating]) -> FloatArray:
         return self.camera.by_network(frames, size, white=white_of(frames), dark=np.asarray(dark))
+
+    def _proved(
+        self,
+        even: FloatArray,
+        found: Sharpened,
+        coarse: Sharpened,
+        share: NDArray[np.float64],
+    ) -> Sharpened:
+        """Give it with the evidence of first returns over the background of the pixels around.
+
+        Weights below 0 can take the background of a sub-pixel away, and anything is evidence over
+        nothing.
+
+        Args:
+            even: (m h, m w, bins) what was fitted.
+            found: In it.
+            coarse: In the array's own pixels.
+            share: (m h, m w) photons of a pixel for each that was fitted.
+        """
+        fitter, way = self.sharpener.fitter, self.sharpener.way
+        around = uniform_filter(coarse.background[0], size=2 * REACH + 1, mode="nearest")
+        least = (self._finer(around) / share).reshape(-1)
+        rows = np.flatnonzero(found.valid[0])
+        step = fitter.bank.step_ps
+        nearest = (found.time_of_flight_ps[0].reshape(-1)[rows] - fitter.bank.mu_ps[0]) / step
+        proof = evidence_at(
+            fitter.bank,
+            even.reshape(-1, even.shape[2])[rows],
+            np.clip(np.rint(nearest).astype(np.int64), 0, len(fitter.bank.mu_ps) - 1),
+            found.amplitude[0].reshape(-1)[rows],
+            found.background[0].reshape(-1)[rows],
+            least=least[rows],
+        )
+        evidence, valid = found.evidence.copy(), found.valid.copy()
+        own = evidence[0].reshape(-1)
+        own[rows] = np.minimum(own[rows], proof)
+        threshold = threshold_for(way.false_alarms, fitter.search_length)
+        valid &= valid[:1] & (own.reshape(valid.shape[1:]) > threshold)
+        return replace(found, evidence=evidence, valid=valid)
+
+    def _finer(self, values: NDArray[Any]) -> NDArray[Any]:
+        return _finer(values, self.camera.scale)
 
     def _told(
         self,

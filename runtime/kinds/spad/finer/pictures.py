@@ -16,14 +16,19 @@ EMPTY: Final = 0.0
 Step = Callable[[int, int], None]
 
 
-def where_light_is(frame: FloatArray) -> float:
+def where_light_is(frame: FloatArray, dark: NDArray[np.floating] | float = 0.0) -> float:
     """Give the photons of a pixel (h, w) where photons are: their mean, weighed by themselves.
 
-    Chance alone adds one photon to that, which is taken off.
+    Chance alone adds one photon to that, which is taken off, and so are dark counts.
+
+    Args:
+        frame: Photons, without dark counts.
+        dark: Those, (h, w) or one number.
     """
-    counts = np.asarray(frame, np.float64)
-    total = max(float(counts.sum()), 1e-12)
-    return max(float(np.square(counts).sum()) / total - 1, total / counts.size)
+    counts = np.asarray(frame + dark, np.float64)
+    weighed = float(np.square(counts).sum()) / max(float(counts.sum()), 1e-12)
+    mean = max(float(frame.sum(dtype=np.float64)) / counts.size, 0.0)
+    return max(weighed - 1 - float(np.mean(dark)), mean)
 
 
 def finer_frames(
@@ -61,7 +66,7 @@ def finer_frames(
         if photons > EMPTY:
             one = frame[None]
             found[number] = (
-                camera.linear(where_light_is(frame))(one)[0]
+                camera.linear(where_light_is(frame, dark))(one)[0]
                 if size is None
                 else camera.by_network(one, size, white=white, dark=dark, cancel=cancel)[0]
             )

@@ -11,12 +11,13 @@ from camkit.runtime.cancel import check_cancelled
 from camkit.runtime.kinds.spad.corrected import Strip
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
+from camkit.runtime.kinds.spad.hot_pixels import check_map
 from camkit.runtime.kinds.spad.products.archive import write_archive
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.points import write_points
 from camkit.runtime.kinds.spad.products.preview import depth_picture, write_preview
 from camkit.runtime.kinds.spad.products.record import told_pulse, told_way
-from camkit.runtime.kinds.spad.products.strips import pieces
+from camkit.runtime.kinds.spad.products.strips import check_room, pieces
 from camkit.runtime.kinds.spad.products.survey import Survey
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.scatter import growth
@@ -28,6 +29,8 @@ LITTLE_LOST: Final = 0.02
 """Of the cycles: a pixel that lost less to pile-up scatters as Poisson counts do, within 1 %."""
 PIXEL_BYTES: Final = 150
 """Of all arrays of one return."""
+FINE_BYTES_OF_COUNT: Final = 290
+"""What a count of the array takes behind a bundle, with all that is made of it."""
 NAMED_HOT: Final = 10
 
 
@@ -57,6 +60,7 @@ def make_depth(making: Making, survey: Survey, began: float) -> Made:
     arrays = _arrays(found, survey)
     fit_s = time.perf_counter() - began - read_s
     array, scale = survey.timing.array, 1 if survey.camera is None else survey.camera.scale
+    phase = 0 if survey.camera is None else survey.camera.sensor.phase
     is_known = array.pitch_um is not None and array.focal_length_mm is not None
     # where nothing is known of the lens, one whose focal length is the width of the array
     lens = {
@@ -65,11 +69,14 @@ def make_depth(making: Making, survey: Survey, began: float) -> Made:
     }
     hot = _hot_places(found, scale)
     layers = arrays["depth_m"].reshape(found.valid.shape)
+    intensity = arrays["intensity"].reshape(found.valid.shape)
     return Made(
         arrays=arrays,
         writers={
             ".npz": lambda path: write_archive(path, arrays),
-            ".ply": lambda path: write_points(path, layers, found.intensity, **lens),
+            ".ply": lambda path: write_points(
+                path, layers, intensity, **lens, scale=scale, phase=phase
+            ),
             ".png": lambda path: write_preview(path, depth_picture(layers[0])),
         },
         pictures={
@@ -102,6 +109,7 @@ def _worked_through(
         held_bytes=PIXEL_BYTES * way.returns * survey.shape[0] * survey.shape[1],
     )
     hot = survey.timing.hot(survey.shape)
+    check_map(hot)
     found, blind, worst = [], [], 0.0
     for piece in cut:
         check_cancelled(making.cancel)
@@ -128,6 +136,7 @@ def _made_finer(
 ) -> tuple[Sharpened, NDArray[np.bool_], float, Mapping[str, Any]]:
     """Give the same on the fine grid of a bundle, and how it was found."""
     check_cancelled(making.cancel)
+    check_room(survey.shape, survey.bins, FINE_BYTES_OF_COUNT, survey.settings.max_mem_bytes)
     strip = survey.rows.rows(0, survey.shape[0])
     made = fine.cube(
         strip.counts,
@@ -169,7 +178,8 @@ def fine_sharpener(survey: Survey, camera: FineCamera, pulse: Pulse) -> FineShar
 
 def _arrays(found: Sharpened, survey: Survey) -> dict[str, NDArray[Any]]:
     """Give the arrays of the archive; the leading axis goes where there is one return."""
-    dark = survey.timing.dark(survey.shape) if survey.camera is None else 0.0
+    scale = 1 if survey.camera is None else survey.camera.scale
+    dark = survey.timing.dark(survey.shape).repeat(scale, axis=0).repeat(scale, axis=1)
     depth = (found.time_of_flight_ps - survey.timing.correction.offset_ps) * LIGHT_M_PER_PS / 2
     arrays: dict[str, NDArray[Any]] = {
         "depth_m": np.where(found.valid, depth, np.nan),

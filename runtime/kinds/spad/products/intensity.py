@@ -3,7 +3,7 @@
 import time
 
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.photons import frames_of, made_finer, sum_of
+from camkit.runtime.kinds.spad.products.photons import frames_of, full_pixels, made_finer, sum_of
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.preview import grey_picture, white_of, write_preview
 from camkit.runtime.kinds.spad.products.record import told_finer
@@ -19,7 +19,9 @@ def make_intensity(making: Making, survey: Survey, began: float) -> Made:
     """
     is_film = survey.axis is None and survey.bins > 1
     frames = frames_of(making, survey) if survey.axis is None else sum_of(making, survey)
+    read_s = time.perf_counter() - began
     frames = made_finer(making, survey, frames)
+    finer_s = time.perf_counter() - began - read_s
     white = max(white_of(frame) for frame in frames)
     # one picture of a film: all its photons
     shown = frames.mean(axis=0) if is_film else frames[0]
@@ -38,7 +40,7 @@ def make_intensity(making: Making, survey: Survey, began: float) -> Made:
             "tiff": (".tif", lambda path: write_tiff(path, frames)),
         },
         record={"product": "intensity", "frames": len(frames), **told_finer(survey)},
-        seconds={"read": time.perf_counter() - began},
-        warnings=survey.warnings(),
+        seconds={"read": read_s} | ({} if survey.camera is None else {"finer": finer_s}),
+        warnings=(*full_pixels(survey), *survey.warnings()),
         sections={"spad": {"photons": float(frames.sum(dtype="float64").round(1))}},
     )

@@ -9,11 +9,13 @@ import numpy as np
 from camkit.contracts import FloatArray
 from camkit.runtime.cancel import check_cancelled
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
-from camkit.runtime.kinds.spad.hot_pixels import painted_over
-from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, pieces
+from camkit.runtime.kinds.spad.hot_pixels import check_map, painted_over
+from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, check_room, pieces
 from camkit.runtime.kinds.spad.products.survey import Survey
 from camkit.runtime.maker import Making
 
+FINE_BYTES_OF_COUNT: Final = 80
+"""What a count of the array takes on the fine grid."""
 SHARE: Final = 0.4
 """Of the free memory: an array that takes more lies in a file while it is made."""
 
@@ -33,6 +35,17 @@ def frames_of(making: Making, survey: Survey) -> FloatArray:
     return _sound(found, survey)
 
 
+def full_pixels(survey: Survey) -> tuple[str, ...]:
+    """Give what the user should know of pixels that counted in every cycle."""
+    blind = survey.rows.blind_pixels
+    if not blind:
+        return ()
+    return (
+        f"{blind} pixels lost bins to pile-up: they have at least the photons that are given, "
+        "nobody can tell how many more",
+    )
+
+
 def sum_of(making: Making, survey: Survey) -> FloatArray:
     """Give the photons of every pixel, (1, h, w) float32; errors as of `frames_of`."""
     found = np.empty((1, *survey.shape), np.float32)
@@ -42,9 +55,15 @@ def sum_of(making: Making, survey: Survey) -> FloatArray:
 
 
 def made_finer(making: Making, survey: Survey, frames: FloatArray) -> FloatArray:
-    """Give pictures (n, h, w) on the fine grid of the bundle; without one as they are."""
+    """Give pictures (n, h, w) on the fine grid of the bundle; without one as they are.
+
+    Raises:
+        ContractError: If they do not fit the memory.
+        Cancelled: If the caller wished so.
+    """
     if survey.camera is None:
         return frames
+    check_room(survey.shape, len(frames), FINE_BYTES_OF_COUNT, survey.settings.max_mem_bytes)
     of_frame = survey.bins if survey.axis is not None and len(frames) == 1 else 1
     return finer_frames(
         survey.camera,
@@ -75,6 +94,7 @@ def _strips(making: Making, survey: Survey, held_bytes: int) -> Iterator[tuple[i
 
 def _sound(frames: FloatArray, survey: Survey) -> FloatArray:
     hot = survey.timing.hot(survey.shape)
+    check_map(hot)
     if hot.any():
         for frame in frames:
             frame[:] = painted_over(frame, hot)

@@ -1,8 +1,9 @@
 """Depth as points in space: a binary PLY of every pixel that is believed.
 
 A pixel at (x, y) of an array behind a lens looks along (x p, y p, f), from the middle of the array;
-time of flight measures the way along that line, so the point lies `depth` along it, not `depth`
-in front of the lens. +x is right, +y down, +z along the light.
+of a fine grid, sub-pixel `phase` of a pixel looks where the pixel does. Time of flight measures the
+way along that line, so the point lies `depth` along it, not `depth` in front of the lens. +x is
+right, +y down, +z along the light.
 
 References: G. Turk, "The PLY polygon file format" (1994).
 """
@@ -16,13 +17,26 @@ from camkit.units import UM_PER_MM
 
 
 def directions(
-    shape: tuple[int, int], pitch_um: float, focal_length_mm: float
+    shape: tuple[int, int],
+    pitch_um: float,
+    focal_length_mm: float,
+    *,
+    scale: int = 1,
+    phase: int = 0,
 ) -> NDArray[np.float64]:
-    """Give the unit vectors (h, w, 3) along which pixels look."""
-    height, width = shape
-    y, x = np.meshgrid(
-        np.arange(height) - (height - 1) / 2, np.arange(width) - (width - 1) / 2, indexing="ij"
+    """Give the unit vectors (h, w, 3) along which pixels look.
+
+    Args:
+        shape: (h, w).
+        pitch_um: Of these pixels.
+        focal_length_mm: Of the lens.
+        scale: Sub-pixels along a side of a pixel of the array.
+        phase: Which of them lies on its middle.
+    """
+    down, across = (
+        np.arange(length) - scale * (length // scale - 1) / 2 - phase for length in shape
     )
+    y, x = np.meshgrid(down, across, indexing="ij")
     focal_px = focal_length_mm * UM_PER_MM / pitch_um
     towards = np.stack([x, y, np.full(shape, focal_px)], axis=-1)
     return np.asarray(towards / np.linalg.norm(towards, axis=-1, keepdims=True))
@@ -35,6 +49,8 @@ def write_points(
     *,
     pitch_um: float,
     focal_length_mm: float,
+    scale: int = 1,
+    phase: int = 0,
 ) -> None:
     """Write the points.
 
@@ -44,8 +60,11 @@ def write_points(
         intensity: (returns, h, w), a property of each point.
         pitch_um: Of the pixels.
         focal_length_mm: Of the lens.
+        scale: See `directions`.
+        phase: Likewise.
     """
-    towards = directions(depth_m.shape[1:], pitch_um, focal_length_mm)
+    shape = (depth_m.shape[1], depth_m.shape[2])
+    towards = directions(shape, pitch_um, focal_length_mm, scale=scale, phase=phase)
     kept = np.isfinite(depth_m)
     which, y, x = np.nonzero(kept)
     places = towards[y, x] * depth_m[kept][:, None]

@@ -65,6 +65,26 @@ def pieces(
     return list(_cut(height, max(rows, 1), reach))
 
 
+def check_room(shape: tuple[int, int], bins: int, of_count: int, max_mem_bytes: int) -> None:
+    """Refuse what has to be held as a whole and does not fit.
+
+    Args:
+        shape: (h, w).
+        bins: Counts of a pixel.
+        of_count: Bytes that a count takes.
+        max_mem_bytes: Memory that the process may take.
+
+    Raises:
+        ContractError: Says how much it needs.
+    """
+    need = KEPT_BYTES + of_count * shape[0] * shape[1] * bins
+    if need > max_mem_bytes:
+        raise ContractError(
+            f"{shape[1]}x{shape[0]} pixels of {bins} bins on the fine grid of a bundle need "
+            f"--max-mem {need // 10**6 + 1}M; the cap is {max_mem_bytes // 10**6}M"
+        )
+
+
 def _cut(height: int, rows: int, reach: int) -> Iterator[Piece]:
     count = -(-height // rows)
     for number in range(count):

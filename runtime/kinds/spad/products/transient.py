@@ -6,7 +6,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from camkit.runtime.kinds.spad.products.archive import write_archive
-from camkit.runtime.kinds.spad.products.photons import frames_of, made_finer
+from camkit.runtime.kinds.spad.products.photons import frames_of, full_pixels, made_finer
 from camkit.runtime.kinds.spad.products.picture import write_exr, write_tiff
 from camkit.runtime.kinds.spad.products.preview import (
     grey_picture,
@@ -24,7 +24,9 @@ def make_transient(making: Making, survey: Survey, began: float) -> Made:
     """Give the photons of every pixel and bin; arguments and errors as of `make_depth`."""
     axis = survey.an_axis
     frames = frames_of(making, survey)
+    read_s = time.perf_counter() - began
     frames = made_finer(making, survey, frames)
+    finer_s = time.perf_counter() - began - read_s
     arrays: dict[str, NDArray[Any]] = {"transient": frames, "time_ps": axis.centres_ps}
     white = white_of_flight(frames)
     shown = frames.sum(axis=0)
@@ -40,7 +42,7 @@ def make_transient(making: Making, survey: Survey, began: float) -> Made:
             "tiff": (".tif", lambda path: write_tiff(path, frames)),
         },
         record={"product": "transient", **told_axis(axis), **told_finer(survey)},
-        seconds={"read": time.perf_counter() - began},
-        warnings=survey.warnings(),
+        seconds={"read": read_s} | ({} if survey.camera is None else {"finer": finer_s}),
+        warnings=(*full_pixels(survey), *survey.warnings()),
         sections={"spad": {"photons": float(frames.sum(dtype="float64").round(1))}},
     )

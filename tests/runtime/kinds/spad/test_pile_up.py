@@ -32,6 +32,16 @@ def test_what_was_drowned_is_told() -> None:
     assert found.blind.tolist() == [True, False, False]
     np.testing.assert_allclose(found.worst, [0.999, 0.01, 0])
     assert np.isfinite(found.counts).all()
+    # full in every cycle but one: at least so many, and none that later bins could tell
+    assert found.counts[0, 2] == pytest.approx(-1000 * np.log(0.02), rel=1e-5)
+    assert not found.counts[0, 3:].any()
+
+
+def test_a_full_gate_is_brighter_than_one_that_is_nearly_full() -> None:
+    counts = np.array([[50, 90, 97, 99, 100]], np.float32)
+    found = without_pile_up(counts, 100, "gate")
+    assert (np.diff(found.counts[0])[:3] > 0).all()
+    assert found.counts[0, 4] == found.counts[0, 3] == pytest.approx(-100 * np.log(0.02))
 
 
 def test_few_counts_of_many_cycles_stay_as_they_are() -> None:

@@ -227,6 +227,17 @@ def test_pile_up_is_undone_before_the_fit(tmp_path: Path, axis: TimeAxis, draw: 
         camkit.load(None, kind="spad", timing=path).make(tmp_path / "a.npz")
 
 
+def test_saturated_pixels_are_bright_and_told(tmp_path: Path) -> None:
+    counts = np.full((1, 8, 8), 50, np.uint16)
+    counts[0, 3, 4] = 100
+    np.savez(tmp_path / "a.npz", counts=counts)
+    timing = tmp_path / "t.toml"
+    timing.write_text(TIMING.replace("time_bin_ps", "cycles = 100\ntime_bin_ps"), encoding="utf-8")
+    made = camkit.load(None, kind="spad", timing=timing).make(tmp_path / "a.npz")
+    assert made.arrays["intensity"].argmax() == 3 * 8 + 4
+    assert any("1 pixels lost bins to pile-up" in told for told in made.warnings)
+
+
 def test_a_change_of_the_timing_file_is_a_new_product(
     scan: Path, timing: Path, tmp_path: Path
 ) -> None:

@@ -141,3 +141,42 @@ def test_an_edge_seen_by_squares_is_not_two_surfaces(
     assert found.valid[1, :, beside].mean() < 0.05
     right = np.abs(found.time_of_flight_ps[0] - times) < 100
     assert right[found.valid[0]].mean() > 0.95
+
+
+@pytest.mark.parametrize("side", ["3", "5"])
+def test_a_blind_pixel_lends_no_photons_to_squares(
+    cube: np.ndarray, axis: TimeAxis, pulse: GatedPulse, side: str
+) -> None:
+    sharpener = Sharpener(axis, pulse, Way(pool=side))  # type: ignore[arg-type]
+    cube[7, 20] = 0
+    usual = sharpener.strip(cube).time_of_flight_ps[0]
+    cube[7, 20, 40:45] = 400  # a mirror, whose pulse was cut off
+    blind = np.zeros((HEIGHT, WIDTH), bool)
+    blind[7, 20] = True
+    found = sharpener.strip(cube, blind=blind)
+    assert not found.valid[0, 7, 20]
+    around = np.abs(found.time_of_flight_ps[0] - usual)[5:10, 18:23]
+    around[2, 2] = 0
+    assert around.max() < 1e-6
+
+
+def test_a_second_return_of_a_hot_pixel_has_no_photons(
+    cube: np.ndarray, axis: TimeAxis, pulse: GatedPulse
+) -> None:
+    sharpener = Sharpener(axis, pulse, Way(returns=2))
+    hot = np.zeros((HEIGHT, WIDTH), bool)
+    hot[3, 4] = True
+    found = sharpener.strip(cube, hot=hot)
+    assert found.amplitude[0, 3, 4] > 0
+    assert found.amplitude[1, 3, 4] == found.evidence[1, 3, 4] == 0
+    assert found.time_of_flight_ps[1, 3, 4] == found.time_of_flight_ps[0, 3, 4]
+
+
+def test_a_strip_may_hold_hot_rows_that_a_whole_array_could_not(
+    cube: np.ndarray, sharpener: Sharpener
+) -> None:
+    hot = np.zeros((HEIGHT, WIDTH), bool)
+    hot[:6] = True
+    found = sharpener.strip(cube[:10], hot=hot[:10], core=slice(4, 6))
+    assert not found.valid.any()
+    assert np.isfinite(found.time_of_flight_ps).all()

@@ -126,3 +126,57 @@ def test_few_photons_are_read_linearly_and_many_by_the_network(camera: FineCamer
         assert made.size == size
         assert made.photons == pytest.approx(photons, rel=0.2)
         assert always.cube(counts, DARK, hot=NOTHING, blind=NOTHING).size == "S"
+
+
+def test_stated_dark_counts_are_noise_too(camera: FineCamera) -> None:
+    axis, pulse = times_of(camera)
+    fine = FineSharpener(camera, axis, pulse, Way())
+    rng = np.random.default_rng(5)
+    ratios: dict[float, list[np.ndarray]] = {0.0: [], 4.0: []}
+    for seed in range(3):
+        depth, counts = _scan(camera, 300.0, 10.0, seed)
+        counts = counts + rng.poisson(4.0, counts.shape).astype(np.float32)
+        for stated, of_stated in ratios.items():
+            found = fine.cube(counts, DARK + stated, hot=NOTHING, blind=NOTHING).found
+            error = np.abs(found.time_of_flight_ps[0] - 2 * depth / LIGHT_M_PER_PS)
+            of_stated.append((error / found.sigma_ps[0])[found.valid[0]])
+    unstated, told = (np.quantile(np.concatenate(ratios[dark]), 0.6827) for dark in (0.0, 4.0))
+    assert told == pytest.approx(unstated, rel=0.1)
+
+
+@pytest.mark.parametrize(("photons", "dark"), [(60.0, 0.0), (300.0, 0.0), (300.0, 0.4)])
+def test_dark_sky_beside_a_wall_is_believed_nowhere(
+    camera: FineCamera, photons: float, dark: float
+) -> None:
+    axis, pulse = times_of(camera)
+    shape = (SCALE * HEIGHT, SCALE * WIDTH)
+    albedo = np.full(shape, 1e-9)
+    albedo[:, : shape[1] // 4] = 1
+    light = seen_by(camera, light_of_depth(np.full(shape, 0.14), albedo, axis, pulse))
+    mean = photons * light / light.sum(axis=0).max() + 0.02 + dark
+    fine = FineSharpener(camera, axis, pulse, Way())
+    alarms = []
+    for seed in range(8):
+        counts = np.random.default_rng(seed).poisson(mean).transpose(1, 2, 0).astype(np.float32)
+        counts = np.ascontiguousarray(counts)
+        found = fine.cube(counts, DARK + dark, hot=NOTHING, blind=NOTHING).found
+        assert found.valid[0][:, : shape[1] // 4 - 8].mean() > 0.9
+        alarms.append(found.valid[0][:, shape[1] // 2 :].mean())
+    assert np.mean(alarms) <= 2e-3
+
+
+def test_a_blind_pixel_does_not_reach_its_neighbours(camera: FineCamera) -> None:
+    axis, pulse = times_of(camera)
+    depth, counts = _scan(camera, 300.0, 10.0, 2)
+    spoilt = counts.copy()
+    spoilt[8, 10] *= 20
+    spoilt[8, 10, spoilt[8, 10].argmax() - 4 :] = 0
+    blind = NOTHING.copy()
+    blind[8, 10] = True
+    fine = FineSharpener(camera, axis, pulse, Way())
+    found = fine.cube(spoilt, DARK, hot=NOTHING, blind=blind).found
+    assert not found.valid[0][32:36, 40:44].any()
+    error = np.abs(_metres(found.time_of_flight_ps[0]) - depth)[24:44, 32:52]
+    sound = fine.cube(counts, DARK, hot=NOTHING, blind=NOTHING).found
+    usual = np.abs(_metres(sound.time_of_flight_ps[0]) - depth)[24:44, 32:52]
+    assert np.quantile(error, 0.9) < 2 * np.quantile(usual, 0.9) + 0.002

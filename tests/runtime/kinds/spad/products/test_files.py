@@ -23,7 +23,7 @@ from camkit.runtime.kinds.spad.products.preview import (
     white_of_flight,
     write_preview,
 )
-from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, pieces
+from camkit.runtime.kinds.spad.products.strips import KEPT_BYTES, check_room, pieces
 from camkit.runtime.kinds.spad.products.video import write_video
 
 
@@ -81,6 +81,18 @@ def test_a_plane_stays_a_plane() -> None:
     towards = directions((40, 60), 150, 5)
     range_m = 1.7 / towards[..., 2]  # what light measures of a plane 1.7 m in front of the lens
     np.testing.assert_allclose((towards * range_m[..., None])[..., 2], 1.7)
+
+
+def test_a_sub_pixel_looks_where_the_pixel_does_on_whose_middle_it_lies() -> None:
+    coarse = directions((8, 12), 150, 5)
+    fine = directions((32, 48), 37.5, 5, scale=4, phase=2)
+    np.testing.assert_allclose(fine[2::4, 2::4], coarse, atol=1e-12)
+
+
+def test_what_does_not_fit_the_memory_as_a_whole_says_what_it_needs() -> None:
+    check_room((32, 64), 125, 290, 400_000_000)
+    with pytest.raises(ContractError, match=r"64x32 pixels of 4096 bins.*need --max-mem 2693M"):
+        check_room((32, 64), 4096, 290, 930_000_000)
 
 
 def test_previews_show_near_and_far_and_what_is_not_known(tmp_path: Path) -> None:
