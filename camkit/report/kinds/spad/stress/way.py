@@ -17,9 +17,7 @@ from camkit.contracts import FloatArray
 from camkit.report.kinds.spad.bicubic import bicubic
 from camkit.report.kinds.spad.stress.shot import DepthShot, PictureShot
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
-from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
-from camkit.runtime.kinds.spad.finer.linear import linear_estimate
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
 from camkit.runtime.kinds.spad.finer.sampling import point_kernel
 from camkit.runtime.kinds.spad.hot_pixels import painted_over
@@ -84,13 +82,9 @@ class Ways:
         return painted_over(frame, shot.hot) if shot.hot.any() else frame
 
     def _bare(self, frame: FloatArray) -> FloatArray:
-        stage = self.camera.stage
-        covariance = PictureCovariance(
-            contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent
-        )
         photons = max(float(frame.mean(dtype=np.float64)), 0.0)
         side = self.camera.kernel.shape[0]
-        estimate = linear_estimate(point_kernel(side), self.camera.grid, covariance, photons)
+        estimate = self.camera.linear(photons, point_kernel(side))
         return np.asarray(np.maximum(estimate(frame[None])[0], 0), np.float32)
 
     def _upsampled(self, found: Sharpened) -> Sharpened:
