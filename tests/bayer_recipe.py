@@ -1,7 +1,6 @@
 """A camera behind a mosaic so small that training it takes seconds; fixtures to import."""
 
 import pytest
-import torch
 
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
@@ -62,14 +61,6 @@ network = "lean_s"
 config = { widths = [16, 16], encoder_blocks = [1], decoder_blocks = [1] }
 schedule = { steps = 60, precision = "float32", learning_rate = 4e-3 }
 """
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture(scope="session")

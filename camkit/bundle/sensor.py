@@ -307,10 +307,12 @@ class SpadSensor(PixelSensor):
     Attributes:
         time_bins: Bins of a histogram; 0 for an array that only counts.
         time_bin_ps: Width of a bin.
-        dead_time_ps: Time for which a diode is blind after a photon.
+        dead_time_ps: Time for which a diode is blind after a photon; simulated pictures lose counts
+            to it.
         dark_count_rate_hz: Counts per second and pixel without light.
         fill_factor: Share of a pixel that sees light.
-        detection_efficiency: Share of the photons there that are counted (format 2.3).
+        detection_efficiency: Share of the photons there that are counted (format 2.3); a stated
+            fact, since photons are those counted wherever a number of them is given.
         sub_pixels: Along a side of a pixel, of the grid on which pictures are made (format 2.3).
         phase: Sub-pixel, along either axis, at which a pixel sees (format 2.3).
     """

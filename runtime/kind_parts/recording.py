@@ -22,7 +22,9 @@ class RecordingOptions:
     """How a scene is recorded.
 
     Attributes:
-        photons: Of a pixel that sees white; of captures by time, of a pixel on average.
+        photons: That are counted, whatever the sensor's detection efficiency: of a pixel that sees
+            white; of captures by time, of a pixel on average. A pixel that sees all of itself
+            collects as many for every sub-pixel.
         sbr: Photons of the signal over those of the background, all time bins together.
         seed: Of chance; the same seed gives the same capture.
     """

@@ -10,5 +10,6 @@ high_speed  a fan before the array, with its plate and without; `fan`, `strip`
 transient   a pulse that sweeps over an object and its mirror image; `mirror`, `strip`
 tables      tables 4.1 and 4.2: networks of every sampling trained and judged; `table`
 baselines   those networks as the bundle that `camkit bench` reads; `edge_export`
+linear      the runtime's linear estimate, for misetched and tables
 real_data   captures of real cameras against what is known of them
 """

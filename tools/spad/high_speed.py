@@ -27,8 +27,6 @@ from camkit.report.bench.machine import describe_machine
 from camkit.report.kinds.spad.bicubic import bicubic
 from camkit.report.kinds.spad.score import psnr_db
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
-from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
-from camkit.runtime.kinds.spad.finer.linear import linear_estimate
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
 from camkit.runtime.kinds.spad.finer.sampling import point_kernel
 from camkit.runtime.kinds.spad.twin.array import see_through
@@ -153,13 +151,9 @@ def _by_network(camera: FineCamera, size: str) -> Restore:
 
 
 def _linear(camera: FineCamera, kernel: FloatArray) -> Restore:
-    stage = camera.stage
-    covariance = PictureCovariance(
-        contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent
-    )
 
     def restore(frames: FloatArray) -> FloatArray:
-        estimate = linear_estimate(kernel, camera.grid, covariance, float(frames.mean()))
+        estimate = camera.linear(float(frames.mean()), kernel)
         return np.asarray(np.maximum(estimate(frames), 0), np.float32)
 
     return restore

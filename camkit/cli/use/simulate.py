@@ -46,7 +46,7 @@ def simulate(
     ] = None,
     photons: Annotated[
         float | None,
-        typer.Option(help="Of a pixel: of white in counts, on average by time; default: 10000."),
+        typer.Option(help="Counted by a pixel: of white, or on average by time; default: 10000."),
     ] = None,
     sbr: Annotated[
         float | None, typer.Option(help="Photons of the signal over those of the background.")

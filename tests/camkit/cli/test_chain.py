@@ -1,11 +1,7 @@
 """The whole chain by its commands: train, export, check, simulate, process."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
-import torch
 
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import open_bundle
@@ -15,6 +11,7 @@ from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.training.kind import read_recipe
 from tests.bayer_recipe import RECIPE
+from tests.one_thread import one_thread  # noqa: F401
 
 PRESCRIPTION = Path(__file__).resolve().parents[3] / "models_def" / "prescriptions" / "duet.toml"
 SMALL = {
@@ -24,14 +21,6 @@ SMALL = {
     "rays = 512",
     "steps = 12": "steps = 4",
 }
-
-
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 def test_a_recipe_becomes_a_proved_bundle_that_turns_a_capture_into_a_picture(

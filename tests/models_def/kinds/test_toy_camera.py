@@ -25,14 +25,6 @@ from tests.toy_camera.recipe import ROLES, STREAKS, TURN_DEG, write_toy
 pytestmark = pytest.mark.usefixtures("toy_installed")
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
 def camkit(*arguments):
     """Run a command as a user does, in a process of its own."""
     command = [sys.executable, "-m", "camkit", *map(str, arguments)]

@@ -3,7 +3,7 @@
 from tests.bayer_recipe import (  # noqa: F401
     bank,
     material,
-    one_thread,
     recipe,
     recipe_path,
 )
+from tests.one_thread import one_thread  # noqa: F401

@@ -13,10 +13,10 @@ import torch
 from camkit.models_def.kinds.spad import validation
 from camkit.models_def.kinds.spad.networks import build_spad_network
 from camkit.models_def.kinds.spad.plate_psf import write_plate_psf
-from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
 from camkit.models_def.training.kind import to_recipe
 from camkit.scenes import procedural_scene
 from tests.spad_bundle import leaning_kernel
+from tests.spad_checkpoint import write_untrained
 from tools.comparison import equal_training
 from tools.spad import tables
 from tools.spad.table import measuring, training
@@ -107,23 +107,16 @@ def write_run(runs: Path, name: str) -> None:
     folder.mkdir(parents=True)
     (folder / equal_training.RECIPE).write_text(text, encoding="utf-8")
     (folder / equal_training.DONE).write_text('{"cpu_minutes": 15}', encoding="utf-8")
-    checkpoint = Checkpoint(
-        recipe_toml=text,
+    write_untrained(
+        training.checkpoint_of(runs, row, seed),
+        text,
+        role=training.ROLE,
         size=row.size,
         network=chosen.network,
         config=dict(chosen.config),
-        bank_digest="",
         training_data="nothing",
-        step=0,
-        elapsed_s=0.0,
-        cpu_s=0.0,
-        valid_db=None,
         weights=network.state_dict(),
-        average=network.state_dict(),
-        optimizer={},
-        role=training.ROLE,
     )
-    write_checkpoint(training.checkpoint_of(runs, row, seed), checkpoint)
 
 
 def write_sets(folder: Path) -> Path:

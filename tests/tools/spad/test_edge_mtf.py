@@ -2,93 +2,35 @@
 
 import json
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
-from camkit.models_def.kinds.spad.networks import build_spad_network
 from camkit.models_def.kinds.spad.plate_psf import read_plate_psf
-from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
+from tests.one_thread import one_thread  # noqa: F401
+from tests.spad_checkpoint import tiny_recipe, write_untrained
 from tools.spad import edge_mtf
 from tools.spad.edge_mtf import CYCLES_PER_PX, PLATE, SLOPES, Row, main
 
 TOLERANCE = 0.02
 """A hundredth of the measurement, and as much for samples that are four sub-pixels apart."""
-CONFIG = {"width": 16, "blocks": 1}
-RECIPE = """
-name = "tiny"
-kind = "spad"
-
-[sensor]
-type = "spad"
-width_px = 64
-height_px = 32
-pixel_pitch_um = 150.0
-fill_factor = 0.0314
-sub_pixels = 4
-phase = 2
-
-[sampling]
-mode = "low_fill"
-
-[data]
-procedural_scenes = 2
-scene_px = 256
-sample_px = 16
-photons_min = 100.0
-photons_max = 1e4
-
-[schedule]
-steps = 4
-batch = 2
-patch_px = 8
-loss = "mse"
-
-[networks.S]
-network = "sub_pixel_s"
-config = { width = 16, blocks = 1 }
-"""
+RECIPE = tiny_recipe('mode = "low_fill"')
 
 
 @pytest.fixture(autouse=True)
-def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Arrays of 80 pixels a side, and few crops to fit to."""
     sizes = {"SIDE_PX": 384, "CUT_PX": 32, "FIT_CROPS": 4, "FIT_PX": 64}
     for name, value in sizes.items():
         monkeypatch.setattr(edge_mtf, name, value)
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture
 def checkpoint(tmp_path: Path) -> Path:
     """Give an untrained network behind an array without a plate."""
-    torch.manual_seed(3)
-    weights = build_spad_network("sub_pixel_s", **CONFIG).state_dict()
-    path = tmp_path / "untrained.pt"
-    written = Checkpoint(
-        recipe_toml=RECIPE,
-        size="S",
-        network="sub_pixel_s",
-        config=CONFIG,
-        bank_digest="",
-        training_data="none",
-        step=0,
-        elapsed_s=0.0,
-        cpu_s=0.0,
-        valid_db=None,
-        weights=weights,
-        average=weights,
-        optimizer={},
-    )
-    write_checkpoint(path, written)
-    return path
+    return write_untrained(tmp_path / "untrained.pt", RECIPE)
 
 
 def rows_of(folder: Path) -> dict[tuple[str, str, float | None], dict[str, Any]]:

@@ -1,99 +1,44 @@
 """A mis-etched plate in small: what is measured wins back, and every method is told of."""
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.kinds.spad.networks import build_spad_network
 from camkit.models_def.kinds.spad.plate_psf import read_plate_psf, write_plate_psf
 from camkit.models_def.kinds.spad.sampling import gaussian_psf
 from camkit.models_def.kinds.spad.training import SpadMaterial
 from camkit.models_def.training.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from camkit.models_def.training.trainer import TrainOptions
+from tests.one_thread import one_thread  # noqa: F401
+from tests.spad_bundle import leaning_kernel
+from tests.spad_checkpoint import tiny_recipe, write_untrained
 from tools.spad import misetched
 from tools.spad.misetch import tuning
 from tools.spad.misetch.tuning import recipe_text
 from tools.spad.misetched import main
 
 SMALL = ["--cells", "33", "--tiles", "8"]
-CONFIG = {"width": 16, "blocks": 1}
-LEAN = np.linspace(0.5, 1.5, 11)
-RECIPE = """
-name = "tiny"
-kind = "spad"
-
-[sensor]
-type = "spad"
-width_px = 64
-height_px = 32
-pixel_pitch_um = 150.0
-fill_factor = 0.0314
-sub_pixels = 4
-phase = 2
-
-[sampling]
-mode = "learned"
-psf = "design.safetensors"
-
-[schedule]
-steps = 4
-learning_rate = 2e-3
-batch = 2
-patch_px = 8
-
-[networks.S]
-network = "sub_pixel_s"
-config = { width = 16, blocks = 1 }
-"""
-
-
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    before = torch.get_num_threads()
-    yield
-    torch.set_num_threads(before)
+RECIPE = tiny_recipe('mode = "learned"\npsf = "design.safetensors"')
 
 
 @pytest.fixture
 def design(tmp_path: Path) -> Path:
     """Give a PSF that leans."""
-    kernel = gaussian_psf(1.6) * np.outer(LEAN, LEAN**2)
     path = tmp_path / "design.safetensors"
-    write_plate_psf(path, np.asarray(kernel / kernel.sum(), np.float32))
+    write_plate_psf(path, leaning_kernel())
     return path
 
 
 @pytest.fixture
 def checkpoint(tmp_path: Path, design: Path) -> Path:
     """Give an untrained network behind that PSF."""
-    torch.manual_seed(3)
-    weights = build_spad_network("sub_pixel_s", **CONFIG).state_dict()
-    path = tmp_path / "start.pt"
-    written = Checkpoint(
-        recipe_toml=RECIPE,
-        role="upscale",
-        size="S",
-        network="sub_pixel_s",
-        config=CONFIG,
-        bank_digest=SpadMaterial(kernel=read_plate_psf(design)).digest(),
-        training_data="none",
-        step=0,
-        elapsed_s=0.0,
-        cpu_s=0.0,
-        valid_db=None,
-        weights=weights,
-        average=weights,
-        optimizer={},
-    )
-    write_checkpoint(path, written)
-    return path
+    digest = SpadMaterial(kernel=read_plate_psf(design)).digest()
+    return write_untrained(tmp_path / "start.pt", RECIPE, bank_digest=digest)
 
 
 @pytest.fixture

@@ -5,18 +5,19 @@ stops it. The value is the chance of a photon in the brightest bin and cycle; th
 detector that is never blind.
 """
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.report.kinds.spad.synthetic import PULSE
+from camkit.report.kinds.spad.synthetic import AXIS, PULSE
 from camkit.runtime.kinds.spad.bound import information
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
 from camkit.runtime.kinds.spad.scatter import growth
 from camkit.runtime.kinds.spad.sharpen import Sharpener, Way
-from camkit.runtime.kinds.spad.time_axis import Orientation, TimeAxis
+from camkit.runtime.kinds.spad.time_axis import Orientation
 from tools.spad.limit.judged import Sweep, judged, swept
 
 CHANCES: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85, 0.95)
@@ -44,7 +45,7 @@ def sweeps() -> list[Sweep]:
 
 def _point(chance: float, orientation: Orientation, *, corrected: bool) -> dict[str, Any]:
     rng = np.random.default_rng(int(1000 * chance))
-    axis = TimeAxis.regular(orientation, bins=125, time_bin_ps=20)
+    axis = replace(AXIS, orientation=orientation)
     times = rng.uniform(*SPAN_PS, SHAPE[0] * SHAPE[1])
     every = np.broadcast_to(np.arange(axis.bins), (len(times), axis.bins))
     shares = axis.shares(PULSE, times, every)

@@ -5,19 +5,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import torch
-from torch import Tensor, nn
+from torch import nn
 
-from camkit.bundle.stages import SuperResolve
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.counting import Exposure
 from camkit.models_def.kinds.spad.evaluation import SETS, evaluate, read_set
 from camkit.models_def.kinds.spad.sampling import Sampling
-from camkit.models_def.networks.bicubic import SCALE
 from camkit.models_def.training.kind import Restorer
-from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
-from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
+from tools.spad.linear import linear_restorer
 
 LEVELS: Final[Mapping[str, float]] = {"no noise": math.inf, "10000": 1e4, "1000": 1e3}
 """Photons of white."""
@@ -46,21 +42,7 @@ def network_method(network: nn.Module) -> Method:
 
 def linear_method(told: Sampling) -> Method:
     """Give the runtime's linear estimate, told a PSF that need not be the one that is."""
-    usual = SuperResolve()
-    covariance = PictureCovariance(
-        contrast=usual.contrast, reach=usual.reach, exponent=usual.exponent
-    )
-    grid = Grid(scale=SCALE, phase=told.phase)
-
-    def at(exposure: Exposure) -> Restorer:
-        def restore(planes: Tensor) -> Tensor:
-            photons = float(planes[:, :1].mean()) * exposure.white_counts
-            found = linear_estimate(told.kernel, grid, covariance, photons)
-            return torch.from_numpy(found(planes[0, :1].numpy()))[None]
-
-        return restore
-
-    return at
+    return lambda exposure: linear_restorer(told, exposure)
 
 
 def scored(sets: Sets, sampling: Sampling, method: Method, photons: float) -> dict[str, Any]:

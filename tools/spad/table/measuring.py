@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Final
 
 import torch
-from torch import Tensor, nn
+from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
-from camkit.bundle.stages import SuperResolve
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.spad.counting import Exposure
@@ -26,12 +25,10 @@ from camkit.models_def.kinds.spad.plate_psf import read_plate_psf
 from camkit.models_def.kinds.spad.recipe import SpadRecipe
 from camkit.models_def.kinds.spad.sampling import FULL_LIGHT, Sampling, make_sampling
 from camkit.models_def.kinds.spad.training import PART, sampling_of
-from camkit.models_def.networks.bicubic import SCALE
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint, recipe_of
 from camkit.models_def.training.kind import Restorer
 from camkit.report.journal import append_journal, read_journal
-from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
-from camkit.runtime.kinds.spad.finer.linear import Grid, linear_estimate
+from tools.spad.linear import linear_restorer
 from tools.spad.table.judged import GAUSSIAN_UNTRAINED, Judged
 from tools.spad.table.training import checkpoint_of, ended, level_sigma, plate_file
 
@@ -195,7 +192,7 @@ def _entries(
 def _reader(row: Judged, seed: int, runs: Path, pictures: Path | None) -> Reader:
     if row.trained is None:
         sampling = _plain_sampling(row, runs, pictures)
-        restore = _bicubic if row.method == "bicubic" else _linear
+        restore = _bicubic if row.method == "bicubic" else linear_restorer
         return Reader(
             sampling=sampling,
             restore=lambda exposure: restore(sampling, exposure),
@@ -242,23 +239,6 @@ def network_mac_per_px(network: nn.Module) -> float:
 def _bicubic(sampling: Sampling, exposure: Exposure) -> Restorer:
     del exposure
     return bicubic(sampling)
-
-
-def _linear(sampling: Sampling, exposure: Exposure) -> Restorer:
-    """Give the best linear estimate of the runtime, at the photons that a picture shows."""
-    usual = SuperResolve()
-    covariance = PictureCovariance(
-        contrast=usual.contrast, reach=usual.reach, exponent=usual.exponent
-    )
-    grid = Grid(scale=SCALE, phase=sampling.phase)
-    white = exposure.brighter(sampling.light).white_counts
-
-    def restore(planes: Tensor) -> Tensor:
-        photons = float(planes[:, :1].mean()) * white
-        found = linear_estimate(sampling.kernel, grid, covariance, photons)
-        return torch.from_numpy(found(planes[0, :1].numpy()))[None]
-
-    return restore
 
 
 def _kernel_digest(sampling: Sampling, what: str) -> str:

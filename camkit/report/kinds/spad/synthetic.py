@@ -11,9 +11,10 @@ from camkit.runtime.kinds.spad.bank import Bank, make_bank
 from camkit.runtime.kinds.spad.bound import information
 from camkit.runtime.kinds.spad.pulse import GatedPulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
+from camkit.runtime.kinds.spad.twin.working import GATE_WIDTH_PS, STEP_PS
 
-AXIS: Final = TimeAxis.regular("gate", bins=125, time_bin_ps=20)
-PULSE: Final = GatedPulse(width_ps=200, rc_ps=60, sigma_ps=42.5)
+AXIS: Final = TimeAxis.regular("gate", bins=125, time_bin_ps=STEP_PS)
+PULSE: Final = GatedPulse(width_ps=GATE_WIDTH_PS, rc_ps=60, sigma_ps=42.5)
 DARKEST: Final = 1e-6
 BLOCK: Final = 8192
 

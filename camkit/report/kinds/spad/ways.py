@@ -20,8 +20,6 @@ from camkit.contracts import FloatArray
 from camkit.report.bench.trial import Skip
 from camkit.report.kinds.spad.bicubic import bicubic
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
-from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
-from camkit.runtime.kinds.spad.finer.linear import linear_estimate
 from camkit.runtime.kinds.spad.finer.sampling import (
     GAUSSIAN_PIXELS,
     box_kernel,
@@ -162,13 +160,9 @@ def by_network(engine: NetworkEngine) -> Restore:
 
 def by_linear(camera: FineCamera, kernel: FloatArray) -> Restore:
     """Give the best linear estimate of an array behind a kernel, at the level of its photons."""
-    stage, grid = camera.stage, camera.grid
-    covariance = PictureCovariance(
-        contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent
-    )
 
     def restore(planes: FloatArray, photons: float) -> FloatArray:
-        return np.asarray(linear_estimate(kernel, grid, covariance, photons)(planes[:1])[0])
+        return np.asarray(camera.linear(photons, kernel)(planes[:1])[0])
 
     return restore
 

@@ -183,15 +183,18 @@ class FineCamera:
                 f"{self.bundle.manifest.name} {own[1]}x{own[0]}; say --bundle none"
             )
 
-    def linear(self, photons: float) -> LinearEstimate:
-        """Give the linear estimate at a level of light, photons of a pixel on average."""
-        stage = self.stage
-        return linear_estimate(
-            self.kernel,
-            self.grid,
-            PictureCovariance(contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent),
-            photons,
-        )
+    def linear(self, photons: float, kernel: FloatArray | None = None) -> LinearEstimate:
+        """Give the linear estimate at a level of light.
+
+        Args:
+            photons: Of a pixel, on average; inf for no noise.
+            kernel: (n, n) of an array that sees otherwise; None for that of this one.
+
+        Raises:
+            ContractError: As `linear_estimate`.
+        """
+        seen = self.kernel if kernel is None else kernel
+        return linear_estimate(seen, self.grid, PictureCovariance.of(self.stage), photons)
 
     def network(self, size: str) -> NetworkEngine:
         """Give the network of a size, made when first asked for.

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.stages import SuperResolve
 from camkit.errors import ContractError
 
 
@@ -35,6 +36,11 @@ class PictureCovariance:
                 "contrast and reach of a covariance must be > 0, its exponent in (0, 2]; got "
                 f"{self.contrast}, {self.reach}, {self.exponent}"
             )
+
+    @classmethod
+    def of(cls, stage: SuperResolve) -> "PictureCovariance":
+        """Give what a stage takes for granted."""
+        return cls(contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent)
 
     def lags(self, most: int) -> NDArray[np.float64]:
         """Give C at all distances up to `most` sub-pixels, (2 most + 1, 2 most + 1)."""

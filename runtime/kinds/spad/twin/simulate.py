@@ -20,6 +20,7 @@ from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kind_parts.recording import Recorded, RecordingOptions
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.linear import Grid
+from camkit.runtime.kinds.spad.finer.sampling import light_of
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
 from camkit.runtime.kinds.spad.timing import Timing
@@ -36,6 +37,7 @@ from camkit.runtime.twin.light import LUMINANCE
 
 SCENE_SUFFIX: Final = ".npz"
 MOST_BYTES: Final = 2_000_000_000
+S_PER_PS: Final = 1e-12
 
 
 def record(scene: FloatArray | Path, bundle: Bundle, options: RecordingOptions) -> Recorded:
@@ -148,14 +150,29 @@ def dark_counts(camera: FineCamera, point: str) -> float:
     return camera.sensor.dark_count_rate_hz * WORKING_POINTS[point].time_s
 
 
+def collected(camera: FineCamera, photons: float) -> float:
+    """Give the photons of a pixel where one that sees a sub-pixel has so many.
+
+    Pixels that see all of themselves collect those of scale^2 sub-pixels (4x4: 16 times).
+    """
+    return photons * light_of(camera.stage, camera.grid)
+
+
+def dead_share(camera: FineCamera, point: str) -> float:
+    """Give the dead time over the time for which a pixel counts, at a working point."""
+    return camera.sensor.dead_time_ps * S_PER_PS / WORKING_POINTS[point].time_s
+
+
 def _counted(
     camera: FineCamera, light: FloatArray, options: RecordingOptions, rng: np.random.Generator
 ) -> Recorded:
-    mean = seen_by(camera, light[None]).astype(np.float64) * options.photons
+    photons = collected(camera, options.photons)
+    mean = seen_by(camera, light[None]).astype(np.float64) * photons
     if np.isfinite(options.sbr):
         mean += mean.mean() / options.sbr
-    dark = dark_counts(camera, "intensity")
-    counts = count_frames(mean, Disturbances(dark=dark), rng)[0]
+    point = "intensity"
+    added = Disturbances(dark=dark_counts(camera, point), dead_share=dead_share(camera, point))
+    counts = count_frames(mean, added, rng)[0]
     return Recorded(name="counts", values=counts, stated=_stated(camera))
 
 
@@ -166,8 +183,9 @@ def _timed(
     options: RecordingOptions,
     rng: np.random.Generator,
 ) -> Recorded:
-    mean = scaled_to(seen_by(camera, light), options.photons)
-    mean += options.photons / options.sbr / axis.bins
+    photons = collected(camera, options.photons)
+    mean = scaled_to(seen_by(camera, light), photons)
+    mean += photons / options.sbr / axis.bins
     dark = dark_counts(camera, "depth")
     counts = count_times(mean, axis.orientation, Disturbances(dark=dark), rng)
     stated = {**_stated(camera), **camera.stated_times()}

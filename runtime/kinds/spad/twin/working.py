@@ -14,14 +14,10 @@ class WorkingPoint:
     Attributes:
         frames: Put together to one picture, or to one step of the gate.
         frame_us: Time of each.
-        step_ps: From one delay of the gate to the next; None without a gate.
-        gate_width_ps: Width of the gate; None without one.
     """
 
     frames: int
     frame_us: float
-    step_ps: float | None = None
-    gate_width_ps: float | None = None
 
     @property
     def time_s(self) -> float:
@@ -37,6 +33,9 @@ class WorkingPoint:
 WORKING_POINTS: Final = {
     "intensity": WorkingPoint(frames=100, frame_us=52.0),
     "high_speed": WorkingPoint(frames=10, frame_us=80.0),
-    "depth": WorkingPoint(frames=1500, frame_us=52.0, step_ps=20.0, gate_width_ps=200.0),
+    "depth": WorkingPoint(frames=1500, frame_us=52.0),
 }
-"""High speed gives 1,250 pictures a second."""
+"""High speed gives 1,250 pictures a second; depth counts so long at every delay of the gate."""
+STEP_PS: Final = 20.0
+"""From one delay of the gate to the next."""
+GATE_WIDTH_PS: Final = 200.0

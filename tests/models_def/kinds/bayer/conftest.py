@@ -3,7 +3,6 @@
 from tests.bayer_recipe import (  # noqa: F401
     bank,
     material,
-    one_thread,
     recipe,
     recipe_path,
 )

@@ -1,14 +1,14 @@
 """A single-photon camera so small that a step of its network takes no second."""
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
-import torch
 
 from camkit.models_def.kinds.spad.recipe import SpadRecipe, to_spad_recipe
+from tests.changed_table import Table, changed_table
 
 TINY = """
 name = "tiny-spad"
@@ -51,16 +51,6 @@ network = "joint_sub_pixel_s"
 config = { width = 16, blocks = 1 }
 """
 
-Table = dict[str, Any]
-
-
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
 
 @pytest.fixture(scope="session")
 def tiny_text() -> str:
@@ -69,22 +59,8 @@ def tiny_text() -> str:
 
 @pytest.fixture
 def changed() -> Callable[..., Table]:
-    """Give the table of the tiny recipe, changed at dotted keys; None takes a key out."""
-
-    def change(**changes: Any) -> Table:
-        table = tomllib.loads(TINY)
-        for dotted, value in changes.items():
-            *path, last = dotted.split("__")
-            place = table
-            for part in path:
-                place = place.setdefault(part, {})
-            if value is None:
-                del place[last]
-            else:
-                place[last] = value
-        return table
-
-    return change
+    """Give the table of the tiny recipe, changed as `changed_table` says."""
+    return partial(changed_table, TINY)
 
 
 @pytest.fixture(scope="session")

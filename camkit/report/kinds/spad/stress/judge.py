@@ -30,7 +30,7 @@ from camkit.runtime.kinds.spad.finer.camera import DEFAULT_SIZE, FineCamera
 
 PLAIN: Final = "low_fill"
 """Role of the network without a plate, of the baselines."""
-VERSION: Final = 1
+VERSION: Final = 2
 """Raised when the same bundle gives other points than before."""
 
 

@@ -119,6 +119,7 @@ class DepthShot:
         judged: (m h, m w) sub-pixels that count.
         counts: (h, w, bins), pile-up undone.
         blind: (h, w) pixels that pile-up left no counts in some bins.
+        cycles: Of the laser, where counts scatter more for pile-up that was undone; else 0.
         axis: As it is believed to be.
         pulse: The same.
     """
@@ -128,5 +129,6 @@ class DepthShot:
     judged: NDArray[np.bool_]
     counts: FloatArray
     blind: NDArray[np.bool_]
+    cycles: int
     axis: TimeAxis
     pulse: Pulse

@@ -18,6 +18,7 @@ from camkit.report.kinds.spad.stress.shot import (
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.sampling import point_kernel
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
+from camkit.runtime.kinds.spad.products.depth import LITTLE_LOST
 from camkit.runtime.kinds.spad.proving import stage_set
 from camkit.runtime.kinds.spad.pulse import Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
@@ -111,10 +112,11 @@ class Studio:
         added = Disturbances(hot=setting.hot, hot_counts=setting.hot_counts, cycles=cycles)
         counts = count_times(mean, axis.orientation, added, _chance(scene))
         flat = counts.transpose(1, 2, 0).reshape(-1, axis.bins).astype(np.float32)
-        blind = np.zeros(self.shape, bool)
+        blind, scattering = np.zeros(self.shape, bool), 0
         if cycles:
             undone = without_pile_up(flat, cycles, axis.orientation)
             flat, blind = undone.counts, undone.blind.reshape(self.shape)
+            scattering = cycles if undone.worst.max() >= LITTLE_LOST else 0
         believed = setting.believed or (axis, pulse)
         return DepthShot(
             scene=scene.name,
@@ -122,6 +124,7 @@ class Studio:
             judged=judged,
             counts=np.ascontiguousarray(flat.reshape(*self.shape, axis.bins)),
             blind=blind,
+            cycles=scattering,
             axis=believed[0],
             pulse=believed[1],
         )

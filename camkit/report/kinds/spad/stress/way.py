@@ -11,17 +11,17 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.report.kinds.spad.bicubic import bicubic
 from camkit.report.kinds.spad.stress.shot import DepthShot, PictureShot
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
-from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
 from camkit.runtime.kinds.spad.finer.depth import FineSharpener
-from camkit.runtime.kinds.spad.finer.linear import linear_estimate
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
 from camkit.runtime.kinds.spad.finer.sampling import point_kernel
 from camkit.runtime.kinds.spad.hot_pixels import painted_over
+from camkit.runtime.kinds.spad.scatter import growth
 from camkit.runtime.kinds.spad.sharpen import Sharpened, Sharpener, Way
 
 BARE: Final = "bare"
@@ -65,12 +65,15 @@ class Ways:
         """Give way -> what it found of every sub-pixel."""
         way = Way(returns=len(shot.times_ps))
         nothing, no_dark = np.zeros_like(shot.blind), np.zeros(shot.blind.shape)
+        coarse = Sharpener(shot.axis, shot.pulse, way)
+        grown = _growth(coarse, shot)
 
         def finer(camera: FineCamera, size: str | None) -> Sharpened:
             fine = FineSharpener(camera, shot.axis, shot.pulse, way, size=size, always=True)
-            return fine.cube(shot.counts, no_dark, hot=nothing, blind=shot.blind).found
+            cube = fine.cube(shot.counts, no_dark, hot=nothing, blind=shot.blind, growth=grown)
+            return cube.found
 
-        alone = Sharpener(shot.axis, shot.pulse, way).strip(shot.counts, blind=shot.blind)
+        alone = coarse.strip(shot.counts, blind=shot.blind, growth=grown)
         found = {BICUBIC: self._upsampled(alone), LINEAR: finer(self.camera, None)}
         return found | {name: finer(*network) for name, network in self.networks.items()}
 
@@ -79,13 +82,9 @@ class Ways:
         return painted_over(frame, shot.hot) if shot.hot.any() else frame
 
     def _bare(self, frame: FloatArray) -> FloatArray:
-        stage = self.camera.stage
-        covariance = PictureCovariance(
-            contrast=stage.contrast, reach=stage.reach, exponent=stage.exponent
-        )
         photons = max(float(frame.mean(dtype=np.float64)), 0.0)
         side = self.camera.kernel.shape[0]
-        estimate = linear_estimate(point_kernel(side), self.camera.grid, covariance, photons)
+        estimate = self.camera.linear(photons, point_kernel(side))
         return np.asarray(np.maximum(estimate(frame[None])[0], 0), np.float32)
 
     def _upsampled(self, found: Sharpened) -> Sharpened:
@@ -98,3 +97,11 @@ class Ways:
             sigma_ps=found.sigma_ps.repeat(scale, axis=1).repeat(scale, axis=2),
             valid=found.valid.repeat(scale, axis=1).repeat(scale, axis=2),
         )
+
+
+def _growth(sharpener: Sharpener, shot: DepthShot) -> NDArray[np.float64] | None:
+    """Give (h, w) how much more counts scatter for pile-up; None where it took little."""
+    if shot.cycles == 0:
+        return None
+    flat = shot.counts.reshape(-1, shot.counts.shape[2])
+    return growth(sharpener.fitter, flat, shot.cycles).reshape(shot.blind.shape)

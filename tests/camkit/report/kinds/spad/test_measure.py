@@ -23,7 +23,7 @@ from camkit.report.kinds.spad.ways import NET, Way, read_baselines, ways_of
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from tests.spad_bundle import HEIGHT, PHASE, SCALE, WIDTH, write_spad_bundle
 
-ROLES = ("low_fill", "gaussian", "srcnn")
+ROLES = ("low_fill", "gaussian", "srcnn", "vdsr")
 SIGMA = 1.5
 
 
@@ -34,7 +34,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 @pytest.fixture(scope="module")
 def baselines(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    """Give the network of the tiny bundle in three roles."""
+    """Give the network of the tiny bundle in all roles but full_fill."""
     folder = tmp_path_factory.mktemp("baselines")
     one = write_spad_bundle(folder).manifest
     stages = (
@@ -42,6 +42,7 @@ def baselines(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
         SuperResolve(role="low_fill", gives=("low_fill",), sampling="low_fill"),
         SuperResolve(role="gaussian", gives=("gaussian",), sampling="gaussian", sigma=SIGMA),
         SuperResolve(role="srcnn", gives=("srcnn",)),
+        SuperResolve(role="vdsr", gives=("vdsr",)),
     )
     networks = dict.fromkeys(ROLES, one.networks["upscale"])
     parts = Parts(sensor=one.sensor, optics=one.optics, networks=networks)
@@ -79,11 +80,11 @@ def _picture_rows(bundle: Bundle, names: dict[str, FineCamera]) -> list[dict[str
 def test_every_method_is_judged_behind_every_sampling(bundle: Bundle, built_in: Bundle) -> None:
     del built_in
     found = read_baselines(FineCamera.of(bundle))
-    assert [skip.what for skip in found.skips] == ["network full_fill", "network vdsr"]
+    assert [skip.what for skip in found.skips] == ["network full_fill"]
     rows = _picture_rows(bundle, dict(found.cameras))
     methods = {(row["sampling"], row["method"], row["size"]) for row in rows}
     assert methods == {
-        *(("learned", name, None) for name in ("linear", "bicubic", "srcnn")),
+        *(("learned", name, None) for name in ("linear", "bicubic", "srcnn", "vdsr")),
         *(
             (s, m, None)
             for s in ("low_fill", "gaussian", "full_fill")
@@ -203,8 +204,9 @@ def test_baselines_of_another_array_are_left_out(
 
 
 def test_a_role_that_is_not_there_is_named(baselines: Bundle) -> None:
-    with pytest.raises(BundleError, match="no role 'vdsr'; it has low_fill, gaussian, srcnn"):
-        FineCamera.of(baselines, role="vdsr")
+    held = "low_fill, gaussian, srcnn, vdsr"
+    with pytest.raises(BundleError, match=f"no role 'full_fill'; it has {held}"):
+        FineCamera.of(baselines, role="full_fill")
 
 
 def test_baselines_themselves_are_not_benched(baselines: Bundle) -> None:

@@ -4,7 +4,6 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import torch
 
 from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.toml_table import key_line
@@ -54,14 +53,6 @@ network = "lean_s"
 config = { in_channels = 3 }
 
 """
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 def small_text(**thesis) -> str:

@@ -1,12 +1,17 @@
 """The array of a bundle: what it takes, its network's planes, photons in and out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from camkit.bundle.reader import open_bundle
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, network_planes, white_of
+from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
+from camkit.runtime.kinds.spad.finer.linear import linear_estimate
 from camkit.runtime.kinds.spad.finer.pictures import finer_frames
+from camkit.runtime.kinds.spad.finer.sampling import point_kernel
 from tests.bundle_factory import write_tiny_bundle
 from tests.spad_bundle import HEIGHT, WIDTH
 
@@ -59,6 +64,15 @@ def test_frames_without_photons_stay_dark(camera: FineCamera) -> None:
         fine = finer_frames(camera, frames, 0.0, size)
         assert (fine[1] == 0).all()
         assert fine[0].mean() == pytest.approx(frames[0].mean(), rel=0.03)
+
+
+def test_the_linear_estimate_is_that_of_the_stage_behind_any_kernel(camera: FineCamera) -> None:
+    stage = camera.stage.model_copy(update={"contrast": 0.3, "reach": 20.0, "exponent": 1.1})
+    other, point = replace(camera, stage=stage), point_kernel(camera.kernel.shape[0])
+    covariance = PictureCovariance(contrast=0.3, reach=20.0, exponent=1.1)
+    for kernel, found in ((camera.kernel, other.linear(40.0)), (point, other.linear(40.0, point))):
+        wanted = linear_estimate(kernel, camera.grid, covariance, 40.0)
+        np.testing.assert_array_equal(found.weights, wanted.weights)
 
 
 def test_white_is_never_chance_alone() -> None:

@@ -2,12 +2,15 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import camkit
-from camkit.bundle.reader import Bundle
+from camkit.bundle.reader import Bundle, built_in_bundles, open_bundle
+from camkit.bundle.sensor import SpadSensor
+from camkit.bundle.stages import Correct, Sharpen, SuperResolve
 from camkit.cli.app import run
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kind_parts.recording import RecordingOptions
@@ -17,8 +20,8 @@ from camkit.runtime.kinds.spad.proving import stage_set
 from camkit.runtime.kinds.spad.timing import LIGHT_M_PER_PS
 from camkit.runtime.kinds.spad.twin.scene import light_in_flight, light_of_depth
 from camkit.runtime.kinds.spad.twin.simulate import record, times_of
-from camkit.runtime.kinds.spad.twin.working import WORKING_POINTS
-from tests.spad_bundle import BINS, HEIGHT, SCALE, WIDTH
+from camkit.runtime.kinds.spad.twin.working import GATE_WIDTH_PS, STEP_PS, WORKING_POINTS
+from tests.spad_bundle import BINS, HEIGHT, SCALE, TIMES, WIDTH, write_spad_bundle
 
 FINE = (SCALE * HEIGHT, SCALE * WIDTH)
 
@@ -85,6 +88,39 @@ def test_the_same_seed_gives_the_same_counts(bundle: Bundle) -> None:
     assert (first == again).all()
     assert (first != other).any()
     assert first.mean() == pytest.approx(25.0, rel=0.1)
+
+
+def _even_counts(folder: Path, photons: float, **changes: Any) -> np.ndarray:
+    """Count even white with the array of a bundle that is changed."""
+    options = RecordingOptions(photons=photons, seed=3)
+    white = np.ones((3, *FINE), np.float32)
+    return record(white, write_spad_bundle(folder, **changes), options).values
+
+
+def test_pixels_that_see_all_of_themselves_collect_the_light_of_all_sub_pixels(
+    scene: Path, tmp_path: Path
+) -> None:
+    stages = (Correct(), SuperResolve(sampling="full_fill"), TIMES)
+    counts = _even_counts(tmp_path, 40, stages=stages)
+    assert counts.mean() == pytest.approx(16 * 40, rel=0.02)
+    full = write_spad_bundle(tmp_path, stages=stages)
+    cube = record(scene, full, RecordingOptions(photons=20, sbr=1, seed=3)).values
+    assert cube.sum(axis=0).mean() == pytest.approx(16 * 40, rel=0.02)
+
+
+def test_a_diode_that_is_blind_after_a_photon_loses_counts(bundle: Bundle, tmp_path: Path) -> None:
+    sensor = bundle.manifest.sensor
+    half = WORKING_POINTS["intensity"].time_s * 1e12 / 5000
+    blind = sensor.model_copy(update={"dead_time_ps": half})
+    assert _even_counts(tmp_path, 5000, sensor=blind).mean() == pytest.approx(2500, rel=0.01)
+
+
+def test_photons_are_those_counted_whatever_the_detection_efficiency(
+    bundle: Bundle, tmp_path: Path
+) -> None:
+    poor = bundle.manifest.sensor.model_copy(update={"detection_efficiency": 0.12})
+    counts, all_of_them = _even_counts(tmp_path, 900, sensor=poor), _even_counts(tmp_path, 900)
+    np.testing.assert_array_equal(counts, all_of_them)
 
 
 def test_light_in_flight_becomes_frames(bundle: Bundle, tmp_path: Path) -> None:
@@ -195,3 +231,12 @@ def test_the_working_points_are_those_of_the_prototype() -> None:
     assert WORKING_POINTS["high_speed"].rate_hz == pytest.approx(1250)
     assert WORKING_POINTS["intensity"].time_s == pytest.approx(5.2e-3)
     assert WORKING_POINTS["depth"].time_s == pytest.approx(0.078)
+
+
+def test_the_shipped_array_scans_and_detects_as_the_prototype_does() -> None:
+    manifest = open_bundle(built_in_bundles()["spad-sr"]).manifest
+    sensor, usual = manifest.sensor, manifest.stage(Sharpen)
+    assert isinstance(sensor, SpadSensor)
+    assert usual is not None
+    assert (sensor.time_bin_ps, usual.gate_width_ps) == (STEP_PS, GATE_WIDTH_PS) == (20, 200)
+    assert sensor.detection_efficiency == 0.12

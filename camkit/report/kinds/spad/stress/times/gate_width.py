@@ -23,11 +23,17 @@ def gate_like(stated: Pulse, *, width: float = 1.0, rc: float = 1.0) -> Pulse:
     return replace(stated, width_ps=width * stated.width_ps, rc_ps=rc * stated.rc_ps)
 
 
-def _shoot(judge: SpadJudge, scene: SpadScene, value: float) -> DepthShot:
+def scan_through(
+    judge: SpadJudge, scene: SpadScene, *, width: float = 1.0, rc: float = 1.0
+) -> DepthShot:
+    """Count surfaces through such a gate; the fit believes what the bundle states.
+
+    Raises:
+        UnsupportedError: If it states no gate.
+    """
     axis, stated = judge.studio.times()
-    return judge.scan(
-        scene, DepthSetting(pulse=gate_like(stated, width=value), believed=(axis, stated))
-    )
+    other = gate_like(stated, width=width, rc=rc)
+    return judge.scan(scene, DepthSetting(pulse=other, believed=(axis, stated)))
 
 
 SCENARIO = Scenario(
@@ -38,7 +44,7 @@ SCENARIO = Scenario(
     values=(0.5, 0.8, 0.9, 0.95, 0.98, 1.0, 1.02, 1.05, 1.1, 1.25, 2.0),
     nominal=1.0,
     quick=(0.9, 1.0, 1.1),
-    shoot=_shoot,
+    shoot=lambda judge, scene, value: scan_through(judge, scene, width=value),
     applies=has_times,
     log=True,
     note=f"All times move alike; [correction] offset_ps would take that off. {OF_DEPTH}",

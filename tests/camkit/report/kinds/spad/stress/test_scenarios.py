@@ -161,6 +161,19 @@ def test_pile_up_is_undone_before_it_is_judged(judge: SpadJudge, scene: SpadScen
     assert means[1] == pytest.approx(means[0], rel=0.05)
 
 
+def test_sigma_behind_the_correction_takes_in_that_its_counts_scatter_more(
+    judge: SpadJudge, scene: SpadScene
+) -> None:
+    """As of `camkit process`, which also leaves little pile-up alone."""
+    shot = judge.scan(scene, DepthSetting(chance=0.85))
+    found, without = (judge.ways.depths(s) for s in (shot, replace(shot, cycles=0)))
+    assert set(found) == {"bicubic", "linear", "S"}
+    for name, told in found.items():
+        wider = np.median(told.sigma_ps / without[name].sigma_ps)
+        assert wider > 1.05, name
+    assert judge.scan(scene, DepthSetting(chance=0.01)).cycles == 0
+
+
 def test_pictures_of_depth_and_light_are_grey_and_of_the_fine_grid(
     judge: SpadJudge, scene: SpadScene
 ) -> None:
