@@ -6,7 +6,7 @@
 [gate]        width_ps, rc_ps, jitter_ps (standard deviation)
 [laser]       fwhm_ps (full width), wavelength_nm
 [irf]         file: two columns, times in ps and values; mu is where the time is 0
-[array]       axes, key, stamp_ps, pitch_um, focal_length_mm
+[array]       axes, key, stamp_ps, pitch_um, focal_length_mm, bundle (the camera)
 [lifetime]    period_ps (of the laser, where what it excited before is still seen), from_ps, to_ps
               (bins that are fitted); for the product lifetime alone
 [correction]  offset_ps, dark (counts of a bin: a number, or an .npy map), hot (an .npy map)
@@ -82,6 +82,7 @@ class Array(_Table):
     stamp_ps: Positive | None = None
     pitch_um: Positive | None = None
     focal_length_mm: Positive | None = None
+    bundle: str | None = None
 
 
 class Lifetime(_Table):
@@ -241,9 +242,14 @@ TABLE_OF: Final[Mapping[str, str]] = {
     name: table
     for table, kind in TABLES.items()
     for name in kind.model_fields
-    if name not in {"file", "axes", "key", "hot", "dark"}
+    if name not in {"file", "axes", "key", "bundle", "hot", "dark"}
 }
 """Names that a capture may state of itself -> their tables."""
+
+
+def timing_beside(capture: Path) -> Path:
+    """Name the timing file that may lie beside a capture: NAME.TYPE.toml."""
+    return capture.with_name(capture.name + ".toml")
 
 
 def read_timing(path: Path) -> Timing:

@@ -41,6 +41,7 @@ class ArrayFile(CountsFile):
         kind: CountsKind | None = None,
         usual: str | None = "tyx",
         stated: Mapping[str, object] | None = None,
+        assumed: Mapping[str, object] | None = None,
         close: Callable[[], None] | None = None,
     ) -> None:
         """Look at an array.
@@ -51,7 +52,8 @@ class ArrayFile(CountsFile):
             hints: What the caller knows.
             kind: What it holds; None: times where it has three axes, else counts.
             usual: The axes that it has unless the caller says otherwise; None if that is not known.
-            stated: What is known of its times.
+            stated: What it says of its times.
+            assumed: What is usual of such files.
             close: Lets go of what it lies in.
 
         Raises:
@@ -59,6 +61,7 @@ class ArrayFile(CountsFile):
             ContractError: If its axes are not known.
         """
         self.path, self.stated, self._close = path, stated or {}, close or (lambda: None)
+        self.assumed = assumed or {}
         if values.dtype.kind not in "biuf" or values.dtype.itemsize > 8:
             raise DecodeError(f"{path.name} holds {values.dtype}; expected numbers")
         if len(values.shape) not in {2, 3}:

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -19,6 +20,8 @@ EXTRA: Final = 'pip install "camkit[spad]"'
 MOST_COUNT: Final = 2**24
 """Whole numbers up to here are exact in float32."""
 MOST_PIXELS: Final = 100_000_000
+ARRIVALS: Final[Mapping[str, object]] = MappingProxyType({"orientation": "histogram"})
+"""What is usual of files that hold when photons came."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +50,7 @@ class CountsFile(ABC):
         width: Pixels of a row.
         bins: Time bins, or frames; 0 for stamps.
         stated: What the file says of its times, by the names of the timing file.
+        assumed: What is usual of such files; what anyone states goes before.
     """
 
     path: Path
@@ -55,6 +59,7 @@ class CountsFile(ABC):
     width: int
     bins: int
     stated: Mapping[str, object]
+    assumed: Mapping[str, object] = MappingProxyType({})
 
     @property
     def outside(self) -> int:

@@ -7,24 +7,31 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.runtime.kinds.spad.timing import read_timing, timing_beside
+
 NAME: Final = "bundle"
-"""Key of an NPZ, attribute of the data set of an HDF5."""
+"""Key of an NPZ, attribute of the data set of an HDF5, name in a timing file beside the capture."""
 LONGEST: Final = 64
 
 
 def named_bundle(path: Path) -> str | None:
     """Give the name; None for files that name none, or cannot be read.
 
+    NPZ and HDF5 name it themselves, others in the timing file beside them.
+
     Reading the capture tells what is wrong with a file.
     """
     read = _READERS.get(path.suffix.lower())
-    if read is None:
-        return None
     try:
-        found = str(np.asarray(read(path)).item())
+        found = _beside(path) if read is None else str(np.asarray(read(path)).item())
     except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, ImportError):
         return None
     return found if 0 < len(found) <= LONGEST else None
+
+
+def _beside(path: Path) -> str:
+    beside = timing_beside(path)
+    return (read_timing(beside).array.bundle or "") if beside.is_file() else ""
 
 
 def _of_npz(path: Path) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kinds.spad.files.counts_file import CountsFile, checked_size
+from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, CountsFile, checked_size
 
 
 class StampsFile(CountsFile):
@@ -30,12 +30,12 @@ class StampsFile(CountsFile):
             path: Where they came from.
             shape: (h, w).
             cells: Row -> the stamps of each of its pixels, arrays of any shape.
-            stated: What is known of their times.
+            stated: What the file says of their times.
             close: Lets go of what they lie in.
         """
         self.path, self.kind, self.bins = path, "stamps", 0
         self.height, self.width = checked_size(path, *shape)
-        self.stated, self._close = {"orientation": "histogram", **(stated or {})}, close
+        self.stated, self.assumed, self._close = stated or {}, ARRIVALS, close
         self._cells = cells
         self._outside: dict[int, int] = {}
 

@@ -18,11 +18,13 @@ from camkit.runtime.kinds.spad.guess_pulse import guess_pulse
 from camkit.runtime.kinds.spad.products.settings import Product, Settings
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
-from camkit.runtime.kinds.spad.timing import Timing
+from camkit.runtime.kinds.spad.timing import Timing, timing_beside
 from camkit.runtime.maker import Making
 
 SAMPLE_ROWS: Final = 16
 """Rows, evenly spread, in which a pulse is looked for that nobody stated."""
+WHAT: Final = {"gate": "a scan with a gate", "histogram": "a histogram of arrivals"}
+"""Orientation -> what such a capture is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +39,7 @@ class Survey:
         rows: Its rows, pile-up undone.
         settings: What the caller chose.
         camera: The array of a bundle, whose products lie on its fine grid; None without one.
+        notes: What the user should know of how the capture was understood.
     """
 
     file: CountsFile
@@ -46,6 +49,7 @@ class Survey:
     rows: CorrectedRows
     settings: Settings
     camera: FineCamera | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -98,8 +102,9 @@ class Survey:
         """Give what the user should know of the capture itself, once its rows were read."""
         outside = self.file.outside
         if not outside:
-            return ()
-        return (f"{outside} time stamps lie outside the bins of [timing] and were left out",)
+            return self.notes
+        told = f"{outside} time stamps lie outside the bins of [timing] and were left out"
+        return (*self.notes, told)
 
     def _sample(self) -> FloatArray:
         height = self.file.height
@@ -117,16 +122,19 @@ def surveyed(making: Making) -> Iterator[Survey]:
         ContractError: If capture and options do not fit each other.
         BundleError: If the bundle makes no picture of photons finer.
     """
-    settings = Settings.of(making.options)
+    settings = Settings.of(making.options, Path(making.path))
     camera = None if making.bundle is None else FineCamera.of(making.bundle, making.threads)
     _check_finer(settings, camera)
     array = settings.timing.array
     hints = Hints(axes=array.axes, key=array.key, max_bytes=settings.max_mem_bytes // 4)
     with open_counts(Path(making.path), hints) as file:
         timing = settings.timing.with_stated(file.stated)
+        notes: tuple[str, ...] = ()
         if camera is not None:
             camera.check_shape((file.height, file.width))
+            notes = _surprise(file, timing, camera)
             timing = _with_bundle(timing, camera)
+        timing = timing.with_stated(file.assumed)
         product = settings.product_of(is_histogram=file.kind != "counts")
         axis = None if file.kind == "counts" else _axis(file, timing)
         yield Survey(
@@ -142,6 +150,7 @@ def surveyed(making: Making) -> Iterator[Survey]:
             ),
             settings=settings,
             camera=camera,
+            notes=() if product == "intensity" else notes,
         )
 
 
@@ -174,6 +183,18 @@ def _with_bundle(timing: Timing, camera: FineCamera) -> Timing:
     if timing.pulse() is not None:
         unwanted |= {"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"}
     return timing.with_stated({n: value for n, value in stated.items() if n not in unwanted})
+
+
+def _surprise(file: CountsFile, timing: Timing, camera: FineCamera) -> tuple[str, ...]:
+    """Tell that a bundle makes something else of a capture than is usual of such files."""
+    usual, own = file.assumed.get("orientation"), camera.stated_times().get("orientation")
+    if timing.timing.orientation is not None or None in (usual, own) or usual == own:
+        return ()
+    return (
+        f"{file.path.name} is taken as {WHAT[str(own)]}, as bundle {camera.bundle.manifest.name} "
+        f"states, though such files usually hold {WHAT[str(usual)]}; state [timing] orientation in "
+        f"a file for --timing, or in {timing_beside(file.path).name} beside it",
+    )
 
 
 def _axis(file: CountsFile, timing: Timing) -> TimeAxis:

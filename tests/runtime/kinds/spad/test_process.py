@@ -245,6 +245,18 @@ def test_a_change_of_the_timing_file_is_a_new_product(
     assert [status(), status()] == ["ok", "skipped"]
 
 
+def test_a_change_of_the_timing_file_beside_is_a_new_product(scan: Path, tmp_path: Path) -> None:
+    beside = scan.with_name("scan.npz.toml")
+    found = []
+    for first_ps in (0, 0, 100):
+        text = TIMING.replace("time_bin_ps", f"first_ps = {first_ps}\ntime_bin_ps")
+        beside.write_text(text, encoding="utf-8")
+        (result,) = camkit.process(scan, bundle="none", out_dir=tmp_path / "out", resume=True)
+        assert result.error is None
+        found.append(result.status)
+    assert found == ["ok", "skipped", "ok"]
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [

@@ -58,6 +58,45 @@ def test_times_come_back_from_every_type_of_file(
     assert made.record["finer"] == "net"
 
 
+@pytest.mark.parametrize("suffix", ["tif", "mat", "ptu"])
+def test_what_lies_beside_a_capture_is_taken_without_being_named(
+    scene: Path,
+    bundle: Bundle,
+    camera: FineCamera,
+    tmp_path: Path,
+    suffix: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / f"scan.{suffix}"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 400) == 0
+    assert named_bundle(out) == "tiny-spad"
+    made = camkit.load(str(bundle.path)).make(out)
+    assert np.nanmedian(np.abs(made.arrays["depth_m"] - stage_set(camera, 5))) < 0.003
+    assert (made.record["timing"], made.record["orientation"]) == (f"scan.{suffix}.toml", "gate")
+    assert not any("is taken as" in told for told in made.warnings)
+    capsys.readouterr()
+    assert run(["plan", str(out), "--bundle", str(bundle.path), "--product", "depth"]) == 0
+    assert f"timing: scan.{suffix}.toml (lies beside the capture)" in capsys.readouterr().out
+
+
+def test_a_bundle_goes_before_what_is_usual_of_a_type_of_file(
+    scene: Path, bundle: Bundle, camera: FineCamera, tmp_path: Path
+) -> None:
+    """A PTU is mostly a histogram of arrivals, but the array behind the plate has a gate."""
+    out = tmp_path / "scan.ptu"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 400) == 0
+    beside = out.with_name("scan.ptu.toml")
+    beside.unlink()
+    made = camkit.load(str(bundle.path)).make(out)
+    assert np.nanmedian(np.abs(made.arrays["depth_m"] - stage_set(camera, 5))) < 0.003
+    told = " ".join(made.warnings)
+    assert "scan.ptu is taken as a scan with a gate, as bundle tiny-spad states" in told
+    beside.write_text('[timing]\norientation = "histogram"\n', encoding="utf-8")
+    stated = camkit.load(str(bundle.path)).make(out)
+    assert stated.record["orientation"] == "histogram"
+    assert not any("is taken as" in told for told in stated.warnings)
+
+
 def test_a_picture_gives_counts_that_name_their_bundle(
     bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
