@@ -23,6 +23,7 @@ from camkit.runtime.maker import Making
 
 SAMPLE_ROWS: Final = 16
 """Rows, evenly spread, in which a pulse is looked for that nobody stated."""
+PULSE: Final = frozenset({"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"})
 WHAT: Final = {"gate": "a scan with a gate", "histogram": "a histogram of arrivals"}
 """Orientation -> what such a capture is."""
 
@@ -177,11 +178,8 @@ def _check_finer(settings: Settings, camera: FineCamera | None) -> None:
 def _with_bundle(timing: Timing, camera: FineCamera) -> Timing:
     """Give what is known of times, with what the bundle says where nobody else does."""
     stated = {"pitch_um": camera.sensor.pixel_pitch_um, **camera.stated_times()}
-    unwanted: set[str] = set()
-    if timing.timing.time_bin_ps is not None or timing.timing.bin_edges_ps is not None:
-        unwanted |= {"time_bin_ps", "first_ps"}
-    if timing.pulse() is not None:
-        unwanted |= {"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"}
+    # a measured pulse stands for gate and laser together
+    unwanted = PULSE if timing.irf.file is not None else frozenset()
     return timing.with_stated({n: value for n, value in stated.items() if n not in unwanted})
 
 

@@ -97,6 +97,25 @@ def test_a_bundle_goes_before_what_is_usual_of_a_type_of_file(
     assert not any("is taken as" in told for told in stated.warnings)
 
 
+def test_what_is_stated_leaves_the_rest_of_the_bundle(
+    scene: Path, bundle: Bundle, camera: FineCamera, tmp_path: Path
+) -> None:
+    """Another laser is no other gate, and another width of bins no other beginning."""
+    out, timing = tmp_path / "scan.mat", tmp_path / "t.toml"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 400) == 0
+    text = '[array]\naxes = "yxt"\n[timing]\ntime_bin_ps = 20\n'
+    timing.write_text(text + "[laser]\nfwhm_ps = 90\n", encoding="utf-8")
+    made = camkit.load(str(bundle.path), timing=timing).make(out)
+    told = dict(made.record["pulse"])
+    assert told.pop("sigma_ps") == pytest.approx(np.hypot(42.5, 90 / 2.3548))
+    assert told == {"width_ps": 200.0, "rc_ps": 60.0, "guessed": False}
+    assert np.nanmedian(np.abs(made.arrays["depth_m"] - stage_set(camera, 5))) < 0.003
+    (tmp_path / "irf.csv").write_text("-40 0\n0 1\n40 0\n", encoding="utf-8")
+    timing.write_text(text + '[irf]\nfile = "irf.csv"\n', encoding="utf-8")
+    measured = camkit.load(str(bundle.path), timing=timing).make(out)
+    assert measured.record["pulse"]["measured_to_ps"] == pytest.approx(40)
+
+
 def test_a_picture_gives_counts_that_name_their_bundle(
     bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
