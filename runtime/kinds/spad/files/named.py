@@ -1,12 +1,14 @@
 """The bundle that a capture itself names, as simulated ones do."""
 
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from camkit.errors import CamkitError
+from camkit.runtime.kinds.spad.files.hdf5 import BROKEN
+from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.timing import read_timing, timing_beside
 
 NAME: Final = "bundle"
@@ -21,12 +23,17 @@ def named_bundle(path: Path) -> str | None:
 
     Reading the capture tells what is wrong with a file.
     """
-    read = _READERS.get(path.suffix.lower())
+    read = _READERS.get(path.suffix.lower(), _beside)
     try:
-        found = _beside(path) if read is None else str(np.asarray(read(path)).item())
-    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, ImportError):
+        found = np.asarray(read(path))
+    except (CamkitError, ImportError, MemoryError, *BROKEN):
         return None
-    return found if 0 < len(found) <= LONGEST else None
+    if found.dtype.kind not in "US" or found.size != 1:
+        return None
+    name = found.item()
+    if isinstance(name, bytes):
+        name = name.decode("utf-8", "replace")
+    return name if 0 < len(name) <= LONGEST else None
 
 
 def _beside(path: Path) -> str:
@@ -35,8 +42,7 @@ def _beside(path: Path) -> str:
 
 
 def _of_npz(path: Path) -> Any:
-    with np.load(path, allow_pickle=False) as file:
-        return file[NAME]
+    return read_npz(path, names=(NAME,)).get(NAME, "")
 
 
 def _of_hdf5(path: Path) -> Any:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.counts_file import Hints
+from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from tests.spad_files import AXES, STAMPS, WRITERS, small_cube
 
@@ -180,6 +181,25 @@ def test_a_zip_must_hold_one_sdt(tmp_path: Path) -> None:
                 archive.writestr(name, "x")
         with pytest.raises(DecodeError, match=rf"must hold one \.sdt file; it holds {told}"):
             open_counts(tmp_path / "a.zip", Hints())
+
+
+def test_a_name_that_announces_more_than_it_holds_is_none(tmp_path: Path) -> None:
+    """A batch asks every file for its bundle before any work, so none may stop it there."""
+    sound, lying, torn = (tmp_path / f"{name}.npz" for name in ("sound", "lying", "torn"))
+    np.savez(sound, counts=np.ones((9, 9)), bundle="spad-sr")
+    assert named_bundle(sound) == "spad-sr"
+    with zipfile.ZipFile(lying, "w") as archive:
+        archive.writestr("bundle.npy", _npy((10**13,), "<U7"))
+    np.savez_compressed(torn, bundle=np.array(["spad-sr"] * 1000))
+    data = bytearray(torn.read_bytes())
+    data[80:120] = b"\xff" * 40
+    torn.write_bytes(data)
+    with h5py.File(tmp_path / "none.h5", "w") as file:
+        file.attrs["bundle"] = h5py.Empty("S1")
+        file.create_dataset("counts", data=np.ones((9, 9))).attrs["bundle"] = np.bytes_("spad-sr")
+    for name in (lying, torn):
+        assert named_bundle(name) is None
+    assert named_bundle(tmp_path / "none.h5") == "spad-sr"
 
 
 def test_data_that_lie_in_other_files_are_refused(tmp_path: Path) -> None:
