@@ -69,10 +69,11 @@ def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
     channels = len(file.active_channels)
     channel = _channel(path, channels, hints)
     size = float(np.prod(file.shape[1:], dtype=np.float64)) * COUNT_BYTES
+    size += int(file.number_records) * RECORD_BYTES
     if size > TIMES * hints.max_bytes:
         raise ContractError(
-            f"{path.name} unpacks to {size / 1e9:.3g} GB, and such files are read whole; raise "
-            "--max-mem, or save its histograms as HDF5"
+            f"{path.name}, {file.number_records} photons and markers, takes {size / 1e9:.3g} GB, "
+            "and such files are read whole; raise --max-mem, or save its histograms as .h5 or .npz"
         )
     if not file.is_image:
         found = np.asarray(file.decode_histogram(dtype="uint32"))

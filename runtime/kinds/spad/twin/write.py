@@ -21,6 +21,8 @@ from camkit.runtime.output.part_file import atomic_output
 
 CYCLE: Final = 2
 """Of a PTU: the laser's period over the time that all bins take."""
+MOST_STAMPS: Final = 50_000_000
+"""Photons of a PTU, 200 MB."""
 
 
 def write_recorded(path: Path, recorded: Recorded) -> None:
@@ -100,6 +102,12 @@ def _write_ptu(path: Path, recorded: Recorded) -> None:
     bin_ps = recorded.stated.get("time_bin_ps")
     if recorded.values.ndim != 3 or bin_ps is None:
         raise ContractError("a PTU holds times of photons; write counts as NPZ, HDF5, TIFF or MAT")
+    stamps = int(recorded.values.sum(dtype=np.int64))
+    if stamps > MOST_STAMPS:
+        raise ContractError(
+            f"a PTU holds every photon by itself: {stamps} of them, more than {MOST_STAMPS}; write "
+            "the histogram as .npz or .h5, or take fewer photons"
+        )
     cube = np.ascontiguousarray(recorded.values.transpose(1, 2, 0))
     period_s = CYCLE * cube.shape[2] * bin_ps * 1e-12
     ptufile.imwrite(path, _small(cube), period_s, bin_ps * 1e-12)

@@ -204,6 +204,14 @@ def test_a_cube_beyond_memory_is_not_held(tmp_path: Path) -> None:
         open_counts(tmp_path / "a.mat", Hints(axes="tyx", max_bytes=100_000))
 
 
+def test_more_photons_than_fit_into_memory_are_refused(tmp_path: Path) -> None:
+    WRITERS["scan.ptu"](tmp_path / "a.ptu", 30 * small_cube())
+    with pytest.raises(ContractError, match=r"a.ptu, \d{5} photons and markers.*\.h5 or \.npz"):
+        open_counts(tmp_path / "a.ptu", Hints(max_bytes=100_000))
+    with open_counts(tmp_path / "a.ptu", Hints(max_bytes=400_000)) as file:
+        assert file.rows(0, HEIGHT).sum() == 30 * small_cube().sum()
+
+
 def test_fortran_order_and_big_endian_are_read(tmp_path: Path) -> None:
     cube = np.asfortranarray(small_cube().astype(">i4"))
     write_npz(tmp_path / "a.npz", cube)

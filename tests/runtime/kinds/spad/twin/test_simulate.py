@@ -167,6 +167,8 @@ def test_light_in_flight_becomes_frames(bundle: Bundle, tmp_path: Path) -> None:
         (("-o", "x.npz", "--iso", "200"), "--iso means nothing to bundle tiny-spad"),
         (("-o", "x.npz", "--photons", "0"), "photons must be a number > 0"),
         (("-o", "x.ptu"), "a PTU holds times of photons"),
+        (("-o", "x.npz", "--photons", "1e10"), "captures hold at most 16777216; take fewer"),
+        (("-o", "x.npz", "--photons", "1e20"), "captures hold at most 16777216; take fewer"),
     ],
 )
 def test_what_cannot_be_recorded_is_said_in_one_line(
@@ -181,6 +183,15 @@ def test_what_cannot_be_recorded_is_said_in_one_line(
     assert _simulate("procedural:1", "--bundle", bundle.path, *words) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_photons_are_stored_one_by_one_only_where_they_are_few(
+    scene: Path, bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "scan.ptu"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 1e6) == 2
+    assert "more than 50000000; write the histogram as .npz or .h5" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.npz"]
 
 
 def test_files_that_exist_are_kept(
