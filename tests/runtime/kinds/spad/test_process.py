@@ -330,6 +330,22 @@ def test_the_plan_says_what_would_be_done(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_plan_of_a_capture_in_this_folder_is_told(
+    scan: Path, timing: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It writes nothing, so it overwrites nothing; process would."""
+    monkeypatch.chdir(scan.parent)
+    words = (scan.name, "--bundle", "none", "--timing", timing)
+    for command in (("plan", *words), ("process", *words, "--dry-run")):
+        assert _command(*command) == 0
+        told = capsys.readouterr().out
+        assert "product: depth" in told
+        assert "note: process would refuse to overwrite the capture itself" in told
+    assert _command("process", *words) == 2
+    assert "scan.npz would overwrite itself" in " ".join(capsys.readouterr().err.split())
+    assert [path.name for path in scan.parent.iterdir()] == ["scan.npz"]
+
+
 def test_zipped_histograms_are_named_without_their_type(tmp_path: Path) -> None:
     write_sdt_zip(tmp_path / "cells.sdt.zip", small_cube())
     (result,) = camkit.process(
