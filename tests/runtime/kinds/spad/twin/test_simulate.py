@@ -1,6 +1,8 @@
 """A scene through `camkit simulate` into every type of file, and back by `camkit process`."""
 
+import io
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -225,6 +227,36 @@ def test_scenes_of_another_array_or_of_nothing_are_refused(bundle: Bundle, tmp_p
     (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
     with pytest.raises(DecodeError, match="cannot read the scene"):
         record(tmp_path / "broken.npz", bundle, options)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"depth_m": np.full(FINE, "far")},
+        {"albedo": np.full(FINE, 1 + 2j)},
+        {"transient": np.full((BINS, 8, 8), "light")},
+    ],
+)
+def test_scenes_of_what_is_no_number_are_refused(
+    bundle: Bundle, tmp_path: Path, changes: dict[str, np.ndarray]
+) -> None:
+    path = tmp_path / "scene.npz"
+    np.savez(path, **{"depth_m": np.ones(FINE), "albedo": np.ones(FINE), **changes})
+    (name,) = changes
+    with pytest.raises(DecodeError, match=rf"scene.npz: {name} holds .*; expected real numbers"):
+        record(path, bundle, RecordingOptions(photons=10))
+
+
+def test_a_scene_that_announces_more_than_it_holds_is_refused(
+    bundle: Bundle, tmp_path: Path
+) -> None:
+    header = io.BytesIO()
+    facts = {"descr": "<f8", "fortran_order": False, "shape": (10**7, 10**7)}
+    np.lib.format.write_array_header_1_0(header, facts)
+    with zipfile.ZipFile(tmp_path / "scene.npz", "w") as archive:
+        archive.writestr("depth_m.npy", header.getvalue() + bytes(800))
+    with pytest.raises(DecodeError, match=r"cannot read the scene .*has only \d+ bytes"):
+        record(tmp_path / "scene.npz", bundle, RecordingOptions(photons=10))
 
 
 def test_light_of_a_surface_is_its_albedo_at_its_time(camera: FineCamera) -> None:
