@@ -14,6 +14,7 @@ from camkit.runtime.kinds.spad.files.counts_file import (
     CountsKind,
     Hints,
     axes_of,
+    checked_bins,
     checked_counts,
     checked_size,
 )
@@ -57,7 +58,7 @@ class ArrayFile(CountsFile):
             close: Lets go of what it lies in.
 
         Raises:
-            DecodeError: If it holds no numbers, or has no pixels.
+            DecodeError: If it holds no numbers, has no pixels, or more bins than any capture.
             ContractError: If its axes are not known.
         """
         self.path, self.stated, self._close = path, stated or {}, close or (lambda: None)
@@ -74,10 +75,9 @@ class ArrayFile(CountsFile):
         self._values = values
         sizes = dict(zip(self._axes, values.shape, strict=True))
         self.height, self.width = checked_size(path, sizes["y"], sizes["x"])
-        self.bins = sizes.get("t", 1)
-        if self.bins < 1:
-            raise DecodeError(f"{path.name} has no time bins")
         self.kind = kind or ("counts" if is_flat else "histogram")
+        pixels = self.height * self.width
+        self.bins = checked_bins(path, sizes.get("t", 1), pixels, self.kind)
 
     def rows(self, top: int, bottom: int, edges: NDArray[np.float64] | None = None) -> FloatArray:
         """Read some rows; see `CountsFile`."""

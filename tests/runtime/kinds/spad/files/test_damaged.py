@@ -183,6 +183,24 @@ def test_a_zip_must_hold_one_sdt(tmp_path: Path) -> None:
             open_counts(tmp_path / "a.zip", Hints())
 
 
+@pytest.mark.parametrize(
+    ("name", "shape", "told"),
+    [
+        ("histogram", (2**42, 4, 4), "has 4398046511104 time bins; expected at most 100000"),
+        ("histogram", (100_000, 400, 400), "expected at most 10000000000 counts in all"),
+        ("counts", (2**42, 4, 4), "holds 4398046511104 frames of 16 pixels; expected at most"),
+    ],
+)
+def test_arrays_beyond_any_capture_are_refused(
+    tmp_path: Path, name: str, shape: tuple[int, ...], told: str
+) -> None:
+    """A sparse data set announces in a few bytes what no memory holds."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset(name, shape, "u1", chunks=(64, 4, 4))
+    with pytest.raises(DecodeError, match=told):
+        open_counts(tmp_path / "a.h5", Hints())
+
+
 def test_a_name_that_announces_more_than_it_holds_is_none(tmp_path: Path) -> None:
     """A batch asks every file for its bundle before any work, so none may stop it there."""
     sound, lying, torn = (tmp_path / f"{name}.npz" for name in ("sound", "lying", "torn"))
