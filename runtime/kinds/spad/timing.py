@@ -224,8 +224,7 @@ class Timing(_Table):
         for name, value in stated.items():
             if name in TABLE_OF:
                 table = tables.setdefault(TABLE_OF[name], {})
-                is_numpy = isinstance(value, np.ndarray | np.generic)
-                table.setdefault(name, np.asarray(value).tolist() if is_numpy else value)
+                table.setdefault(name, _plain(name, value))
         return _checked(tables, self.folder, "what the capture states of itself")
 
 
@@ -245,6 +244,8 @@ TABLE_OF: Final[Mapping[str, str]] = {
     if name not in {"file", "axes", "key", "bundle", "hot", "dark"}
 }
 """Names that a capture may state of itself -> their tables."""
+WHOLE: Final = frozenset({"bins", "cycles"})
+"""Names of whole numbers."""
 
 
 def timing_beside(capture: Path) -> Path:
@@ -265,6 +266,15 @@ def read_timing(path: Path) -> Timing:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ContractError(f"timing {path} is not valid TOML: {error}") from error
     return _checked(tables, path.parent, f"timing {path}")
+
+
+def _plain(name: str, value: object) -> object:
+    """Give a stated value as TOML would; most files know no whole numbers, only floats."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = np.asarray(value).tolist()
+    if name in WHOLE and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value
 
 
 def _checked(tables: Mapping[str, Any], folder: Path, what: str) -> Timing:

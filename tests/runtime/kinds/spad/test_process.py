@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import h5py
 import numpy as np
 import pytest
+import scipy.io
 import tifffile
 
 import camkit
@@ -186,6 +188,18 @@ def test_every_type_of_file_is_a_capture(name: str, tmp_path: Path) -> None:
     assert result.output == tmp_path / "out" / (name.split(".", maxsplit=1)[0] + ".npz")
     found = np.load(result.output)
     assert np.nanmedian(found["time_of_flight_ps"]) == pytest.approx(400, abs=8)
+
+
+def test_whole_floats_of_every_type_of_file_are_cycles(tmp_path: Path) -> None:
+    stated = {"orientation": "gate", "time_bin_ps": 20.0, "cycles": 78_000.0, "fwhm_ps": 100.0}
+    np.savez(tmp_path / "a.npz", histogram=small_cube(), **stated)
+    scipy.io.savemat(tmp_path / "b.mat", {"histogram": small_cube(), **stated})
+    with h5py.File(tmp_path / "c.h5", "w") as file:
+        file.create_dataset("histogram", data=small_cube()).attrs.update(stated)
+    pipeline = camkit.load(None, kind="spad")
+    for name in ("a.npz", "b.mat", "c.h5"):
+        (told,) = [d for d in pipeline.plan(tmp_path / name)["decisions"] if d["what"] == "pile-up"]
+        assert told["reason"] == "78000 cycles are stated"
 
 
 def test_time_stamps_that_lie_outside_are_told(tmp_path: Path) -> None:
