@@ -168,6 +168,17 @@ def test_what_a_file_states_of_its_times_is_taken(tmp_path: Path) -> None:
             assert file.assumed == {"orientation": "histogram"}
 
 
+def test_null_data_sets_beside_a_cube_are_left_out(tmp_path: Path) -> None:
+    write_h5(tmp_path / "a.h5", small_cube())
+    with h5py.File(tmp_path / "a.h5", "r+") as made:
+        made["remark"] = h5py.Empty("S1")
+        made["first_ps"] = h5py.Empty("f8")
+        made.attrs["cycles"] = h5py.Empty("f8")
+    with open_counts(tmp_path / "a.h5", Hints()) as file:
+        assert file.stated == {"time_bin_ps": 20.0}
+        np.testing.assert_array_equal(file.rows(0, HEIGHT), small_cube().transpose(1, 2, 0))
+
+
 def test_among_several_variables_one_is_chosen(tmp_path: Path) -> None:
     cubes = {"first": small_cube(1), "second": small_cube(2)}
     np.savez(tmp_path / "a.npz", **cubes)
