@@ -71,7 +71,7 @@ class ArrayFile(CountsFile):
                 "or rows and columns"
             )
         is_flat = len(values.shape) == 2
-        self._axes = axes_of(path, values.shape, hints, "yx" if is_flat else usual)
+        self.axes = self._axes = axes_of(path, values.shape, hints, "yx" if is_flat else usual)
         self._values = values
         sizes = dict(zip(self._axes, values.shape, strict=True))
         self.height, self.width = checked_size(path, sizes["y"], sizes["x"])

@@ -54,6 +54,8 @@ class CountsFile(ABC):
         bins: Time bins, or frames; 0 for stamps.
         stated: What the file says of its times, by the names of the timing file.
         assumed: What is usual of such files; what anyone states goes before.
+        axes: Letters t, y, x in the order of the file's array, as a caller would state them; empty
+            where nobody can.
     """
 
     path: Path
@@ -63,6 +65,7 @@ class CountsFile(ABC):
     bins: int
     stated: Mapping[str, object]
     assumed: Mapping[str, object] = MappingProxyType({})
+    axes: str = ""
 
     @property
     def outside(self) -> int:

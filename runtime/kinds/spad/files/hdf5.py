@@ -70,7 +70,9 @@ def _opened(path: Path, file: Any, hints: Hints, *, is_matlab: bool) -> CountsFi
         axes = hints.axes
         hints = replace(hints, axes=None if axes is None else axes[::-1])
         usual = None if usual is None else usual[::-1]
-    return ArrayFile(path, chosen, hints, kind=kind, usual=usual, stated=stated, close=file.close)
+    found = ArrayFile(path, chosen, hints, kind=kind, usual=usual, stated=stated, close=file.close)
+    found.axes = found.axes[::-1] if is_matlab else found.axes
+    return found
 
 
 def _is_cube(item: Any) -> bool:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import permutations
 from pathlib import Path
 from typing import Final
 
@@ -132,7 +133,7 @@ def surveyed(making: Making) -> Iterator[Survey]:
         timing = settings.timing.with_stated(file.stated)
         notes: tuple[str, ...] = ()
         if camera is not None:
-            camera.check_shape((file.height, file.width))
+            _check_shape(file, camera)
             notes = _surprise(file, timing, camera)
             timing = _with_bundle(timing, camera)
         timing = timing.with_stated(file.assumed)
@@ -173,6 +174,27 @@ def _check_finer(settings: Settings, camera: FineCamera | None) -> None:
         )
     if camera is not None and (settings.size is not None or settings.finer == "net"):
         camera.size(settings.size)
+
+
+def _check_shape(file: CountsFile, camera: FineCamera) -> None:
+    """Refuse a capture of another array, and say so if its axes are only in another order.
+
+    Raises:
+        ContractError: If it is none of this array.
+    """
+    try:
+        camera.check_shape((file.height, file.width))
+    except ContractError as error:
+        sizes = {"y": file.height, "x": file.width, "t": file.bins}
+        shape = [sizes[axis] for axis in file.axes]
+        for axes in permutations(file.axes):
+            turned = dict(zip(axes, shape, strict=True))
+            if (turned["y"], turned["x"]) == (camera.sensor.height_px, camera.sensor.width_px):
+                raise ContractError(
+                    f"{error}; or, if its axes are in another order, [array] axes = "
+                    f'"{"".join(axes)}" in a file for --timing'
+                ) from error
+        raise
 
 
 def _with_bundle(timing: Timing, camera: FineCamera) -> Timing:

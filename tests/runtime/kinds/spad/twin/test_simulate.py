@@ -5,8 +5,10 @@ import json
 import zipfile
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+import scipy.io
 
 import camkit
 from camkit.bundle.reader import Bundle
@@ -116,6 +118,23 @@ def test_what_is_stated_leaves_the_rest_of_the_bundle(
     timing.write_text(text + '[irf]\nfile = "irf.csv"\n', encoding="utf-8")
     measured = camkit.load(str(bundle.path), timing=timing).make(out)
     assert measured.record["pulse"]["measured_to_ps"] == pytest.approx(40)
+
+
+@pytest.mark.parametrize("suffix", ["mat", "h5"])
+def test_axes_in_another_order_are_named_where_they_would_fit(
+    bundle: Bundle, tmp_path: Path, suffix: str
+) -> None:
+    path, cube = tmp_path / f"a.{suffix}", np.ones((HEIGHT, WIDTH, BINS), np.uint16)
+    if suffix == "mat":
+        scipy.io.savemat(path, {"histogram": cube})
+    else:
+        with h5py.File(path, "w") as file:
+            file["histogram"] = cube
+    with pytest.raises(ContractError, match=rf"has {BINS}x{WIDTH} pixels.*axes = \"yxt\" in a"):
+        camkit.load(str(bundle.path)).make(path)
+    np.savez(tmp_path / "b.npz", histogram=np.ones((BINS, 9, 9), np.uint16))
+    with pytest.raises(ContractError, match=r"has 9x9 pixels.*say --bundle none$"):
+        camkit.load(str(bundle.path)).make(tmp_path / "b.npz")
 
 
 def test_a_picture_gives_counts_that_name_their_bundle(
