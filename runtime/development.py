@@ -200,7 +200,7 @@ def develop_file(
             work.record["estimate"] = estimate.compare(total_s, result.peak_rss_mb)
         record = {
             **result.to_json(),
-            **identity_of(capture.sha256, pipeline, write, mosaic),
+            **identity_of(source, capture.sha256, pipeline, write, mosaic),
             "output_sha256": output_sha256,
             "plan": work.record,
             "clipped_fraction": work.clipped_fraction,
@@ -225,7 +225,7 @@ def proved_done(
     if not (source.is_file() and target.is_file() and sidecar_path(target).is_file()):
         return False
     record = read_sidecar(target)
-    wanted = identity_of(file_sha256(source), pipeline, write, mosaic)
+    wanted = identity_of(source, file_sha256(source), pipeline, write, mosaic)
     if record is None or any(record.get(key) != value for key, value in wanted.items()):
         return False
     if record.get("output_sha256") != file_sha256(target):
@@ -242,6 +242,7 @@ def _are_whole(target: Path, hashes: Any) -> bool:
 
 
 def identity_of(
+    source: Path,
     input_sha256: str | None,
     pipeline: Pipeline,
     write: WriteOptions,
@@ -262,7 +263,7 @@ def identity_of(
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
     chosen["of_kind"] = dict(pipeline.options.of_kind)
     if pipeline.maker is not None:
-        chosen["of_kind"] |= pipeline.maker.identity(pipeline.options)
+        chosen["of_kind"] |= pipeline.maker.identity(pipeline.options, source)
     identity = {
         "camkit": __version__,
         "input_sha256": input_sha256,

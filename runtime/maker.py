@@ -105,8 +105,8 @@ class Maker:
         beside: Options -> suffixes of the files that may appear beside it.
         formats: What --format may say, each with its suffix.
         methods: What --method may say.
-        identity: Options -> what decides the products beyond the options themselves, such as the
-            content of a file that they name; plain JSON values.
+        identity: (options, capture's file) -> what decides the products beyond these two, such as
+            the content of a file that the options name; plain JSON values.
         with_bundle: Names of the options that mean something with a bundle alone.
         named: A capture's file -> the bundle that it names; None if it names none.
         stem: A capture's file -> the name of its products, without suffix.
@@ -118,7 +118,7 @@ class Maker:
     beside: Callable[[Options], tuple[str, ...]]
     formats: Mapping[str, str]
     methods: tuple[str, ...]
-    identity: Callable[[Options], Mapping[str, Any]]
+    identity: Callable[[Options, Path], Mapping[str, Any]]
     with_bundle: frozenset[str] = frozenset()
     named: Callable[[Path], str | None] = _nameless
     stem: Callable[[Path], str] = _stem

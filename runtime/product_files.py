@@ -58,7 +58,7 @@ def make_file(
         )
         record = {
             **result.to_json(),
-            **identity_of(file_sha256(source), pipeline, write, None),
+            **identity_of(source, file_sha256(source), pipeline, write, None),
             "output_sha256": main,
             "beside_sha256": dict(zip(list(files)[1:], beside, strict=True)),
             "plan": dict(made.record),

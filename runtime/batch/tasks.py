@@ -44,6 +44,12 @@ class Task:
         """Give every file that may appear, the main one first."""
         return (self.target, *self.beside)
 
+    @property
+    def own(self) -> tuple[Path, ...]:
+        """Give the files among these that are the capture itself."""
+        source = self.source.resolve()
+        return tuple(path for path in self.files if path.resolve() == source)
+
 
 def list_tasks(
     sources: Sequence[Path],
@@ -52,6 +58,7 @@ def list_tasks(
     write: WriteOptions,
     options: Options | None = None,
     kind: Kind | None = None,
+    writes: bool = True,
 ) -> list[Task]:
     """Decide bundle and outputs of every input, and refuse what cannot be before any work.
 
@@ -61,10 +68,12 @@ def list_tasks(
         write: Where and how to write.
         options: What changes the products, of which those of a kind say what kind a capture is.
         kind: Of the bundle that is named; None without one.
+        writes: False for a plan, which may name the input itself as an output.
 
     Raises:
-        ContractError: If two inputs would give one output, an output exists (and neither resume
-            nor overwrite was asked for), or no input names a bundle.
+        ContractError: If an input would overwrite itself, two inputs would give one output, an
+            output exists (and neither resume nor overwrite was asked for), or no input names a
+            bundle.
     """
     folders = _folders(sources, write)
     made = options or Options()
@@ -74,6 +83,8 @@ def list_tasks(
         for source, folder, maker in zip(sources, folders, makers, strict=True)
     ]
     sound = [t for t in tasks if t.refusal is None]
+    if writes:
+        _refuse_themselves(sound)
     _refuse_clashes(sound)
     nameless = [t for t in tasks if t.refusal is not None and t.refusal.endswith(_NAMELESS)]
     if nameless and not sound:
@@ -81,7 +92,7 @@ def list_tasks(
         raise ContractError(
             f"no file names a bundle ({names}); say --bundle NAME, or --bundle none to develop only"
         )
-    existing = [path for t in sound for path in t.files if path.exists()]
+    existing = [p for t in sound for p in t.files if p.exists() and p not in t.own]
     if existing and not (write.resume or write.overwrite):
         listed = ", ".join(map(str, existing[:5]))
         raise ContractError(
@@ -141,15 +152,17 @@ def state_of(path: Path) -> tuple[int, int] | None:
     return found.st_mtime_ns, found.st_size
 
 
+def _refuse_themselves(tasks: Sequence[Task]) -> None:
+    for task in tasks:
+        if task.own:
+            raise ContractError(f"{task.source} would overwrite itself; choose another --out-dir")
+
+
 def _refuse_clashes(tasks: Sequence[Task]) -> None:
     owners: dict[Path, Path] = {}
     for task in tasks:
         for path in task.files:
             target = path.resolve()
-            if target == task.source.resolve():
-                raise ContractError(
-                    f"{task.source} would overwrite itself; choose another --out-dir"
-                )
             if target in owners:
                 raise ContractError(
                     f"{owners[target]} and {task.source} would both give {path}; "

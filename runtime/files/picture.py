@@ -47,6 +47,8 @@ MOSAIC_ADVICE: Final = (
     "if it is a Bayer mosaic, say --mosaic RGGB --black-level N --white-level N "
     "(RGGB, BGGR, GRBG or GBRG at the top-left pixel)"
 )
+COUNTS_SUFFIXES: Final = (".tif", ".tiff")
+COUNTS_ADVICE: Final = "if it counts single photons, say --product intensity, or depth"
 FAINT: Final = 0.01
 """Negative samples up to this share of the brightest are noise."""
 _JPEG_MAGIC: Final = b"\xff\xd8"
@@ -80,7 +82,10 @@ def read_picture(path: Path, *, keep_codes: bool = False) -> Capture:
     picture = _decode(path)
     samples, notes = picture.samples, [*picture.notes]
     if samples.ndim == 2 and not _is_exr(path):
-        raise DecodeError(f"expected an RGB picture, got a single channel; {MOSAIC_ADVICE}")
+        counted = f"; {COUNTS_ADVICE}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
+        raise DecodeError(
+            f"expected an RGB picture, got a single channel; {MOSAIC_ADVICE}{counted}"
+        )
     if samples.ndim == 2:
         samples = np.broadcast_to(samples, (3, *samples.shape))
     if picture.to_rec709 is not None:

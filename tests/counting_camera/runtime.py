@@ -61,7 +61,7 @@ def plan(making: Making) -> Mapping[str, Any]:
     }
 
 
-def _identity(options: Options) -> Mapping[str, Any]:
+def _identity(options: Options, _: Path) -> Mapping[str, Any]:
     weights = options.chosen("weights")
     return {} if weights is None else {"weights": Path(weights).read_text(encoding="utf-8")}
 

@@ -15,6 +15,7 @@ from rich.text import Text
 import camkit
 from camkit.bundle.manifest import Manifest
 from camkit.cli.app import app
+from camkit.kinds import KINDS
 from camkit.runtime.output.sidecar import sidecar_path
 from tests.capture_factory import write_tiny_captures
 
@@ -149,6 +150,13 @@ def _check_options(command: str) -> None:
     for parameter in parameters:
         names = {*parameter.opts, *parameter.secondary_opts}
         assert names & (documented | EVERYWHERE), f"{command}: {names} is not documented"
+
+
+def test_the_reference_lists_what_options_of_a_kind_may_be() -> None:
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    for option in (option for kind in KINDS.values() for option in kind.options if option.choices):
+        choices = "\\|".join(option.choices)
+        assert f"| `--{option.name} {choices}` |" in text, option.name
 
 
 def test_the_reference_lists_the_keys_of_sidecar_and_json(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from camkit.cli.say import say
 from camkit.errors import BundleError, CamkitError, ContractError
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options
     from camkit.runtime.pipeline import Pipeline
+
+OVERWRITES: Final = "process would refuse to overwrite the capture itself: choose an --out-dir"
 
 
 def print_plans(
@@ -40,12 +42,17 @@ def print_plans(
     sources = expand(files, kind)
     if not sources:
         return None
-    for task in list_tasks(sources, bundle=bundle, write=write, options=options, kind=kind):
+    tasks = list_tasks(
+        sources, bundle=bundle, write=write, options=options, kind=kind, writes=False
+    )
+    for task in tasks:
         facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
         try:
             if task.refusal is not None:
                 raise ContractError(task.refusal)
             facts |= _planned(task, pipelines.get(task.bundle, task.source), headerless)
+            if task.own:
+                facts["warnings"].append(OVERWRITES)
         except CamkitError as error:
             if bundle is not None and isinstance(error, BundleError):
                 raise

@@ -63,7 +63,7 @@ def process(
     method: Annotated[
         str | None,
         typer.Option(
-            help="Way of a stage: net, wiener, rl, admm-tv, develop; of photons log, lsq."
+            help="Way of a stage: net, wiener, rl, admm-tv, develop; of photons log, lsq, linear."
         ),
     ] = None,
     mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",

@@ -6,7 +6,7 @@
 [gate]        width_ps, rc_ps, jitter_ps (standard deviation)
 [laser]       fwhm_ps (full width), wavelength_nm
 [irf]         file: two columns, times in ps and values; mu is where the time is 0
-[array]       axes, key, stamp_ps, pitch_um, focal_length_mm
+[array]       axes, key, stamp_ps, pitch_um, focal_length_mm, bundle (the camera)
 [lifetime]    period_ps (of the laser, where what it excited before is still seen), from_ps, to_ps
               (bins that are fitted); for the product lifetime alone
 [correction]  offset_ps, dark (counts of a bin: a number, or an .npy map), hot (an .npy map)
@@ -82,6 +82,7 @@ class Array(_Table):
     stamp_ps: Positive | None = None
     pitch_um: Positive | None = None
     focal_length_mm: Positive | None = None
+    bundle: str | None = None
 
 
 class Lifetime(_Table):
@@ -223,8 +224,7 @@ class Timing(_Table):
         for name, value in stated.items():
             if name in TABLE_OF:
                 table = tables.setdefault(TABLE_OF[name], {})
-                is_numpy = isinstance(value, np.ndarray | np.generic)
-                table.setdefault(name, np.asarray(value).tolist() if is_numpy else value)
+                table.setdefault(name, _plain(name, value))
         return _checked(tables, self.folder, "what the capture states of itself")
 
 
@@ -241,9 +241,16 @@ TABLE_OF: Final[Mapping[str, str]] = {
     name: table
     for table, kind in TABLES.items()
     for name in kind.model_fields
-    if name not in {"file", "axes", "key", "hot", "dark"}
+    if name not in {"file", "axes", "key", "bundle", "hot", "dark"}
 }
 """Names that a capture may state of itself -> their tables."""
+WHOLE: Final = frozenset({"bins", "cycles"})
+"""Names of whole numbers."""
+
+
+def timing_beside(capture: Path) -> Path:
+    """Name the timing file that may lie beside a capture: NAME.TYPE.toml."""
+    return capture.with_name(capture.name + ".toml")
 
 
 def read_timing(path: Path) -> Timing:
@@ -259,6 +266,15 @@ def read_timing(path: Path) -> Timing:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ContractError(f"timing {path} is not valid TOML: {error}") from error
     return _checked(tables, path.parent, f"timing {path}")
+
+
+def _plain(name: str, value: object) -> object:
+    """Give a stated value as TOML would; most files know no whole numbers, only floats."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = np.asarray(value).tolist()
+    if name in WHOLE and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value
 
 
 def _checked(tables: Mapping[str, Any], folder: Path, what: str) -> Timing:

@@ -14,6 +14,7 @@ from camkit.runtime.kinds.spad.files.counts_file import (
     CountsKind,
     Hints,
     axes_of,
+    checked_bins,
     checked_counts,
     checked_size,
 )
@@ -41,6 +42,7 @@ class ArrayFile(CountsFile):
         kind: CountsKind | None = None,
         usual: str | None = "tyx",
         stated: Mapping[str, object] | None = None,
+        assumed: Mapping[str, object] | None = None,
         close: Callable[[], None] | None = None,
     ) -> None:
         """Look at an array.
@@ -51,14 +53,16 @@ class ArrayFile(CountsFile):
             hints: What the caller knows.
             kind: What it holds; None: times where it has three axes, else counts.
             usual: The axes that it has unless the caller says otherwise; None if that is not known.
-            stated: What is known of its times.
+            stated: What it says of its times.
+            assumed: What is usual of such files.
             close: Lets go of what it lies in.
 
         Raises:
-            DecodeError: If it holds no numbers, or has no pixels.
+            DecodeError: If it holds no numbers, has no pixels, or more bins than any capture.
             ContractError: If its axes are not known.
         """
         self.path, self.stated, self._close = path, stated or {}, close or (lambda: None)
+        self.assumed = assumed or {}
         if values.dtype.kind not in "biuf" or values.dtype.itemsize > 8:
             raise DecodeError(f"{path.name} holds {values.dtype}; expected numbers")
         if len(values.shape) not in {2, 3}:
@@ -67,14 +71,13 @@ class ArrayFile(CountsFile):
                 "or rows and columns"
             )
         is_flat = len(values.shape) == 2
-        self._axes = axes_of(path, values.shape, hints, "yx" if is_flat else usual)
+        self.axes = self._axes = axes_of(path, values.shape, hints, "yx" if is_flat else usual)
         self._values = values
         sizes = dict(zip(self._axes, values.shape, strict=True))
         self.height, self.width = checked_size(path, sizes["y"], sizes["x"])
-        self.bins = sizes.get("t", 1)
-        if self.bins < 1:
-            raise DecodeError(f"{path.name} has no time bins")
         self.kind = kind or ("counts" if is_flat else "histogram")
+        pixels = self.height * self.width
+        self.bins = checked_bins(path, sizes.get("t", 1), pixels, self.kind)
 
     def rows(self, top: int, bottom: int, edges: NDArray[np.float64] | None = None) -> FloatArray:
         """Read some rows; see `CountsFile`."""

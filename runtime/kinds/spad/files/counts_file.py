@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -19,6 +20,11 @@ EXTRA: Final = 'pip install "camkit[spad]"'
 MOST_COUNT: Final = 2**24
 """Whole numbers up to here are exact in float32."""
 MOST_PIXELS: Final = 100_000_000
+MOST_BINS: Final = 100_000
+MOST_COUNTS: Final = 10_000_000_000
+"""Of a capture in all: 40 GB where they are worked with."""
+ARRIVALS: Final[Mapping[str, object]] = MappingProxyType({"orientation": "histogram"})
+"""What is usual of files that hold when photons came."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +53,9 @@ class CountsFile(ABC):
         width: Pixels of a row.
         bins: Time bins, or frames; 0 for stamps.
         stated: What the file says of its times, by the names of the timing file.
+        assumed: What is usual of such files; what anyone states goes before.
+        axes: Letters t, y, x in the order of the file's array, as a caller would state them; empty
+            where nobody can.
     """
 
     path: Path
@@ -55,6 +64,8 @@ class CountsFile(ABC):
     width: int
     bins: int
     stated: Mapping[str, object]
+    assumed: Mapping[str, object] = MappingProxyType({})
+    axes: str = ""
 
     @property
     def outside(self) -> int:
@@ -100,6 +111,28 @@ def checked_size(path: Path, height: int, width: int) -> tuple[int, int]:
             f"than {MOST_PIXELS // 10**6} million"
         )
     return height, width
+
+
+def checked_bins(path: Path, bins: int, pixels: int, kind: CountsKind) -> int:
+    """Refuse an array without times or frames, or with more than any capture has.
+
+    Raises:
+        DecodeError: Says what came.
+    """
+    name = "frames" if kind == "counts" else "time bins"
+    if bins < 1:
+        raise DecodeError(f"{path.name} has no {name}")
+    if kind != "counts" and bins > MOST_BINS:
+        raise DecodeError(
+            f"{path.name} has {bins} time bins; expected at most {MOST_BINS}: put bins together, "
+            "or say [array] axes in a file for --timing if time is another axis"
+        )
+    if bins * pixels > MOST_COUNTS:
+        raise DecodeError(
+            f"{path.name} holds {bins} {name} of {pixels} pixels; expected at most "
+            f"{MOST_COUNTS} counts in all: cut it into several files"
+        )
+    return bins
 
 
 def checked_counts(path: Path, values: NDArray[Any], top: int) -> FloatArray:

@@ -59,7 +59,8 @@ def _opened(path: Path, file: Any, hints: Hints, *, is_matlab: bool) -> CountsFi
     chosen = large[name]
     if chosen.is_virtual or chosen.external:
         raise DecodeError(f"{path.name}: {name} lies in other files; store it in one")
-    small = {n.rsplit("/", 1)[-1]: d[()] for n, d in sets.items() if 0 < d.size < SMALL}
+    # a null data set has no size at all
+    small = {n.rsplit("/", 1)[-1]: d[()] for n, d in sets.items() if 0 < (d.size or 0) < SMALL}
     stated = stated_values({**small, **dict(file.attrs), **dict(chosen.attrs)})
     if h5py.check_ref_dtype(chosen.dtype) is not None:
         return _cells(path, file, chosen, stated)
@@ -69,7 +70,9 @@ def _opened(path: Path, file: Any, hints: Hints, *, is_matlab: bool) -> CountsFi
         axes = hints.axes
         hints = replace(hints, axes=None if axes is None else axes[::-1])
         usual = None if usual is None else usual[::-1]
-    return ArrayFile(path, chosen, hints, kind=kind, usual=usual, stated=stated, close=file.close)
+    found = ArrayFile(path, chosen, hints, kind=kind, usual=usual, stated=stated, close=file.close)
+    found.axes = found.axes[::-1] if is_matlab else found.axes
+    return found
 
 
 def _is_cube(item: Any) -> bool:
@@ -97,6 +100,6 @@ def _cells(path: Path, file: Any, cells: Any, stated: dict[str, object]) -> Coun
 
 def _cell(item: Any) -> NDArray[Any]:
     """Give the stamps of a cell; MATLAB stores the size of an empty one in its place."""
-    if item.attrs.get(MATLAB_EMPTY, 0):
+    if item.attrs.get(MATLAB_EMPTY, 0) or not item.size:
         return np.empty(0)
     return np.asarray(item[()])

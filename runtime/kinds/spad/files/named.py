@@ -1,35 +1,48 @@
 """The bundle that a capture itself names, as simulated ones do."""
 
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from camkit.errors import CamkitError
+from camkit.runtime.kinds.spad.files.hdf5 import BROKEN
+from camkit.runtime.kinds.spad.files.npz import read_npz
+from camkit.runtime.kinds.spad.timing import read_timing, timing_beside
+
 NAME: Final = "bundle"
-"""Key of an NPZ, attribute of the data set of an HDF5."""
+"""Key of an NPZ, attribute of the data set of an HDF5, name in a timing file beside the capture."""
 LONGEST: Final = 64
 
 
 def named_bundle(path: Path) -> str | None:
     """Give the name; None for files that name none, or cannot be read.
 
+    NPZ and HDF5 name it themselves, others in the timing file beside them.
+
     Reading the capture tells what is wrong with a file.
     """
-    read = _READERS.get(path.suffix.lower())
-    if read is None:
-        return None
+    read = _READERS.get(path.suffix.lower(), _beside)
     try:
-        found = str(np.asarray(read(path)).item())
-    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, ImportError):
+        found = np.asarray(read(path))
+    except (CamkitError, ImportError, MemoryError, *BROKEN):
         return None
-    return found if 0 < len(found) <= LONGEST else None
+    if found.dtype.kind not in "US" or found.size != 1:
+        return None
+    name = found.item()
+    if isinstance(name, bytes):
+        name = name.decode("utf-8", "replace")
+    return name if 0 < len(name) <= LONGEST else None
+
+
+def _beside(path: Path) -> str:
+    beside = timing_beside(path)
+    return (read_timing(beside).array.bundle or "") if beside.is_file() else ""
 
 
 def _of_npz(path: Path) -> Any:
-    with np.load(path, allow_pickle=False) as file:
-        return file[NAME]
+    return read_npz(path, names=(NAME,)).get(NAME, "")
 
 
 def _of_hdf5(path: Path) -> Any:

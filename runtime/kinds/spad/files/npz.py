@@ -1,7 +1,9 @@
 """NPZ: arrays by name, the cube among them; nothing in it is ever executed."""
 
 import io
+import math
 import zipfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final
 
@@ -38,6 +40,34 @@ def open_npz(path: Path, hints: Hints) -> CountsFile:
     return ArrayFile(path, values, hints, kind=KEYS.get(name), stated=stated_values(small))
 
 
+def read_npz(
+    path: Path, *, names: Collection[str] | None = None, max_bytes: int = SMALL_BYTES
+) -> dict[str, NDArray[Any]]:
+    """Read whole arrays by name, as large as the file says before anything is unpacked.
+
+    Args:
+        path: The file.
+        names: Those to read, where they are there; None for all.
+        max_bytes: Of all that are read.
+
+    Raises:
+        DecodeError: If the file is damaged, holds no arrays, or larger ones.
+    """
+    with opened_zip(path) as archive:
+        members = {i.filename.removesuffix(SUFFIX): i for i in archive.infolist()}
+        wanted = {n: i for n, i in members.items() if names is None or n in names}
+        size = sum(info.file_size for info in wanted.values())
+        if size > max_bytes:
+            raise DecodeError(
+                f"{path.name} unpacks to {size / 1e9:.1f} GB; expected at most "
+                f"{max_bytes / 1e9:g} GB"
+            )
+        return {
+            name: _array(archive, info, _header(archive, info), max_bytes)
+            for name, info in wanted.items()
+        }
+
+
 Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
 
 
@@ -72,7 +102,7 @@ def _array(
     """
     shape, is_fortran, dtype = header
     data = member_bytes(archive, member, max_bytes)
-    count = int(np.prod(shape, dtype=np.int64)) if min(shape, default=1) >= 0 else -1
+    count = math.prod(shape) if min(shape, default=1) >= 0 else -1
     start = io.BytesIO(bytes(data[:HEADER_BYTES]))
     version = npy.read_magic(start)
     (npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0)(start)

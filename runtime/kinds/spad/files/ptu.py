@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
-from camkit.runtime.kinds.spad.files.counts_file import EXTRA, CountsFile, Hints
+from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
 
 BROKEN: Final = (
     *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError, MemoryError),
@@ -42,8 +42,15 @@ def open_ptu(path: Path, hints: Hints) -> CountsFile:
         raise
     except BROKEN as error:
         raise DecodeError(f"{path.name} is damaged, or no PTU of T3: {error}") from error
-    stated = {"orientation": "histogram", "time_bin_ps": width_ps}
-    return ArrayFile(path, values, hints, kind="histogram", usual="yxt", stated=stated)
+    return ArrayFile(
+        path,
+        values,
+        hints,
+        kind="histogram",
+        usual="yxt",
+        stated={"time_bin_ps": width_ps},
+        assumed=ARRIVALS,
+    )
 
 
 def _check_whole(path: Path, file: Any) -> None:
@@ -62,10 +69,11 @@ def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
     channels = len(file.active_channels)
     channel = _channel(path, channels, hints)
     size = float(np.prod(file.shape[1:], dtype=np.float64)) * COUNT_BYTES
+    size += int(file.number_records) * RECORD_BYTES
     if size > TIMES * hints.max_bytes:
         raise ContractError(
-            f"{path.name} unpacks to {size / 1e9:.3g} GB, and such files are read whole; raise "
-            "--max-mem, or save its histograms as HDF5"
+            f"{path.name}, {file.number_records} photons and markers, takes {size / 1e9:.3g} GB, "
+            "and such files are read whole; raise --max-mem, or save its histograms as .h5 or .npz"
         )
     if not file.is_image:
         found = np.asarray(file.decode_histogram(dtype="uint32"))

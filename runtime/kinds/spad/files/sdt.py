@@ -3,13 +3,13 @@
 import struct
 import tempfile
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from camkit.errors import ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
-from camkit.runtime.kinds.spad.files.counts_file import EXTRA, CountsFile, Hints
+from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.packed import PIECE, member_bytes, opened_zip
 
 BROKEN: Final = (
@@ -62,11 +62,16 @@ def _open_plain(path: Path, plain: Path, hints: Hints) -> CountsFile:
         values = values[None]
     if len(seconds) < 2 or len(seconds) != values.shape[-1]:
         raise DecodeError(f"{path.name}: {len(seconds)} times for {values.shape[-1]} bins")
-    stated: dict[str, Any] = {
-        "orientation": "histogram",
-        "time_bin_ps": float((seconds[-1] - seconds[0]) / (len(seconds) - 1) * PS_PER_S),
-    }
-    return ArrayFile(path, values, hints, kind="histogram", usual="yxt", stated=stated)
+    width_ps = float((seconds[-1] - seconds[0]) / (len(seconds) - 1) * PS_PER_S)
+    return ArrayFile(
+        path,
+        values,
+        hints,
+        kind="histogram",
+        usual="yxt",
+        stated={"time_bin_ps": width_ps},
+        assumed=ARRIVALS,
+    )
 
 
 def _block(path: Path, count: int, hints: Hints) -> int:

@@ -32,6 +32,8 @@ NO_PHOTON: Final = np.uint32(1 << 31)
 OVERFLOWS: Final = np.uint32((1 << 28) - 1)
 TAC_STEP: Final = re.compile(rb"SP_TAC_TC,F,([0-9.eE+-]+)\]")
 SET_BYTES: Final = 1_000_000
+AT_ONCE: Final = 500_000
+"""Records that are decoded at once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,34 +57,55 @@ def decode_spc(data: bytes) -> Photons:
     Raises:
         DecodeError: If it is not whole records, or has no header.
     """
+    records = _records(data)
+    is_over, is_none = (records & OVERFLOW) > 0, (records & NO_PHOTON) > 0
+    many = np.where(is_none, records & OVERFLOWS, 1)
+    overflows = np.cumsum(np.where(is_over, many, 0).astype(np.int64))
+    is_photon = _are_photons(records)
+    own = records[is_photon]
+    return Photons(
+        macro=(own & 0xFFF).astype(np.int64) + MACRO_TICKS * overflows[is_photon],
+        micro=_micro(own),
+        routing=((own >> 12) & 0xF).astype(np.uint8),
+    )
+
+
+def micro_times(data: bytes) -> NDArray[np.uint16]:
+    """Give the time within the cycle of every photon of a stream; errors as of `decode_spc`."""
+    records = _records(data)
+    parts = [records[at : at + AT_ONCE] for at in range(0, len(records), AT_ONCE)]
+    found = [_micro(part[_are_photons(part)]) for part in parts]
+    return np.concatenate([*found, np.empty(0, np.uint16)])
+
+
+def _records(data: bytes) -> NDArray[np.uint32]:
+    """Give all records behind the header."""
     if len(data) < RECORD_BYTES or len(data) % RECORD_BYTES:
         raise DecodeError(f"{len(data)} bytes are no whole records of {RECORD_BYTES}")
     records = np.frombuffer(data, dtype="<u4")
     if not records[0] & NO_PHOTON:
         raise DecodeError("the first record is no header of an SPC-130 or SPC-150")
-    records = records[1:]
-    is_over, is_none = (records & OVERFLOW) > 0, (records & NO_PHOTON) > 0
-    many = np.where(is_none, records & OVERFLOWS, 1)
-    overflows = np.cumsum(np.where(is_over, many, 0).astype(np.int64))
-    is_photon = ~is_none & ~((records & MARKER) > 0)
-    own = records[is_photon]
-    return Photons(
-        macro=(own & 0xFFF).astype(np.int64) + MACRO_TICKS * overflows[is_photon],
-        micro=(LAST_ADC - ((own >> 16) & 0xFFF)).astype(np.uint16),
-        routing=((own >> 12) & 0xF).astype(np.uint8),
-    )
+    return records[1:]
+
+
+def _are_photons(records: NDArray[np.uint32]) -> NDArray[np.bool_]:
+    return np.asarray((records & (NO_PHOTON | MARKER)) == 0)
+
+
+def _micro(photons: NDArray[np.uint32]) -> NDArray[np.uint16]:
+    return np.asarray(LAST_ADC - ((photons >> 16) & 0xFFF), dtype=np.uint16)
 
 
 def open_spc(path: Path, hints: Hints) -> CountsFile:
     """Open a stream as the time stamps of one pixel; see `open_counts`."""
     del hints
     try:
-        photons = decode_spc(path.read_bytes())
+        micro = micro_times(path.read_bytes())
     except DecodeError as error:
         raise DecodeError(f"{path.name} is damaged, or no SPC: {error}") from error
     step = _tac_step_ps(path.with_suffix(".set"))
     stated = {} if step is None else {"stamp_ps": step}
-    return StampsFile(path, (1, 1), lambda _: [photons.micro], stated=stated)
+    return StampsFile(path, (1, 1), lambda _: [micro], stated=stated)
 
 
 def _tac_step_ps(path: Path) -> float | None:

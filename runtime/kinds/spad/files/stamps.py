@@ -1,15 +1,18 @@
 """Time stamps of photons, pixel by pixel, sorted into bins when rows are asked for."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kinds.spad.files.counts_file import CountsFile, checked_size
+from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, CountsFile, checked_size
+
+AT_ONCE: Final = 500_000
+"""Stamps that are sorted at once."""
 
 
 class StampsFile(CountsFile):
@@ -30,12 +33,12 @@ class StampsFile(CountsFile):
             path: Where they came from.
             shape: (h, w).
             cells: Row -> the stamps of each of its pixels, arrays of any shape.
-            stated: What is known of their times.
+            stated: What the file says of their times.
             close: Lets go of what they lie in.
         """
         self.path, self.kind, self.bins = path, "stamps", 0
         self.height, self.width = checked_size(path, *shape)
-        self.stated, self._close = {"orientation": "histogram", **(stated or {})}, close
+        self.stated, self.assumed, self._close = stated or {}, ARRIVALS, close
         self._cells = cells
         self._outside: dict[int, int] = {}
 
@@ -45,17 +48,31 @@ class StampsFile(CountsFile):
             raise ContractError("time stamps need the edges of bins")
         found = np.empty((bottom - top, self.width, len(edges) - 1), np.float32)
         for y in range(top, bottom):
-            cells = [np.ravel(cell) for cell in self._cells(y)]
-            sizes = [cell.size for cell in cells]
-            stamps = np.concatenate([_numbers(self.path, cell) for cell in cells])
-            at = np.searchsorted(edges, stamps, side="right") - 1
-            inside = (at >= 0) & (at < len(edges) - 1)
-            self._outside[y] = int((~inside).sum())
-            pixel = np.repeat(np.arange(self.width), sizes)
-            flat = pixel[inside] * (len(edges) - 1) + at[inside]
-            counts = np.bincount(flat, minlength=self.width * (len(edges) - 1))
+            counts = np.zeros(self.width * (len(edges) - 1), np.int64)
+            outside = 0
+            for pixels, stamps in self._pieces(y):
+                at = np.searchsorted(edges, stamps, side="right") - 1
+                inside = (at >= 0) & (at < len(edges) - 1)
+                outside += int((~inside).sum())
+                flat = pixels[inside] * (len(edges) - 1) + at[inside]
+                counts += np.bincount(flat, minlength=len(counts))
+            self._outside[y] = outside
             found[y - top] = counts.reshape(self.width, -1)
         return found
+
+    def _pieces(self, y: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+        """Give the stamps of a row with their pixels, so many at once as memory is no matter."""
+        cells = [np.ravel(cell) for cell in self._cells(y)]
+        ends = np.cumsum([cell.size for cell in cells])
+        begins = ends - [cell.size for cell in cells]
+        for start in range(0, int(ends[-1]), AT_ONCE):
+            end = min(start + AT_ONCE, int(ends[-1]))
+            some = [
+                (x, cells[x][max(start - begins[x], 0) : end - begins[x]])
+                for x in np.flatnonzero((begins < end) & (ends > start))
+            ]
+            pixels = np.repeat([x for x, _ in some], [part.size for _, part in some])
+            yield pixels, np.concatenate([_numbers(self.path, part) for _, part in some])
 
     @property
     def outside(self) -> int:

@@ -130,8 +130,9 @@ class LifetimeFitter:
         starts = self._starts
         found, most = np.empty((4, len(n))), np.full(len(n), -np.inf)
         for template in starts.best(counts):
-            a, b = _shared_out(n, starts.shares[template])
-            height = _height(n, a[:, None] * starts.shares[template] + b[:, None])
+            shares = starts.shares(template)
+            a, b = _shared_out(n, shares)
+            height = _height(n, a[:, None] * shares + b[:, None])
             tried = np.stack([np.log(starts.lifetime_ps[template]), starts.mu_ps[template], a, b])
             found = np.where(height > most, tried, found)
             most = np.maximum(height, most)

@@ -3,6 +3,7 @@
 A look that assumes too little background takes it for a slow decay, so there are several looks.
 """
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -10,12 +11,15 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.kinds.spad.lifetime.decay import Decay, Floats
+from camkit.runtime.kinds.spad.time_axis import TimeAxis
 
 APART: Final = 1.7
 """Factor between two lifetimes."""
 STEP_SIGMAS: Final = 2.0
 """Of the pulse's edge: between two times, a bin at least."""
 MOST_TIMES: Final = 400
+MOST_BINS: Final = 2 * MOST_TIMES
+"""Templates so far apart need no finer bins; finer ones are put together."""
 DARK_SHARES: Final = (0.1, 0.5, 0.9)
 """Of the photons: background that looks assume."""
 
@@ -26,14 +30,17 @@ class Starts:
     Attributes:
         mu_ps: (m,) times of its templates.
         lifetime_ps: (m,) their lifetimes.
-        shares: (m, bins).
         length: How far normed templates turn along time, all lifetimes together: how much there is
             to search, see `camkit.runtime.kinds.spad.evidence`.
     """
 
     def __init__(self, decay: Decay, least_ps: float, most_ps: float) -> None:
         """Lay templates over an axis, for lifetimes between two limits."""
-        axis = decay.axis
+        axis, self._decay = decay.axis, decay
+        group = -(-axis.bins // MOST_BINS)
+        self._first = np.arange(0, axis.bins, group)
+        edges = axis.edges_ps[np.append(self._first, axis.bins)]
+        coarse = replace(decay, axis=TimeAxis(orientation=axis.orientation, edges_ps=edges))
         count = max(2, int(np.ceil(np.log(most_ps / least_ps) / np.log(APART))) + 1)
         lifetimes = np.geomspace(least_ps, most_ps, count)
         span = float(axis.centres_ps[-1] - axis.centres_ps[0])
@@ -41,19 +48,29 @@ class Starts:
         times = axis.centres_ps[0] - decay.pulse.mean_ps + np.arange(0, span, step)
         self.mu_ps = np.tile(times, count)
         self.lifetime_ps = np.repeat(lifetimes, len(times))
-        self.shares = np.concatenate(
-            [decay.shapes(times, np.full(len(times), tau)).shares for tau in lifetimes]
+        shares = np.concatenate(
+            [coarse.shapes(times, np.full(len(times), tau)).shares for tau in lifetimes]
         )
-        seen = np.maximum(self.shares.sum(axis=1, keepdims=True), 1e-9)
+        seen = np.maximum(shares.sum(axis=1, keepdims=True), 1e-9)
+        even = np.diff(np.append(self._first, axis.bins)) / axis.bins
         self._logs = [
-            np.log((1 - dark) * self.shares / seen + dark / axis.bins).T.astype(np.float32)
+            np.log((1 - dark) * shares / seen + dark * even).T.astype(np.float32)
             for dark in DARK_SHARES
         ]
-        self.length = sum(_turned(part) for part in np.split(self.shares, count))
+        self.length = sum(_turned(part) for part in np.split(shares, count))
+        self._shares = shares if group == 1 else None
 
     def best(self, counts: FloatArray) -> list[NDArray[np.int64]]:
         """Give the likeliest template of every pixel, by every look."""
+        if self._shares is None:
+            counts = np.add.reduceat(counts, self._first, axis=1)
         return [(counts @ logs).argmax(axis=1) for logs in self._logs]
+
+    def shares(self, templates: NDArray[np.int64]) -> Floats:
+        """Give what every bin of the axis sees of some templates, (p, bins)."""
+        if self._shares is not None:
+            return np.asarray(self._shares[templates])
+        return self._decay.shapes(self.mu_ps[templates], self.lifetime_ps[templates]).shares
 
 
 def _turned(shares: Floats) -> float:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -43,7 +44,11 @@ def make(making: Making) -> Made:
     """
     began = time.perf_counter()
     with surveyed(making) as survey:
-        return MAKERS[survey.product](making, survey, began)
+        made = MAKERS[survey.product](making, survey, began)
+        axis, file = survey.axis, survey.settings.timing_file
+        told = {} if axis is None else told_axis(axis)
+        named = None if file is None else file.name
+        return replace(made, record={**told, **made.record, "timing": named})
 
 
 def plan(making: Making) -> Mapping[str, Any]:
@@ -61,19 +66,22 @@ def plan(making: Making) -> Mapping[str, Any]:
             found |= told_way(survey.settings.way)
         return {
             "size": None,
-            "decisions": list(_decisions(survey)),
+            "decisions": list(_decisions(making, survey)),
             "estimate": None,
             "plan": found,
             "warnings": list(survey.warnings()),
         }
 
 
-def _decisions(survey: Survey) -> list[dict[str, Any]]:
+def _decisions(making: Making, survey: Survey) -> list[dict[str, Any]]:
     way, is_asked = survey.settings.way, survey.settings.product is not None
     of_file = "the capture holds " + ("counts" if survey.axis is None else "times of photons")
     found: list[tuple[str, str, str]] = [
         ("product", survey.product, "asked" if is_asked else of_file)
     ]
+    if (file := survey.settings.timing_file) is not None:
+        is_named = making.options.chosen("timing") is not None
+        found.append(("timing", file.name, "asked" if is_named else "lies beside the capture"))
     if survey.product == "depth":
         pulse = "a pulse is stated" if survey.timing.pulse() is not None else "none is stated"
         found += [

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, get_args
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.pooling import Pool
 from camkit.runtime.kinds.spad.sharpen import METHODS, Method, Way
-from camkit.runtime.kinds.spad.timing import Timing, read_timing
+from camkit.runtime.kinds.spad.timing import Timing, read_timing, timing_beside
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
 
 Finer = Literal["net", "linear"]
@@ -30,6 +30,7 @@ class Settings:
         finer: How pictures become finer behind a bundle's plate; None for what the plan says.
         size: Of its network; None for the usual one.
         timing: What is known of times.
+        timing_file: Where that stands; None where nobody wrote it down.
         max_mem_bytes: Memory that the process may take.
     """
 
@@ -38,17 +39,18 @@ class Settings:
     chosen: tuple[str, ...]
     timing: Timing
     max_mem_bytes: int
+    timing_file: Path | None = None
     finer: Finer | None = None
     size: str | None = None
 
     @classmethod
-    def of(cls, options: Options) -> "Settings":
-        """Read what was chosen.
+    def of(cls, options: Options, capture: Path) -> "Settings":
+        """Read what was chosen for a capture.
 
         Raises:
             ContractError: If the timing file is none.
         """
-        named = options.chosen("timing")
+        file = _timing_file(options, capture)
         method: Method = next((m for m in METHODS if m == options.method), "log")
         pool: Pool = options.chosen("pool") or "auto"  # type: ignore[assignment]
         finer: Finer | None = next((way for way in FINER if way == options.method), None)
@@ -59,8 +61,9 @@ class Settings:
             product=options.chosen("product"),  # type: ignore[arg-type]
             way=Way(method=method, pool=pool, returns=int(options.chosen("returns") or 1)),
             chosen=tuple(chosen),
-            timing=Timing() if named is None else read_timing(Path(named)),
+            timing=Timing() if file is None else read_timing(file),
             max_mem_bytes=options.max_mem_bytes or DEFAULT_MAX_MEM_BYTES,
+            timing_file=file,
             finer=finer,
             size=options.size,
         )
@@ -85,13 +88,22 @@ class Settings:
         return product
 
 
-def identity(options: Options) -> Mapping[str, Any]:
-    """Give the content of the files that options name, and of those that these name."""
-    named = options.chosen("timing")
-    if named is None:
+def identity(options: Options, capture: Path) -> Mapping[str, Any]:
+    """Give the content of a capture's timing file, and of the files that it names."""
+    file = _timing_file(options, capture)
+    if file is None:
         return {}
-    files = [Path(named), *read_timing(Path(named)).files]
+    files = [file, *read_timing(file).files]
     return {
         f"timing_{number}": hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
         for number, file in enumerate(files)
     }
+
+
+def _timing_file(options: Options, capture: Path) -> Path | None:
+    """Give the timing file that was named, else that beside the capture, if one lies there."""
+    named = options.chosen("timing")
+    if named is not None:
+        return Path(named)
+    beside = timing_beside(capture)
+    return beside if beside.is_file() else None

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import permutations
 from pathlib import Path
 from typing import Final
 
@@ -18,11 +19,14 @@ from camkit.runtime.kinds.spad.guess_pulse import guess_pulse
 from camkit.runtime.kinds.spad.products.settings import Product, Settings
 from camkit.runtime.kinds.spad.pulse import FWHM_PER_SIGMA, Pulse
 from camkit.runtime.kinds.spad.time_axis import TimeAxis
-from camkit.runtime.kinds.spad.timing import Timing
+from camkit.runtime.kinds.spad.timing import Timing, timing_beside
 from camkit.runtime.maker import Making
 
 SAMPLE_ROWS: Final = 16
 """Rows, evenly spread, in which a pulse is looked for that nobody stated."""
+PULSE: Final = frozenset({"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"})
+WHAT: Final = {"gate": "a scan with a gate", "histogram": "a histogram of arrivals"}
+"""Orientation -> what such a capture is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +41,7 @@ class Survey:
         rows: Its rows, pile-up undone.
         settings: What the caller chose.
         camera: The array of a bundle, whose products lie on its fine grid; None without one.
+        notes: What the user should know of how the capture was understood.
     """
 
     file: CountsFile
@@ -46,6 +51,7 @@ class Survey:
     rows: CorrectedRows
     settings: Settings
     camera: FineCamera | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -98,8 +104,9 @@ class Survey:
         """Give what the user should know of the capture itself, once its rows were read."""
         outside = self.file.outside
         if not outside:
-            return ()
-        return (f"{outside} time stamps lie outside the bins of [timing] and were left out",)
+            return self.notes
+        told = f"{outside} time stamps lie outside the bins of [timing] and were left out"
+        return (*self.notes, told)
 
     def _sample(self) -> FloatArray:
         height = self.file.height
@@ -117,16 +124,19 @@ def surveyed(making: Making) -> Iterator[Survey]:
         ContractError: If capture and options do not fit each other.
         BundleError: If the bundle makes no picture of photons finer.
     """
-    settings = Settings.of(making.options)
+    settings = Settings.of(making.options, Path(making.path))
     camera = None if making.bundle is None else FineCamera.of(making.bundle, making.threads)
     _check_finer(settings, camera)
     array = settings.timing.array
     hints = Hints(axes=array.axes, key=array.key, max_bytes=settings.max_mem_bytes // 4)
     with open_counts(Path(making.path), hints) as file:
         timing = settings.timing.with_stated(file.stated)
+        notes: tuple[str, ...] = ()
         if camera is not None:
-            camera.check_shape((file.height, file.width))
+            _check_shape(file, camera)
+            notes = _surprise(file, timing, camera)
             timing = _with_bundle(timing, camera)
+        timing = timing.with_stated(file.assumed)
         product = settings.product_of(is_histogram=file.kind != "counts")
         axis = None if file.kind == "counts" else _axis(file, timing)
         yield Survey(
@@ -142,6 +152,7 @@ def surveyed(making: Making) -> Iterator[Survey]:
             ),
             settings=settings,
             camera=camera,
+            notes=() if product == "intensity" else notes,
         )
 
 
@@ -165,15 +176,45 @@ def _check_finer(settings: Settings, camera: FineCamera | None) -> None:
         camera.size(settings.size)
 
 
+def _check_shape(file: CountsFile, camera: FineCamera) -> None:
+    """Refuse a capture of another array, and say so if its axes are only in another order.
+
+    Raises:
+        ContractError: If it is none of this array.
+    """
+    try:
+        camera.check_shape((file.height, file.width))
+    except ContractError as error:
+        sizes = {"y": file.height, "x": file.width, "t": file.bins}
+        shape = [sizes[axis] for axis in file.axes]
+        for axes in permutations(file.axes):
+            turned = dict(zip(axes, shape, strict=True))
+            if (turned["y"], turned["x"]) == (camera.sensor.height_px, camera.sensor.width_px):
+                raise ContractError(
+                    f"{error}; or, if its axes are in another order, [array] axes = "
+                    f'"{"".join(axes)}" in a file for --timing'
+                ) from error
+        raise
+
+
 def _with_bundle(timing: Timing, camera: FineCamera) -> Timing:
     """Give what is known of times, with what the bundle says where nobody else does."""
     stated = {"pitch_um": camera.sensor.pixel_pitch_um, **camera.stated_times()}
-    unwanted: set[str] = set()
-    if timing.timing.time_bin_ps is not None or timing.timing.bin_edges_ps is not None:
-        unwanted |= {"time_bin_ps", "first_ps"}
-    if timing.pulse() is not None:
-        unwanted |= {"width_ps", "rc_ps", "jitter_ps", "fwhm_ps"}
+    # a measured pulse stands for gate and laser together
+    unwanted = PULSE if timing.irf.file is not None else frozenset()
     return timing.with_stated({n: value for n, value in stated.items() if n not in unwanted})
+
+
+def _surprise(file: CountsFile, timing: Timing, camera: FineCamera) -> tuple[str, ...]:
+    """Tell that a bundle makes something else of a capture than is usual of such files."""
+    usual, own = file.assumed.get("orientation"), camera.stated_times().get("orientation")
+    if timing.timing.orientation is not None or None in (usual, own) or usual == own:
+        return ()
+    return (
+        f"{file.path.name} is taken as {WHAT[str(own)]}, as bundle {camera.bundle.manifest.name} "
+        f"states, though such files usually hold {WHAT[str(usual)]}; state [timing] orientation in "
+        f"a file for --timing, or in {timing_beside(file.path).name} beside it",
+    )
 
 
 def _axis(file: CountsFile, timing: Timing) -> TimeAxis:

@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.kinds.spad.files.counts_file import MOST_COUNT
 from camkit.runtime.kinds.spad.time_axis import Orientation
 
+CHANCE: Final = 6.0
+"""Standard deviations that a count may lie above its mean."""
 HOT_TIMES: Final = 50.0
 """Dark counts of a hot pixel over those of others."""
 
@@ -66,9 +69,13 @@ def count_frames(
         mean: (n, h, w) photons of every pixel and frame on average, >= 0.
         disturbances: What comes on top, and what is missed.
         rng: Source of chance.
+
+    Raises:
+        ContractError: If there are more photons than `process` reads.
     """
     expected = disturbances.added(np.asarray(mean, np.float64))
     expected /= 1 + expected * disturbances.dead_share
+    _check_most(expected)
     return np.asarray(rng.poisson(expected), dtype=np.uint32)
 
 
@@ -78,9 +85,10 @@ def count_times(
     disturbances: Disturbances,
     rng: np.random.Generator,
 ) -> NDArray[np.uint32]:
-    """Count by time; arguments as of `count_frames`, with (bins, h, w)."""
+    """Count by time; arguments and errors as of `count_frames`, with (bins, h, w)."""
     expected = disturbances.added(np.asarray(mean, np.float64))
     cycles = disturbances.cycles
+    _check_most(np.minimum(expected, cycles) if cycles else expected)
     if cycles == 0:
         return np.asarray(rng.poisson(expected), dtype=np.uint32)
     answered = -np.expm1(-expected / cycles)
@@ -92,6 +100,16 @@ def count_times(
         found[place] = rng.binomial(left, share)
         left -= found[place]
     return found
+
+
+def _check_most(expected: NDArray[np.float64]) -> None:
+    """Refuse counts that no reader takes for exact, chance at its brightest included."""
+    peak = float(expected.max(initial=0.0))
+    if not peak + CHANCE * math.sqrt(peak) <= MOST_COUNT:
+        raise ContractError(
+            f"the brightest pixel would count {peak:.3g} photons in one picture or time bin, and "
+            f"captures hold at most {MOST_COUNT}; take fewer photons"
+        )
 
 
 def scaled_to(light: FloatArray, photons: float) -> NDArray[np.float64]:

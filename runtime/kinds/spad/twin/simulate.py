@@ -5,7 +5,6 @@ an NPZ of depth_m and albedo    histogram (bins, h, w)
 an NPZ of transient             the same, of light in flight
 """
 
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +17,7 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kind_parts.recording import Recorded, RecordingOptions
+from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.linear import Grid
 from camkit.runtime.kinds.spad.finer.sampling import light_of
@@ -36,6 +36,7 @@ from camkit.runtime.kinds.spad.twin.working import WORKING_POINTS
 from camkit.runtime.twin.light import LUMINANCE
 
 SCENE_SUFFIX: Final = ".npz"
+SCENE_ARRAYS: Final = frozenset({"depth_m", "albedo", "transient"})
 MOST_BYTES: Final = 2_000_000_000
 S_PER_PS: Final = 1e-12
 
@@ -115,14 +116,16 @@ def read_scene(path: Path) -> dict[str, NDArray[Any]]:
         DecodeError: If the file is no NPZ of numbers, or too large.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(info.file_size for info in archive.infolist())
-        if size > MOST_BYTES:
-            raise DecodeError(f"{path.name} unpacks to {size / 1e9:.1f} GB; that is no scene")
-        with np.load(path, allow_pickle=False) as file:
-            return {name: np.asarray(file[name]) for name in file.files}
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        found = read_npz(path, max_bytes=MOST_BYTES)
+    except DecodeError as error:
         raise DecodeError(f"cannot read the scene {path}: {error}") from error
+    for name in SCENE_ARRAYS & found.keys():
+        if found[name].dtype.kind not in "biuf":
+            raise DecodeError(
+                f"cannot read the scene {path}: {name} holds {found[name].dtype}; expected real "
+                "numbers"
+            )
+    return found
 
 
 def _fine_shape(camera: FineCamera) -> tuple[int, int]:

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.kind_parts.recording import Recorded
 from camkit.runtime.kinds.spad.files.counts_file import EXTRA
-from camkit.runtime.kinds.spad.timing import TABLE_OF
+from camkit.runtime.kinds.spad.files.named import NAME
+from camkit.runtime.kinds.spad.timing import TABLE_OF, timing_beside
 from camkit.runtime.output.part_file import atomic_output
 
 CYCLE: Final = 2
 """Of a PTU: the laser's period over the time that all bins take."""
-TIMING: Final = ".toml"
+MOST_STAMPS: Final = 50_000_000
+"""Photons of a PTU, 200 MB."""
 
 
 def write_recorded(path: Path, recorded: Recorded) -> None:
@@ -39,21 +41,25 @@ def write_recorded(path: Path, recorded: Recorded) -> None:
         return
     axes = {".mat": "yxt"}.get(suffix) if recorded.values.ndim == 3 else None
     with atomic_output(beside) as part:
-        part.write_text(timing_text(recorded.stated, axes=axes), encoding="utf-8")
+        text = timing_text(recorded.stated, axes=axes, bundle=recorded.stated.get(NAME))
+        part.write_text(text, encoding="utf-8")
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
     """Name the files that make up a capture: itself, and its timing file where it needs one."""
     if path.suffix.lower() in _SAY_ALL:
         return (path,)
-    return path, path.with_name(path.name + TIMING)
+    return path, timing_beside(path)
 
 
-def timing_text(stated: Mapping[str, Any], *, axes: str | None = None) -> str:
+def timing_text(
+    stated: Mapping[str, Any], *, axes: str | None = None, bundle: str | None = None
+) -> str:
     """Give a timing file of what is stated."""
     tables: dict[str, list[str]] = {}
-    if axes is not None:
-        tables["array"] = [f'axes = "{axes}"']
+    for name, value in (("axes", axes), ("bundle", bundle)):
+        if value is not None:
+            tables.setdefault("array", []).append(f'{name} = "{value}"')
     for name, value in stated.items():
         if name in TABLE_OF:
             told = f'"{value}"' if isinstance(value, str) else repr(value)
@@ -96,6 +102,12 @@ def _write_ptu(path: Path, recorded: Recorded) -> None:
     bin_ps = recorded.stated.get("time_bin_ps")
     if recorded.values.ndim != 3 or bin_ps is None:
         raise ContractError("a PTU holds times of photons; write counts as NPZ, HDF5, TIFF or MAT")
+    stamps = int(recorded.values.sum(dtype=np.int64))
+    if stamps > MOST_STAMPS:
+        raise ContractError(
+            f"a PTU holds every photon by itself: {stamps} of them, more than {MOST_STAMPS}; write "
+            "the histogram as .npz or .h5, or take fewer photons"
+        )
     cube = np.ascontiguousarray(recorded.values.transpose(1, 2, 0))
     period_s = CYCLE * cube.shape[2] * bin_ps * 1e-12
     ptufile.imwrite(path, _small(cube), period_s, bin_ps * 1e-12)

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import h5py
 import numpy as np
 import pytest
+import scipy.io
 import tifffile
 
 import camkit
@@ -188,6 +190,18 @@ def test_every_type_of_file_is_a_capture(name: str, tmp_path: Path) -> None:
     assert np.nanmedian(found["time_of_flight_ps"]) == pytest.approx(400, abs=8)
 
 
+def test_whole_floats_of_every_type_of_file_are_cycles(tmp_path: Path) -> None:
+    stated = {"orientation": "gate", "time_bin_ps": 20.0, "cycles": 78_000.0, "fwhm_ps": 100.0}
+    np.savez(tmp_path / "a.npz", histogram=small_cube(), **stated)
+    scipy.io.savemat(tmp_path / "b.mat", {"histogram": small_cube(), **stated})
+    with h5py.File(tmp_path / "c.h5", "w") as file:
+        file.create_dataset("histogram", data=small_cube()).attrs.update(stated)
+    pipeline = camkit.load(None, kind="spad")
+    for name in ("a.npz", "b.mat", "c.h5"):
+        (told,) = [d for d in pipeline.plan(tmp_path / name)["decisions"] if d["what"] == "pile-up"]
+        assert told["reason"] == "78000 cycles are stated"
+
+
 def test_time_stamps_that_lie_outside_are_told(tmp_path: Path) -> None:
     write_cells5(tmp_path / "a.mat", small_cube())
     (tmp_path / "t.toml").write_text(
@@ -256,6 +270,18 @@ def test_a_change_of_the_timing_file_is_a_new_product(
     assert [status(), status()] == ["ok", "skipped"]
 
 
+def test_a_change_of_the_timing_file_beside_is_a_new_product(scan: Path, tmp_path: Path) -> None:
+    beside = scan.with_name("scan.npz.toml")
+    found = []
+    for first_ps in (0, 0, 100):
+        text = TIMING.replace("time_bin_ps", f"first_ps = {first_ps}\ntime_bin_ps")
+        beside.write_text(text, encoding="utf-8")
+        (result,) = camkit.process(scan, bundle="none", out_dir=tmp_path / "out", resume=True)
+        assert result.error is None
+        found.append(result.status)
+    assert found == ["ok", "skipped", "ok"]
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [
@@ -310,6 +336,10 @@ def test_a_tiff_is_a_picture_unless_an_option_says_otherwise(tmp_path: Path, tim
         stack, bundle="none", out_dir=tmp_path / "b", product="intensity", timing=timing
     )
     assert told[0].output == tmp_path / "b" / "stack.npz"
+    single = tmp_path / "in" / "single.tif"
+    tifffile.imwrite(single, small_cube()[0])
+    (refused,) = camkit.process(single, bundle="none", out_dir=tmp_path / "a")
+    assert "if it counts single photons, say --product intensity" in str(refused.error)
 
 
 def test_the_plan_says_what_would_be_done(
@@ -327,6 +357,22 @@ def test_the_plan_says_what_would_be_done(
         capsys.readouterr().out.split()
     )
     assert not (tmp_path / "out").exists()
+
+
+def test_a_plan_of_a_capture_in_this_folder_is_told(
+    scan: Path, timing: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It writes nothing, so it overwrites nothing; process would."""
+    monkeypatch.chdir(scan.parent)
+    words = (scan.name, "--bundle", "none", "--timing", timing)
+    for command in (("plan", *words), ("process", *words, "--dry-run")):
+        assert _command(*command) == 0
+        told = capsys.readouterr().out
+        assert "product: depth" in told
+        assert "note: process would refuse to overwrite the capture itself" in told
+    assert _command("process", *words) == 2
+    assert "scan.npz would overwrite itself" in " ".join(capsys.readouterr().err.split())
+    assert [path.name for path in scan.parent.iterdir()] == ["scan.npz"]
 
 
 def test_zipped_histograms_are_named_without_their_type(tmp_path: Path) -> None:

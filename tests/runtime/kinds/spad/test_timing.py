@@ -167,6 +167,18 @@ def test_the_caller_goes_before_the_capture(tmp_path: Path) -> None:
         Timing().with_stated({"time_bin_ps": -3.0})
 
 
+def test_whole_floats_of_a_capture_are_whole_numbers(tmp_path: Path) -> None:
+    """MATLAB knows hardly any others; a timing file does."""
+    for value in (78_000.0, np.float64(78_000), np.array(78_000.0), np.array(78_000)):
+        timing = Timing().with_stated({"cycles": value, "bins": np.array(40.0), "first_ps": 8.0})
+        assert (timing.timing.cycles, timing.timing.bins) == (78_000, 40)
+    for wrong in (0.5, np.nan, np.inf, -1.0):
+        with pytest.raises(ContractError, match=r"states of itself: \[timing\] cycles"):
+            Timing().with_stated({"cycles": wrong})
+    with pytest.raises(ContractError, match="valid integer"):
+        _read(tmp_path, "[timing]\ncycles = 78000.0\n")
+
+
 def test_maps_are_of_the_size_of_the_capture(tmp_path: Path) -> None:
     dark = np.arange(6, dtype=np.float32).reshape(2, 3)
     np.save(tmp_path / "dark.npy", dark)

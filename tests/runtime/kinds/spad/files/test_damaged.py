@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.counts_file import Hints
+from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from tests.spad_files import AXES, STAMPS, WRITERS, small_cube
 
@@ -180,6 +181,43 @@ def test_a_zip_must_hold_one_sdt(tmp_path: Path) -> None:
                 archive.writestr(name, "x")
         with pytest.raises(DecodeError, match=rf"must hold one \.sdt file; it holds {told}"):
             open_counts(tmp_path / "a.zip", Hints())
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "told"),
+    [
+        ("histogram", (2**42, 4, 4), "has 4398046511104 time bins; expected at most 100000"),
+        ("histogram", (100_000, 400, 400), "expected at most 10000000000 counts in all"),
+        ("counts", (2**42, 4, 4), "holds 4398046511104 frames of 16 pixels; expected at most"),
+    ],
+)
+def test_arrays_beyond_any_capture_are_refused(
+    tmp_path: Path, name: str, shape: tuple[int, ...], told: str
+) -> None:
+    """A sparse data set announces in a few bytes what no memory holds."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset(name, shape, "u1", chunks=(64, 4, 4))
+    with pytest.raises(DecodeError, match=told):
+        open_counts(tmp_path / "a.h5", Hints())
+
+
+def test_a_name_that_announces_more_than_it_holds_is_none(tmp_path: Path) -> None:
+    """A batch asks every file for its bundle before any work, so none may stop it there."""
+    sound, lying, torn = (tmp_path / f"{name}.npz" for name in ("sound", "lying", "torn"))
+    np.savez(sound, counts=np.ones((9, 9)), bundle="spad-sr")
+    assert named_bundle(sound) == "spad-sr"
+    with zipfile.ZipFile(lying, "w") as archive:
+        archive.writestr("bundle.npy", _npy((10**13,), "<U7"))
+    np.savez_compressed(torn, bundle=np.array(["spad-sr"] * 1000))
+    data = bytearray(torn.read_bytes())
+    data[80:120] = b"\xff" * 40
+    torn.write_bytes(data)
+    with h5py.File(tmp_path / "none.h5", "w") as file:
+        file.attrs["bundle"] = h5py.Empty("S1")
+        file.create_dataset("counts", data=np.ones((9, 9))).attrs["bundle"] = np.bytes_("spad-sr")
+    for name in (lying, torn):
+        assert named_bundle(name) is None
+    assert named_bundle(tmp_path / "none.h5") == "spad-sr"
 
 
 def test_data_that_lie_in_other_files_are_refused(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import scipy.io
 import tifffile
 
 from camkit.errors import ContractError, DecodeError, UnsupportedError
+from camkit.runtime.kinds.spad.files import stamps
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.open_counts import open_counts
 from camkit.runtime.kinds.spad.files.spc import decode_spc
@@ -68,6 +69,32 @@ def test_time_stamps_are_sorted_into_bins(name: str, tmp_path: Path) -> None:
         assert file.outside == cube.sum() - cube[5:35].sum()
         np.testing.assert_array_equal(file.rows(3, 5, edges), found[3:5])
     np.testing.assert_array_equal(found, cube[5:35].transpose(1, 2, 0))
+
+
+def test_many_stamps_are_sorted_piece_by_piece(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    STAMPS["cells5.mat"](tmp_path / "a.mat", small_cube())
+    edges = np.arange(31) + 4.5
+    with open_counts(tmp_path / "a.mat", Hints()) as file:
+        whole, outside = file.rows(0, HEIGHT, edges), file.outside
+    monkeypatch.setattr(stamps, "AT_ONCE", 37)
+    with open_counts(tmp_path / "a.mat", Hints()) as file:
+        np.testing.assert_array_equal(file.rows(0, HEIGHT, edges), whole)
+        assert file.outside == outside
+
+
+def test_a_long_stream_takes_little_more_memory_than_its_file(tmp_path: Path) -> None:
+    import tracemalloc
+
+    path = tmp_path / "long.spc"
+    path.write_bytes(_spc(*np.random.default_rng(0).integers(0, 2**28, 4_000_000)))
+    tracemalloc.start()
+    with open_counts(path, Hints()) as file:
+        assert file.rows(0, 1, np.arange(4097) - 0.5).sum() == 4_000_000
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4 * path.stat().st_size
 
 
 @pytest.mark.parametrize("axes", ["tyx", "txy", "ytx", "yxt", "xty", "xyt"])
@@ -137,7 +164,19 @@ def test_what_a_file_states_of_its_times_is_taken(tmp_path: Path) -> None:
         WRITERS[name](tmp_path / name, small_cube())
         with open_counts(tmp_path / name, Hints()) as file:
             assert file.stated["time_bin_ps"] == pytest.approx(20.0, rel=1e-6)
-            assert file.stated["orientation"] == "histogram"
+            assert "orientation" not in file.stated
+            assert file.assumed == {"orientation": "histogram"}
+
+
+def test_null_data_sets_beside_a_cube_are_left_out(tmp_path: Path) -> None:
+    write_h5(tmp_path / "a.h5", small_cube())
+    with h5py.File(tmp_path / "a.h5", "r+") as made:
+        made["remark"] = h5py.Empty("S1")
+        made["first_ps"] = h5py.Empty("f8")
+        made.attrs["cycles"] = h5py.Empty("f8")
+    with open_counts(tmp_path / "a.h5", Hints()) as file:
+        assert file.stated == {"time_bin_ps": 20.0}
+        np.testing.assert_array_equal(file.rows(0, HEIGHT), small_cube().transpose(1, 2, 0))
 
 
 def test_among_several_variables_one_is_chosen(tmp_path: Path) -> None:
@@ -201,6 +240,14 @@ def test_a_cube_beyond_memory_is_not_held(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "a.mat", {"cube": cube}, do_compression=True)
     with pytest.raises(ContractError, match=r"can only be read whole; save it with -v7.3"):
         open_counts(tmp_path / "a.mat", Hints(axes="tyx", max_bytes=100_000))
+
+
+def test_more_photons_than_fit_into_memory_are_refused(tmp_path: Path) -> None:
+    WRITERS["scan.ptu"](tmp_path / "a.ptu", 30 * small_cube())
+    with pytest.raises(ContractError, match=r"a.ptu, \d{5} photons and markers.*\.h5 or \.npz"):
+        open_counts(tmp_path / "a.ptu", Hints(max_bytes=100_000))
+    with open_counts(tmp_path / "a.ptu", Hints(max_bytes=400_000)) as file:
+        assert file.rows(0, HEIGHT).sum() == 30 * small_cube().sum()
 
 
 def test_fortran_order_and_big_endian_are_read(tmp_path: Path) -> None:
@@ -292,7 +339,7 @@ def test_real_files_hold_what_is_known_of_them() -> None:
             found = file.rows(0, file.height, edges.get(name))
         assert found.shape[:2] == (height, width)
         assert found.sum(dtype=np.float64) == photons
-    stamps = np.loadtxt(folder / "bh_test_noise.asc", dtype=np.int64)
+    listed = np.loadtxt(folder / "bh_test_noise.asc", dtype=np.int64)
     photons_of = decode_spc((folder / "bh_test_noise.spc").read_bytes())
-    np.testing.assert_array_equal(photons_of.macro, stamps[:, 0])
-    np.testing.assert_array_equal(photons_of.micro, stamps[:, 1])
+    np.testing.assert_array_equal(photons_of.macro, listed[:, 0])
+    np.testing.assert_array_equal(photons_of.micro, listed[:, 1])

@@ -89,6 +89,24 @@ def test_dark_pixels_and_prompt_light_are_not_known(fitter: LifetimeFitter) -> N
     assert fitter.fit(np.zeros((0, AXIS.bins), np.float32)).lifetime_ps.shape == (0,)
 
 
+def test_many_bins_are_searched_as_few_are() -> None:
+    """The bank of starts does not grow with the bins, and fits still reach the bound."""
+    import tracemalloc
+
+    fine = TimeAxis.regular("histogram", bins=4096, time_bin_ps=48.83 / 16)
+    decay = Decay(axis=fine, pulse=GaussianPulse(sigma_ps=10))
+    mean = 2000 * decay.shapes(np.full(40, 2500.0), np.full(40, 900.0)).shares + 0.01
+    counts = np.random.default_rng(0).poisson(mean).astype(np.float32)
+    tracemalloc.start()
+    found = LifetimeFitter(decay).fit(counts)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 200e6
+    assert found.known.all()
+    assert np.median(found.lifetime_ps) == pytest.approx(900, rel=0.02)
+    assert np.sqrt(np.mean((found.lifetime_ps - 900) ** 2)) < 1.4 * np.median(found.sigma_ps)
+
+
 def test_limits_that_are_none_are_refused() -> None:
     with pytest.raises(ContractError, match="limits of lifetimes must be > 0 and increase"):
         LifetimeFitter(DECAY, (500.0, 100.0))

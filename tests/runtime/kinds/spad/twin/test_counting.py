@@ -62,6 +62,20 @@ def test_light_is_scaled_to_photons_of_a_pixel() -> None:
         scaled_to(np.zeros((10, 4, 5), np.float32), 70.0)
 
 
+def test_counts_that_no_reader_takes_are_refused() -> None:
+    bright = np.full((9, 2, 2), 1e10)
+    for count in (
+        lambda: count_frames(bright, Disturbances(), RNG(0)),
+        lambda: count_frames(bright * 1e290, Disturbances(), RNG(0)),
+        lambda: count_times(bright, "histogram", Disturbances(), RNG(0)),
+        lambda: count_times(bright, "gate", Disturbances(cycles=2**30), RNG(0)),
+    ):
+        with pytest.raises(ContractError, match=r"captures hold at most 16777216; take fewer"):
+            count()
+    assert count_frames(bright[0, 0] * 1.6e-3, Disturbances(), RNG(0)).max() < 2**24
+    assert count_times(bright, "gate", Disturbances(cycles=100), RNG(0)).max() == 100
+
+
 @pytest.mark.parametrize("changes", [{"dark": -1.0}, {"dead_share": np.inf}, {"cycles": -1}])
 def test_disturbances_that_cannot_be_are_refused(changes: dict[str, float]) -> None:
     with pytest.raises(ContractError, match=next(iter(changes))):

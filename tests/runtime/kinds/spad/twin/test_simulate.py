@@ -1,11 +1,15 @@
 """A scene through `camkit simulate` into every type of file, and back by `camkit process`."""
 
+import io
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
+import scipy.io
 
 import camkit
 from camkit.bundle.reader import Bundle, built_in_bundles, open_bundle
@@ -59,6 +63,81 @@ def test_times_come_back_from_every_type_of_file(
     assert made.arrays["depth_m"].shape == FINE
     assert np.nanmedian(error) < 0.003
     assert made.record["finer"] == "net"
+
+
+@pytest.mark.parametrize("suffix", ["tif", "mat", "ptu"])
+def test_what_lies_beside_a_capture_is_taken_without_being_named(
+    scene: Path,
+    bundle: Bundle,
+    camera: FineCamera,
+    tmp_path: Path,
+    suffix: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / f"scan.{suffix}"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 400) == 0
+    assert named_bundle(out) == "tiny-spad"
+    made = camkit.load(str(bundle.path)).make(out)
+    assert np.nanmedian(np.abs(made.arrays["depth_m"] - stage_set(camera, 5))) < 0.003
+    assert (made.record["timing"], made.record["orientation"]) == (f"scan.{suffix}.toml", "gate")
+    assert not any("is taken as" in told for told in made.warnings)
+    capsys.readouterr()
+    assert run(["plan", str(out), "--bundle", str(bundle.path), "--product", "depth"]) == 0
+    assert f"timing: scan.{suffix}.toml (lies beside the capture)" in capsys.readouterr().out
+
+
+def test_a_bundle_goes_before_what_is_usual_of_a_type_of_file(
+    scene: Path, bundle: Bundle, camera: FineCamera, tmp_path: Path
+) -> None:
+    """A PTU is mostly a histogram of arrivals, but the array behind the plate has a gate."""
+    out = tmp_path / "scan.ptu"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 400) == 0
+    beside = out.with_name("scan.ptu.toml")
+    beside.unlink()
+    made = camkit.load(str(bundle.path)).make(out)
+    assert np.nanmedian(np.abs(made.arrays["depth_m"] - stage_set(camera, 5))) < 0.003
+    told = " ".join(made.warnings)
+    assert "scan.ptu is taken as a scan with a gate, as bundle tiny-spad states" in told
+    beside.write_text('[timing]\norientation = "histogram"\n', encoding="utf-8")
+    stated = camkit.load(str(bundle.path)).make(out)
+    assert stated.record["orientation"] == "histogram"
+    assert not any("is taken as" in told for told in stated.warnings)
+
+
+def test_what_is_stated_leaves_the_rest_of_the_bundle(
+    scene: Path, bundle: Bundle, camera: FineCamera, tmp_path: Path
+) -> None:
+    """Another laser is no other gate, and another width of bins no other beginning."""
+    out, timing = tmp_path / "scan.mat", tmp_path / "t.toml"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 400) == 0
+    text = '[array]\naxes = "yxt"\n[timing]\ntime_bin_ps = 20\n'
+    timing.write_text(text + "[laser]\nfwhm_ps = 90\n", encoding="utf-8")
+    made = camkit.load(str(bundle.path), timing=timing).make(out)
+    told = dict(made.record["pulse"])
+    assert told.pop("sigma_ps") == pytest.approx(np.hypot(42.5, 90 / 2.3548))
+    assert told == {"width_ps": 200.0, "rc_ps": 60.0, "guessed": False}
+    assert np.nanmedian(np.abs(made.arrays["depth_m"] - stage_set(camera, 5))) < 0.003
+    (tmp_path / "irf.csv").write_text("-40 0\n0 1\n40 0\n", encoding="utf-8")
+    timing.write_text(text + '[irf]\nfile = "irf.csv"\n', encoding="utf-8")
+    measured = camkit.load(str(bundle.path), timing=timing).make(out)
+    assert measured.record["pulse"]["measured_to_ps"] == pytest.approx(40)
+
+
+@pytest.mark.parametrize("suffix", ["mat", "h5"])
+def test_axes_in_another_order_are_named_where_they_would_fit(
+    bundle: Bundle, tmp_path: Path, suffix: str
+) -> None:
+    path, cube = tmp_path / f"a.{suffix}", np.ones((HEIGHT, WIDTH, BINS), np.uint16)
+    if suffix == "mat":
+        scipy.io.savemat(path, {"histogram": cube})
+    else:
+        with h5py.File(path, "w") as file:
+            file["histogram"] = cube
+    with pytest.raises(ContractError, match=rf"has {BINS}x{WIDTH} pixels.*axes = \"yxt\" in a"):
+        camkit.load(str(bundle.path)).make(path)
+    np.savez(tmp_path / "b.npz", histogram=np.ones((BINS, 9, 9), np.uint16))
+    with pytest.raises(ContractError, match=r"has 9x9 pixels.*say --bundle none$"):
+        camkit.load(str(bundle.path)).make(tmp_path / "b.npz")
 
 
 def test_a_picture_gives_counts_that_name_their_bundle(
@@ -145,6 +224,8 @@ def test_light_in_flight_becomes_frames(bundle: Bundle, tmp_path: Path) -> None:
         (("-o", "x.npz", "--iso", "200"), "--iso means nothing to bundle tiny-spad"),
         (("-o", "x.npz", "--photons", "0"), "photons must be a number > 0"),
         (("-o", "x.ptu"), "a PTU holds times of photons"),
+        (("-o", "x.npz", "--photons", "1e10"), "captures hold at most 16777216; take fewer"),
+        (("-o", "x.npz", "--photons", "1e20"), "captures hold at most 16777216; take fewer"),
     ],
 )
 def test_what_cannot_be_recorded_is_said_in_one_line(
@@ -159,6 +240,15 @@ def test_what_cannot_be_recorded_is_said_in_one_line(
     assert _simulate("procedural:1", "--bundle", bundle.path, *words) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_photons_are_stored_one_by_one_only_where_they_are_few(
+    scene: Path, bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "scan.ptu"
+    assert _simulate(scene, "--bundle", bundle.path, "-o", out, "--photons", 1e6) == 2
+    assert "more than 50000000; write the histogram as .npz or .h5" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.npz"]
 
 
 def test_files_that_exist_are_kept(
@@ -192,6 +282,36 @@ def test_scenes_of_another_array_or_of_nothing_are_refused(bundle: Bundle, tmp_p
     (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
     with pytest.raises(DecodeError, match="cannot read the scene"):
         record(tmp_path / "broken.npz", bundle, options)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"depth_m": np.full(FINE, "far")},
+        {"albedo": np.full(FINE, 1 + 2j)},
+        {"transient": np.full((BINS, 8, 8), "light")},
+    ],
+)
+def test_scenes_of_what_is_no_number_are_refused(
+    bundle: Bundle, tmp_path: Path, changes: dict[str, np.ndarray]
+) -> None:
+    path = tmp_path / "scene.npz"
+    np.savez(path, **{"depth_m": np.ones(FINE), "albedo": np.ones(FINE), **changes})
+    (name,) = changes
+    with pytest.raises(DecodeError, match=rf"scene.npz: {name} holds .*; expected real numbers"):
+        record(path, bundle, RecordingOptions(photons=10))
+
+
+def test_a_scene_that_announces_more_than_it_holds_is_refused(
+    bundle: Bundle, tmp_path: Path
+) -> None:
+    header = io.BytesIO()
+    facts = {"descr": "<f8", "fortran_order": False, "shape": (10**7, 10**7)}
+    np.lib.format.write_array_header_1_0(header, facts)
+    with zipfile.ZipFile(tmp_path / "scene.npz", "w") as archive:
+        archive.writestr("depth_m.npy", header.getvalue() + bytes(800))
+    with pytest.raises(DecodeError, match=r"cannot read the scene .*has only \d+ bytes"):
+        record(tmp_path / "scene.npz", bundle, RecordingOptions(photons=10))
 
 
 def test_light_of_a_surface_is_its_albedo_at_its_time(camera: FineCamera) -> None:
