@@ -90,6 +90,10 @@ def _nameless(_: Path) -> None:
     return None
 
 
+def _undescribed(_: Path) -> Mapping[str, Any]:
+    return {}
+
+
 def _stem(path: Path) -> str:
     return path.stem
 
@@ -110,6 +114,7 @@ class Maker:
         with_bundle: Names of the options that mean something with a bundle alone.
         named: A capture's file -> the bundle that it names; None if it names none.
         stem: A capture's file -> the name of its products, without suffix.
+        describe: A capture's file -> what it is, as plain JSON values.
     """
 
     make: Callable[[Making], Made]
@@ -122,6 +127,7 @@ class Maker:
     with_bundle: frozenset[str] = frozenset()
     named: Callable[[Path], str | None] = _nameless
     stem: Callable[[Path], str] = _stem
+    describe: Callable[[Path], Mapping[str, Any]] = _undescribed
 
     def check(self, kind: Kind, bundle: Bundle | None, options: Options) -> None:
         """Refuse options before any work.

@@ -93,8 +93,14 @@ def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
 
 
 def _describe_capture(path: Path, mosaic: Any) -> dict[str, Any]:
-    from camkit.runtime.raw import read_capture
+    from camkit.kinds import kind_of_file
+    from camkit.runtime.kind import runtime_part
+    from camkit.runtime.raw import file_sha256, read_capture
 
+    kind = kind_of_file(path)
+    if kind is not None and (maker := runtime_part(kind.name).maker) is not None:
+        facts = maker.describe(path)
+        return {"capture": str(path), "sha256": file_sha256(path), "kind": kind.name, **facts}
     capture = read_capture(path, mosaic=mosaic)
     matrix = capture.color_matrix
     noise = capture.noise

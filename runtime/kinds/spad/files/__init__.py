@@ -14,4 +14,5 @@ spc          Becker & Hickl photon streams
 packed       members of a zip, unpacked under a cap
 open_counts  the reader of a file, by its type
 named        the bundle that a file names
+described    what a file holds and states, for people
 """

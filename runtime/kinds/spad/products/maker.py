@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.runtime.kinds.spad.files.described import describe
 from camkit.runtime.kinds.spad.files.named import named_bundle
 from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.products.depth import make_depth
@@ -154,5 +155,6 @@ MAKER: Final = Maker(
     with_bundle=frozenset({"size"}),
     identity=identity,
     named=named_bundle,
+    describe=describe,
     stem=stem,
 )

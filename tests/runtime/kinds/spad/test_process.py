@@ -359,6 +359,24 @@ def test_the_plan_says_what_would_be_done(
     assert not (tmp_path / "out").exists()
 
 
+def test_info_says_what_a_capture_holds_and_states(
+    scan: Path, timing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert _command("info", scan) == 0
+    told = capsys.readouterr().out
+    assert "kind: spad\nholds: histogram\nwidth: 16\nheight: 12\nbins: 125\naxes: tyx\n" in told
+    np.savez(tmp_path / "a.npz", counts=np.ones((3, 4, 5)), bin_edges_ps=np.arange(9.0), bundle="b")
+    (tmp_path / "a.npz.toml").write_text("[array]\naxes = 'xyt'\n", encoding="utf-8")
+    assert _command("info", tmp_path / "a.npz", "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["holds"], facts["frames"], facts["axes"]) == ("counts", 5, "xyt")
+    assert facts["stated"] == {"bin_edges_ps": "9 values, 0.0 to 8.0"}
+    assert (facts["timing"], facts["bundle_named"]) == ("a.npz.toml", "b")
+    (tmp_path / "bad.npz").write_bytes(b"PK")
+    assert _command("info", tmp_path / "bad.npz") == 1
+    assert "bad.npz is damaged, or no zip" in " ".join(capsys.readouterr().err.split())
+
+
 def test_a_plan_of_a_capture_in_this_folder_is_told(
     scan: Path, timing: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
