@@ -34,7 +34,7 @@ from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.errors import BundleError
 
-FORMAT_VERSION: Final = (2, 3)
+FORMAT_VERSION: Final = (2, 4)
 _OLDEST: Final = 1
 _S = TypeVar("_S", bound=Entry)
 NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
@@ -114,7 +114,7 @@ class Manifest(Entry):
         exported_with: Package -> version.
     """
 
-    format_version: Annotated[str, Field(pattern=r"^[0-9]{1,4}\.[0-9]{1,4}$")] = "2.3"
+    format_version: Annotated[str, Field(pattern=r"^[0-9]{1,4}\.[0-9]{1,4}$")] = "2.4"
     kind: Word = "bayer"
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
     version: Annotated[str, Field(pattern=r"^[0-9]+\.[0-9]+\.[0-9]+(-[0-9A-Za-z.-]+)?$")]

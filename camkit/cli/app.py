@@ -11,6 +11,7 @@ import typer
 
 from camkit.cli.design.design import design
 from camkit.cli.design.export import export
+from camkit.cli.design.fit_bank import fit_bank
 from camkit.cli.design.freeze import freeze
 from camkit.cli.design.lens.app import lens_app
 from camkit.cli.design.plate.app import plate_app
@@ -51,6 +52,7 @@ for command in (
     design,
     freeze,
     train,
+    fit_bank,
     export,
 ):
     app.command()(command)

@@ -256,6 +256,8 @@ def freeze_optics(
         ContractError: If the optics are wrong or no grid keeps the loss.
     """
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
+    # losses of every camera by the same filter, each colour alone
+    chosen = chosen.model_copy(update={"together": None})
     wanted = grid or FreezeGrid()
     tell(f"tracing {optics.name} and its copies")
     bench = make_bench(optics, sensor, chosen, grid=wanted)

@@ -4,12 +4,15 @@ Twin of the block filter of `camkit.runtime.bank.wiener`; `tests/parity` holds t
 patch is one periodic block: cut about 80 px from each side of the result, as the bank does.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.ndimage
 import torch
 from torch import Tensor
 
 from camkit.bundle.stages import Wiener
+from camkit.models_def.sensors.together import restore_together
 
 # Tuned on development pictures with the PSF of the first camera; export writes them down.
 PRIOR_SCALE = 3e-4
@@ -43,6 +46,36 @@ def to_otf(kernels: Tensor, size: tuple[int, int]) -> Tensor:
     return otf
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BlockFacts:
+    """What the bank knows of patches.
+
+    Attributes:
+        planes: (b, c, h, w), tapered.
+        otf: (b, c, h, w // 2 + 1).
+        level: (b, c) > 0; a block darker than its read noise is taken to hold that much signal.
+        variance: (b, c) of the noise.
+    """
+
+    planes: Tensor
+    otf: Tensor
+    level: Tensor
+    variance: Tensor
+
+
+def block_facts(
+    patches: Tensor, kernels: Tensor, shot: Tensor, read_variance: Tensor, settings: Wiener
+) -> BlockFacts:
+    """Give what the bank knows of patches; arguments as of `wiener_restore`."""
+    otf = to_otf(kernels, (patches.shape[-2], patches.shape[-1]))
+    planes = taper_edges(patches, otf, settings.overlap_px // 4)
+    mean = planes.mean(dim=(-2, -1)).clamp(min=0)
+    power = torch.maximum(mean * mean, read_variance).clamp(min=LEAST_POWER)
+    return BlockFacts(
+        planes=planes, otf=otf, level=power.sqrt(), variance=shot * mean + read_variance
+    )
+
+
 def wiener_restore(
     patches: Tensor,
     kernels: Tensor,
@@ -50,8 +83,12 @@ def wiener_restore(
     read_variance: Tensor,
     settings: Wiener,
     saturated: Tensor | None = None,
+    *,
+    height_mm: float = 0.0,
 ) -> Tensor:
-    """Deconvolve patches, each a periodic block, with conj(H) / (|H|^2 + NSR).
+    """Deconvolve patches, each a periodic block.
+
+    Each colour with conj(H) / (|H|^2 + NSR), or all with one model (`together`).
 
     Args:
         patches: (b, c, h, w), linear, white balanced; sides at least those of the kernels.
@@ -62,22 +99,25 @@ def wiener_restore(
         saturated: (b, 1 or c, h, w), true where the sensor clipped; those pixels, and the two
             beside them that the demosaic reaches, are at least as bright as they read. Their
             surroundings are explained by Richardson-Lucy first; the rest goes through the filter.
+        height_mm: Field height of the patches, for what copies of the lens differ in there.
 
     Returns:
         (b, c, h, w).
 
     References: Sun 2021, eq. (2.9); van der Schaaf and van Hateren 1996 (natural-image prior).
     """
+    facts = block_facts(patches, kernels, shot, read_variance, settings)
+    patches, otf, level, variance = facts.planes, facts.otf, facts.level, facts.variance
     size = (patches.shape[-2], patches.shape[-1])
-    otf = to_otf(kernels, size)
-    patches = taper_edges(patches, otf, settings.overlap_px // 4)
-    level = patches.mean(dim=(-2, -1)).clamp(min=0)
-    variance = shot * level + read_variance
-    # A block darker than its read noise is taken to hold that much signal.
-    power = torch.maximum(level * level, read_variance).clamp(min=LEAST_POWER)
-    power = settings.prior_scale * power
+
+    def deconvolved(planes: Tensor, noise: Tensor) -> Tensor:
+        if settings.together is not None:
+            return restore_together(planes, otf, level, noise, height_mm, settings.together)
+        ratio = noise / (settings.prior_scale * level.square())
+        return _filter(planes, _gain(otf, ratio, settings.prior_exponent, size))
+
     if saturated is None or settings.clip_iterations == 0 or not bool(saturated.any()):
-        return _filter(patches, _gain(otf, variance / power, settings.prior_exponent, size))
+        return deconvolved(patches, variance)
     side = 2 * CLIPPED_REACH_PX + 1
     unknown = torch.nn.functional.max_pool2d(
         saturated.to(patches.dtype), side, stride=1, padding=CLIPPED_REACH_PX
@@ -92,7 +132,7 @@ def wiener_restore(
     lights = torch.where(clipped_patch, lights * near, 0)
     residual = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
     variance = torch.maximum(variance, unexplained)
-    return lights + _filter(residual, _gain(otf, variance / power, settings.prior_exponent, size))
+    return lights + deconvolved(residual, variance)
 
 
 def _nearness(clipped: Tensor, reach_px: int | None, *, like: Tensor) -> Tensor:

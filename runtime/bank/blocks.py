@@ -49,11 +49,13 @@ class Block:
         samples: (c, b, b) float32, the blurred picture, made periodic by `taper_edges`.
         otf: (c, b, b // 2 + 1) complex64, the local PSF's; its centre is the origin.
         unknown: (1 or c, b, b), true where the sensor clipped; None if nowhere.
+        height_mm: Field height of its place.
     """
 
     samples: FloatArray
     otf: ComplexArray
     unknown: NDArray[np.bool_] | None = None
+    height_mm: float = 0.0
 
 
 BlockFilter = Callable[[Block], FloatArray]
@@ -396,7 +398,8 @@ class BlockBank:
             )
             samples, unknown = strip.cut(column)
             samples = taper_edges(samples, otf, self._guard_px)
-            block = Block(samples=samples, otf=otf, unknown=unknown)
+            height_mm = float(np.hypot(x_mm, y_mm))
+            block = Block(samples=samples, otf=otf, unknown=unknown, height_mm=height_mm)
             sharp = self._filter(block)[:, strip.span.inner, column.inner]
             return sharp * window
 

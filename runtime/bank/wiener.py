@@ -2,6 +2,8 @@
 
     X = Y conj(H) / (|H|^2 + N / S),  S(f) = prior_scale * level^2 * (f^2 + f0^2)^(-exponent / 2)
 
+or, where the bundle says so, all colours of a block with one model (`together`).
+
 Where the sensor clipped, a linear filter would turn the missing light into rings over the whole
 block. There a few rounds of Richardson-Lucy, which take clipped samples as "at least this bright",
 explain the lights first (`lights`); the Wiener filter gets what they leave, and what they leave
@@ -21,6 +23,7 @@ from camkit.runtime.bank.blocks import Block, BlockFilter
 from camkit.runtime.bank.lights import explain_lights
 from camkit.runtime.bank.richardson_lucy import background_of, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
+from camkit.runtime.bank.together import restore_together
 
 CORNER_FREQUENCY: Final = 1 / 512
 """f0 in cycles/pixel: below it the prior no longer rises."""
@@ -50,17 +53,29 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
         variance = shot * level + read_variance
         # A block darker than its read noise is taken to hold that much signal.
         power = np.maximum(np.maximum(level * level, read_variance), LEAST_POWER)
-        rise = _prior_rise(block.samples.shape[-1], settings.prior_exponent)
-        if block.unknown is None or settings.clip_iterations == 0:
+
+        def deconvolved(samples: FloatArray, variance: NDArray[np.float64]) -> FloatArray:
+            if settings.together is not None:
+                return restore_together(
+                    samples,
+                    block.otf,
+                    level=np.sqrt(power),
+                    variance=variance,
+                    height_mm=block.height_mm,
+                    together=settings.together,
+                )
+            rise = _prior_rise(samples.shape[-1], settings.prior_exponent)
             gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
-            return apply_transfer(block.samples, gain)
+            return apply_transfer(samples, gain)
+
+        if block.unknown is None or settings.clip_iterations == 0:
+            return deconvolved(block.samples, variance)
         unknown = spread_clipped(block.unknown)
         lights, unexplained = explain_lights(block, unknown, background, settings, kernel_px)
         residual = block.samples - apply_transfer(lights, block.otf)
         np.copyto(residual, 0, where=unknown)
         variance = np.maximum(variance, unexplained)
-        gain = _gain(block.otf, rise, variance / (settings.prior_scale * power))
-        return lights + apply_transfer(residual, gain)
+        return lights + deconvolved(residual, variance)
 
     return restore
 

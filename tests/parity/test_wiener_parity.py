@@ -17,6 +17,7 @@ from tests.psf_factory import (
     texture,
     with_noise,
 )
+from tests.together_factory import TOGETHER
 
 TOLERANCE = 1e-5
 KERNELS = coma_kernels(radius_px=10)[0]
@@ -26,8 +27,9 @@ def tensors(noise):
     return torch.tensor(noise.shot), torch.tensor(noise.read_variance)
 
 
-def settings(clip_iterations, clip_reach_px=None):
+def settings(clip_iterations, clip_reach_px=None, together=None):
     return Wiener(
+        together=together,
         block_px=64,
         overlap_px=24,
         prior_scale=3e-4,
@@ -62,6 +64,31 @@ def test_block_filter_and_torch_agree(size, clip_iterations, reach, mask_channel
         torch.from_numpy(np.stack(masks)) if mask_channels else None,
     )
     np.testing.assert_allclose(restored.numpy(), np.stack(expected), atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("size", [64, 66, 63])
+@pytest.mark.parametrize("clip_iterations", [0, 6])
+@pytest.mark.parametrize("height_mm", [0.0, 7.0])
+def test_colours_together_agree(size, clip_iterations, height_mm):
+    bank = settings(clip_iterations, 16 if clip_iterations else None, TOGETHER)
+    kernel = KERNELS[1]
+    scene = texture(size, size, seed=4)
+    scene[:, 20:24, 20:24] = 8.0
+    planes = with_noise(blur_periodic(scene, kernel), ISO_100, np.random.default_rng(2))
+    mask = planes[:1] >= 1
+    planes = np.minimum(planes, 1)
+    otf = to_otf(kernel, size)
+    block = Block(samples=taper_edges(planes, otf, 6), otf=otf, unknown=mask, height_mm=height_mm)
+    restored = wiener_restore(
+        torch.from_numpy(planes)[None],
+        torch.from_numpy(kernel)[None],
+        *tensors(ISO_100),
+        bank,
+        torch.from_numpy(mask)[None],
+        height_mm=height_mm,
+    )
+    expected = wiener_filter(bank, ISO_100)(block)
+    np.testing.assert_allclose(restored[0].numpy(), expected, atol=5 * TOLERANCE)
 
 
 @pytest.mark.parametrize("channels", [1, 2, 5])

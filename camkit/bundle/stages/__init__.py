@@ -26,6 +26,7 @@ from camkit.bundle.stages.raise_clipped import RaiseClipped
 from camkit.bundle.stages.repair import Repair
 from camkit.bundle.stages.sharpen import Sharpen
 from camkit.bundle.stages.super_resolve import SuperResolve
+from camkit.bundle.stages.together import Together
 from camkit.bundle.stages.undistort import Undistort
 from camkit.bundle.stages.white_balance import WhiteBalance
 from camkit.bundle.stages.wiener import Wiener
@@ -47,6 +48,7 @@ __all__ = [
     "Stage",
     "StageEntry",
     "SuperResolve",
+    "Together",
     "Undistort",
     "WhiteBalance",
     "Wiener",

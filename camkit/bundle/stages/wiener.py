@@ -15,6 +15,7 @@ from camkit.bundle.stages.entry import (
     need_domain,
     need_rows,
 )
+from camkit.bundle.stages.together import Together
 
 _PITCH_RTOL: Final = 1e-6
 
@@ -30,6 +31,7 @@ class Wiener(StageEntry):
         clip_iterations: Rounds of re-estimating clipped pixels; 0 for none.
         clip_reach_px: Farther than this from clipped samples nothing is re-estimated (format 2.1);
             None for whole blocks, as before.
+        together: How the colours are restored together (format 2.4); None for each alone.
     """
 
     type: Literal["wiener"] = "wiener"
@@ -41,6 +43,7 @@ class Wiener(StageEntry):
     prior_exponent: NonNegative
     clip_iterations: Annotated[int, Field(ge=0, le=100)] = 0
     clip_reach_px: Annotated[int, Field(ge=2, le=1024)] | None = None
+    together: Together | None = None
 
     @model_validator(mode="after")
     def _check(self) -> "Wiener":
@@ -66,6 +69,11 @@ class Wiener(StageEntry):
             raise JoinError(
                 f"it takes one plane for each of {', '.join(parts.sensor.channels)}, not "
                 f"{', '.join(plane.channels)}"
+            )
+        if self.together is not None and len(self.together.noise) != len(plane.channels):
+            raise JoinError(
+                f"it restores {len(self.together.noise)} colours together and takes "
+                f"{len(plane.channels)}"
             )
         if not plane.grid.warped:
             raise JoinError("it works in the geometry of the sensor, before any undistortion")

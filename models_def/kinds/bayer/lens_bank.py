@@ -59,7 +59,8 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
     depths_mm = choices.depths_mm or (lens.object_distance_mm,)
     kernels = []
     for copy, depth_mm in product(
-        focused_copies(lens, choices.copies + 2, choices.seed), depths_mm
+        focused_copies(lens, 1 + choices.copies + choices.validation_copies, choices.seed),
+        depths_mm,
     ):
         traced, kept = colour_kernels(
             with_object_distance(copy, depth_mm),
@@ -85,6 +86,7 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
         relative_illumination=relative_illumination_at(lens, torch.from_numpy(heights)).numpy(),
         depths=depths,
         frozen_depths=np.stack(kernels[:depths]) if recipe.data.known_depth_share else None,
+        validation_copies=choices.validation_copies,
     )
 
 

@@ -26,7 +26,7 @@ class PsfBank:
 
     Attributes:
         copies: (copy * depth, field, 3, h, w) float32, each sums to 1; the depths of a copy lie
-            side by side, the last copy is for validation.
+            side by side, the last copies are for validation.
         copy_heights_mm: (field,) float64, increasing from 0.
         frozen: (field, 3, h, w) float32, what the bundle will hold.
         frozen_heights_mm: (field,) float64, increasing from 0.
@@ -34,6 +34,7 @@ class PsfBank:
         depths: Of every copy.
         frozen_depths: (depth, field, 3, h, w) float32, what `frozen` is the mean of; None for one
             depth, or where nobody asks for them.
+        validation_copies: How many of the copies are never trained on.
     """
 
     copies: FloatArray
@@ -43,13 +44,16 @@ class PsfBank:
     relative_illumination: NDArray[np.float64]
     depths: int = 1
     frozen_depths: FloatArray | None = None
+    validation_copies: int = 1
 
     def __post_init__(self) -> None:
         count = self.copies.shape[0] if self.copies.ndim == 5 else 0
-        if self.depths < 1 or count % self.depths or count < 2 * self.depths:
+        kept = self.validation_copies
+        if min(self.depths, kept) < 1 or count % self.depths or count < (1 + kept) * self.depths:
             raise ContractError(
-                "copies must be (copy >= 2 times depth, field, 3, h, w), the last copy for "
-                f"validation; got {self.copies.shape} with {self.depths} depth(s)"
+                "copies must be (copy times depth, field, 3, h, w), one to train on at least and "
+                f"the last {kept} for validation; got {self.copies.shape} with {self.depths} "
+                "depth(s)"
             )
         if self.frozen.ndim != 4 or self.copies.shape[2] != 3 or self.frozen.shape[1] != 3:
             raise ContractError(
@@ -64,7 +68,7 @@ class PsfBank:
     @property
     def training_copies(self) -> int:
         """How many copies may be trained on, each depth of a copy counted."""
-        return int(self.copies.shape[0]) - self.depths
+        return int(self.copies.shape[0]) - self.depths * self.validation_copies
 
     def blur_kernels(self, copy: int, x_mm: float, y_mm: float) -> Tensor:
         """Give the (1, 3, h, w) kernels of one copy at a sensor position."""
@@ -95,6 +99,7 @@ class PsfBank:
     def digest(self) -> str:
         """Give the sha256 of all kernels and positions."""
         total = hashlib.sha256(b"" if self.depths == 1 else str(self.depths).encode())
+        total.update(b"" if self.validation_copies == 1 else b"%d" % self.validation_copies)
         for name in _ARRAYS:
             total.update(np.ascontiguousarray(getattr(self, name)).tobytes())
         if self.frozen_depths is not None:
@@ -116,6 +121,8 @@ def write_bank(path: Path, bank: PsfBank) -> None:
     arrays = {name: getattr(bank, name) for name in _ARRAYS}
     if bank.depths > 1:
         arrays["depths"] = np.array(bank.depths)
+    if bank.validation_copies > 1:
+        arrays["validation_copies"] = np.array(bank.validation_copies)
     if bank.frozen_depths is not None:
         arrays["frozen_depths"] = bank.frozen_depths
     np.savez(path, **arrays)
@@ -125,9 +132,10 @@ def read_bank(path: Path) -> PsfBank:
     """Read what `write_bank` wrote."""
     with np.load(path, allow_pickle=False) as arrays:
         depths = int(arrays["depths"]) if "depths" in arrays else 1
+        unseen = int(arrays["validation_copies"]) if "validation_copies" in arrays else 1
         apart = arrays.get("frozen_depths")
         kept = {name: arrays[name] for name in _ARRAYS}
-        return PsfBank(**kept, depths=depths, frozen_depths=apart)
+        return PsfBank(**kept, depths=depths, frozen_depths=apart, validation_copies=unseen)
 
 
 def _at(kernels: FloatArray, heights_mm: NDArray[np.float64], x_mm: float, y_mm: float) -> Tensor:

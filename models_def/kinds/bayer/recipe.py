@@ -4,12 +4,12 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Final
 
 from camkit.bundle.sensor import BayerSensor
-from camkit.bundle.stages import Wiener
+from camkit.bundle.stages import Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import ContractError
 from camkit.models_def.toml_table import section, typed
@@ -39,7 +39,9 @@ class LensRecipe:
     Attributes:
         prescription: Name of a built-in lens, or path of a file (.toml, .zmx) relative to the
             recipe.
-        copies: Fabricated copies whose PSFs are trained on; one more is kept for validation.
+        copies: Fabricated copies whose PSFs are trained on.
+        validation_copies: Further ones that pictures to choose by are taken with, in turn. One
+            alone may be an outlier; eight show what the lens is like.
         fields: Field heights of the kernel bank.
         kernel_px: Side of its kernels, odd.
         rays: Rays in half the pupil.
@@ -56,14 +58,20 @@ class LensRecipe:
     rays: int = 4096
     seed: int = 101
     depths_mm: tuple[float, ...] = ()
+    validation_copies: int = 1
 
     def __post_init__(self) -> None:
+        if self.validation_copies < 1:
+            raise ContractError(
+                f"lens.validation_copies must be >= 1; got {self.validation_copies}"
+            )
         if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
             raise ContractError(f"lens.depths_mm must increase from above 0; got {self.depths_mm}")
 
     def to_json(self) -> dict[str, Any]:
-        """Give what decides the kernels, to name files by; depths only where there are any."""
-        return {name: value for name, value in asdict(self).items() if value != ()}
+        """Give what decides the kernels, to name files by; what is as usual is left out."""
+        usual = {"depths_mm": (), "validation_copies": 1}
+        return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,6 +206,10 @@ class BayerRecipe(Recipe):
             raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
         if self.data.known_depth_share and depths < 2:
             raise ContractError("data.known_depth_share needs two or more lens.depths_mm")
+
+    def with_together(self, together: Together | None) -> "BayerRecipe":
+        """Give it with another model of colours in its bank."""
+        return replace(self, wiener=self.wiener.model_copy(update={"together": together}))
 
 
 def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:

@@ -97,12 +97,31 @@ class Circumstances:
         gains: White balance (R, G, B).
         frozen: (1, 3, kh, kw) kernels of the block that the place belongs to.
         illumination: Relative illumination of the place.
+        height_mm: Field height of the block.
     """
 
     noise: NoiseModel
     gains: tuple[float, float, float]
     frozen: Tensor
     illumination: float
+    height_mm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Developed:
+    """A photographed crop before any filter.
+
+    Attributes:
+        planes: (1, 3, S, S) linear, white balanced, with surroundings of `margin_px`.
+        unknown: (1, 1, S, S) bool, where the sensor clipped.
+        true: (1, 3, s, s) sharp light of the middle, illumination contained.
+        given: Noise, gains, kernels and light.
+    """
+
+    planes: Tensor
+    unknown: Tensor
+    true: Tensor
+    given: Circumstances
 
 
 def scene_side_px(recipe: BayerRecipe, bank: PsfBank) -> int:
@@ -170,7 +189,14 @@ def tint_crop(rng: Generator, crop: FloatArray) -> FloatArray:
 def make_shot(
     crop: FloatArray, exposure: Exposure, recipe: BayerRecipe, bank: PsfBank, rng: Generator
 ) -> Shot:
-    """Photograph a sharp crop and run the front end of the runtime on it.
+    """Photograph a sharp crop and run the front end of the runtime on it; see `photograph`."""
+    return finish_shot(photograph(crop, exposure, recipe, bank, rng), recipe)
+
+
+def photograph(
+    crop: FloatArray, exposure: Exposure, recipe: BayerRecipe, bank: PsfBank, rng: Generator
+) -> Developed:
+    """Photograph a sharp crop and develop it.
 
     Args:
         crop: (3, side, side) linear Rec.709 with side = `scene_side_px`.
@@ -198,54 +224,56 @@ def make_shot(
     capture, saturated = expose(blurred, gains, recipe.sensor, exposure.iso, rng)
     noise = sensor.noise_at(exposure.iso).with_gains(gains)
     planes, unknown = _develop(capture, saturated, gains, recipe, exposure.borders)
-    return finish_shot(
-        planes,
-        unknown,
-        _cut(sharp, data.sample_px) * illumination,
-        Circumstances(
+    frozen = bank.frozen_kernels(
+        exposure.block_x_mm,
+        exposure.block_y_mm,
+        exposure.copy % bank.depths if exposure.depth_known else None,
+    )
+    return Developed(
+        planes=planes,
+        unknown=unknown,
+        true=cut_middle(sharp, data.sample_px) * illumination,
+        given=Circumstances(
             noise=noise,
             gains=gains,
-            frozen=bank.frozen_kernels(
-                exposure.block_x_mm,
-                exposure.block_y_mm,
-                exposure.copy % bank.depths if exposure.depth_known else None,
-            ),
+            frozen=frozen,
             illumination=illumination,
+            height_mm=float(np.hypot(exposure.block_x_mm, exposure.block_y_mm)),
         ),
-        recipe,
     )
 
 
-def finish_shot(
-    planes: Tensor, unknown: Tensor, true: Tensor, given: Circumstances, recipe: BayerRecipe
-) -> Shot:
-    """Filter and stabilise developed planes, as the runtime does.
-
-    Args:
-        planes: (1, 3, S, S) linear, white balanced, with surroundings of `margin_px`.
-        unknown: (1, 1, S, S) bool, where the sensor clipped.
-        true: (1, 3, s, s) sharp light of the middle, illumination contained.
-        given: Noise, gains, kernels and light.
-        recipe: Camera and sample sizes.
-    """
+def finish_shot(developed: Developed, recipe: BayerRecipe) -> Shot:
+    """Filter and stabilise developed planes, as the runtime does."""
+    planes, unknown, given = developed.planes, developed.unknown, developed.given
     data, noise = recipe.data, given.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
-    restored = wiener_restore(planes, given.frozen, shot, read, recipe.wiener, unknown)
+    restored = wiener_restore(
+        planes, given.frozen, shot, read, recipe.wiener, unknown, height_mm=given.height_mm
+    )
     stable = [
-        stabilise(_cut(x, data.sample_px), shot, read, scale=recipe.scale)
+        stabilise(cut_middle(x, data.sample_px), shot, read, scale=recipe.scale)
         for x in (planes, restored)
     ]
-    target = stabilise(true.clamp(max=data.target_max), shot, read, scale=recipe.scale)
-    lost = _lost(true, _cut(unknown, data.sample_px), given.gains)
     return Shot(
         sample=Sample(
             inputs={port.name: x[0] for port, x in zip(LAYOUT.inputs, stable, strict=True)},
-            target=torch.where(lost, torch.tensor(NOT_JUDGED), target)[0],
+            target=target_of(developed, recipe)[0],
             weight=recipe.scale * shot.sqrt(),
         ),
         noise=noise,
         illumination=given.illumination,
     )
+
+
+def target_of(developed: Developed, recipe: BayerRecipe) -> Tensor:
+    """Give (1, 3, s, s) what a sample should become, stabilised; NOT_JUDGED where nobody knows."""
+    data, given = recipe.data, developed.given
+    shot, read = torch.tensor(given.noise.shot), torch.tensor(given.noise.read_variance)
+    bright = developed.true.clamp(max=data.target_max)
+    target = stabilise(bright, shot, read, scale=recipe.scale)
+    lost = _lost(developed.true, cut_middle(developed.unknown, data.sample_px), given.gains)
+    return torch.where(lost, torch.tensor(NOT_JUDGED), target)
 
 
 def _drifted(kernels: Tensor, size: float, turn: float) -> Tensor:
@@ -305,7 +333,7 @@ def _develop(
     return planes, unknown > 0
 
 
-def _cut(planes: Tensor, side_px: int) -> Tensor:
+def cut_middle(planes: Tensor, side_px: int) -> Tensor:
     """Cut the middle square."""
     top, left = ((n - side_px) // 2 for n in planes.shape[-2:])
     return planes[..., top : top + side_px, left : left + side_px]

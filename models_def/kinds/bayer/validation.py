@@ -37,12 +37,13 @@ SEED: Final = 424242
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidationCapture:
-    """One capture: its shot, the (3, s, s) sharp sRGB picture, and where it was taken."""
+    """One capture: its shot, the (3, s, s) sharp sRGB picture, where and by which copy."""
 
     shot: Shot
     sharp: FloatArray
     field_share: float
     iso: float
+    copy: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,8 +75,8 @@ def make_validation_captures(
 ) -> list[ValidationCapture]:
     """Photograph the middle of each picture at five field heights, two ISOs, the depths in turn.
 
-    The lens is the copy that is not trained on; each Wiener block lies off its place as a block
-    of the bank does. Without a folder, procedural scenes are photographed.
+    The lens is one of the copies that are not trained on, in turn; each Wiener block lies off its
+    place as a block of the bank does. Without a folder, procedural scenes are photographed.
     """
     side = scene_side_px(recipe, bank)
     captures = []
@@ -88,7 +89,13 @@ def make_validation_captures(
                 inner = (side - recipe.data.sample_px) // 2
                 sharp = encode_srgb(crop[:, inner : side - inner, inner : side - inner])
                 captures.append(
-                    ValidationCapture(shot=shot, sharp=sharp, field_share=share, iso=iso)
+                    ValidationCapture(
+                        shot=shot,
+                        sharp=sharp,
+                        field_share=share,
+                        iso=iso,
+                        copy=(exposure.copy - bank.training_copies) // bank.depths,
+                    )
                 )
     return captures
 
@@ -110,7 +117,8 @@ def _middle(picture: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
 
 def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn: int) -> Exposure:
     height = share * corner_height_mm(recipe)
-    depth = sum(divmod(turn, len(FIELD_SHARES))) % bank.depths
+    number = sum(divmod(turn, len(FIELD_SHARES)))
+    depth, unseen = number % bank.depths, number // bank.depths % bank.validation_copies
     azimuth = turn * GOLDEN_ANGLE_RAD
     x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
     offset = BLOCK_OFFSET_PX * recipe.sensor.pixel_pitch_um / 1000
@@ -119,7 +127,7 @@ def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn
         y_mm=float(y_mm),
         block_x_mm=float(x_mm + offset * np.cos(3 * azimuth)),
         block_y_mm=float(y_mm + offset * np.sin(3 * azimuth)),
-        copy=bank.training_copies + depth,
+        copy=bank.training_copies + unseen * bank.depths + depth,
         iso=iso,
     )
 
@@ -133,7 +141,8 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
         restore: (1, 6, s, s) stabilised planes -> (1, 3, s, s) stabilised.
 
     Returns:
-        Mean PSNR on sRGB values; by ISO, and by field height as a share of the corner's.
+        Mean PSNR on sRGB values; by ISO, by field height as a share of the corner's, and by copy
+        of the lens where there are several.
     """
     with torch.no_grad():
         values = [
@@ -145,6 +154,9 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
         f"{f:g}": _mean(values, [c.field_share == f for c in captures]) for f in FIELD_SHARES
     }
     parts = {"by_iso": by_iso, "by_field": by_field}
+    copies = sorted({c.copy for c in captures})
+    if len(copies) > 1:
+        parts["by_copy"] = {f"{n}": _mean(values, [c.copy == n for c in captures]) for n in copies}
     return Score(mean_db=float(np.mean(values)), parts=parts)
 
 

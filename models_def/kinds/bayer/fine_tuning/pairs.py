@@ -26,7 +26,13 @@ from camkit.models_def.kinds.bayer.fine_tuning.alignment import CLIPPED_ABOVE, A
 from camkit.models_def.kinds.bayer.fine_tuning.homography import Homography, warp_to
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
-from camkit.models_def.kinds.bayer.samples import LAYOUT, NOT_JUDGED, Circumstances, finish_shot
+from camkit.models_def.kinds.bayer.samples import (
+    LAYOUT,
+    NOT_JUDGED,
+    Circumstances,
+    Developed,
+    finish_shot,
+)
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample
@@ -199,18 +205,19 @@ def _cut(
     window = np.s_[:, y - margin : y + side + margin, x - margin : x + side + margin]
     planes = torch.from_numpy(pair.capture[window].copy())[None]
     shown, inside = _warped(pair, place, side)
-    shot = finish_shot(
-        planes,
-        planes.amax(1, keepdim=True) >= CLIPPED_ABOVE,
-        torch.from_numpy(shown * np.float32(illumination)).clamp(min=0)[None],
-        Circumstances(
+    developed = Developed(
+        planes=planes,
+        unknown=planes.amax(1, keepdim=True) >= CLIPPED_ABOVE,
+        true=torch.from_numpy(shown * np.float32(illumination)).clamp(min=0)[None],
+        given=Circumstances(
             noise=noise,
             gains=settings.gains,
             frozen=bank.frozen_kernels(float(block_x_mm), float(block_y_mm)),
             illumination=illumination,
+            height_mm=float(np.hypot(block_x_mm, block_y_mm)),
         ),
-        recipe,
     )
+    shot = finish_shot(developed, recipe)
     target = shot.sample.target
     judged = torch.where(torch.from_numpy(inside), target, torch.tensor(NOT_JUDGED))
     return replace(shot.sample, target=judged)

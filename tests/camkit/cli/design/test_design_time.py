@@ -13,6 +13,7 @@ RECIPE = Path(__file__).resolve().parents[4] / "models_def" / "recipes" / "duet.
 COMMANDS = {
     "freeze": ["lens.toml", "-o", "psf.safetensors"],
     "train": ["recipe.toml"],
+    "fit-bank": ["recipe.toml", "-o", "with.toml"],
     "export": ["one.pt", "-o", "one.camkit"],
 }
 

@@ -26,7 +26,7 @@ def test_kernels_are_normalised_everywhere_and_turn_with_the_azimuth(bank):
 
 
 def test_bank_without_a_copy_for_validation_is_refused(bank):
-    with pytest.raises(ContractError, match="copy >= 2"):
+    with pytest.raises(ContractError, match="one to train on at least and the last 1"):
         replace(bank, copies=bank.copies[:1])
 
 
@@ -57,3 +57,15 @@ def test_copies_that_are_not_all_there_at_all_depths_are_refused(bank, copies, d
     kernels = np.repeat(bank.copies[:1], copies, axis=0)
     with pytest.raises(ContractError, match="depth"):
         replace(bank, copies=kernels, depths=depths)
+
+
+def test_several_copies_are_kept_from_training(bank, tmp_path):
+    several = replace(bank, copies=np.repeat(bank.copies, 2, axis=0), validation_copies=3)
+    assert several.training_copies == 1
+    write_bank(tmp_path / "bank.npz", several)
+    found = read_bank(tmp_path / "bank.npz")
+    assert found.validation_copies == 3
+    assert found.digest() == several.digest()
+    assert found.digest() != replace(several, validation_copies=2).digest()
+    with pytest.raises(ContractError, match="the last 4 for validation"):
+        replace(several, validation_copies=4)

@@ -75,3 +75,30 @@ def test_validation_goes_through_all_depths_of_the_unseen_copy_at_every_field(
                 height = share * corner_height_mm(recipe)
                 here = [e for e in taken if np.isclose(np.hypot(e.x_mm, e.y_mm), height)]
                 assert {e.copy for e in here if e.iso == iso} == unseen
+
+
+def test_several_unseen_copies_take_turns_at_every_field(recipe, bank, monkeypatch):
+    taken = []
+    monkeypatch.setattr(validation, "PROCEDURAL_PICTURES", 8)
+    monkeypatch.setattr(validation, "make_shot", lambda _crop, exposure, *_: taken.append(exposure))
+    for depths in (1, 2):
+        taken.clear()
+        many = np.repeat(bank.copies[:1], 5 * depths, axis=0)
+        several = replace(bank, copies=many, depths=depths, validation_copies=4)
+        make_validation_captures(recipe, several, None)
+        unseen = set(range(depths, 5 * depths))
+        assert {exposure.copy for exposure in taken} == unseen
+        for share in FIELD_SHARES:
+            there = {
+                e.copy
+                for e in taken
+                if np.hypot(e.x_mm, e.y_mm) == pytest.approx(share * corner_height_mm(recipe))
+            }
+            assert there == unseen
+
+
+def test_scores_are_told_by_copy_where_there_are_several(recipe, bank):
+    several = replace(bank, copies=np.repeat(bank.copies, 2, axis=0), validation_copies=3)
+    found = BayerJudge(captures=make_validation_captures(recipe, several, None), recipe=recipe)
+    by_copy = found.score(lambda planes: planes[:, 3:]).parts["by_copy"]
+    assert set(by_copy) == {"0", "1", "2"}

@@ -1,0 +1,75 @@
+"""Numbers of a Wiener bank that restores the colours of a block together (format 2.4)."""
+
+from itertools import pairwise
+from typing import Annotated, Final, Self
+
+from pydantic import Field, model_validator
+
+from camkit.bundle.entry import Entry, NonNegative, Positive
+
+BAND: Final = (0.015, 0.25)
+"""Cycles per pixel in which the power of a block is measured."""
+BAND_STEP: Final = 3
+"""Of every so many frequencies along either axis one is measured."""
+
+Line = tuple[float, ...]
+
+
+class Spread(Entry):
+    """How much the transfer of fabricated copies scatters around the frozen one.
+
+    Attributes:
+        heights_mm: Field heights, increasing from 0.
+        frequencies: Cycles per pixel, increasing from 0.
+        variance: (height, colour, frequency) mean of |H_copy - H|^2.
+    """
+
+    heights_mm: Annotated[Line, Field(min_length=1, max_length=64)]
+    frequencies: Annotated[Line, Field(min_length=2, max_length=64)]
+    variance: tuple[tuple[Annotated[tuple[NonNegative, ...], Field(max_length=64)], ...], ...]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in ("heights_mm", "frequencies"):
+            line = getattr(self, name)
+            if line[0] != 0 or any(b <= a for a, b in pairwise(line)):
+                raise ValueError(f"{name} must increase from 0")
+        if len(self.variance) != len(self.heights_mm):
+            raise ValueError("variance must have one entry for each of heights_mm")
+        colours = {len(of_height) for of_height in self.variance}
+        lengths = {len(line) for of_height in self.variance for line in of_height}
+        if len(colours) != 1 or lengths != {len(self.frequencies)}:
+            raise ValueError("variance must be (height, colour, frequency)")
+        return self
+
+
+class Together(Entry):
+    """What the bank takes the colours of a scene, and their noise, for.
+
+    Attributes:
+        noise: Of every colour, logarithm of its noise over the sensor's at low frequencies, where
+            the demosaic piles it up.
+        noise_rise: How that logarithm changes with four times the frequency squared.
+        scale: Power of the light that all colours share, over the squared level.
+        exponent: Of its fall with frequency.
+        follow: Exponent with which it follows what a block shows; 0 for not at all.
+        own: Power of what a colour has of its own, over that of the shared light.
+        mistrust: Times the variance of the transfer.
+        spread: That variance.
+    """
+
+    noise: Line
+    noise_rise: Line
+    scale: Positive
+    exponent: NonNegative
+    follow: Annotated[float, Field(ge=0, le=1)]
+    own: NonNegative
+    mistrust: NonNegative
+    spread: Spread
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        colours = len(self.spread.variance[0])
+        if {len(self.noise), len(self.noise_rise)} != {colours}:
+            raise ValueError(f"noise and noise_rise must have one number for each of {colours}")
+        return self

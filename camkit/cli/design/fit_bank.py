@@ -1,0 +1,59 @@
+"""`camkit fit-bank`: the numbers of a bank that restores the colours of a camera together."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
+
+
+def fit_bank(
+    recipe: Annotated[Path, typer.Argument(help="The recipe (TOML).")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The recipe with its numbers (TOML).")
+    ],
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of pictures; without it procedural scenes only.")
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Samples that are photographed.")] = 240,
+    steps: Annotated[int, typer.Option(help="Steps of the descent.")] = 160,
+    seed: Annotated[int, typer.Option(help="Of samples and descent.")] = 0,
+    cache_dir: Annotated[Path, typer.Option(help="Folder for traced kernels.")] = Path("runs"),
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Fit the bank that restores all colours together to a recipe's camera (needs torch)."""
+    from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
+
+    require_torch("camkit fit-bank")
+    refuse_existing([output], overwrite=overwrite)
+    from camkit.models_def.training.bank_fitting import (
+        BankFitOptions,
+        bank_fitting_kind,
+        with_bank,
+    )
+    from camkit.models_def.training.kind import read_recipe
+    from camkit.runtime.output.part_file import atomic_output
+
+    plan = read_recipe(recipe)
+    found = bank_fitting_kind(plan.kind).fit(
+        plan,
+        BankFitOptions(
+            pictures=data,
+            recipe_folder=recipe.parent,
+            cache_folder=cache_dir,
+            samples=samples,
+            steps=steps,
+            seed=seed,
+        ),
+        lambda line: say(line, err=True),
+    )
+    text = with_bank(recipe.read_text(encoding="utf-8"), found.together)
+    with atomic_output(output) as part:
+        part.write_text(text, encoding="utf-8")
+    numbers = found.together.model_dump(mode="json", exclude={"spread"})
+    told = {"samples": found.samples, "steps": found.steps, "gain_db": round(found.gain_db, 3)}
+    print_report({"output": str(output), **told, **numbers}, json_)

@@ -1,0 +1,310 @@
+"""The numbers of a Wiener bank that restores colours together, fitted to a camera.
+
+    copies of the lens -> spread of the transfer
+    training scenes -> photographed, developed -> descent on what the bank leaves -> numbers
+
+The loss is that of training: squared errors of stabilised planes, a sample's error by its
+logarithm, so that dark and bright samples, the axis and the corner, count alike. Samples with
+clipped light are left out: there a bank has other work.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from camkit.bundle.stages import Together
+from camkit.bundle.stages.together import Spread
+from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.material import trace_material
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import (
+    Developed,
+    cut_middle,
+    draw_exposure,
+    photograph,
+    scene_side_px,
+    target_of,
+    tint_crop,
+)
+from camkit.models_def.sensors.stabilise import stabilise
+from camkit.models_def.sensors.together import Numbers, restore_together
+from camkit.models_def.sensors.wiener import block_facts, to_otf, wiener_restore
+from camkit.models_def.training.bank_fitting import BankFit, BankFitOptions
+from camkit.models_def.training.pictures import open_source
+
+FREQUENCIES: Final = (0.0, 0.015, 0.03, 0.05, 0.075, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4, 0.75)
+"""Of the table of the spread, cycles per pixel."""
+HEIGHTS: Final = 9
+JUDGED_BELOW: Final = 0.3
+"""Cycles per pixel: what lies above tells little of a lens."""
+GRID_PX: Final = 256
+SPREAD_DIGITS: Final = 7
+DIGITS: Final = 4
+FIRST: Final = Together(
+    noise=(1.6, 0.5, 1.6),
+    noise_rise=(1.4, 0.7, 1.6),
+    scale=2e-3,
+    exponent=2.4,
+    follow=0.5,
+    own=0.13,
+    mistrust=3.3,
+    spread=Spread(heights_mm=(0.0,), frequencies=(0.0, 1.0), variance=(((0.0, 0.0),) * 3,)),
+)
+"""Where the descent begins."""
+RATE: Final = 0.04
+LAST_RATE: Final = 0.002
+BATCH: Final = 6
+HELD_OUT: Final = 4
+"""Every so many samples one is kept to judge by."""
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Case:
+    """A sample as the bank meets it."""
+
+    planes: Tensor
+    otf: Tensor
+    level: Tensor
+    variance: Tensor
+    height_mm: float
+    target: Tensor
+    shot: Tensor
+    read: Tensor
+    alone: float
+
+
+def spread_of(bank: PsfBank) -> Spread:
+    """Measure how much the transfer of the copies to train on scatters around the frozen one."""
+    count = len(bank.copy_heights_mm)
+    chosen = np.unique(np.linspace(0, count - 1, min(HEIGHTS, count)).round().astype(int))
+    places = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX)[None])
+    variance = []
+    for index in chosen:
+        height = float(bank.copy_heights_mm[index])
+        frozen = to_otf(bank.frozen_kernels(0.0, height), (GRID_PX, GRID_PX))
+        gaps = [
+            (to_otf(bank.blur_kernels(copy, 0.0, height), (GRID_PX, GRID_PX)) - frozen).abs()
+            for copy in range(bank.training_copies)
+        ]
+        mean = torch.stack(gaps).square().mean(dim=0)[0].numpy().astype(np.float64)
+        variance.append(tuple(_line(of_colour, places) for of_colour in mean))
+    return Spread(
+        heights_mm=tuple(float(h) for h in bank.copy_heights_mm[chosen]),
+        frequencies=FREQUENCIES,
+        variance=tuple(variance),
+    )
+
+
+def transfer_errors(bank: PsfBank) -> tuple[float, ...]:
+    """Give how far the transfer of every copy lies off the frozen one, those to train on first.
+
+    Root of the mean |H_copy - H|^2 over that of |H|^2, below 0.3 cycles per pixel, over all fields
+    and colours (and depths of a copy).
+    """
+    places = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX)[None])
+    inside = torch.from_numpy((places > 0) & (places < JUDGED_BELOW))
+    squares, powers = np.zeros(len(bank.copies)), 0.0
+    for height in bank.copy_heights_mm.tolist():
+        frozen = to_otf(bank.frozen_kernels(0.0, height), (GRID_PX, GRID_PX))[..., inside]
+        powers += float(frozen.abs().square().sum())
+        for copy in range(len(bank.copies)):
+            own = to_otf(bank.blur_kernels(copy, 0.0, height), (GRID_PX, GRID_PX))[..., inside]
+            squares[copy] += float((own - frozen).abs().square().sum())
+    of_copies = squares.reshape(-1, bank.depths).mean(axis=1)
+    return tuple(float(error) for error in np.sqrt(of_copies / powers))
+
+
+def _line(values: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[float, ...]:
+    """Give the mean around every frequency of the table, by the hats between its neighbours."""
+    hats = [np.interp(places, FREQUENCIES, unit) for unit in np.eye(len(FREQUENCIES))]
+    means = [float((hat * values).sum() / hat.sum()) for hat in hats]
+    return tuple(round(mean, SPREAD_DIGITS) for mean in (0.0, *means[1:]))
+
+
+def fit_bank(recipe: BayerRecipe, bank: PsfBank, options: BankFitOptions, tell: Tell) -> BankFit:
+    """Fit the numbers of a camera.
+
+    Args:
+        recipe: The camera and its samples; what its bank says of colours together is not used.
+        bank: Its kernels.
+        options: How it is fitted; folders of kernels are not used.
+        tell: Takes a line now and then.
+
+    Raises:
+        ContractError: If there are too few samples, or the descent leaves the numbers' ranges.
+    """
+    samples, steps, seed = options.samples, options.steps, options.seed
+    alone = recipe.with_together(None)
+    shots = _photographed(alone, bank, options.pictures, samples, seed)
+    cases = [_case(shot, alone) for shot in shots if not bool(shot.unknown.any())]
+    if len(cases) < 2 * HELD_OUT:
+        raise ContractError(
+            f"{len(cases)} of {samples} samples are without clipped light, too few to fit a bank "
+            "to; raise --samples"
+        )
+    tell(f"{len(cases)} samples, {samples - len(cases)} left out for clipped light")
+    errors = transfer_errors(bank)
+    own_errors, unseen = errors[: -bank.validation_copies], errors[-bank.validation_copies :]
+    tell(f"transfer of copies off by {_told(own_errors)}; of those to choose by {_told(unseen)}")
+    first = FIRST.model_copy(update={"spread": spread_of(bank)})
+    held, own = cases[::HELD_OUT], [c for i, c in enumerate(cases) if i % HELD_OUT]
+    values = _to_values(first).requires_grad_()
+    optimiser = torch.optim.Adam([values], lr=RATE, betas=(0.9, 0.99))
+    rng = np.random.default_rng(seed)
+    for step in range(steps):
+        for group in optimiser.param_groups:
+            group["lr"] = LAST_RATE + (RATE - LAST_RATE) * (1 - step / steps)
+        optimiser.zero_grad()
+        losses = [
+            torch.log(_error(own[i], first, _to_numbers(values), alone))
+            for i in rng.integers(len(own), size=BATCH)
+        ]
+        torch.stack(losses).mean().backward()  # type: ignore[no-untyped-call]
+        optimiser.step()
+        if (step + 1) % max(steps // 5, 1) == 0:
+            tell(f"step {step + 1}: {_gain_db(held, first, values, alone):.2f} dB over alone")
+    together = _rounded(first, values.detach())
+    return BankFit(
+        together=together,
+        gain_db=_gain_db(held, together, _to_values(together), alone),
+        samples=len(cases),
+        steps=steps,
+    )
+
+
+def _told(errors: Sequence[float]) -> str:
+    return ", ".join(f"{error:.2f}" for error in errors)
+
+
+def _photographed(
+    recipe: BayerRecipe, bank: PsfBank, pictures: Path | None, count: int, seed: int
+) -> Sequence[Developed]:
+    source = open_source(
+        pictures,
+        picture_share=recipe.data.picture_share,
+        scenes=recipe.data.procedural_scenes,
+        scene_px=recipe.data.scene_px,
+    )
+    shots = []
+    for index in range(count):
+        rng = np.random.default_rng((seed, index))
+        exposure = draw_exposure(rng, recipe, bank)
+        crop = tint_crop(rng, source.draw_crop(rng, scene_side_px(recipe, bank)))
+        shots.append(photograph(crop, exposure, recipe, bank, rng))
+    return shots
+
+
+def _case(developed: Developed, recipe: BayerRecipe) -> _Case:
+    given = developed.given
+    shot, read = torch.tensor(given.noise.shot), torch.tensor(given.noise.read_variance)
+    facts = block_facts(developed.planes, given.frozen, shot, read, recipe.wiener)
+    target = target_of(developed, recipe)
+    plain = wiener_restore(developed.planes, given.frozen, shot, read, recipe.wiener)
+    return _Case(
+        planes=facts.planes,
+        otf=facts.otf,
+        level=facts.level,
+        variance=facts.variance,
+        height_mm=given.height_mm,
+        target=target,
+        shot=shot,
+        read=read,
+        alone=float(_squares(plain, target, (shot, read), recipe)),
+    )
+
+
+def _error(case: _Case, together: Together, numbers: Numbers, recipe: BayerRecipe) -> Tensor:
+    restored = restore_together(
+        case.planes, case.otf, case.level, case.variance, case.height_mm, together, numbers
+    )
+    return _squares(restored, case.target, (case.shot, case.read), recipe)
+
+
+def _squares(
+    restored: Tensor, target: Tensor, noise: tuple[Tensor, Tensor], recipe: BayerRecipe
+) -> Tensor:
+    """Give the mean squared error of stabilised planes."""
+    stable = stabilise(cut_middle(restored, recipe.data.sample_px), *noise, scale=recipe.scale)
+    weight = recipe.scale * noise[0].sqrt()[:, None, None]
+    return ((stable - target) * weight).square().mean()
+
+
+def _gain_db(
+    cases: Sequence[_Case], together: Together, values: Tensor, recipe: BayerRecipe
+) -> float:
+    with torch.no_grad():
+        numbers = _to_numbers(values)
+        gains = [
+            10 * np.log10(case.alone / float(_error(case, together, numbers, recipe)))
+            for case in cases
+        ]
+    return float(np.mean(gains))
+
+
+def _to_values(together: Together) -> Tensor:
+    """Give the numbers as the descent moves them: those > 0 by their logarithm."""
+    logs = np.log([together.scale, max(together.own, 1e-6), max(together.mistrust, 1e-6)])
+    return torch.tensor(
+        [*together.noise, *together.noise_rise, together.exponent, together.follow, *logs],
+        dtype=torch.float32,
+    )
+
+
+def _to_numbers(values: Tensor) -> Numbers:
+    colours = (len(values) - 5) // 2
+    exponent, follow, scale, own, mistrust = values[2 * colours :]
+    return Numbers(
+        noise=values[:colours],
+        noise_rise=values[colours : 2 * colours],
+        scale=scale.exp(),
+        exponent=exponent,
+        follow=follow.clamp(0, 1),
+        own=own.exp(),
+        mistrust=mistrust.exp(),
+    )
+
+
+def _rounded(first: Together, values: Tensor) -> Together:
+    """Give the numbers as a recipe states them.
+
+    Raises:
+        ContractError: If one is not what it may be.
+    """
+    numbers = _to_numbers(values)
+
+    def short(value: Tensor) -> float:
+        return float(f"{float(value):.{DIGITS}g}")
+
+    if not bool(torch.isfinite(values).all()) or float(numbers.exponent) < 0:
+        raise ContractError("the descent did not find numbers for the bank; raise --samples")
+    return Together(
+        noise=tuple(short(v) for v in numbers.noise),
+        noise_rise=tuple(short(v) for v in numbers.noise_rise),
+        scale=short(numbers.scale),
+        exponent=short(numbers.exponent),
+        follow=short(numbers.follow),
+        own=short(numbers.own),
+        mistrust=short(numbers.mistrust),
+        spread=first.spread,
+    )
+
+
+class BayerBankFitting:
+    """Fulfils `camkit.models_def.training.bank_fitting.BankFittingKind`."""
+
+    def fit(self, recipe: BayerRecipe, options: BankFitOptions, tell: Tell) -> BankFit:
+        """Trace the lens, or read what was traced before, and fit."""
+        material = trace_material(recipe, options.recipe_folder, options.cache_folder)
+        return fit_bank(recipe, material.bank, options, tell)
+
+
+BANK_FITTING: Final = BayerBankFitting()

@@ -1,0 +1,123 @@
+"""Fitting the bank of a camera whose colours are restored together, for the kinds that have one.
+
+The part of such a kind defines `BANK_FITTING` beside its `PART`, which fulfils `BankFittingKind`.
+"""
+
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol, cast
+
+from camkit.bundle.stages import Together
+from camkit.errors import ContractError, UnsupportedError
+from camkit.kinds import find_kind
+
+WIENER: Final = re.compile(r"^\[wiener\]\n(?:(?!\[).*\n|\n)*", re.MULTILINE)
+TOGETHER: Final = re.compile(
+    r"^\[wiener\.together(?:\.spread)?\]\n(?:(?!\[).*\n|\n)*", re.MULTILINE
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BankFitOptions:
+    """What a fit is given.
+
+    Attributes:
+        pictures: Folder to draw scenes from; None for procedural ones.
+        recipe_folder: For a lens that the recipe names by its path.
+        cache_folder: Where traced kernels are kept.
+        samples: How many are photographed.
+        steps: Of the descent.
+        seed: Of samples and descent.
+    """
+
+    pictures: Path | None
+    recipe_folder: Path
+    cache_folder: Path
+    samples: int = 240
+    steps: int = 160
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.samples < 1 or self.steps < 1:
+            raise ContractError(
+                f"samples and steps must be >= 1; got {self.samples} and {self.steps}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BankFit:
+    """What was fitted, and what it is worth on samples that were not fitted to.
+
+    Attributes:
+        together: The numbers.
+        gain_db: Over the bank that restores every colour alone, mean over held-out samples.
+        samples: Without clipped light, both kinds together.
+        steps: Of the descent.
+    """
+
+    together: Together
+    gain_db: float
+    samples: int
+    steps: int
+
+
+class BankFittingKind(Protocol):
+    """A kind of camera with a bank to fit."""
+
+    def fit(self, recipe: Any, options: BankFitOptions, tell: Callable[[str], None]) -> BankFit:
+        """Fit the numbers of a recipe's camera; raise ContractError if that cannot be done."""
+        ...
+
+
+def bank_fitting_kind(name: str) -> BankFittingKind:
+    """Give the part of a kind that fits banks.
+
+    Raises:
+        UnsupportedError: If its cameras have none.
+    """
+    part = find_kind(name).part("models_def")
+    if not hasattr(part, "BANK_FITTING"):
+        raise UnsupportedError(f"cameras of the kind {name!r} have no bank of colours to fit")
+    return cast("BankFittingKind", part.BANK_FITTING)
+
+
+def with_bank(recipe: str, together: Together) -> str:
+    """Give the text of a recipe with these numbers in its table [wiener], and nothing else changed.
+
+    Raises:
+        ContractError: If it has no such table, or says them in another way than this writes them.
+    """
+    plain = TOGETHER.sub("", recipe)
+    found = WIENER.search(plain)
+    if found is None:
+        raise ContractError("the recipe has no table [wiener] to put the numbers into")
+    head, rest = plain[: found.end()].rstrip("\n"), plain[found.end() :]
+    text = f"{head}\n\n{bank_table(together)}\n{rest}"
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ContractError(f"the recipe states its bank in a way of its own: {error}") from error
+    if Together.model_validate(table["wiener"].get("together")) != together:
+        raise ContractError("the recipe states its bank in a way of its own; take that out first")
+    return text
+
+
+def bank_table(together: Together) -> str:
+    """Give the numbers as tables of a recipe."""
+    lines = ["[wiener.together]"]
+    for name, value in together.model_dump(exclude={"spread"}).items():
+        lines.append(f"{name} = {list(value) if isinstance(value, tuple) else value!r}")
+    spread = together.spread
+    lines += [
+        "",
+        "[wiener.together.spread]",
+        f"heights_mm = {list(spread.heights_mm)}",
+        f"frequencies = {list(spread.frequencies)}",
+        "variance = [",
+    ]
+    for of_height in spread.variance:
+        lines += ["    [", *(f"        {list(line)}," for line in of_height), "    ],"]
+    return "\n".join([*lines, "]", ""])
