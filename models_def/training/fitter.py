@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights, take_first_weights
-from camkit.models_def.training.losses import patch_errors, training_loss
+from camkit.models_def.training.losses import overshoots, patch_errors, training_loss
 from camkit.models_def.training.recipe import NetworkRecipe
 from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
@@ -85,7 +85,10 @@ class Fitter:
         """
         output = self.run(batch.planes, progress)
         target, weight = batch.target.to(self.device), batch.weight.to(self.device)
-        loss = training_loss(self.schedule.loss, patch_errors(output, target, weight))
+        errors = patch_errors(output, target, weight)
+        if self.schedule.overshoot:
+            errors = errors + self.schedule.overshoot * overshoots(output, target, weight)
+        loss = training_loss(self.schedule.loss, errors)
         self.descend(loss, step, progress)
         return float(loss.detach())
 

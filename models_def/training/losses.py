@@ -15,6 +15,8 @@ from torch import Tensor
 from camkit.errors import ContractError
 
 LOG_FLOOR: Final = 3e-4
+RANGE_PX: Final = 5
+"""Side of the square whose range an output should keep to."""
 
 
 def patch_errors(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
@@ -30,6 +32,30 @@ def patch_errors(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
     """
     judged = target >= 0
     gap = torch.where(judged, output - target, 0.0) * weight[:, :, None, None]
+    return gap.square().sum((1, 2, 3)) / judged.sum((1, 2, 3)).clamp(min=1)
+
+
+def overshoots(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
+    """Give the mean square of what leaves the range of the target around each pixel, per patch.
+
+    A square's range is that of 5x5 pixels of the target. A halo is such an overshoot, a missing
+    edge is none: this is no measure of sharpness, and belongs beside `patch_errors`.
+
+    Args:
+        output: (b, c, h, w) stabilised.
+        target: (b, c, h, w) stabilised; negative marks a pixel that is not to be judged.
+        weight: (b, c) scale * sqrt(shot) per channel.
+
+    Returns:
+        (b,) in the square-root domain.
+    """
+    judged = target >= 0
+    known = torch.where(judged, target, -torch.inf)
+    most = torch.nn.functional.max_pool2d(known, RANGE_PX, 1, RANGE_PX // 2)
+    unknown = torch.where(judged, -target, -torch.inf)
+    least = -torch.nn.functional.max_pool2d(unknown, RANGE_PX, 1, RANGE_PX // 2)
+    beyond = torch.relu(output - most) + torch.relu(least - output)
+    gap = torch.where(judged, beyond, 0.0) * weight[:, :, None, None]
     return gap.square().sum((1, 2, 3)) / judged.sum((1, 2, 3)).clamp(min=1)
 
 

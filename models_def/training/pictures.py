@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from camkit.colorimetry import decode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
+from camkit.models_def.training.clean_scenes import edges, night
 from camkit.scenes import procedural_scene
 
 PICTURE_ENDINGS: Final = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
@@ -71,6 +72,8 @@ class SceneSource:
         picture_share: Probability of a picture rather than a procedural scene.
         scenes: Number of different procedural scenes.
         scene_px: Their side.
+        edge_share: Probability of clean edges instead of either.
+        night_share: Probability of stars and discs on black.
     """
 
     pictures: Sequence[Path]
@@ -78,6 +81,8 @@ class SceneSource:
     scenes: int
     scene_px: int
     _held: dict[int, NDArray[Any]]
+    edge_share: float = 0.0
+    night_share: float = 0.0
 
     def draw_crop(self, rng: Generator, side_px: int) -> FloatArray:
         """Cut a random crop, the livelier of two candidates of one picture.
@@ -85,6 +90,11 @@ class SceneSource:
         Returns:
             (3, side_px, side_px) float32 linear Rec.709; a smaller picture is mirrored outwards.
         """
+        if clean := self.edge_share + self.night_share:
+            drawn = rng.random()  # only where asked for: other recipes keep their samples
+            if drawn < clean:
+                draw = edges if drawn < self.edge_share else night
+                return draw(rng, side_px)
         picture = self._draw_picture(rng)
         crops = [_cut(rng, picture, side_px) for _ in range(CANDIDATES)]
         best = max(crops, key=_liveliness)
@@ -109,7 +119,13 @@ class SceneSource:
 
 
 def open_source(
-    folder: Path | None, *, picture_share: float, scenes: int, scene_px: int
+    folder: Path | None,
+    *,
+    picture_share: float,
+    scenes: int,
+    scene_px: int,
+    edge_share: float = 0.0,
+    night_share: float = 0.0,
 ) -> SceneSource:
     """Open a source of crops; without a folder it is procedural only."""
     return SceneSource(
@@ -118,6 +134,8 @@ def open_source(
         scenes=scenes,
         scene_px=scene_px,
         _held={},
+        edge_share=edge_share,
+        night_share=night_share,
     )
 
 

@@ -93,6 +93,7 @@ class ScheduleRecipe:
         gradient_clip: Largest norm of the gradient.
         ema_decay: Decay of the weight average that is validated and exported.
         loss: log_mse or mse, both in the square-root domain of the signal.
+        overshoot: Weight of squared overshoots beside squared errors, against halos.
         precision: bfloat16 multiplies (weights stay float32) or float32.
         float32_share: Share of the schedule, at its end, computed in float32 anyway.
         seed: Seed of weights, samples and order.
@@ -108,6 +109,7 @@ class ScheduleRecipe:
     gradient_clip: float = 1.0
     ema_decay: float = 0.999
     loss: str = "log_mse"
+    overshoot: float = 0.0
     precision: str = "bfloat16"
     float32_share: float = 0.05
     seed: int = 1
@@ -119,6 +121,8 @@ class ScheduleRecipe:
             raise ContractError(
                 f"schedule.precision must be one of {PRECISIONS}; got {self.precision!r}"
             )
+        if self.overshoot < 0:
+            raise ContractError(f"schedule.overshoot must be >= 0; got {self.overshoot}")
         check_share("schedule.float32_share", self.float32_share)
         check_share("schedule.ema_decay", self.ema_decay)
         if min(self.steps, self.batch, self.patch_px) < 1 or self.learning_rate <= 0:

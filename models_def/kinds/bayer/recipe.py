@@ -93,6 +93,8 @@ class BayerDataRecipe(DataRecipe):
         target_max: Targets are clipped at this multiple of the white level.
         depth_shares: How often each of `lens.depths_mm` is drawn, relative to the others; empty
             for equally often.
+        edge_share: Share of samples of clean edges, which photographs have few of.
+        night_share: Share of samples of stars and discs on black.
         known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
             `camkit process --depth-m` gives it; the others' has the mean kernel.
     """
@@ -110,9 +112,14 @@ class BayerDataRecipe(DataRecipe):
     target_max: float = 4.0
     depth_shares: tuple[float, ...] = ()
     known_depth_share: float = 0.0
+    edge_share: float = 0.0
+    night_share: float = 0.0
 
     def __post_init__(self) -> None:
         DataRecipe.__post_init__(self)
+        check_share("data.edge_share + data.night_share", self.edge_share + self.night_share)
+        if min(self.edge_share, self.night_share) < 0:
+            raise ContractError("data.edge_share and data.night_share must be >= 0")
         check_share("data.known_depth_share", self.known_depth_share)
         check_share("data.border_share", self.border_share)
         check_share("data.drift_share", self.drift_share)

@@ -60,6 +60,8 @@ class BayerMaker:
             picture_share=recipe.data.picture_share,
             scenes=recipe.data.procedural_scenes,
             scene_px=recipe.data.scene_px,
+            edge_share=recipe.data.edge_share,
+            night_share=recipe.data.night_share,
         )
 
     def make(self, index: int) -> Sample:

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from camkit.errors import ContractError
-from camkit.models_def.training.losses import patch_errors, training_loss
+from camkit.models_def.training.losses import overshoots, patch_errors, training_loss
 
 
 def test_unjudged_pixels_do_not_count():
@@ -42,3 +42,27 @@ def test_log_loss_cares_for_relative_errors():
 def test_unknown_loss_is_refused():
     with pytest.raises(ContractError, match="log_mse or mse"):
         training_loss("l1", torch.ones(1))
+
+
+def test_what_stays_within_the_range_around_is_no_overshoot():
+    target = torch.zeros(1, 1, 9, 9)
+    target[..., 5:] = 1.0
+    blurred = torch.nn.functional.avg_pool2d(target, 3, 1, 1, count_include_pad=False)
+    assert float(overshoots(blurred, target, torch.ones(1, 1))) == 0
+    ringing = target.clone()
+    ringing[..., 5] += 0.2
+    ringing[..., 4] -= 0.1
+    found = float(overshoots(ringing, target, torch.full((1, 1), 2.0)))
+    assert found == pytest.approx(4 * (0.04 + 0.01) / 9)
+
+
+def test_pixels_that_nobody_knows_widen_no_range_and_are_not_judged():
+    target = torch.full((1, 1, 9, 9), 0.5)
+    target[..., 4, 4] = -1.0
+    output = torch.full_like(target, 0.5)
+    output[..., 4, 4] = 9.0
+    assert float(overshoots(output, target, torch.ones(1, 1))) == 0
+    output[..., 4, 5] = 0.7
+    assert float(overshoots(output, target, torch.ones(1, 1))) == pytest.approx(0.04 / 80)
+    nothing = torch.full_like(target, -1.0)
+    assert float(overshoots(output, nothing, torch.ones(1, 1))) == 0
