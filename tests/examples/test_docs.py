@@ -124,7 +124,7 @@ def test_results_are_data_and_pictures_of_no_great_size() -> None:
 
 def _sections() -> dict[str, str]:
     text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
-    parts = re.split(r"^## camkit ([a-z]+)[^\n]*\n", text, flags=re.MULTILINE)[1:]
+    parts = re.split(r"^## camkit ([a-z-]+)[^\n]*\n", text, flags=re.MULTILINE)[1:]
     return dict(zip(parts[::2], parts[1::2], strict=True))
 
 

@@ -31,6 +31,7 @@ OPTIONS = {
     "stress": "--scenarios --quick --data --sizes --scenes --compare --out-dir --write --list "
     "--json --debug",
     "train": "--size --data --steps --max-minutes --resume --fine-tune --vgg --pairs --debug",
+    "fit-bank": "-o --data --samples --steps --seed --cache-dir --overwrite --json --debug",
     "design": "--data --out-dir --steps --lens-rate --prescription --seed --pictures --threads "
     "--resume --overwrite --json --debug",
     "export": "-o --psf --stress-psf --prescription --debug",
@@ -133,4 +134,5 @@ def test_a_closed_pipe_ends_the_run_without_a_traceback() -> None:
 
 
 def test_every_command_can_be_called_with_help() -> None:
-    assert {c.callback.__name__ for c in app.registered_commands} == set(OPTIONS)
+    names = {c.callback.__name__.replace("_", "-") for c in app.registered_commands}
+    assert names == set(OPTIONS)
