@@ -1,4 +1,4 @@
-"""Pictures between sensor geometry and ideal geometry, in bands, by Lanczos interpolation.
+"""Pictures between sensor geometry and ideal geometry, in bands, by interpolation.
 
 The ideal picture has the size of the capture and is centred on the ideal position of the
 capture's centre: nothing moves on a whole sensor, and a crop far off the axis stays in view.
@@ -8,7 +8,7 @@ are computed on an 8 px lattice that is fixed to the picture and enlarged linear
 do not depend on their height.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Final
 
@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.stages.undistort import Interpolation
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.distortion import (
@@ -34,6 +35,10 @@ LATTICE_PX: Final = 8
 BAND_ROWS: Final = 256
 LANCZOS_REACH_PX: Final = 4
 MAX_SIDE_PX: Final = 32766
+FLAGS: Final[Mapping[Interpolation, int]] = {
+    "lanczos": cv2.INTER_LANCZOS4,
+    "cubic": cv2.INTER_CUBIC,
+}
 
 
 def undistort_bands(
@@ -43,6 +48,7 @@ def undistort_bands(
     *,
     band_rows: int = BAND_ROWS,
     threads: int = 1,
+    interpolation: Interpolation = "lanczos",
 ) -> Iterator[FloatArray]:
     """Undistort a capture, band by band; what lies outside it repeats its edge.
 
@@ -52,6 +58,7 @@ def undistort_bands(
         window: Where the picture lies on the sensor.
         band_rows: Height of the bands, a multiple of 8; the pixels do not depend on it.
         threads: Threads that share a band; the pixels do not depend on them.
+        interpolation: Between pixels.
 
     Yields:
         (c, rows, w) float32 in ideal geometry, from top to bottom.
@@ -61,7 +68,8 @@ def undistort_bands(
         UnsupportedError: If a side is too long for cv2.remap.
     """
     warp = Warp(distortion, window, to_sensor=False)
-    yield from _warp_bands(source, warp, band_rows=band_rows, threads=threads)
+    flag = FLAGS[interpolation]
+    yield from _warp_bands(source, warp, band_rows=band_rows, threads=threads, flag=flag)
 
 
 def distort_array(
@@ -166,7 +174,7 @@ class Warp:
 
 
 def _warp_bands(
-    source: RowSource, warp: Warp, *, band_rows: int, threads: int
+    source: RowSource, warp: Warp, *, band_rows: int, threads: int, flag: int
 ) -> Iterator[FloatArray]:
     _check_size(source.shape, warp.window, warp.distortion)
     if band_rows < LATTICE_PX or band_rows % LATTICE_PX:
@@ -177,7 +185,7 @@ def _warp_bands(
     for top, (first, last) in zip(tops, spans, strict=True):
         bottom = min(top + band_rows, height)
         band = np.empty((channels, bottom - top, width), dtype=np.float32)
-        fill = partial(_warp_rows, warp, (source.read(first, last), first), (band, top))
+        fill = partial(_warp_rows, warp, (source.read(first, last), first), (band, top), flag)
         run_slices(fill, bottom - top, threads=threads, lattice=LATTICE_PX)
         del fill  # it holds rows that nobody needs while the next band is waited for
         yield band
@@ -188,6 +196,7 @@ def _warp_rows(
     warp: Warp,
     source: tuple[FloatArray, int],
     target: tuple[FloatArray, int],
+    flag: int,
     begin: int,
     end: int,
 ) -> None:
@@ -197,7 +206,8 @@ def _warp_rows(
         if not warp.shares_map(channel):
             whole, fraction = warp.maps(channel, top + begin, top + end)
             whole[..., 1] -= first
-        band[channel, begin:end] = _remap(rows[channel], (whole, fraction), cv2.BORDER_REPLICATE)
+        maps = whole, fraction
+        band[channel, begin:end] = _remap(rows[channel], maps, cv2.BORDER_REPLICATE, flag)
 
 
 def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]:
@@ -214,11 +224,14 @@ def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]
     return spans[::-1]
 
 
-def _remap(plane: FloatArray, maps: tuple[NDArray[np.int16], object], border: int) -> FloatArray:
+def _remap(
+    plane: FloatArray,
+    maps: tuple[NDArray[np.int16], object],
+    border: int,
+    flag: int = FLAGS["lanczos"],
+) -> FloatArray:
     whole, fraction = maps
-    out = cv2.remap(
-        np.ascontiguousarray(plane), whole, fraction, cv2.INTER_LANCZOS4, borderMode=border
-    )
+    out = cv2.remap(np.ascontiguousarray(plane), whole, fraction, flag, borderMode=border)
     return np.asarray(out, dtype=np.float32)
 
 

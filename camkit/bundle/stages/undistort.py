@@ -8,13 +8,21 @@ from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_rows, one_linear
 
+Interpolation = Literal["lanczos", "cubic"]
+
 
 class Undistort(StageEntry):
-    """Removal of the radial distortion of the frozen PSF, per channel."""
+    """Removal of the radial distortion of the frozen PSF, per channel.
+
+    Attributes:
+        interpolation: Between pixels: lanczos (8x8), as before, or cubic (4x4) for a quarter of
+            its time (format 2.4).
+    """
 
     type: Literal["undistort"] = "undistort"
     takes: tuple[Word, ...] = ("even",)
     gives: tuple[Word, ...] = ("straight",)
+    interpolation: Interpolation = "lanczos"
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the plane in ideal geometry."""

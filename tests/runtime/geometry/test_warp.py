@@ -51,6 +51,21 @@ def psnr(found: FloatArray, truth: FloatArray) -> float:
     return float(-10 * np.log10(np.mean((found - truth) ** 2)))
 
 
+def test_cubic_interpolation_is_near_lanczos_and_does_not_depend_on_bands() -> None:
+    place, picture = window((640, 424), (512, 340)), band_limited(424, 640, 0.1)
+
+    def cubic(band_rows: int) -> FloatArray:
+        bands = undistort_bands(
+            ArrayRows(picture), BARREL, place, band_rows=band_rows, interpolation="cubic"
+        )
+        return np.concatenate(list(bands), axis=1)
+
+    made = cubic(256)
+    np.testing.assert_array_equal(made, cubic(64))
+    plain = undistort(picture, BARREL, place)
+    assert 40 < psnr(made, plain) < 80
+
+
 @pytest.mark.parametrize("origin", [(0, 0), (512, 340), (896, 600)])
 def test_band_limited_picture_survives_there_and_back(origin: tuple[int, int]) -> None:
     size = SENSOR if origin == (0, 0) else (640, 424)

@@ -38,6 +38,19 @@ def test_bands_are_those_of_the_whole_in_ideal_geometry(bundle: Bundle) -> None:
     )
 
 
+def test_the_bundle_says_how_it_interpolates(bundle: Bundle) -> None:
+    light = np.random.default_rng(0).random((3, 64, 96), dtype=np.float32)
+    job = made_job(made_mosaic(), bundle)
+    made = {
+        way: read_all(run_stage(Undistort(interpolation=way), job, stream_of(light))[0].rows(), 13)
+        for way in ("lanczos", "cubic")
+    }
+    window = job.placement.window
+    bands = undistort_bands(ArrayRows(light), bundle.psf.distortion, window, interpolation="cubic")
+    np.testing.assert_array_equal(made["cubic"], np.concatenate(list(bands), axis=1))
+    assert np.abs(made["cubic"] - made["lanczos"]).max() > 1e-4
+
+
 @pytest.mark.parametrize("channels", [("Y",), tuple("abcde")])
 def test_pixels_move_away_from_the_axis_wherever_it_meets_the_sensor(
     tmp_path: Path, channels: tuple[str, ...]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Undistort
 from camkit.contracts import RadialDistortion
 from camkit.runtime.geometry.placement import place
 from camkit.runtime.geometry.sensor_window import SensorWindow
@@ -87,3 +88,18 @@ def test_a_warp_without_distortion_moves_a_whole_sensor_by_less_than_that(bundle
     whole, fraction = warp.maps(0, 0, 16)
     np.testing.assert_array_equal(whole[..., 0], np.tile(np.arange(6000), (16, 1)))
     assert not np.any(fraction)
+
+
+def test_cubic_interpolation_is_told_with_its_cost(bundle: Bundle) -> None:
+    stages = tuple(
+        stage.model_copy(update={"interpolation": "cubic"})
+        if isinstance(stage, Undistort)
+        else stage
+        for stage in bundle.manifest.stages
+    )
+    cubic = replace(bundle, manifest=bundle.manifest.model_copy(update={"stages": stages}))
+    subject = _subject(bundle, 768)
+    for given, is_told in ((bundle, False), (cubic, True)):
+        decision = decide(replace(subject, bundle=given), Work())[1]
+        assert decision is not None
+        assert ("cubic" in decision.reason) == is_told
