@@ -19,7 +19,7 @@ BYTES_PER_COLUMN: Final = 4_280
 """Of rows on their way (measured, see docs/performance.md)."""
 REST_SHARE: Final = 0.25
 CUBIC_SHARE: Final = 0.32
-"""Of the time of Lanczos (`python -m tools.undistortion`)."""
+"""Of the time of Lanczos (`python -m tools.plan.undistortion`)."""
 
 
 def is_left_out(options: Options) -> bool:

@@ -6,5 +6,6 @@
 - `measurement`: the journal of single measurements, which may be resumed
 - `rows`: the rows of the comparison
 - `quality_table`: means, gains and the page
+- `bank_gain`: what a bank that restores colours together is worth by itself (a command)
 - `compact_json`: results as they are kept, those of `lens_table` too
 """

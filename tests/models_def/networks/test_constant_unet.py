@@ -24,6 +24,7 @@ def test_a_picture_of_roots_may_become_brighter_than_it_was():
 
 
 def test_every_layer_learns():
+    torch.manual_seed(0)
     network = ConstantUnet(ConstantConfig(width=4, scales=3))
     (network(torch.rand(1, 6, 16, 16)) - 1).square().mean().backward()
     assert all(p.grad is not None and p.grad.abs().sum() > 0 for p in network.parameters())

@@ -12,7 +12,7 @@ from camkit.models_def.training.bank_fitting import bank_table
 from tests.psf_factory import texture
 from tests.together_factory import TOGETHER
 from tests.wide_bundle import write_wide_bundle
-from tools import bank_gain
+from tools.comparison import bank_gain
 
 
 def test_gains_are_told_with_their_error_by_iso_copy_and_place(

@@ -9,7 +9,7 @@ import pytest
 
 from camkit.scenes import procedural_scene
 from tests.bundle_factory import write_tiny_bundle
-from tools import undistortion
+from tools.plan import undistortion
 
 
 def test_seconds_and_losses_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
