@@ -1,6 +1,6 @@
 """What a bank that restores colours together is worth by itself, through several copies of a lens.
 
-    python -m tools.comparison.bank_gain RECIPE --bundle duet --data TESTS/set14 -o docs/results/bank.json
+    python -m tools.comparison.bank_gain RECIPE --data TESTS/set14 -o docs/results/bank.json
 
 RECIPE holds `[wiener.together]` (`camkit fit-bank`). Captures as of `tools.quality` through freshly
 traced copies, picture i through copy i: the bundle's bank as it is, the same with the recipe's

@@ -1,6 +1,6 @@
 """Lanczos or cubic undistortion: seconds of either, and what cubic loses of restored pictures.
 
-    python -m tools.plan.undistortion --bundle duet --data PICTURES -o docs/results/undistortion.json
+    python -m tools.plan.undistortion --data PICTURES -o docs/results/undistortion.json
 
 Seconds are CPU seconds of one thread per megapixel, of bands of a picture of the sensor's width, in
 turns; medians. Losses: the middle of every picture, photographed half-way to the corner of the
