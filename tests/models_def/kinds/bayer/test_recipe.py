@@ -7,6 +7,7 @@ from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.recipe import CAMERA_PARTS, samples_digest
 from camkit.models_def.training.kind import read_recipe, to_recipe
 from camkit.models_def.training.recipe import differing_part
+from tests.changed_table import changed_table
 
 RECIPES = Path(__file__).resolve().parents[4] / "models_def" / "recipes"
 SHIPPED = RECIPES / "duet.toml"
@@ -17,17 +18,7 @@ def differing_camera(one, other):
 
 
 def table(recipe_path, **changes):
-    content = tomllib.loads(recipe_path.read_text(encoding="utf-8"))
-    for dotted, value in changes.items():
-        *path, last = dotted.split("__")
-        place = content
-        for part in path:
-            place = place.setdefault(part, {})
-        if value is None:
-            del place[last]
-        else:
-            place[last] = value
-    return content
+    return changed_table(recipe_path.read_text(encoding="utf-8"), **changes)
 
 
 def test_shipped_recipe_has_its_networks_and_the_stated_sensor():
