@@ -83,7 +83,7 @@ def shapes_of(together: Together, block_px: int) -> Shapes:
 
 def spread_at(spread: Spread, height_mm: float, shapes: Shapes) -> FloatArray:
     """Give V of a field height, (c, b, b // 2 + 1); linear between the table's places."""
-    table, heights = np.array(spread.variance), np.array(spread.heights_mm)
+    table, heights = _table(spread)
     place = float(np.interp(height_mm, heights, np.arange(len(heights))))
     below = min(int(place), max(len(heights) - 2, 0))
     above = min(below + 1, len(heights) - 1)
@@ -95,6 +95,12 @@ def spread_at(spread: Spread, height_mm: float, shapes: Shapes) -> FloatArray:
             for line, step in zip(lines, steps, strict=True)
         ]
     )
+
+
+@lru_cache(maxsize=4)
+def _table(spread: Spread) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the variances (height, colour, frequency), and the heights in mm."""
+    return np.array(spread.variance, np.float64), np.array(spread.heights_mm, np.float64)
 
 
 def restore_together(
