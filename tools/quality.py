@@ -29,9 +29,11 @@ from camkit.contracts import FrozenPsf
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.machine import processor_name
 from camkit.report.fabricated_psf import fabricated_psf, lens_text
-from camkit.report.quality import FIELD_SHARES, Shot, list_set, read_picture
+from camkit.report.quality import FABRICATION_SEEDS, FIELD_SHARES, Shot, list_set, read_picture
 from camkit.runtime.network.engine import available_threads
+from tools.capture.simulated import color_sensor
 from tools.comparison.compact_json import to_compact_json
+from tools.comparison.copies import transfer_error
 from tools.comparison.measurement import (
     CAPTURE_COLUMNS,
     COLUMNS,
@@ -76,6 +78,7 @@ def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     add = parser.add_argument
     add("--bundle", required=True, help="name or path of the bundle")
+    add("--before", metavar="PATH", help="the bundle as it was: its bank and networks beside")
     add("--compare", nargs=2, action="append", default=[], metavar=("PATH", "LABEL"))
     add("--data", type=Path, required=True, help="folder of the sets (with --tune: of pictures)")
     add("--sets", default="kodak_odd,bsd100_half_a,set14,set5")
@@ -98,9 +101,23 @@ def parse_arguments() -> argparse.Namespace:
 
 def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Shot], Photograph]:
     """Give the function that photographs a shot; PSFs stay in memory."""
+    lens = lenses(arguments, bundle)
+
+    def take(shot: Shot) -> Photograph:
+        psf = bundle.psf
+        if shot.psf == "fresh":
+            psf = lens(TUNING_SEED if arguments.tune else shot.fabrication_seed)
+        most_px = TUNING_SIDE_PX if arguments.tune else None
+        return photograph(shot, read_picture(shot.picture, most_px), bundle, psf)
+
+    return take
+
+
+def lenses(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], FrozenPsf]:
+    """Give the function that traces the copy of a seed, once for all threads."""
     tracing = threading.Lock()
 
-    @lru_cache(maxsize=8)
+    @lru_cache(maxsize=len(FABRICATION_SEEDS))
     def traced(seed: int) -> FrozenPsf:
         return fabricated_psf(
             bundle,
@@ -113,14 +130,7 @@ def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Sho
         with tracing:
             return traced(seed)
 
-    def take(shot: Shot) -> Photograph:
-        psf = bundle.psf
-        if shot.psf == "fresh":
-            psf = lens(TUNING_SEED if arguments.tune else shot.fabrication_seed)
-        most_px = TUNING_SIDE_PX if arguments.tune else None
-        return photograph(shot, read_picture(shot.picture, most_px), bundle, psf)
-
-    return take
+    return lens
 
 
 def tune(arguments: argparse.Namespace, bundle: Bundle) -> None:
@@ -187,6 +197,7 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         tuned_from_json(tuned["values"]),
         isos_of(arguments),
         lens_text(bundle, arguments.prescription),
+        open_bundle(find_bundle(arguments.before)) if arguments.before else None,
     )
     journal = arguments.work_dir / f"{arguments.out.stem}.jsonl"
     if not arguments.resume:
@@ -210,6 +221,7 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
         "protocol": {"text": protocol_text(bundle, isos_of(arguments))},
         "methods": names,
         "seconds_per_megapixel": seconds_per_megapixel(measurements),
+        "copies": errors_of_copies(arguments, bundle, measurements),
         "summary": summarise(measurements, names),
         "identities": {row.name: row.identity for row in rows},
         "columns": {"capture": CAPTURE_COLUMNS, "method": VALUE_COLUMNS},
@@ -220,6 +232,16 @@ def compare(arguments: argparse.Namespace, bundle: Bundle) -> None:
     if arguments.csv is not None:
         write_csv(arguments.csv, measurements)
     show_result(report)
+
+
+def errors_of_copies(
+    arguments: argparse.Namespace, bundle: Bundle, measurements: Sequence[Measurement]
+) -> dict[str, float]:
+    """Give seed -> how far the transfer of the copy lies off the frozen one, of those measured."""
+    sensor = color_sensor(bundle)
+    seeds = sorted({m.seed for m in measurements if m.seed is not None})
+    lens = lenses(arguments, bundle)
+    return {str(seed): round(transfer_error(bundle.psf, lens(seed), sensor), 3) for seed in seeds}
 
 
 def measure_missing(

@@ -30,7 +30,8 @@ from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
 FIELD_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Places from centred on the axis to touching the sensor's corner, as shares of that way."""
 QUADRANTS: Final = ((1, 1), (-1, 1), (-1, -1), (1, -1))
-FABRICATION_SEEDS: Final = (2001, 2002, 2003)
+FABRICATION_SEEDS: Final = (2001, 2002, 2003, 3001, 3002, 3003, 3004, 3005)
+"""Of the copies: eight, since three may all be lucky, or one an outlier."""
 BORDER_PX: Final = 32
 LIGHT_SUFFIXES: Final = (".exr", ".hdr")
 """Pictures that hold linear light, which may exceed white and may be what no camera sees."""

@@ -56,10 +56,19 @@ Tell = Callable[[str], None]
 
 LOSS_LIMIT_DB: Final = 0.05
 DEPTH_SHARE: Final = 0.75
-BLOCK_TOLERANCE_DB: Final = 0.1
+BLOCK_TOLERANCE_DB: Final = 0.02
 FIELD_COUNTS: Final = (7, 9, 11, 13, 17, 21, 25)
 WAVELENGTH_COUNTS: Final = (3, 5, 7, 9, 11, 13)
-BLOCKS: Final = ((768, 160), (512, 160), (384, 160), (512, 192), (384, 192))
+BLOCKS: Final = (
+    (768, 160),
+    (512, 160),
+    (384, 160),
+    (512, 192),
+    (384, 192),
+    (320, 112),
+    (256, 96),
+    (216, 96),
+)
 
 
 def _silent(_: str) -> None:
@@ -256,19 +265,20 @@ def freeze_optics(
         ContractError: If the optics are wrong or no grid keeps the loss.
     """
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
-    # losses of every camera by the same filter, each colour alone
-    chosen = chosen.model_copy(update={"together": None})
+    # losses of samples by the same filter for every camera, each colour alone
+    alone = chosen.model_copy(update={"together": None})
     wanted = grid or FreezeGrid()
     tell(f"tracing {optics.name} and its copies")
-    bench = make_bench(optics, sensor, chosen, grid=wanted)
+    bench = make_bench(optics, sensor, alone, grid=wanted)
     frozen, loss = choose_grid(optics, sensor, bench, limit_db=limit_db, grid=grid, tell=tell)
-    blocks, blocked = choose_blocks(frozen.psf, bench, limit_db=limit_db, tell=tell)
+    own = replace(bench, settings=chosen)
+    blocks, blocked = choose_blocks(frozen.psf, own, limit_db=limit_db, tell=tell)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
     kept_mm = tuple(frozen.psf.depths_mm.tolist())
     between_db = 0.0
     if between := between_mm(kept_mm):
-        there = make_bench(optics, sensor, chosen, grid=replace(wanted, depths_mm=between))
+        there = make_bench(optics, sensor, alone, grid=replace(wanted, depths_mm=between))
         between_db = frozen_loss(frozen.psf, there).mean_db
     farthest = int(np.argmax(frozen.psf.field_heights_mm))
     return FreezeReport(

@@ -232,10 +232,14 @@ def block_loss(psf: FrozenPsf, bench: Bench, settings: Wiener) -> Loss:
         _kernels(p, sensor, (at[:, 0], at[:, 1]), bench.focus_mm)
         for p, at in ((psf, centres), (psf, probed), (bench.copies[0], probed))
     )
+    heights_mm = np.hypot(*centres.T), np.hypot(*probed.T)
     scene = _scenes(1, settings.block_px + LARGER_PX, bench.seed, len(sensor.channels))
     ratios = [
         _probe(
-            (blocks[i : i + 1], locals_[i : i + 1]),
+            (
+                _Known(kernel=blocks[i : i + 1], height_mm=float(heights_mm[0][i])),
+                _Known(kernel=locals_[i : i + 1], height_mm=float(heights_mm[1][i])),
+            ),
             trues[i : i + 1],
             scene,
             offset,
@@ -246,25 +250,39 @@ def block_loss(psf: FrozenPsf, bench: Bench, settings: Wiener) -> Loss:
     return _loss(torch.tensor(ratios))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Known:
+    """What a filter is told of its place: kernel (1, c, kh, kw) and field height."""
+
+    kernel: Tensor
+    height_mm: float
+
+
 def _probe(
-    kernels: tuple[Tensor, Tensor],
+    known: tuple[_Known, _Known],
     true_kernel: Tensor,
     scene: Tensor,
     offset_px: FloatGrid,
     by: tuple[Bench, Wiener],
 ) -> float:
-    """Give the ratio of squared errors at an offset: with the block's kernel over the local one."""
+    """Give the ratio of squared errors at an offset: as the block knows the place over as it is."""
     bench, settings = by
-    block_kernel, local_kernel = kernels
     large = scene.shape[-1]
     noisy, shot, read = _noisy(_convolve(scene, true_kernel), bench.sensor, 1.0, bench.seed)
     top, left = (int(large / 2 + o - PROBE_PX / 2) for o in (offset_px[1], offset_px[0]))
     sharp = scene[..., top : top + PROBE_PX, left : left + PROBE_PX]
     errors = []
-    for side, kernel in ((settings.block_px, block_kernel), (large, local_kernel)):
+    for side, told in zip((settings.block_px, large), known, strict=True):
         start = (large - side) // 2
         window = slice(start, start + side)
-        restored = wiener_restore(noisy[..., window, window], kernel, shot, read, settings)
+        restored = wiener_restore(
+            noisy[..., window, window],
+            told.kernel,
+            shot,
+            read,
+            settings,
+            height_mm=told.height_mm,
+        )
         rows = slice(top - start, top - start + PROBE_PX)
         columns = slice(left - start, left - start + PROBE_PX)
         errors.append(float((restored[..., rows, columns] - sharp).square().mean()))

@@ -4,7 +4,10 @@
 - `photograph`: a capture, developed for them and finished
 - `tuning`: their parameters, chosen on validation pictures
 - `measurement`: the journal of single measurements, which may be resumed
+- `names`: of the rows, and what tables call them
+- `copies`: how far a copy's transfer lies off the frozen one
 - `rows`: the rows of the comparison
+- `paired`: gains on the same captures, with their error
 - `quality_table`: means, gains and the page
 - `bank_gain`: what a bank that restores colours together is worth by itself (a command)
 - `compact_json`: results as they are kept, those of `lens_table` too

@@ -25,7 +25,14 @@ from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.report.bench.machine import describe_machine
 from camkit.report.fabricated_psf import fabricated_psf
-from camkit.report.quality import FIELD_SHARES, Shot, inner_srgb, list_set, psnr, read_picture
+from camkit.report.quality import (
+    FIELD_SHARES,
+    Shot,
+    inner_srgb,
+    list_set,
+    psnr,
+    read_picture,
+)
 from tools.comparison.compact_json import to_compact_json
 from tools.comparison.peers import PEERS
 from tools.comparison.photograph import (
@@ -37,7 +44,6 @@ from tools.comparison.photograph import (
 )
 from tools.comparison.tuning import tuned_from_json
 
-COPIES: Final = (2001, 2002, 2003, 3001, 3002, 3003, 3004, 3005)
 ISOS: Final = (100.0, 1600.0)
 TUNED: Final = Path("docs/results/quality.json")
 PEER: Final = "admm_tv"
@@ -86,7 +92,6 @@ def main(words: Sequence[str] | None = None) -> None:
     for number, picture in enumerate(list_set(arguments.data, arguments.pictures)):
         for position in range(0, len(FIELD_SHARES), -(-len(FIELD_SHARES) // arguments.places)):
             for iso in ISOS:
-                copy = COPIES[number % len(COPIES)]
                 shot = Shot(
                     set_name=arguments.data.name,
                     picture=picture,
@@ -95,6 +100,7 @@ def main(words: Sequence[str] | None = None) -> None:
                     iso=iso,
                     psf="fresh",
                 )
+                copy = shot.fabrication_seed
                 taken = photograph(shot, read_picture(picture), bundle, lens(copy))
                 judged = {name: _psnr_db(restore, taken) for name, restore in ways.items()}
                 found.append(Judged(copy=copy, position=position, iso=iso, psnr_db=judged))

@@ -27,7 +27,8 @@ from camkit.runtime.twin.simulate import Simulation
 from tools.capture.simulated import captured, color_sensor, rec709_of
 from tools.comparison.peers import LocalCapture
 
-PROTOCOL_VERSION: Final = 1
+PROTOCOL_VERSION: Final = 2
+"""2: through eight copies."""
 TUNING_SEED: Final = 2004
 """Fabrication errors that the classical methods are tuned on; no comparison uses them."""
 

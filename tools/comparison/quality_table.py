@@ -7,26 +7,13 @@ from typing import Any, Final
 import numpy as np
 
 from tools.comparison.measurement import Measurement
+from tools.comparison.names import CLASSICAL, title_of
+from tools.comparison.paired import best_classical, paired_gains, pairs_of, to_lines
 
-CLASSICAL: Final = ("skimage_wiener", "skimage_rl", "admm_tv")
-TITLES: Final = {
-    "input": "input (developed only)",
-    "skimage_wiener": "scikit-image Wiener",
-    "skimage_rl": "scikit-image Richardson-Lucy",
-    "admm_tv": "ADMM-TV",
-    "bank": "our Wiener bank",
-    "bank_rl": "our blocks, Richardson-Lucy",
-    "bank_admm_tv": "our blocks, ADMM-TV",
-    "S": "network S",
-    "M": "network M",
-    "L": "network L",
-}
 PSF_TITLES: Final = {
     "fresh": "fabricated lenses, PSF traced afresh",
     "bundle": "the bundle's own PSF",
 }
-AIMS: Final = {"fresh": 2.0, "bundle": 2.5}
-BANK_AIM_DB: Final = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,12 +91,15 @@ def summarise(measurements: Sequence[Measurement], methods: Sequence[str]) -> di
         of_psf = [m for m in kept if m.psf == psf]
         overall = means(of_psf)[()]
         by_iso = means(of_psf, "iso")
+        by_copy = means((m for m in of_psf if m.seed is not None), "seed")
         summary[psf] = {
             "overall": _plain(overall),
             "by_iso": {f"{iso:g}": _plain(found) for (iso,), found in by_iso.items()},
             "by_set": _nested(means(of_psf, "set_name", "iso")),
             "by_position": _nested(means(of_psf, "position", "iso")),
             "height_mm": _heights(of_psf),
+            "by_copy": {str(seed): _plain(found) for (seed,), found in by_copy.items()},
+            "gains": paired_gains(of_psf, pairs_of(methods, best_classical(of_psf))),
             "gain_of_m": gains(overall),
             "gain_of_m_by_iso": {f"{iso:g}": gains(found) for (iso,), found in by_iso.items()},
         }
@@ -136,8 +126,9 @@ def to_markdown(report: Mapping[str, Any]) -> str:
     methods = list(report["methods"])
     for psf, summary in report["summary"].items():
         lines += [f"## Captures through {PSF_TITLES[psf]}", ""]
-        lines += _gain_lines(psf, summary, methods)
         lines += _table("", {"all": summary["by_iso"]}, summary["overall"], methods)
+        lines += to_lines(summary["gains"])
+        lines += _copy_lines(summary["by_copy"], report.get("copies", {}), methods)
         lines += ["### By picture set", ""]
         lines += _groups(summary["by_set"], methods, "set")
         lines += ["### By field position", ""]
@@ -168,7 +159,7 @@ def _heights(measurements: Iterable[Measurement]) -> dict[str, float]:
 def _protocol_lines(report: Mapping[str, Any]) -> list[str]:
     machine, protocol = report["machine"], report["protocol"]
     tuned = "; ".join(
-        f"{TITLES.get(peer, peer)}: "
+        f"{title_of(peer)}: "
         + " and ".join(
             f"{', '.join(f'{name} {v:g}' for name, v in values.items())} at ISO {iso}"
             for iso, values in by_iso.items()
@@ -183,25 +174,6 @@ def _protocol_lines(report: Mapping[str, Any]) -> list[str]:
         *(f"- {line}" for line in protocol["text"]),
         f"- Parameters of the classical methods, tuned on `{report['tuned']['data']}`: {tuned}.",
     ]
-
-
-def _gain_lines(psf: str, summary: Mapping[str, Any], methods: Sequence[str]) -> list[str]:
-    gain = summary["gain_of_m"]
-    if not gain:
-        return []
-    rows = []
-    if "over_best_classical_db" in gain:
-        best = TITLES.get(gain["best_classical"], gain["best_classical"])
-        rows.append((f"best classical ({best})", gain["over_best_classical_db"], AIMS[psf]))
-    if "bank" in gain["over"]:
-        rows.append((TITLES["bank"], gain["over"]["bank"], BANK_AIM_DB))
-    rows += [(name, gain["over"][name], 0.0) for name in methods if name not in TITLES]
-    lines = ["| M over | gain, dB | aim, dB | reached |", "|---|---|---|---|"]
-    lines += [
-        f"| {name} | {value:+.2f} | {aim:+.1f} | {'yes' if value >= aim else 'no'} |"
-        for name, value, aim in rows
-    ]
-    return [*lines, ""]
 
 
 def _table(
@@ -219,8 +191,24 @@ def _table(
     lines.append("|---" * (len(isos) + 2) + "|")
     for name in methods:
         cells = [_cell(by_iso[iso][name]) for iso in isos] + [_cell(overall[name])]
-        lines.append(f"| {TITLES.get(name, name)} | " + " | ".join(cells) + " |")
+        lines.append(f"| {title_of(name)} | " + " | ".join(cells) + " |")
     return [*lines, "", f"Means over {count} captures.", ""]
+
+
+def _copy_lines(
+    by_copy: Mapping[str, Mapping[str, Any]], errors: Mapping[str, float], methods: Sequence[str]
+) -> list[str]:
+    """Give a table with a column for each copy of the lens."""
+    if not by_copy:
+        return []
+    heads = [f"{seed}, off by {errors.get(seed, float('nan')):.2f}" for seed in by_copy]
+    lines = ["### By copy of the lens", ""]
+    lines.append("| seed, relative error of the transfer | " + " | ".join(heads) + " |")
+    lines.append("|---" * (len(heads) + 1) + "|")
+    for name in methods:
+        cells = " | ".join(_cell(found[name]) for found in by_copy.values())
+        lines.append(f"| {title_of(name)} | {cells} |")
+    return [*lines, ""]
 
 
 def _groups(groups: Mapping[str, Any], methods: Sequence[str], what: str) -> list[str]:
@@ -234,7 +222,7 @@ def _groups(groups: Mapping[str, Any], methods: Sequence[str], what: str) -> lis
         lines.append("|---" * (len(heads) + 1) + "|")
         for name in methods:
             cells = [_cell(groups[g][iso][name]) for g in counts]
-            lines.append(f"| {TITLES.get(name, name)} | " + " | ".join(cells) + " |")
+            lines.append(f"| {title_of(name)} | " + " | ".join(cells) + " |")
         lines.append("")
     return lines
 

@@ -1,7 +1,7 @@
 """The rows of the quality comparison, made from bundles and tuned parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from camkit.errors import ContractError
 from camkit.report.quality import BORDER_PX, FABRICATION_SEEDS, FIELD_SHARES
 from tools.capture.simulated import color_sensor
 from tools.comparison.measurement import Row, identity_of
+from tools.comparison.names import BEFORE
 from tools.comparison.peers import PEERS, Setting, part_sides
 from tools.comparison.photograph import (
     PROTOCOL_VERSION,
@@ -57,6 +58,7 @@ def make_rows(
     tuned: Tuned,
     isos: Sequence[float],
     lens: str,
+    before: Bundle | None = None,
 ) -> list[Row]:
     """Make the rows in the order of the tables.
 
@@ -67,9 +69,11 @@ def make_rows(
         tuned: Parameters of the classical peers.
         isos: Sensitivities that parameters are needed for.
         lens: Text of the prescription, part of what decides a measurement.
+        before: The bundle as it was: its bank and networks become rows beside those of today.
 
     Raises:
-        ContractError: If a name is unknown, a parameter is not tuned or a rival is another camera.
+        ContractError: If a name is unknown, a parameter is not tuned or another bundle is not of
+            this camera.
     """
     base = identity_of(
         PROTOCOL_VERSION,
@@ -78,12 +82,13 @@ def make_rows(
         lens,
     )
     rows = [_row(bundle, name, tuned, isos, base) for name in methods]
+    if before is not None:
+        _check_camera(before, bundle)
+        old = [n for n in methods if n in BANK_METHODS or n in before.manifest.sizes]
+        found = (_row(before, name, tuned, isos, identity_of(base, BEFORE)) for name in old)
+        rows += [replace(row, name=row.name + BEFORE) for row in found]
     for rival in rivals:
-        if rival.bundle.manifest.sensor != bundle.manifest.sensor:
-            raise ContractError(
-                f"{rival.bundle.path.name} is another camera than {bundle.path.name}; "
-                "compare bundles of one camera"
-            )
+        _check_camera(rival.bundle, bundle)
         rows.append(
             Row(
                 name=rival.label,
@@ -92,6 +97,14 @@ def make_rows(
             )
         )
     return rows
+
+
+def _check_camera(other: Bundle, bundle: Bundle) -> None:
+    if other.manifest.sensor != bundle.manifest.sensor:
+        raise ContractError(
+            f"{other.path.name} is another camera than {bundle.path.name}; compare bundles of one "
+            "camera"
+        )
 
 
 def _row(bundle: Bundle, name: str, tuned: Tuned, isos: Sequence[float], base: str) -> Row:
@@ -173,10 +186,10 @@ def protocol_text(bundle: Bundle, isos: Sequence[float]) -> list[str]:
         f"ISO {', '.join(f'{iso:g}' for iso in isos)}; mosaic, shot and read noise, saturation "
         "and quantisation as `camkit simulate` makes them.",
         f"Fabricated lenses: radius +-0.2 %, thickness +-0.03 mm, index +-0.0005, uniform, seeds "
-        f"{seeds}; focused at assembly to +-0.02 mm; picture i takes seed i mod 3. Their PSFs are "
-        f"traced afresh at {2 * fields - 1} field heights and {3 * waves - 2} wavelengths (the "
-        f"bundle's frozen PSF has {fields} and {waves}). Methods know the bundle's PSF only. No "
-        "seed was used in training or tuning.",
+        f"{seeds}; focused at assembly to +-0.02 mm; picture i takes seed i mod "
+        f"{len(FABRICATION_SEEDS)}. Their PSFs are traced afresh at {2 * fields - 1} field heights "
+        f"and {3 * waves - 2} wavelengths (the bundle's frozen PSF has {fields} and {waves}). "
+        "Methods know the bundle's PSF only. No seed was used in training or tuning.",
         f"PSNR and SSIM (Gaussian weights) on sRGB values, in sensor geometry, vignetting divided "
         f"out, {BORDER_PX} pixels cut at every border.",
         f"The three classical methods get linear white-balanced demosaicked planes, cut into parts "

@@ -102,7 +102,7 @@ class BayerTraining:
                 Network(scale=recipe.scale),
                 RaiseClipped(),
                 Illumination(),
-                Undistort(),
+                Undistort(interpolation="cubic"),
                 Color(),
             ),
             object_distance_mm=recipe.object_distance_mm,

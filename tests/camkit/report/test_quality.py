@@ -68,7 +68,7 @@ def test_a_picture_larger_than_the_sensor_is_refused() -> None:
 
 
 def test_lens_copies_rotate_with_the_pictures() -> None:
-    seeds = [make_shot(number=i).fabrication_seed for i in range(6)]
+    seeds = [make_shot(number=i).fabrication_seed for i in range(2 * len(FABRICATION_SEEDS))]
     assert seeds == [*FABRICATION_SEEDS, *FABRICATION_SEEDS]
 
 

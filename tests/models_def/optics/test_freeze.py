@@ -24,6 +24,7 @@ from camkit.models_def.optics.sampling import (
     make_bench,
     mean_kernel_loss,
 )
+from tests.together_factory import TOGETHER
 
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
 DUET = MODELS / "prescriptions" / "duet.toml"
@@ -98,7 +99,7 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
         duet(),
         out,
         sensor=sensor,
-        settings=SETTINGS.model_copy(update={"block_px": 384}),
+        settings=SETTINGS.model_copy(update={"block_px": 384, "together": TOGETHER}),
         limit_db=20.0,
         grid=SMALL,
         tell=said.append,
@@ -126,7 +127,7 @@ def test_loss_that_no_grid_can_keep_is_an_error(
 
 @pytest.mark.parametrize(
     ("losses_db", "chosen_px"),
-    [((0.01, 0.0), 768), ((0.5, 0.01), 384), ((0.9, 0.3), 384), ((0.35, 0.3), 768)],
+    [((0.01, 0.0), 768), ((0.5, 0.01), 384), ((0.9, 0.3), 384), ((0.31, 0.3), 768)],
 )
 def test_cheapest_block_grid_that_loses_little_is_taken(
     losses_db: tuple[float, float],
@@ -224,3 +225,15 @@ def test_without_depths_a_lens_is_frozen_at_its_own_distance(
     assert (bench.depths_mm, bench.focus_mm) == ((3e4,), 3e4)
     grid = FreezeGrid(fields=2, wavelengths=1, energy=0.9)
     assert freeze(near, sensor, grid).psf.depths_mm.tolist() == [3e4]
+
+
+def test_blocks_are_judged_by_the_bank_of_the_recipe(bench: Bench) -> None:
+    """One that restores colours together mistrusts its kernel by the height of its place."""
+    losses = []
+    for mistrust in (1.0, 30.0):
+        together = TOGETHER.model_copy(update={"mistrust": mistrust})
+        grid = SETTINGS.model_copy(update={"block_px": 256, "together": together})
+        with pytest.MonkeyPatch.context() as patch:
+            _shrink(patch)
+            losses.append(block_loss(bench.nominal, bench, grid).mean_db)
+    assert losses[0] != losses[1]

@@ -123,3 +123,10 @@ def test_the_protocol_names_grids_and_seeds(bundle: Bundle, tmp_path: Path) -> N
     assert protocol_text(deep, [100.0])[0].startswith("Pictures lie at 1 m;")
     assert "3 field heights and 7 wavelengths" in text
     assert "2001, 2002, 2003" in text
+
+
+def test_the_bundle_as_it_was_has_rows_of_its_own(bundle: Bundle) -> None:
+    rows = make_rows(bundle, METHODS, [], TUNED, [100.0], "lens", with_other_wiener(bundle))
+    names = [row.name for row in rows]
+    assert names == [*METHODS, "bank before", "bank_rl before", "M before"]
+    assert len({row.identity for row in rows}) == len(rows)

@@ -1,0 +1,131 @@
+"""Gains of one method over another on the same captures, with the error of their mean.
+
+A picture is photographed at several places and ISOs, so its captures are not independent: the
+error is that of the mean over pictures, each with its own mean over captures.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from tools.comparison.measurement import Measurement
+from tools.comparison.names import BEFORE, CLASSICAL, TITLES, title_of
+
+OURS: Final = ("bank", "S", "M", "L")
+CLASSIC: Final = "best classical"
+AIMS_DB: Final = {
+    ("bank", CLASSIC): 0.5,
+    ("S", "M" + BEFORE): 0.0,
+    ("M", "M" + BEFORE): 0.2,
+    ("M", CLASSIC): 2.4,
+}
+
+
+def pairs_of(methods: Sequence[str], best_classical: str | None) -> list[tuple[str, str]]:
+    """Give what is compared with what.
+
+    Bank and networks with the same before, S with M before, bank and networks with the best
+    classical method, M with rivals.
+    """
+    ours = [name for name in methods if name in OURS]
+    pairs = [(name, name + BEFORE) for name in ours if name + BEFORE in methods]
+    if "S" in methods and "M" + BEFORE in methods:
+        pairs.append(("S", "M" + BEFORE))
+    if best_classical is not None:
+        pairs += [(name, best_classical) for name in ours]
+    known = {*TITLES, *(name + BEFORE for name in TITLES)}
+    return pairs + [("M", name) for name in methods if "M" in methods and name not in known]
+
+
+def best_classical(measurements: Iterable[Measurement]) -> str | None:
+    """Give the classical method with the highest mean, if there is any."""
+    levels: dict[str, list[float]] = {}
+    for m in measurements:
+        if m.method in CLASSICAL:
+            levels.setdefault(m.method, []).append(m.psnr_db)
+    return max(levels, key=lambda name: float(np.mean(levels[name])), default=None)
+
+
+def paired_gains(
+    measurements: Sequence[Measurement], pairs: Sequence[tuple[str, str]]
+) -> list[dict[str, Any]]:
+    """Give every pair's gain over all captures, by ISO and by place, as plain JSON values."""
+    found = []
+    for method, over in pairs:
+        gains = _differences(measurements, method, over)
+        if gains:
+            found.append(
+                {
+                    "method": method,
+                    "over": over,
+                    "aim_db": _aim(method, over),
+                    "all": _gain(gains),
+                    "by_iso": _split(gains, lambda m: f"{m.iso:g}"),
+                    "by_position": _split(gains, lambda m: str(m.position)),
+                }
+            )
+    return found
+
+
+def to_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Give a table in Markdown, a line for each pair."""
+    if not gains:
+        return []
+    isos, places = list(gains[0]["by_iso"]), list(gains[0]["by_position"])
+    heads = ["all", "aim", *(f"ISO {iso}" for iso in isos), *(f"position {p}" for p in places)]
+    lines = ["| gain in dB, paired | " + " | ".join(heads) + " |", "|---" * (len(heads) + 1) + "|"]
+    for gain in gains:
+        parts = [*gain["by_iso"].values(), *gain["by_position"].values()]
+        cells = " | ".join([_cell(gain["all"]), _aim_cell(gain), *map(_cell, parts)])
+        lines.append(f"| {title_of(gain['method'])} over {title_of(gain['over'])} | {cells} |")
+    return ["### Gains on the same captures", "", *lines, ""]
+
+
+def _aim_cell(gain: Mapping[str, Any]) -> str:
+    aim = gain["aim_db"]
+    if aim is None:
+        return ""
+    return f"{aim:+.1f}: {'reached' if gain['all']['db'] >= aim else 'missed'}"
+
+
+def _aim(method: str, over: str) -> float | None:
+    return AIMS_DB.get((method, CLASSIC if over in CLASSICAL else over))
+
+
+def _cell(gain: Mapping[str, Any]) -> str:
+    error = f" +- {gain['error_db']:.2f}" if "error_db" in gain else ""
+    return f"{gain['db']:+.2f}{error}"
+
+
+def _differences(
+    measurements: Sequence[Measurement], method: str, over: str
+) -> list[tuple[Measurement, float]]:
+    known = {m.capture: m.psnr_db for m in measurements if m.method == over}
+    return [
+        (m, m.psnr_db - known[m.capture])
+        for m in measurements
+        if m.method == method and m.capture in known
+    ]
+
+
+def _split(
+    gains: Sequence[tuple[Measurement, float]], key: Callable[[Measurement], str]
+) -> dict[str, Any]:
+    parts: dict[str, list[tuple[Measurement, float]]] = {}
+    for m, gain in gains:
+        parts.setdefault(key(m), []).append((m, gain))
+    return {name: _gain(parts[name]) for name in sorted(parts, key=float)}
+
+
+def _gain(gains: Sequence[tuple[Measurement, float]]) -> dict[str, Any]:
+    pictures: dict[tuple[str, str], list[float]] = {}
+    for m, gain in gains:
+        pictures.setdefault((m.set_name, m.picture), []).append(gain)
+    means = [float(np.mean(values)) for values in pictures.values()]
+    mean = {"db": round(float(np.mean([gain for _, gain in gains])), 3), "captures": len(gains)}
+    if len(means) < 2:
+        return mean
+    error = float(np.std(means, ddof=1)) / math.sqrt(len(means))
+    return mean | {"error_db": round(error, 3)}
