@@ -9,6 +9,7 @@
 - `rows`: the rows of the comparison
 - `paired`: gains on the same captures, with their error
 - `quality_table`: means, gains and the page
+- `blind`: old and new beside each other in an order that nobody knows (a command)
 - `bank_gain`: what a bank that restores colours together is worth by itself (a command)
 - `compact_json`: results as they are kept, those of `lens_table` too
 """
