@@ -125,7 +125,8 @@ def wiener_restore(
     # Patches without a clipped sample are not touched: no lights, everything is residual.
     clipped_patch = unknown.flatten(1).any(dim=1)[:, None, None, None]
     background = (read_variance / shot.clamp(min=1e-12))[..., None, None]
-    lights = richardson_lucy(patches, otf, background, settings.clip_iterations, unknown)
+    rounds, power = settings.clip_iterations, settings.clip_power
+    lights = richardson_lucy(patches, otf, background, rounds, unknown, power=power)
     near = _nearness(saturated, settings.clip_reach_px, like=patches)
     left = (patches - _filter(lights, otf)).masked_fill(unknown, 0)
     unexplained = (left.square() * near).mean(dim=(-2, -1)) * clipped_patch[..., 0, 0]
@@ -150,7 +151,13 @@ def _nearness(clipped: Tensor, reach_px: int | None, *, like: Tensor) -> Tensor:
 
 
 def richardson_lucy(
-    patches: Tensor, otf: Tensor, background: Tensor, iterations: int, clipped: Tensor
+    patches: Tensor,
+    otf: Tensor,
+    background: Tensor,
+    iterations: int,
+    clipped: Tensor,
+    *,
+    power: float = 1.0,
 ) -> Tensor:
     """Sharpen by Richardson-Lucy; clipped samples are at least as bright as they read.
 
@@ -160,8 +167,9 @@ def richardson_lucy(
         background: (b or 1, c, 1, 1), read_variance / shot.
         iterations: Rounds.
         clipped: (b, 1 or c, h, w) bool.
+        power: Of every round's correction, 1 <= power < 3; more goes further in a round.
 
-    References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background).
+    References: Richardson 1972; Lucy 1974; Snyder et al. 1993 (background); Meinel 1986 (power).
     """
     measured = (patches + background).clamp(min=LEAST_SIGNAL)
     floor = START_SHARE * patches.mean(dim=(-2, -1), keepdim=True)
@@ -170,7 +178,8 @@ def richardson_lucy(
         expected = _filter(sharp, otf).clamp(min=0) + background
         ratio = measured / expected.clamp(min=LEAST_SIGNAL)
         ratio = torch.where(clipped, ratio.clamp(min=1), ratio)
-        sharp = sharp * _filter(ratio, otf.conj()).clamp(min=0)
+        step = _filter(ratio, otf.conj()).clamp(min=0)
+        sharp = sharp * (step if power == 1 else step.pow(power))
     return sharp
 
 

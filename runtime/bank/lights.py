@@ -4,8 +4,8 @@
 
 Farther from the lights nothing is gained by an explanation, and detail is lost: Richardson-Lucy in
 few rounds leaves more unexplained than the noise (measured by tools/clipped_lights.py).
-Where few samples are clipped, small windows do: the kernel must fit one, and its OTF there is the
-block's at every second, third or fourth frequency.
+Where few samples are clipped, small windows do: nearly all of the kernel must fit one, and its OTF
+there is the block's at every second, third or fourth frequency.
 """
 
 from functools import lru_cache
@@ -27,6 +27,8 @@ RING_PX: Final = 16
 """Of the margin is tapered: a window is no periodic picture."""
 SHRINKS: Final = (4, 3, 2)
 """Sides of windows, as parts of a block's side."""
+KERNEL_SHARE: Final = 0.95
+"""Of a kernel must fit a window: the rest wraps around it, far from the lights in its middle."""
 WINDOW_COST: Final = 1.3
 """Of a sample in a window against one in a block."""
 
@@ -57,10 +59,11 @@ def explain_lights(
     samples, side = block.samples, block.samples.shape[-1]
     clipped = block.unknown
     rounds, reach_px = settings.clip_iterations, settings.clip_reach_px
+    power = settings.clip_power
     chosen = choose_windows(np.asarray(clipped.any(axis=0)), side, window_px(settings, kernel_px))
     if chosen is None or reach_px is None:
         near = nearness(clipped, reach_px)
-        found = richardson_lucy(samples, block.otf, background, rounds, unknown)
+        found = richardson_lucy(samples, block.otf, background, rounds, unknown, power=power)
         return found * near, _unexplained(block, found, unknown, near) / side**2
     size, cells = chosen
     core, step = size - 2 * MARGIN_PX, side // size
@@ -78,7 +81,7 @@ def explain_lights(
         near = nearness(own[place], reach_px)
         cut = np.ascontiguousarray(unknown[place])
         window = Block(samples=taper_edges(samples[place], otf, RING_PX), otf=otf)
-        found = richardson_lucy(window.samples, otf, background, rounds, cut)
+        found = richardson_lucy(window.samples, otf, background, rounds, cut, power=power)
         left += _unexplained(window, found, cut, near)
         weight[place] += near
         parts.append((place, found * near))
@@ -110,7 +113,7 @@ def choose_windows(
         if (
             side_px % shrink
             or size % 4
-            or size < (kernel_px or 0)
+            or size < KERNEL_SHARE * (kernel_px or 0)
             or core < step_px
             or core % step_px
         ):

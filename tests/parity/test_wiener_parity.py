@@ -27,8 +27,9 @@ def tensors(noise):
     return torch.tensor(noise.shot), torch.tensor(noise.read_variance)
 
 
-def settings(clip_iterations, clip_reach_px=None, together=None):
+def settings(clip_iterations, clip_reach_px=None, together=None, clip_power=1.0):
     return Wiener(
+        clip_power=clip_power,
         together=together,
         block_px=64,
         overlap_px=24,
@@ -67,10 +68,12 @@ def test_block_filter_and_torch_agree(size, clip_iterations, reach, mask_channel
 
 
 @pytest.mark.parametrize("size", [64, 66, 63])
-@pytest.mark.parametrize("clip_iterations", [0, 6])
+@pytest.mark.parametrize(
+    ("clip_iterations", "clip_power"), [(0, 1.0), (6, 1.0), (3, 2.0), (3, 1.5)]
+)
 @pytest.mark.parametrize("height_mm", [0.0, 7.0])
-def test_colours_together_agree(size, clip_iterations, height_mm):
-    bank = settings(clip_iterations, 16 if clip_iterations else None, TOGETHER)
+def test_colours_together_agree(size, clip_iterations, clip_power, height_mm):
+    bank = settings(clip_iterations, 16 if clip_iterations else None, TOGETHER, clip_power)
     kernel = KERNELS[1]
     scene = texture(size, size, seed=4)
     scene[:, 20:24, 20:24] = 8.0

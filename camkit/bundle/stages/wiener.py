@@ -31,6 +31,8 @@ class Wiener(StageEntry):
         clip_iterations: Rounds of re-estimating clipped pixels; 0 for none.
         clip_reach_px: Farther than this from clipped samples nothing is re-estimated (format 2.1);
             None for whole blocks, as before.
+        clip_power: Each round's correction to this power: 2 goes about twice as far in a round,
+            up to 3 it settles (format 2.4).
         together: How the colours are restored together (format 2.4); None for each alone.
     """
 
@@ -43,6 +45,7 @@ class Wiener(StageEntry):
     prior_exponent: NonNegative
     clip_iterations: Annotated[int, Field(ge=0, le=100)] = 0
     clip_reach_px: Annotated[int, Field(ge=2, le=1024)] | None = None
+    clip_power: Annotated[float, Field(ge=1.0, lt=3.0)] = 1.0
     together: Together | None = None
 
     @model_validator(mode="after")
