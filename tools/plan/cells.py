@@ -50,27 +50,29 @@ class CaptureCells:
 def photograph(
     bundle: Bundle, scene: FloatArray, *, number: int, iso: float, exposure: float = 1.0
 ) -> Simulation:
-    """Photograph a picture at a place of the sensor and a distance that its number chooses.
+    """Photograph a picture at a place of the sensor and a distance that are drawn by chance.
 
     Args:
         bundle: The camera.
         scene: (3, h, w) linear Rec.709.
-        number: Decides field position, quadrant, distance (of those the PSF knows) and noise.
+        number: Seed of field position, quadrant, distance (of those the PSF knows), each drawn
+            apart from the others, and of the noise.
         iso: Sensitivity.
         exposure: Factor on the scene.
     """
     sensor = color_sensor(bundle)
     size = (scene.shape[2], scene.shape[1])
     whole = (sensor.width_px, sensor.height_px)
-    share = FIELD_SHARES[number % len(FIELD_SHARES)]
-    origin = crop_origin(size, whole, share, QUADRANTS[number % len(QUADRANTS)])
+    rng = np.random.default_rng(number)
+    share = FIELD_SHARES[rng.integers(len(FIELD_SHARES))]
+    origin = crop_origin(size, whole, share, QUADRANTS[rng.integers(len(QUADRANTS))])
     depths_mm = bundle.psf.depths_mm
     options = SimulationOptions(
         iso=iso,
         seed=1000 * number + int(iso),
         origin_px=origin,
         exposure=exposure,
-        depth_mm=float(depths_mm[number % depths_mm.size]),
+        depth_mm=float(rng.choice(depths_mm)),
     )
     return simulate(scene, sensor, bundle.psf, options)
 
