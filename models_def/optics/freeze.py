@@ -214,14 +214,11 @@ def between_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(2 / (1 / near + 1 / far) for near, far in pairwise(depths_mm))
 
 
-def choose_blocks(
-    psf: FrozenPsf, bench: Bench, *, limit_db: float = LOSS_LIMIT_DB, tell: Tell = _silent
-) -> tuple[Wiener, Loss]:
-    """Give the cheapest block grid that loses little.
+def choose_blocks(psf: FrozenPsf, bench: Bench, *, tell: Tell = _silent) -> tuple[Wiener, Loss]:
+    """Give the cheapest block grid that loses `BLOCK_TOLERANCE_DB` more than the best at most.
 
-    Tried are `BLOCKS` and the grid of the bench's own settings. Little is the allowed loss, or,
-    where no grid keeps it, `BLOCK_TOLERANCE_DB` more than the best grid loses. The cost of a grid
-    is the area filtered per area answered for.
+    Tried are `BLOCKS` and the grid of the bench's own settings. The cost of a grid is the area
+    filtered per area answered for. A small block may gain, since its prior is that of its place.
     """
     tried: list[tuple[Wiener, Loss]] = []
     grids = {*BLOCKS, (bench.settings.block_px, bench.settings.overlap_px)}
@@ -232,10 +229,7 @@ def choose_blocks(
         loss = block_loss(psf, bench, settings)
         tell(f"blocks of {block_px} px, overlap {overlap_px}: {loss.mean_db:.3f} dB")
         tried.append((settings, loss))
-        if loss.mean_db <= limit_db:
-            break
-    best_db = min(loss.mean_db for _, loss in tried)
-    allowed_db = max(limit_db, best_db + BLOCK_TOLERANCE_DB)
+    allowed_db = min(loss.mean_db for _, loss in tried) + BLOCK_TOLERANCE_DB
     return next(pair for pair in tried if pair[1].mean_db <= allowed_db)
 
 
@@ -256,7 +250,7 @@ def freeze_optics(
         out_path: Receives the frozen PSF (safetensors).
         sensor: Size, pitch, response and noise.
         settings: Of the Wiener filter that measures the loss.
-        limit_db: Mean loss allowed for the samples, and for the blocks.
+        limit_db: Mean loss allowed for the samples.
         grid: Energy, largest side and depths; fields, wavelengths and which of the depths are kept
             are chosen here.
         tell: Takes a line for everything that was tried.
@@ -272,7 +266,7 @@ def freeze_optics(
     bench = make_bench(optics, sensor, alone, grid=wanted)
     frozen, loss = choose_grid(optics, sensor, bench, limit_db=limit_db, grid=grid, tell=tell)
     own = replace(bench, settings=chosen)
-    blocks, blocked = choose_blocks(frozen.psf, own, limit_db=limit_db, tell=tell)
+    blocks, blocked = choose_blocks(frozen.psf, own, tell=tell)
     write_psf(out_path, frozen.psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
     kept_mm = tuple(frozen.psf.depths_mm.tolist())

@@ -143,7 +143,7 @@ def test_cheapest_block_grid_that_loses_little_is_taken(
         lambda _psf, _bench, grid: sampling.Loss(mean_db=known[grid.block_px], worst_db=1.0),
     )
     own = replace(bench, settings=bench.settings.model_copy(update={"block_px": 384}))
-    settings, loss = freeze_module.choose_blocks(bench.nominal, own, limit_db=0.05)
+    settings, loss = freeze_module.choose_blocks(bench.nominal, own)
     assert settings.block_px == chosen_px
     assert loss.mean_db == known[chosen_px]
 
