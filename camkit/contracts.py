@@ -140,6 +140,10 @@ class FrozenPsf:
         symmetry: See above.
         grid_x_mm: (column,) float64, increasing: positions of a grid, to the right of the axis.
         grid_y_mm: (row,) float64, increasing: positions of a grid, down the rows.
+        focus_um: (shift,) float64, increasing, to both sides of 0: how far the sensor is moved
+            away from the lens for `focus_kernels`; None where only the nominal focus is known.
+        focus_kernels: (shift, field, depth, wavelength, h, w) float32, as `kernels`, of a camera
+            whose sensor is moved so.
     """
 
     kernels: FloatArray
@@ -152,11 +156,14 @@ class FrozenPsf:
     symmetry: Symmetry = "radial"
     grid_x_mm: NDArray[np.float64] | None = None
     grid_y_mm: NDArray[np.float64] | None = None
+    focus_um: NDArray[np.float64] | None = None
+    focus_kernels: FloatArray | None = None
 
     def __post_init__(self) -> None:
         self._check_kernels()
         self._check_axes()
         self._check_fields()
+        self._check_focus()
 
     def _check_kernels(self) -> None:
         if self.kernels.ndim != 5 or self.kernels.dtype != np.float32:
@@ -164,15 +171,7 @@ class FrozenPsf:
                 "kernels must be float32 (field, depth, wavelength, h, w); "
                 f"got {self.kernels.dtype} {self.kernels.shape}"
             )
-        if not np.isfinite(self.kernels).all():
-            raise ContractError("kernels hold NaN or inf; freeze the PSF again")
-        if (self.kernels < 0).any():
-            raise ContractError("kernels hold negative values; freeze the PSF again")
-        sums = self.kernels.sum(axis=(-2, -1), dtype=np.float64)
-        if np.abs(sums - 1).max(initial=0) > PSF_SUM_TOLERANCE:
-            raise ContractError(
-                f"every kernel must sum to 1; sums run {sums.min():.6f} to {sums.max():.6f}"
-            )
+        _check_light(self.kernels)
         if self.kernels.shape[-1] % 2 == 0 or self.kernels.shape[-2] % 2 == 0:
             raise ContractError(f"kernel sides must be odd; got {self.kernels.shape[-2:]}")
 
@@ -219,6 +218,42 @@ class FrozenPsf:
         ):
             raise ContractError("field heights must be the distances of the grid from the axis")
 
+    def _check_focus(self) -> None:
+        shifts_um, kernels = self.focus_um, self.focus_kernels
+        if shifts_um is None and kernels is None:
+            return
+        if shifts_um is None or kernels is None:
+            raise ContractError("kernels at other focus and their shifts come together")
+        wanted = (shifts_um.size, *self.kernels.shape)
+        if kernels.dtype != np.float32 or kernels.shape != wanted or shifts_um.ndim != 1:
+            raise ContractError(
+                f"kernels at {shifts_um.size} shifts of focus must be float32 {wanted}; got "
+                f"{kernels.dtype} {kernels.shape}"
+            )
+        both = bool((shifts_um < 0).any() and (shifts_um > 0).any())
+        if (
+            not (np.isfinite(shifts_um).all() and (np.diff(shifts_um) > 0).all() and both)
+            or (shifts_um == 0).any()
+        ):
+            raise ContractError(
+                f"shifts of focus must increase, to both sides of 0 and without it; got "
+                f"{shifts_um.tolist()}"
+            )
+        _check_light(kernels)
+
+
+def _check_light(kernels: FloatArray) -> None:
+    """Refuse kernels that are not finite, negative or not of unit sum."""
+    if not np.isfinite(kernels).all():
+        raise ContractError("kernels hold NaN or inf; freeze the PSF again")
+    if (kernels < 0).any():
+        raise ContractError("kernels hold negative values; freeze the PSF again")
+    sums = kernels.sum(axis=(-2, -1), dtype=np.float64)
+    if np.abs(sums - 1).max(initial=0) > PSF_SUM_TOLERANCE:
+        raise ContractError(
+            f"every kernel must sum to 1; sums run {sums.min():.6f} to {sums.max():.6f}"
+        )
+
 
 def grid_heights_mm(x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give the distances (field,) of the positions of a grid from the axis, row by row."""
@@ -262,3 +297,37 @@ def depth_weights(depths_mm: NDArray[np.float64], depth_mm: float | None) -> NDA
 def depth_name(depth_mm: float) -> str:
     """Give an object distance for people: "0.7 m" or "infinity"."""
     return "infinity" if np.isinf(depth_mm) else f"{depth_mm / MM_PER_M:g} m"
+
+
+def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDArray[np.float64]:
+    """Give the share that the nominal kernels, and those of every shift, have at a focus.
+
+    Kernels are linear between neighbouring shifts, so they stay >= 0 and of unit sum.
+
+    Args:
+        shifts_um: (shift,) of a PSF, increasing; None where only the nominal focus is known.
+        focus_um: How far the sensor lies from its nominal place, away from the lens; 0 is nominal.
+
+    Returns:
+        (1 + shift,) float64, >= 0, sums to 1; the nominal kernels come first.
+
+    Raises:
+        ContractError: If the PSF does not reach so far.
+    """
+    shifts = np.zeros(0) if shifts_um is None else shifts_um
+    if focus_um == 0:
+        return np.concatenate([np.ones(1), np.zeros(shifts.size)])
+    if not shifts.size:
+        raise ContractError(
+            "the PSF knows the nominal focus alone, not that of a unit: freeze it with --focus-um "
+            "and export the bundle again, or leave the unit out"
+        )
+    if not shifts[0] <= focus_um <= shifts[-1]:
+        raise ContractError(
+            f"the PSF reaches from a focus of {shifts[0]:g} to {shifts[-1]:g} um; got "
+            f"{focus_um:g} um: freeze it with a larger --focus-um, or focus the camera anew"
+        )
+    below = int((shifts < 0).sum())
+    knots = np.insert(shifts, below, 0.0)
+    hats = np.array([np.interp(focus_um, knots, unit) for unit in np.eye(knots.size)])
+    return np.concatenate([hats[below : below + 1], np.delete(hats, below)])

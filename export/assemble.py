@@ -23,7 +23,7 @@ import numpy as np
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
-from camkit.bundle.manifest import Manifest, Threshold, planes_of
+from camkit.bundle.manifest import Manifest, Threshold, format_of, planes_of
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, PREVIEW, STRESS_PSF, Bundle
 from camkit.bundle.stages import Parts as KnownParts
@@ -246,6 +246,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
     known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
     data = dict.fromkeys(c.training_data for s in camera.checkpoints.values() for c in s.values())
     return Manifest(
+        format_version=format_of(camera.optics.psf),
         kind=recipe.kind,
         name=recipe.name,
         version=parts.version,

@@ -130,6 +130,11 @@ class Options:
         """Give the object distance as a PSF states it."""
         return None if self.depth_m is None else self.depth_m * MM_PER_M
 
+    @property
+    def focus_um(self) -> float:
+        """Give how far the sensor of the unit lies from its nominal place; 0 without one."""
+        return 0.0 if self.unit is None else self.unit.focus_um
+
 
 def kind_option(name: str) -> KindOption:
     """Give the option of a name that some kind of camera brings.

@@ -1,25 +1,36 @@
 """One camera body: what was found of it beyond its bundle, read from a TOML file.
 
-bundle_sha256 = "..."     the bundle that it was measured with, and is valid for
+lens_sha256 = "..."       of the prescription that it was measured with, as its bundles hold it; or
+bundle_sha256 = "..."     of the one bundle that it was measured with, and is valid for
 name = "body 17"          for people
 
 [facts]                   numbers by name with unit, for stages that know them
 focus_um = 12.5
+
+[measured]                optional: how well, for people; nothing follows from it
+standard_error_um = 0.4
 """
 
 import difflib
+import hashlib
+import json
 import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from camkit.bundle.reader import Bundle
+from camkit.bundle.reader import PRESCRIPTION, Bundle
+from camkit.contracts import focus_weights
 from camkit.errors import ContractError
 from camkit.runtime.stage_finder import known_facts
 
-_KEYS = frozenset({"bundle_sha256", "name", "facts"})
+FOCUS: Final = "focus_um"
+"""How far the sensor lies from its nominal place, away from the lens."""
+_HASHES: Final = ("bundle_sha256", "lens_sha256")
+_KEYS: Final = frozenset({*_HASHES, "name", "facts", "measured"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,28 +39,37 @@ class Unit:
 
     Attributes:
         name: For people.
-        bundle_sha256: Hash of the bundle that it belongs to.
+        bundle_sha256: Hash of the bundle that it belongs to; None where its lens says that.
+        lens_sha256: Hash of the lens, see `lens_hash`, whose bundles it belongs to, or None.
         facts: Name with unit -> number.
     """
 
     name: str
-    bundle_sha256: str
+    bundle_sha256: str | None = None
+    lens_sha256: str | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if (self.bundle_sha256 is None) == (self.lens_sha256 is None):
+            raise ContractError(
+                f"the unit {self.name} must state the hash of its bundle or of its lens: one"
+            )
+
+    @property
+    def focus_um(self) -> float:
+        """Give how far its sensor lies from the nominal place; 0 where that is not stated."""
+        return self.facts.get(FOCUS, 0.0)
 
     def check(self, bundle: Bundle | None) -> None:
         """Refuse a unit of another bundle, or one of which facts would be passed over.
 
         Raises:
-            ContractError: If there is no bundle, its hash is another, or no stage of it knows a
-                fact; near names are suggested.
+            ContractError: If there is no bundle, its hash or that of its lens is another, no stage
+                of it knows a fact (near names are suggested), or its PSF does not reach the focus.
         """
         if bundle is None:
             raise ContractError(f"the unit {self.name} belongs to a bundle, and there is none")
-        if bundle.sha256 != self.bundle_sha256:
-            raise ContractError(
-                f"the unit {self.name} was measured with the bundle of sha256 "
-                f"{self.bundle_sha256[:16]}, this is {bundle.sha256[:16]}; measure it again"
-            )
+        self._check_identity(bundle)
         known = known_facts(bundle.manifest.stages)
         if foreign := [name for name in self.facts if name not in known]:
             near = {n for name in foreign for n in difflib.get_close_matches(name, known, n=2)}
@@ -58,6 +78,39 @@ class Unit:
                 f"the unit {self.name} states {', '.join(foreign)}, which no stage of bundle "
                 f"{bundle.manifest.name} knows; {hint} known are: {', '.join(known) or 'none'}"
             )
+        if self.focus_um:
+            # a stage that knows of focus never joins without optics
+            focus_weights(bundle.psf.focus_um, self.focus_um)
+
+    def _check_identity(self, bundle: Bundle) -> None:
+        if self.bundle_sha256 is not None and bundle.sha256 != self.bundle_sha256:
+            raise ContractError(
+                f"the unit {self.name} was measured with the bundle of sha256 "
+                f"{self.bundle_sha256[:16]}, this is {bundle.sha256[:16]}; measure it again"
+            )
+        if self.lens_sha256 is None:
+            return
+        if PRESCRIPTION not in bundle.names:
+            raise ContractError(
+                f"the unit {self.name} is of a lens, and bundle {bundle.manifest.name} does not "
+                "say which lens it has; measure the unit with the bundle itself"
+            )
+        found = lens_hash(bundle.member(PRESCRIPTION))
+        if found != self.lens_sha256:
+            raise ContractError(
+                f"the unit {self.name} has the lens of sha256 {self.lens_sha256[:16]}, bundle "
+                f"{bundle.manifest.name} that of {found[:16]}: it is another camera's, or the lens "
+                "was designed anew; measure the unit again"
+            )
+
+
+def lens_hash(prescription: bytes) -> str:
+    """Give the hash by which a unit names its lens.
+
+    Args:
+        prescription: The text that a bundle holds of its lens.
+    """
+    return hashlib.sha256(prescription).hexdigest()
 
 
 def read_unit(path: Path) -> Unit:
@@ -74,13 +127,45 @@ def read_unit(path: Path) -> Unit:
         raise ContractError(f"{path} is no TOML: {error}") from error
     if unknown := table.keys() - _KEYS:
         raise ContractError(f"{path}: unknown key(s) {', '.join(sorted(unknown))}")
-    digest, name = table.get("bundle_sha256"), table.get("name", path.stem)
-    facts = table.get("facts", {})
-    if not isinstance(digest, str) or not re.fullmatch("[0-9a-f]{64}", digest):
-        raise ContractError(f"{path}: bundle_sha256 must be the hash of a bundle; got {digest!r}")
+    name, facts = table.get("name", path.stem), table.get("facts", {})
     if not isinstance(name, str) or not isinstance(facts, dict):
         raise ContractError(f"{path}: name must be text and facts a table")
+    if not isinstance(table.get("measured", {}), dict):
+        raise ContractError(f"{path}: measured must be a table")
     for key, value in facts.items():
-        if not isinstance(value, int | float) or isinstance(value, bool):
+        if not isinstance(value, int | float) or isinstance(value, bool) or not isfinite(value):
             raise ContractError(f"{path}: facts.{key} must be a number; got {value!r}")
-    return Unit(name=name, bundle_sha256=digest, facts={key: float(v) for key, v in facts.items()})
+    return Unit(
+        name=name, facts={key: float(v) for key, v in facts.items()}, **_identity(table, path)
+    )
+
+
+def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
+    """Give the one hash that says what a unit belongs to."""
+    given = {key: table[key] for key in _HASHES if key in table}
+    if len(given) != 1:
+        raise ContractError(
+            f"{path}: one of {' and '.join(_HASHES)} must say what the unit belongs to; got "
+            f"{' and '.join(given) or 'none'}"
+        )
+    for key, digest in given.items():
+        if not isinstance(digest, str) or not re.fullmatch("[0-9a-f]{64}", digest):
+            what = key.removesuffix("_sha256")
+            raise ContractError(f"{path}: {key} must be the hash of a {what}; got {digest!r}")
+    return given
+
+
+def format_unit(name: str, identity: Mapping[str, str], measured: Mapping[str, float]) -> str:
+    """Give the TOML text of a unit.
+
+    Args:
+        name: For people.
+        identity: `bundle_sha256` or `lens_sha256`.
+        measured: Numbers by name with unit: its focus among the facts, the rest beside them.
+    """
+    lines = [f"{key} = {json.dumps(value)}" for key, value in (*identity.items(), ("name", name))]
+    facts = {key: value for key, value in measured.items() if key == FOCUS}
+    rest = {key: value for key, value in measured.items() if key != FOCUS}
+    for title, table in (("facts", facts), ("measured", rest)):
+        lines += ["", f"[{title}]", *(f"{key} = {value!r}" for key, value in table.items())]
+    return "\n".join(lines) + "\n"

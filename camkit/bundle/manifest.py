@@ -32,9 +32,12 @@ from camkit.bundle.sensor import Sensor
 from camkit.bundle.stages import JoinError, Parts, Stage
 from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
+from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
 
-FORMAT_VERSION: Final = (2, 4)
+FORMAT_VERSION: Final = (2, 5)
+FOCUS_VERSION: Final = (2, 5)
+"""From here on a PSF may hold kernels of a moved sensor; others state what they always did."""
 _OLDEST: Final = 1
 _S = TypeVar("_S", bound=Entry)
 NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
@@ -208,6 +211,13 @@ class _Head(Entry, extra="ignore"):
 
     format_version: str
     exported_with: dict[str, Any] = Field(default_factory=dict)
+
+
+def format_of(psf: FrozenPsf) -> str:
+    """Give the format of a bundle with such a PSF: kernels of a moved sensor need a newer one."""
+    if psf.focus_um is None:
+        return str(Manifest.model_fields["format_version"].default)
+    return ".".join(map(str, FOCUS_VERSION))
 
 
 def read_manifest(data: bytes) -> Manifest:

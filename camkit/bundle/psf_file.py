@@ -4,7 +4,8 @@ The file holds seven tensors and no metadata, so that the same PSF always gives 
 `kernels` (float32) and, as float64, `field_heights_mm`, `depths_mm`, `wavelengths_um`,
 `pixel_pitch_um` (1,), `distortion_coefficients` (channel, 4), `distortion_radius_mm` (1,) and
 `relative_illumination`. A PSF that is not radial adds `symmetry`, its name in ASCII (uint8), and a
-grid its positions, `grid_x_mm` and `grid_y_mm`.
+grid its positions, `grid_x_mm` and `grid_y_mm`. Kernels of a moved sensor (format 2.5) add
+`focus_kernels` (float32) and `focus_um`.
 """
 
 from collections.abc import Mapping
@@ -29,6 +30,9 @@ _MAX_HEADER_BYTES: Final = 2**20
 _GRID: Final = ("grid_x_mm", "grid_y_mm")
 _ADDED: Final = {"radial": (), "uniform": (_SYMMETRY,), "grid": (_SYMMETRY, *_GRID)}
 """What a PSF of each symmetry holds besides."""
+_FOCUS: Final = ("focus_um", "focus_kernels")
+_SIDES: Final = ("field", "depth", "wavelength", "h", "w")
+_KERNELS: Final = {"kernels": _SIDES, "focus_kernels": ("shift", *_SIDES)}
 
 
 def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
@@ -86,6 +90,9 @@ def psf_to_bytes(psf: FrozenPsf) -> bytes:
             name: np.asarray(positions, dtype=np.float64)
             for name, positions in zip(_GRID, (psf.grid_x_mm, psf.grid_y_mm), strict=True)
         }
+    if psf.focus_um is not None and psf.focus_kernels is not None:
+        tensors[_FOCUS[0]] = np.asarray(psf.focus_um, dtype=np.float64)
+        tensors[_FOCUS[1]] = psf.focus_kernels
     return save({name: np.ascontiguousarray(array) for name, array in tensors.items()})
 
 
@@ -121,6 +128,8 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
             symmetry=symmetry,
             grid_x_mm=tensors.get(_GRID[0]),
             grid_y_mm=tensors.get(_GRID[1]),
+            focus_um=tensors.get(_FOCUS[0]),
+            focus_kernels=tensors.get(_FOCUS[1]),
         )
     except ContractError as error:
         raise BundleError(f"{what} is refused: {error}") from error
@@ -140,6 +149,8 @@ def _read_symmetry(tensors: Mapping[str, NDArray[Any]], what: str) -> Symmetry:
 
 def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what: str) -> None:
     wanted_names = _TENSORS | set(_ADDED[symmetry])
+    if tensors.keys() & set(_FOCUS):
+        wanted_names |= set(_FOCUS)
     if tensors.keys() - {_SYMMETRY} != wanted_names - {_SYMMETRY}:
         missing = ", ".join(sorted(wanted_names - tensors.keys())) or "none"
         extra = ", ".join(sorted(tensors.keys() - wanted_names)) or "none"
@@ -147,15 +158,18 @@ def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what
             f"{what} must hold the {len(wanted_names)} tensors of a frozen PSF; "
             f"missing: {missing}; unknown: {extra}. Freeze the PSF again"
         )
-    kernels = tensors["kernels"]
-    if kernels.dtype != np.float32 or kernels.ndim != 5 or kernels.size == 0:
-        raise BundleError(
-            f"{what}: kernels must be float32 (field, depth, wavelength, h, w), not empty; "
-            f"got {kernels.dtype} {kernels.shape}"
-        )
+    for name, sides in _KERNELS.items():
+        kernels = tensors.get(name)
+        if kernels is None:
+            continue
+        if kernels.dtype != np.float32 or kernels.ndim != len(sides) or kernels.size == 0:
+            raise BundleError(
+                f"{what}: {name} must be float32 ({', '.join(sides)}), not empty; "
+                f"got {kernels.dtype} {kernels.shape}"
+            )
     rows = tensors["distortion_coefficients"].shape[:1]
     shapes = {"distortion_coefficients": (*rows, 4)} | dict.fromkeys(_SCALARS, (1,))
-    for name in sorted(wanted_names - {"kernels", _SYMMETRY}):
+    for name in sorted(wanted_names - {_SYMMETRY, *_KERNELS}):
         array = tensors[name]
         wanted = shapes.get(name, (array.size,))
         if array.dtype != np.float64 or array.shape != wanted:

@@ -23,7 +23,7 @@ from camkit.bundle.container import (
 )
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, optics_from_bytes
-from camkit.bundle.manifest import Manifest, read_manifest
+from camkit.bundle.manifest import FOCUS_VERSION, Manifest, read_manifest
 from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, StreakEntry
 from camkit.bundle.psf_file import psf_from_bytes
 from camkit.contracts import FrozenPsf
@@ -188,6 +188,13 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
     if optics.member_name != stated.member:
         raise BundleError(f"{stated.member} holds optics of another type than the manifest states")
     _check_psf(optics.psf, stated, channels)
+    version = tuple(int(part) for part in manifest.format_version.split("."))
+    if optics.psf.focus_um is not None and version < FOCUS_VERSION:
+        needed = ".".join(map(str, FOCUS_VERSION))
+        raise BundleError(
+            f"{stated.member} holds kernels of a moved sensor, which format {needed} brought, and "
+            f"the manifest states {manifest.format_version}; export the bundle again"
+        )
     return optics
 
 

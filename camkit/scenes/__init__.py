@@ -6,6 +6,7 @@ lettering     lines of made-up glyphs
 procedural    `procedural:SEED`, a bit of everything
 night         `night:SEED`, dark surfaces and lights up to 256 times white
 slanted_edge  a sharp edge, to measure an MTF on
+squares       `squares:SEED`, dark squares on white, to measure the focus of a unit on
 saturation    the exposure at which a share of a scene saturates
 named         the register: a scene by its name
 """

@@ -8,10 +8,12 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.scenes.night import night_scene
 from camkit.scenes.procedural import procedural_scene
+from camkit.scenes.squares import squares_scene
 
 SOURCES: Final[Mapping[str, Callable[[int, int, int], FloatArray]]] = {
     "procedural": procedural_scene,
     "night": night_scene,
+    "squares": squares_scene,
 }
 """Name -> what draws the scene of (seed, height, width)."""
 MOST_DIGITS: Final = 18

@@ -54,13 +54,13 @@ def slanted_edge(
         return np.ascontiguousarray(upright.transpose(0, 2, 1))
     y, x = np.mgrid[:height, :width] - np.array([height - 1, width - 1])[:, None, None] / 2
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
-    share = _bright_share(x * cosine - y * sine, cosine, abs(sine))
+    share = bright_share(x * cosine - y * sine, cosine, abs(sine))
     low, high = levels
     plane = (low + (high - low) * share).astype(np.float32)
     return np.repeat(plane[None], 3, axis=0)
 
 
-def _bright_share(distance: FloatGrid, wide: float, narrow: float) -> FloatGrid:
+def bright_share(distance: FloatGrid, wide: float, narrow: float) -> FloatGrid:
     """Give the share of pixels' area beyond a line.
 
     Seen along the line a square is a trapezoid: a box as wide as one side looks, smeared by a box

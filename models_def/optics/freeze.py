@@ -20,7 +20,7 @@ from camkit.bundle.psf_file import write_psf
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
     Frozen,
@@ -28,7 +28,9 @@ from camkit.models_def.optics.frozen import (
     freeze,
     freeze_at,
     freeze_stress,
+    with_focus,
 )
+from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.optics import Optics
 from camkit.models_def.optics.sampling import (
     Bench,
@@ -96,6 +98,8 @@ class FreezeReport:
         between_loss_db: Mean loss of interpolated kernels half-way (in 1 / distance) between
             the depths kept, against those traced there; 0 with one depth. Not limited: it says
             what a depth given to `process` may cost.
+        focus_um: How far to both sides kernels of a moved sensor reach; 0 where there are none.
+        focus_energy_kept: Least share of a colour's light inside these.
     """
 
     fields: int
@@ -112,9 +116,11 @@ class FreezeReport:
     corner_illumination: float
     depths_mm: tuple[float, ...] = ()
     between_loss_db: float = 0.0
+    focus_um: float = 0.0
+    focus_energy_kept: float = 0.0
 
     def to_json(self) -> dict[str, int | float | str]:
-        """Give the report as a flat mapping; that of one depth does not speak of depths."""
+        """Give the report as a flat mapping, which speaks of depths and focus where it may."""
         facts: dict[str, Any] = {}
         for name, value in asdict(self).items():
             facts |= value if name == "of_optics" else {name: value}
@@ -123,6 +129,8 @@ class FreezeReport:
             facts["depths_mm"] = ", ".join(f"{depth_mm:g}" for depth_mm in depths_mm)
         else:
             del facts["between_loss_db"]
+        if not self.focus_um:
+            del facts["focus_um"], facts["focus_energy_kept"]
         return {k: round(v, 5) if isinstance(v, float) else v for k, v in facts.items()}
 
 
@@ -241,6 +249,7 @@ def freeze_optics(
     settings: Wiener | None = None,
     limit_db: float = LOSS_LIMIT_DB,
     grid: FreezeGrid | None = None,
+    focus_um: float = 0.0,
     tell: Tell = _silent,
 ) -> FreezeReport:
     """Freeze the PSF of optics and write it.
@@ -253,11 +262,16 @@ def freeze_optics(
         limit_db: Mean loss allowed for the samples.
         grid: Energy, largest side and depths; fields, wavelengths and which of the depths are kept
             are chosen here.
+        focus_um: How far the sensor is moved to both sides for kernels of units whose focus is
+            measured; 0 for none. The nominal kernels do not depend on it.
         tell: Takes a line for everything that was tried.
 
     Raises:
         ContractError: If the optics are wrong or no grid keeps the loss.
+        UnsupportedError: If kernels of a moved sensor are wanted of anything but a lens.
     """
+    if focus_um and not isinstance(optics, LensOptics):
+        raise UnsupportedError("only a lens is traced with its sensor moved; leave --focus-um out")
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     # losses of samples by the same filter for every camera, each colour alone
     alone = chosen.model_copy(update={"together": None})
@@ -267,7 +281,11 @@ def freeze_optics(
     frozen, loss = choose_grid(optics, sensor, bench, limit_db=limit_db, grid=grid, tell=tell)
     own = replace(bench, settings=chosen)
     blocks, blocked = choose_blocks(frozen.psf, own, tell=tell)
-    write_psf(out_path, frozen.psf)
+    psf, focus_kept = frozen.psf, 0.0
+    if focus_um and isinstance(optics, LensOptics):
+        tell(f"tracing {optics.name} with its sensor moved by {focus_um:g} um to both sides")
+        psf, focus_kept = with_focus(psf, (-focus_um, focus_um), optics.refocused, sensor)
+    write_psf(out_path, psf)
     fields, _, wavelengths, side_px, _ = frozen.psf.kernels.shape
     kept_mm = tuple(frozen.psf.depths_mm.tolist())
     between_db = 0.0
@@ -290,4 +308,6 @@ def freeze_optics(
         corner_illumination=float(frozen.psf.relative_illumination[farthest]),
         depths_mm=kept_mm,
         between_loss_db=between_db,
+        focus_um=focus_um,
+        focus_energy_kept=focus_kept,
     )

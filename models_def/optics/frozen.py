@@ -11,6 +11,7 @@ that are known at wavelengths of their own keep those.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
@@ -145,6 +146,43 @@ def freeze_at(optics: Optics, sensor: ColorSensor, grid: FreezeGrid, fields: Fie
         grid_y_mm=fields.grid_y_mm,
     )
     return Frozen(psf=psf, energy_kept=kept)
+
+
+def with_focus(
+    psf: FrozenPsf,
+    shifts_um: tuple[float, ...],
+    refocused: Callable[[float], Optics],
+    sensor: ColorSensor,
+) -> tuple[FrozenPsf, float]:
+    """Add the kernels of cameras whose sensor is moved; those of the nominal one stay as they are.
+
+    They have the places, depths, wavelengths and side of the PSF, so they may hold less light.
+
+    Args:
+        psf: Frozen at the nominal focus, of radial optics.
+        shifts_um: How far the sensor is moved away from the lens, increasing, to both sides of 0.
+        refocused: Gives the optics before a sensor that is moved so.
+        sensor: That the PSF was frozen for.
+
+    Returns:
+        The PSF with kernels of every shift, and the least share of the light of a colour in them.
+    """
+    side_px = int(psf.kernels.shape[-1])
+    grid = FreezeGrid(
+        wavelengths=psf.wavelengths_um.size,
+        depths_mm=tuple(psf.depths_mm.tolist()),
+        energy=1.0,
+        max_side_px=side_px,
+        least_energy=0.0,
+    )
+    fields = radial_layout(psf.field_heights_mm.copy())
+    moved = [freeze_at(refocused(shift_um), sensor, grid, fields) for shift_um in shifts_um]
+    added = replace(
+        psf,
+        focus_um=np.array(shifts_um, dtype=np.float64),
+        focus_kernels=np.stack([one.psf.kernels for one in moved]),
+    )
+    return added, min(one.energy_kept for one in moved)
 
 
 def _wavelengths(

@@ -1,5 +1,6 @@
 """A lens as freezing sees it: traced wherever it is asked for."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
@@ -11,13 +12,19 @@ from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.illumination import relative_illumination_at
 from camkit.models_def.optics.distortion import trace_distortion
+from camkit.models_def.optics.focus import focus_shift_mm
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, radial_layout
 from camkit.models_def.optics.paraxial import paraxial_data
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, with_focus_shift
 from camkit.models_def.optics.psf import TracedPsf, trace_psf, with_object_distance
+from camkit.units import UM_PER_MM
 
 RAYS: Final = 4096
+SPREAD_COPIES: Final = 64
+SPREADS: Final = 2.0
+SPREAD_SEED: Final = 7
+_STEP_UM: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,3 +114,18 @@ class LensOptics:
         """Give the nominal lens and fabricated copies, each focused when it was assembled."""
         lenses = focused_copies(self.lens, count, seed)
         return tuple(replace(self, lens=lens) for lens in lenses)
+
+    def refocused(self, focus_um: float) -> "LensOptics":
+        """Give the lens before a sensor that was moved away from it."""
+        return replace(self, lens=with_focus_shift(self.lens, focus_um / UM_PER_MM))
+
+    def focus_range_um(self) -> float:
+        """Give how far the focus of nearly all fabricated copies lies from the nominal one.
+
+        Twice the standard deviation of where spots are smallest, seen from the sensor as it stands
+        after assembly, in whole steps of 5 um.
+        """
+        lenses = focused_copies(self.lens, 1 + SPREAD_COPIES, SPREAD_SEED)
+        nominal_mm, *best_mm = (focus_shift_mm(lens, "spot") for lens in lenses)
+        spread_um = float(np.std(np.array(best_mm) - nominal_mm)) * UM_PER_MM
+        return _STEP_UM * max(1, math.ceil(SPREADS * spread_um / _STEP_UM))

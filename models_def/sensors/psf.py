@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from camkit.contracts import FrozenPsf, Symmetry, depth_weights
+from camkit.contracts import FrozenPsf, Symmetry, depth_weights, focus_weights
 from camkit.errors import ContractError
 
 PAD_PX = 2
@@ -105,6 +105,7 @@ def color_kernels(
     response: NDArray[np.float64],
     *,
     depth_mm: float | None = None,
+    focus_um: float = 0.0,
 ) -> FieldKernels:
     """Weight the wavelength kernels into one kernel per field and channel.
 
@@ -117,13 +118,18 @@ def color_kernels(
         wavelengths_um: (n,) grid of the response.
         response: (c, n) response of the channels.
         depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
+        focus_um: How far the sensor lies from its nominal place, see `focus_weights`.
 
     Raises:
-        ContractError: If the PSF does not reach the depth or the response does not fit.
+        ContractError: If the PSF does not reach depth or focus, or the response does not fit.
     """
     weights = torch.from_numpy(wavelength_weights(psf.wavelengths_um, wavelengths_um, response))
     shares = torch.from_numpy(depth_weights(psf.depths_mm, depth_mm))
-    kernels = torch.from_numpy(psf.kernels.astype(np.float64))
+    in_focus = torch.from_numpy(focus_weights(psf.focus_um, focus_um))
+    every = psf.kernels[None]
+    if psf.focus_kernels is not None:
+        every = np.concatenate([every, psf.focus_kernels])
+    kernels = torch.einsum("s,sfdlhw->fdlhw", in_focus, torch.from_numpy(every.astype(np.float64)))
     mixed = torch.einsum("cl,flhw->fchw", weights, torch.einsum("d,fdlhw->flhw", shares, kernels))
     if psf.symmetry == "radial":
         mixed = 0.5 * (mixed + mixed.flip(-1))

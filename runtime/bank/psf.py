@@ -2,7 +2,8 @@
 
     FrozenPsf (field, depth, wavelength) -> color_kernels -> FieldKernels (field, c) -> at(x, y)
 
-Several depths are blended into one first: those beside the object distance, or all of them.
+Several depths are blended into one first: those beside the object distance, or all of them; and
+before that, where a unit's own focus is known, the kernels beside it.
 
 Kernels of a radial PSF are stored for image points along +y (down the rows). A point in another
 direction gets the kernel turned so that its outward direction stays outward. Everything is computed
@@ -17,7 +18,7 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, FrozenPsf, Symmetry, depth_weights
+from camkit.contracts import FloatArray, FrozenPsf, Symmetry, depth_weights, focus_weights
 from camkit.errors import ContractError
 
 FloatGrid = NDArray[np.float64]
@@ -142,6 +143,7 @@ def color_kernels(
     response: FloatGrid,
     *,
     depth_mm: float | None = None,
+    focus_um: float = 0.0,
 ) -> FieldKernels:
     """Weight the wavelength kernels into one kernel per field and channel.
 
@@ -153,12 +155,14 @@ def color_kernels(
         wavelengths_um: (n,) grid of the response.
         response: (channel, n) response of the channels.
         depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
+        focus_um: How far the sensor lies from its nominal place, see `focus_weights`.
 
     Raises:
-        ContractError: If the PSF does not reach the depth or the response does not fit.
+        ContractError: If the PSF does not reach depth or focus, or the response does not fit.
     """
     weights = wavelength_weights(psf.wavelengths_um, wavelengths_um, response)
-    mixed = np.tensordot(_at_depth(psf, depth_mm), weights, axes=([1], [1]))
+    at_depth = _at_depth(_in_focus(psf, focus_um), depth_weights(psf.depths_mm, depth_mm))
+    mixed = np.tensordot(at_depth, weights, axes=([1], [1]))
     mixed = np.moveaxis(mixed, -1, 1)
     if psf.symmetry == "radial":
         mixed = 0.5 * (mixed + mixed[..., ::-1])
@@ -172,13 +176,24 @@ def color_kernels(
     )
 
 
-def _at_depth(psf: FrozenPsf, depth_mm: float | None) -> FloatArray | FloatGrid:
+def _in_focus(psf: FrozenPsf, focus_um: float) -> FloatArray | FloatGrid:
+    """Blend the shifts of focus; (field, depth, wavelength, h, w)."""
+    nominal, *shares = focus_weights(psf.focus_um, focus_um)
+    if psf.focus_kernels is None or nominal == 1:
+        return psf.kernels
+    blended: FloatGrid = nominal * psf.kernels
+    for share, kernels in zip(shares, psf.focus_kernels, strict=True):
+        if share > 0:
+            blended = blended + share * kernels
+    return blended
+
+
+def _at_depth(kernels: FloatArray | FloatGrid, shares: FloatGrid) -> FloatArray | FloatGrid:
     """Blend the depths; (field, wavelength, h, w)."""
-    shares = depth_weights(psf.depths_mm, depth_mm)
     used = np.flatnonzero(shares)
     if used.size == 1:
-        return psf.kernels[:, used[0]]
-    return np.tensordot(psf.kernels[:, used], shares[used], axes=([1], [0]))
+        return kernels[:, used[0]]
+    return np.tensordot(kernels[:, used], shares[used], axes=([1], [0]))
 
 
 def _kernel_at(

@@ -30,9 +30,11 @@ from camkit.runtime.machine.limits import BANK_WORK
 from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
+from camkit.runtime.unit import FOCUS
 
 METHODS: Final = ("wiener", "rl", "admm-tv")
 OPTIONS: Final = ("depth_m",)
+FACTS: Final = (FOCUS,)
 KERNEL_BLOCKS: Final = 3.2
 """A kernel of another place with its transform, in blocks that are only filtered (measured)."""
 LIGHTS_AT_LEAST: Final = 1 / 7
@@ -84,6 +86,8 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
     if depths_mm.size > 1:
         known = ", ".join(map(depth_name, depths_mm))
         job.record["depth"] = f"mean of {known}" if depth_mm is None else depth_name(depth_mm)
+    if job.options.unit is not None and FOCUS in job.options.unit.facts:
+        job.record[FOCUS] = job.options.focus_um
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         planes, mask = taken[0], taken[1] if len(taken) > 1 else None
@@ -114,7 +118,12 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
-    kernels = color_kernels(bundle.psf, *sensor.response_arrays(), depth_mm=job.options.depth_mm)
+    kernels = color_kernels(
+        bundle.psf,
+        *sensor.response_arrays(),
+        depth_mm=job.options.depth_mm,
+        focus_um=job.options.focus_um,
+    )
     local = LocalPsf(
         kernels=kernels.scaled(job.placement.kernel_scale), window=job.window_of(planes.plane)
     )

@@ -91,21 +91,29 @@ class LightOptions:
     workers: int = 1
 
 
-def lens_of(psf: FrozenPsf, sensor: ColorSensor, *, depth_mm: float | None = None) -> Lens:
+def lens_of(
+    psf: FrozenPsf,
+    sensor: ColorSensor,
+    *,
+    depth_mm: float | None = None,
+    focus_um: float = 0.0,
+) -> Lens:
     """Give what the light goes through for one object distance.
 
     Args:
         psf: Of the optics.
         sensor: Response of its channels.
         depth_mm: Object distance; may only be left out where there is one depth.
+        focus_um: How far the sensor lies from its nominal place, away from the lens.
 
     Raises:
-        ContractError: If there are several depths and none is given, or the PSF does not reach it.
+        ContractError: If there are several depths and none is given, or the PSF does not reach
+            depth or focus.
     """
     if depth_mm is None and psf.depths_mm.size > 1:
         known = ", ".join(map(depth_name, psf.depths_mm))
         raise ContractError(f"light comes from one depth: give one of those the PSF knows, {known}")
-    kernels = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm)
+    kernels = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm, focus_um=focus_um)
     return Lens(
         psf=psf,
         kernels_at=kernels.at,

@@ -38,6 +38,7 @@ class SimulationOptions:
         scale: Samples of the scene along a side of a pixel, see `LightOptions`.
         surround_px: Pixels of the scene beyond every side of the picture, likewise.
         depth_mm: Object distance; may only be left out where the PSF has one depth.
+        focus_um: How far the sensor lies from its nominal place, where the PSF knows of that.
         distort: Apply the radial distortion.
         vignette: Apply the relative illumination.
         noise: Apply shot and read noise.
@@ -53,6 +54,7 @@ class SimulationOptions:
     scale: int = 1
     surround_px: int = 0
     depth_mm: float | None = None
+    focus_um: float = 0.0
     distort: bool = True
     vignette: bool = True
     noise: bool = True
@@ -116,7 +118,7 @@ def simulate(
     light = light_of(
         scene,
         sensor,
-        lens_of(psf, sensor, depth_mm=options.depth_mm),
+        lens_of(psf, sensor, depth_mm=options.depth_mm, focus_um=options.focus_um),
         window,
         LightOptions(
             exposure=options.exposure,

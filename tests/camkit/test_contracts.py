@@ -1,4 +1,4 @@
-"""The shares of depths: linear in 1 / distance, equal without one, nothing beyond the ends."""
+"""The shares of depths (linear in 1 / distance, equal without one) and of shifts of focus."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camkit.contracts import depth_name, depth_weights
+from camkit.contracts import depth_name, depth_weights, focus_weights
 from camkit.errors import ContractError
 from tests.deep_bundle import deep_psf
 
@@ -75,3 +75,25 @@ def test_a_psf_without_increasing_distances_in_front_of_the_lens_is_refused(
     psf = deep_psf((500.0, 1000.0))
     with pytest.raises(ContractError, match="depths"):
         replace(psf, depths_mm=np.array(depths_mm))
+
+
+def test_kernels_between_shifts_are_shared_by_their_neighbours() -> None:
+    shifts_um = np.array([-40.0, -10.0, 20.0])
+    for focus_um, shares in (
+        (0.0, [1, 0, 0, 0]),
+        (-10.0, [0, 0, 1, 0]),
+        (20.0, [0, 0, 0, 1]),
+        (-25.0, [0, 0.5, 0.5, 0]),
+        (-5.0, [0.5, 0, 0.5, 0]),
+        (15.0, [0.25, 0, 0, 0.75]),
+    ):
+        np.testing.assert_allclose(focus_weights(shifts_um, focus_um), shares)
+    np.testing.assert_array_equal(focus_weights(None, 0.0), [1])
+
+
+def test_a_focus_that_is_not_known_is_refused() -> None:
+    with pytest.raises(ContractError, match="knows the nominal focus alone"):
+        focus_weights(None, 1.0)
+    for focus_um in (-41.0, 20.1, np.nan):
+        with pytest.raises(ContractError, match="reaches from a focus of -40 to 20 um; got"):
+            focus_weights(np.array([-40.0, 20.0]), focus_um)

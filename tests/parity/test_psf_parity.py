@@ -6,6 +6,7 @@ from camkit.contracts import FrozenPsf
 from camkit.models_def.sensors import psf as torch_psf
 from camkit.runtime.bank import psf as numpy_psf
 from tests.deep_bundle import deep_psf
+from tests.focus_bundle import focus_psf
 from tests.psf_factory import coma_kernels, frozen_psf, grid_psf, streak_kernel, uniform_psf
 
 KERNELS, HEIGHTS_MM = coma_kernels()
@@ -98,3 +99,11 @@ def test_what_one_side_takes_for_a_field_the_other_does_too() -> None:
     twin = torch_psf.field_kernels(torch.from_numpy(kernels[:1]), _uniform())
     np.testing.assert_allclose(twin.at(*at)[0].numpy(), one.at(0.2, -0.3), atol=LOOKUP_TOLERANCE)
     np.testing.assert_allclose(one.at(0.2, -0.3), kernels[0], atol=LOOKUP_TOLERANCE)
+
+
+@pytest.mark.parametrize("focus_um", [0.0, -40.0, 40.0, -11.0, 29.5])
+def test_kernels_of_a_unit_agree(focus_um: float) -> None:
+    given = focus_psf(), WAVELENGTHS_UM, _response(3)
+    ours = torch_psf.color_kernels(*given, focus_um=focus_um)
+    theirs = numpy_psf.color_kernels(*given, focus_um=focus_um)
+    np.testing.assert_allclose(ours.kernels.numpy(), theirs.kernels, atol=LOOKUP_TOLERANCE)

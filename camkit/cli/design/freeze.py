@@ -1,9 +1,12 @@
-"""`camkit freeze`: a lens, a plate, or a PSF that was measured, to a frozen PSF."""
+"""`camkit freeze`: a lens, a plate, or a PSF that was measured, to a frozen PSF.
+
+With `--unit` it measures one camera body instead (unit.py).
+"""
 
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -12,8 +15,11 @@ from camkit.cli.say import say
 from camkit.errors import ContractError, UnsupportedError
 
 if TYPE_CHECKING:
+    from camkit.bundle.sensor import ColorSensor
+    from camkit.bundle.stages import Wiener
     from camkit.models_def.optics.diffraction.freezing import PlateReport
-    from camkit.models_def.optics.freeze import FreezeReport
+    from camkit.models_def.optics.freeze import FreezeGrid, FreezeReport
+    from camkit.models_def.optics.optics import Optics
 
 
 def freeze(
@@ -25,7 +31,20 @@ def freeze(
             metavar="OPTICS",
         ),
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The frozen PSF (.safetensors).")],
+    captures: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="With --unit: captures of dark squares on white.", metavar="[CAPTURES]..."
+        ),
+    ] = None,
+    *,
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--out", help="The frozen PSF (.safetensors), or the unit (.toml)."),
+    ],
+    unit: Annotated[
+        bool, typer.Option("--unit", help="Measure the focus of the unit that took CAPTURES.")
+    ] = False,
     recipe: Annotated[
         Path | None,
         typer.Option(help="Recipe (TOML) with the sensor and its Wiener bank; default: duet's."),
@@ -46,6 +65,13 @@ def freeze(
         int | None,
         typer.Option(help="Largest side of a kernel, odd; default: 151, of a plate 401."),
     ] = None,
+    focus_um: Annotated[
+        str | None,
+        typer.Option(
+            help="Also freeze kernels with the sensor moved so far to both sides, for units; "
+            "'auto': what nearly all fabricated copies need."
+        ),
+    ] = None,
     stress_out: Annotated[
         Path | None, typer.Option(help="Also write kernels off the design point there.")
     ] = None,
@@ -59,23 +85,25 @@ def freeze(
     """Keep as few PSF samples of a lens or a plate as the stated loss allows (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
-    require_torch("camkit freeze")
     refuse_existing([out, stress_out, report], overwrite=overwrite)
-    from camkit.bundle.psf_file import write_psf
-    from camkit.bundle.sensor import ColorSensor
-    from camkit.bundle.stages import Wiener
-    from camkit.models_def.optics.diffraction.freezing import WINDOW, freeze_plate
-    from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
-    from camkit.models_def.optics.freeze import FreezeGrid, freeze_optics, freeze_stress
-    from camkit.models_def.optics.optics_file import read_optics
-    from camkit.models_def.training.kind import read_recipe, training_kind
+    depths, recipe = _depths(depths_mm), _default_recipe() if recipe is None else recipe
+    if unit or captures:
+        _check_unit(unit=unit, beside=stress_out or report)
+        from camkit.cli.design.unit import measure_unit
 
-    depths = _depths(depths_mm)
-    chosen = read_recipe(_default_recipe() if recipe is None else recipe)
-    stages = training_kind(chosen.kind).design(chosen).stages
-    if not isinstance(chosen.sensor, ColorSensor):
-        raise UnsupportedError(f"a {chosen.sensor.type} sensor has no response to freeze a PSF for")
+        print_report(measure_unit(optics, captures or [], out, recipe, depths, focus_um), json_)
+        return
+    require_torch("camkit freeze")
+    from camkit.bundle.psf_file import write_psf
+    from camkit.cli.design.unit import focus_range_um
+    from camkit.models_def.optics.diffraction.freezing import WINDOW
+    from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
+    from camkit.models_def.optics.freeze import FreezeGrid, freeze_stress
+    from camkit.models_def.optics.optics_file import read_optics
+
+    sensor, bank = _camera_of(recipe)
     found = read_optics(optics)
+    moved_um = focus_range_um(found, focus_um)
     base = WINDOW if isinstance(found, PlateOptics) else FreezeGrid()
     grid = replace(
         base,
@@ -86,26 +114,65 @@ def freeze(
         least_energy=base.least_energy if energy is None else None,
     )
     out.parent.mkdir(parents=True, exist_ok=True)
-    told: FreezeReport | PlateReport
-    if isinstance(found, PlateOptics):
-        told = freeze_plate(found, out, sensor=chosen.sensor, grid=grid, tell=_tell)
-    else:
-        told = freeze_optics(
-            found,
-            out,
-            sensor=chosen.sensor,
-            settings=next((stage for stage in stages if isinstance(stage, Wiener)), None),
-            limit_db=limit_db,
-            grid=grid,
-            tell=_tell,
-        )
+    told = _freeze(found, out, _Wanted(sensor, bank, grid, limit_db, moved_um))
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
-        write_psf(stress_out, freeze_stress(found, chosen.sensor, grid).psf)
+        write_psf(stress_out, freeze_stress(found, sensor, grid).psf)
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
         report.write_text(json.dumps(told.to_json(), indent=2) + "\n", encoding="utf-8")
     print_report(told.to_json(), json_)
+
+
+class _Wanted(NamedTuple):
+    """How optics are frozen."""
+
+    sensor: "ColorSensor"
+    bank: "Wiener | None"
+    grid: "FreezeGrid"
+    limit_db: float
+    focus_um: float
+
+
+def _freeze(optics: "Optics", out: Path, wanted: _Wanted) -> "FreezeReport | PlateReport":
+    from camkit.models_def.optics.diffraction.freezing import freeze_plate
+    from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
+    from camkit.models_def.optics.freeze import freeze_optics
+
+    if isinstance(optics, PlateOptics):
+        if wanted.focus_um:
+            raise UnsupportedError("a plate is frozen at its nominal focus; leave --focus-um out")
+        return freeze_plate(optics, out, sensor=wanted.sensor, grid=wanted.grid, tell=_tell)
+    return freeze_optics(
+        optics,
+        out,
+        sensor=wanted.sensor,
+        settings=wanted.bank,
+        limit_db=wanted.limit_db,
+        grid=wanted.grid,
+        focus_um=wanted.focus_um,
+        tell=_tell,
+    )
+
+
+def _camera_of(recipe: Path) -> "tuple[ColorSensor, Wiener | None]":
+    """Give the sensor of a recipe, and its bank."""
+    from camkit.bundle.sensor import ColorSensor
+    from camkit.bundle.stages import Wiener
+    from camkit.models_def.training.kind import read_recipe, training_kind
+
+    chosen = read_recipe(recipe)
+    stages = training_kind(chosen.kind).design(chosen).stages
+    if not isinstance(chosen.sensor, ColorSensor):
+        raise UnsupportedError(f"a {chosen.sensor.type} sensor has no response to freeze a PSF for")
+    return chosen.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
+
+
+def _check_unit(*, unit: bool, beside: Path | None) -> None:
+    if not unit:
+        raise ContractError("captures are for --unit, which measures the camera that took them")
+    if beside is not None:
+        raise ContractError("--unit writes the unit alone; leave --stress-out and --report out")
 
 
 def _tell(line: str) -> None:

@@ -84,11 +84,13 @@ def _describe_psf(bundle: "Bundle") -> dict[str, Any] | None:
     if PSF not in bundle.names:
         return None
     psf = bundle.psf
+    moved = {} if psf.focus_um is None else {"focus_um": psf.focus_um.tolist()}
     return {
         "kernels": list(psf.kernels.shape),
         "field_heights_mm": [round(float(v), 3) for v in psf.field_heights_mm],
         "depths": [depth_name(v) for v in psf.depths_mm],
         "wavelengths_um": [round(float(v), 4) for v in psf.wavelengths_um],
+        **moved,
     }
 
 

@@ -68,7 +68,7 @@ def process(
     ] = None,
     mode: Annotated[str, typer.Option(help="exact, fast or whole.")] = "exact",
     unit: Annotated[
-        Path | None, typer.Option(help="The camera body: a TOML with the bundle's sha256.")
+        Path | None, typer.Option(help="The camera body: a TOML of camkit freeze --unit.")
     ] = None,
     origin_px: Annotated[
         str | None, typer.Option(help="X,Y on the sensor of a crop that records no place.")

@@ -24,8 +24,8 @@ def simulate(
     scene: Annotated[
         str,
         typer.Argument(
-            help="A picture (8/16-bit sRGB, linear EXR or HDR), procedural:SEED or night:SEED; of "
-            "single photons also an NPZ of depth_m and albedo, or of transient."
+            help="A picture (8/16-bit sRGB, linear EXR or HDR), procedural:SEED, night:SEED or "
+            "squares:SEED; of single photons also an NPZ of depth_m and albedo, or of transient."
         ),
     ],
     bundle: Annotated[str, typer.Option(help="Bundle NAME or PATH of the camera.")],
@@ -61,6 +61,9 @@ def simulate(
         bool, typer.Option("--no-plate", help="Take the bare lens of a camera that has a plate.")
     ] = False,
     depth_m: DepthM = None,
+    unit: Annotated[
+        Path | None, typer.Option(help="The camera body (TOML), whose focus the light takes.")
+    ] = None,
     size_px: Annotated[
         str | None, typer.Option(help="W,H of a scene of a seed; default: the sensor.")
     ] = None,
@@ -98,6 +101,7 @@ def simulate(
             "--truth": truth,
             "--no-plate": no_plate,
             "--depth-m": depth_m,
+            "--unit": unit,
             "--size-px": size_px,
         }
         simulate_recorded(scene, opened, out, counted, given, overwrite=overwrite, json_=json_)
@@ -122,6 +126,7 @@ def simulate(
         bits=bits,
         plate=not no_plate,
         depth_mm=_depth_mm(opened) if depth_m is None else depth_m * MM_PER_M,
+        focus_um=_focus_um(unit, opened),
         workers=available_threads(None),
     )
     drawn = _scene(scene, (size[0] + 2 * surround_px, size[1] + 2 * surround_px))
@@ -227,6 +232,17 @@ def _line(out: Path, simulation: "Simulation", saturation: "Saturation | None") 
 def _depth_mm(bundle: "Bundle") -> float | None:
     """Give the distance of focus; None for a camera that states no optics."""
     return None if bundle.manifest.optics is None else bundle.reference_depth_mm
+
+
+def _focus_um(path: Path | None, bundle: "Bundle") -> float:
+    """Give the focus of a body, which must be one of the bundle's camera."""
+    if path is None:
+        return 0.0
+    from camkit.runtime.unit import read_unit
+
+    unit = read_unit(path)
+    unit.check(bundle)
+    return unit.focus_um
 
 
 def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def]  # numpy stays lazy

@@ -15,6 +15,7 @@ from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_psf, write
 from camkit.contracts import FrozenPsf, RadialDistortion, Symmetry, grid_heights_mm
 from camkit.errors import BundleError
 from tests.bundle_factory import tiny_psf
+from tests.focus_bundle import SHIFTS_UM, focus_psf
 from tests.psf_factory import grid_psf, streak_kernel, uniform_psf
 
 Tensors = dict[str, NDArray[Any]]
@@ -215,3 +216,40 @@ def test_truncated_or_padded_file_is_refused(cut: int, junk: bytes) -> None:
     data = psf_to_bytes(tiny_psf())
     with pytest.raises(BundleError):
         psf_from_bytes(data[:cut] + junk)
+
+
+def test_kernels_of_a_moved_sensor_come_back_bit_for_bit_and_others_keep_their_bytes() -> None:
+    moved, plain = focus_psf(), focus_psf(moved=False)
+    data = psf_to_bytes(moved)
+    back = psf_from_bytes(data)
+    assert back.focus_um is not None
+    np.testing.assert_array_equal(back.focus_um, SHIFTS_UM)
+    np.testing.assert_array_equal(back.focus_kernels, moved.focus_kernels)
+    assert psf_to_bytes(back) == data
+    assert set(load(psf_to_bytes(plain))) == set(load(data)) - {"focus_um", "focus_kernels"}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"focus_um": None}, "missing: focus_um"),
+        ({"focus_kernels": None}, "missing: focus_kernels"),
+        ({"focus_um": np.array([-40.0, 40.0], np.float32)}, "focus_um must be float64"),
+        ({"focus_um": np.array([-40.0, 0.0])}, "to both sides of 0 and without it"),
+        ({"focus_um": np.array([20.0, 40.0])}, "to both sides of 0"),
+        ({"focus_um": np.array([40.0, -40.0])}, "must increase"),
+        ({"focus_um": np.array([-np.inf, 40.0])}, "must increase"),
+        ({"focus_um": np.array([-40.0, 20.0, 40.0])}, "kernels at 3 shifts of focus"),
+        ({"focus_kernels": np.zeros((2, 2, 1, 3, 21), np.float32)}, "shift, field, depth"),
+        ({"focus_kernels": np.zeros((2, 2, 1, 3, 21, 21), np.float32)}, "must sum to 1"),
+        ({"focus_kernels": np.full((2, 2, 1, 3, 21, 21), np.nan, np.float32)}, "NaN or inf"),
+        ({"focus_kernels": np.full((2, 2, 1, 3, 21, 21), -1.0, np.float32)}, "negative"),
+    ],
+)
+def test_damaged_kernels_of_a_moved_sensor_are_refused(
+    change: dict[str, NDArray[Any] | None], message: str
+) -> None:
+    tensors = load(psf_to_bytes(focus_psf())) | change
+    data = save({name: array for name, array in tensors.items() if array is not None})
+    with pytest.raises(BundleError, match=message):
+        psf_from_bytes(data)

@@ -23,7 +23,7 @@ from camkit.bundle import reader
 from camkit.bundle.container import MAX_MEMBERS, check_name
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, bundle_from_bytes, find_bundle, open_bundle
-from camkit.bundle.writer import bundle_to_bytes
+from camkit.bundle.writer import bundle_to_bytes, write_bundle
 from camkit.errors import BundleError
 from tests.bundle_factory import (
     tiny_facts,
@@ -36,6 +36,7 @@ from tests.bundle_factory import (
 )
 from tests.deep_bundle import write_deep_bundle
 from tests.disk_watch import nothing_written
+from tests.focus_bundle import write_focus_bundle
 from tests.psf_factory import streak_kernel, uniform_psf
 
 GOOD = bundle_to_bytes(tiny_manifest(), tiny_members())
@@ -259,7 +260,7 @@ def test_huge_manifest_is_refused() -> None:
     _refuse(_zip(_contents() | {"manifest.json": noise}), "manifest.json is larger")
 
 
-@pytest.mark.parametrize("version", ["1.1", "2.5", "3.0"])
+@pytest.mark.parametrize("version", ["1.1", "2.6", "3.0"])
 def test_newer_format_is_refused_naming_the_version_needed(version: str) -> None:
     data = _with_manifest(lambda document: document.update(format_version=version))
     _refuse(data, f"update to a camkit that reads format {version}")
@@ -495,3 +496,13 @@ def test_the_reference_depth_is_the_focus_or_the_nearest_depth_of_the_psf(
 ) -> None:
     assert write_deep_bundle(tmp_path, depths_mm=depths_mm).reference_depth_mm == expected_mm
     assert open_bundle(write_tiny_bundle(tmp_path)).reference_depth_mm == math.inf
+
+
+def test_kernels_of_a_moved_sensor_need_the_format_that_brought_them(tmp_path: Path) -> None:
+    bundle = write_focus_bundle(tmp_path)
+    assert bundle.manifest.format_version == "2.5"
+    assert write_focus_bundle(tmp_path, moved=False).manifest.format_version == "2.4"
+    members = {name: bundle.member(name) for name in bundle.names}
+    older = bundle.manifest.model_copy(update={"format_version": "2.4"})
+    with pytest.raises(BundleError, match=r"moved sensor, which format 2.5 brought, .* states 2.4"):
+        write_bundle(tmp_path / "older.camkit", older, members)

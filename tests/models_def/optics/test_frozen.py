@@ -18,6 +18,7 @@ from camkit.models_def.optics.frozen import (
     freeze_at,
     freeze_stress,
     stress_depths_mm,
+    with_focus,
 )
 from camkit.models_def.optics.kernel_bank import ChannelResponse as ChannelShares
 from camkit.models_def.optics.kernel_bank import colour_kernels, gaussian_response
@@ -180,3 +181,33 @@ def test_a_lens_is_not_traced_off_the_y_axis() -> None:
     places = grid_layout(np.array([1.0]), np.array([0.0, 1.0]))
     with pytest.raises(ContractError, match="along \\+y"):
         duet().kernels(places, WAVES, depth_mm=math.inf, side_px=31, pitch_um=6.0)
+
+
+def test_kernels_of_a_moved_sensor_join_those_that_stay(sensor: BayerSensor) -> None:
+    """Those of the sensor where it is are the nominal ones, but for light that was cut off."""
+    nominal = freeze(duet(), sensor, SMALL).psf
+    psf, kept = with_focus(nominal, (-60.0, 1e-9, 60.0), duet().refocused, sensor)
+    np.testing.assert_array_equal(psf.kernels, nominal.kernels)
+    assert psf.focus_kernels is not None
+    np.testing.assert_allclose(psf.focus_kernels[1], psf.kernels, atol=2e-4)
+    assert 0.97 < kept <= 1
+    response = sensor.response_arrays()
+    traced = freeze(duet().refocused(30.0), sensor, SMALL).psf
+    other = color_kernels(traced, *response).kernels
+    side = min(other.shape[-1], psf.kernels.shape[-1])
+
+    def cut(kernels: torch.Tensor) -> torch.Tensor:
+        rim = (kernels.shape[-1] - side) // 2
+        return kernels[..., rim : rim + side, rim : rim + side]
+
+    away = [
+        float((cut(color_kernels(psf, *response, focus_um=f).kernels) - cut(other)).square().sum())
+        for f in (0.0, 30.0)
+    ]
+    assert away[1] < away[0] / 4, "half-way between two shifts the blend is near what is traced"
+
+
+def test_the_reach_of_focus_covers_the_copies() -> None:
+    reach_um = duet().focus_range_um()
+    assert reach_um == duet().focus_range_um()
+    assert (reach_um % 5, 60 <= reach_um <= 120) == (0, True)
