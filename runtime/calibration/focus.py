@@ -26,7 +26,7 @@ from camkit.runtime.capture import Capture
 from camkit.runtime.geometry.placement import place
 
 LEAST_EDGES: Final = 3
-MOST_MISFIT: Final = 0.03
+MOST_MISFIT: Final = 0.015
 """Of the step: RMS of profiles around the best kernels, beyond which it is another lens."""
 OUTLIER: Final = 9.0
 """Times the median of the mean square at its own best focus: an edge that is none."""
@@ -266,7 +266,7 @@ def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFoc
     if np.sqrt(least) > MOST_MISFIT:
         raise ContractError(
             f"the edges deviate from those of this lens by {np.sqrt(least):.1%} of their step at "
-            f"best, more than {MOST_MISFIT:.0%}: the captures are of another lens or "
+            f"best, more than {MOST_MISFIT:.1%}: the captures are of another lens or "
             "distance, or the target is not sharp"
         )
     if not tried_um[0] < focus_um < tried_um[-1]:
@@ -280,8 +280,8 @@ def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFoc
     error_um = float(np.sqrt((edges - 1) / edges * np.square(without - without.mean()).sum()))
     if abs(focus_um) <= LEAST_ERRORS * error_um or least > (1 - LEAST_FALL) * nominal:
         raise ContractError(
-            f"the focus is {focus_um:.1f} +- {error_um:.1f} um: as far as these captures tell, "
-            "the nominal one; the unit needs no file"
+            f"the focus is {focus_um:.1f} +- {error_um:.1f} um, which these captures do not tell "
+            "from the nominal one: leave the unit out, or show more edges over the whole field"
         )
     return MeasuredFocus(
         focus_um=focus_um,

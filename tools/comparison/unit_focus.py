@@ -11,7 +11,8 @@ measured on that (`camkit freeze --unit`). Then they photograph the pictures at 
 turn, at ISO 100 and 1600, and the bank alone restores them, with the unit's focus and without.
 Copies of `--outliers` are chosen for their large error. For each copy: the relative RMS error of
 the transfer of the kernels below 0.3 cycles/px over five heights, and PSNR on sRGB values, paired,
-with the standard error over captures.
+with the standard error over captures. `blend` says how far from kernels traced there those are
+that are blended, linearly as in use or by a parabola: the same error, at a half of their reach.
 """
 
 import argparse
@@ -24,6 +25,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.manifest import format_of
 from camkit.bundle.optics import PSF
@@ -49,7 +51,7 @@ from camkit.report.quality import (
     psnr,
     read_picture,
 )
-from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.calibration.focus import EdgeCamera, MeasuredFocus, measure_focus
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options
@@ -70,6 +72,7 @@ TARGET_SHARES: Final = (0.0, 0.35, 0.65, 0.95)
 HEIGHTS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 MOST_CYCLES: Final = 0.3
 _SPECTRUM_PX: Final = 256
+Transfer = NDArray[np.complex128]
 DIGITS: Final = 4
 
 
@@ -130,6 +133,7 @@ def main(words: Sequence[str] | None = None) -> None:
         "bundle": bundle.manifest.name,
         "kernels_to_um": range_um,
         "pictures": len(pictures),
+        "blend": blend_errors(bundle, range_um),
     }
     for part, judged in parts.items():
         gains = {bank: gain([db for one in judged for db in one.gains_db[bank]]) for bank in banks}
@@ -140,12 +144,16 @@ def main(words: Sequence[str] | None = None) -> None:
 
 def refocusable(bundle: Bundle, range_um: float | None) -> tuple[Bundle, float]:
     """Give a bundle with kernels of its lens before a moved sensor, and how far that is moved."""
-    lens = LensOptics(lens=parse_prescription(bundle.member(PRESCRIPTION).decode("utf-8")))
+    lens = _lens_of(bundle)
     reach_um = lens.focus_range_um() if range_um is None else range_um
     psf, _ = with_focus(bundle.psf, (-reach_um, reach_um), lens.refocused, color_sensor(bundle))
     members = {name: bundle.member(name) for name in bundle.names} | {PSF: psf_to_bytes(psf)}
     manifest = bundle.manifest.model_copy(update={"format_version": format_of(psf)})
     return bundle_from_bytes(bundle_to_bytes(manifest, members), path=bundle.path), reach_um
+
+
+def _lens_of(bundle: Bundle) -> LensOptics:
+    return LensOptics(lens=parse_prescription(bundle.member(PRESCRIPTION).decode("utf-8")))
 
 
 def restoring_together(bundle: Bundle, together: Together) -> Bundle:
@@ -232,20 +240,48 @@ def _psnr_db(pipeline: Pipeline, simulation: Simulation, sharp: FloatArray) -> f
     return psnr(*inner_srgb(restored, sharp))
 
 
+def blend_errors(bundle: Bundle, range_um: float) -> dict[str, dict[str, float]]:
+    """Give the relative RMS error of blended transfers half-way to either end of the reach."""
+    lens, sensor = _lens_of(bundle), color_sensor(bundle)
+    response = sensor.response_arrays()
+    low, nominal, high = (
+        _transfers(color_kernels(bundle.psf, *response, focus_um=at))
+        for at in (-range_um, 0.0, range_um)
+    )
+    halves = (-range_um / 2, range_um / 2)
+    there, _ = with_focus(bundle.psf, halves, lens.refocused, sensor)
+    found = {}
+    for half_um, end, other in zip(halves, (low, high), (high, low), strict=True):
+        traced = _transfers(color_kernels(there, *response, focus_um=half_um))
+        linear = (nominal + end) / 2
+        parabola = 0.75 * nominal + 0.375 * end - 0.125 * other
+        found[f"{half_um:g}"] = {
+            "linear": _relative_error(linear, traced),
+            "parabola": _relative_error(parabola, traced),
+            "nominal": _relative_error(nominal, traced),
+        }
+    return found
+
+
 def transfer_error(bundle: Bundle, lens: FrozenPsf, focus_um: float) -> float:
     """Give the relative RMS error of the bundle's transfer at a focus against that of a copy."""
     response = color_sensor(bundle).response_arrays()
     known = color_kernels(bundle.psf, *response, focus_um=focus_um)
-    true = color_kernels(lens, *response)
-    wrong = power = 0.0
-    for height_mm in np.array(HEIGHTS) * bundle.psf.field_heights_mm[-1]:
-        ours, theirs = (_transfer(kernels.at(0.0, height_mm)) for kernels in (known, true))
-        wrong += float(np.square(np.abs(ours - theirs)).sum())
-        power += float(np.square(np.abs(theirs)).sum())
+    return _relative_error(_transfers(known), _transfers(color_kernels(lens, *response)))
+
+
+def _relative_error(ours: Transfer, theirs: Transfer) -> float:
+    wrong, power = (float(np.square(np.abs(part)).sum()) for part in (ours - theirs, theirs))
     return math.sqrt(wrong / power)
 
 
-def _transfer(kernels: FloatArray) -> np.ndarray[Any, np.dtype[np.complex128]]:
+def _transfers(kernels: FieldKernels) -> Transfer:
+    """Give the transfers (height, c, n) at some shares of the largest height."""
+    heights_mm = np.array(HEIGHTS) * kernels.field_heights_mm[-1]
+    return np.stack([_transfer(kernels.at(0.0, float(at_mm))) for at_mm in heights_mm])
+
+
+def _transfer(kernels: FloatArray) -> Transfer:
     """Give the transfer (c, n) below the highest frequency that counts, about the middle pixel."""
     h, w = kernels.shape[-2:]
     wide = np.zeros((len(kernels), _SPECTRUM_PX, _SPECTRUM_PX))

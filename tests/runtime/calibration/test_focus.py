@@ -90,7 +90,7 @@ def test_planes_are_measured_as_a_mosaic_is(bundle: Bundle) -> None:
 
 
 def test_a_body_in_focus_needs_no_file(bundle: Bundle) -> None:
-    with pytest.raises(ContractError, match="the unit needs no file"):
+    with pytest.raises(ContractError, match="from the nominal one: leave the unit out"):
         measure_focus([("target", taken(bundle, 0.0, iso=400.0))], camera(bundle))
 
 

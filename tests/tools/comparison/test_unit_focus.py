@@ -33,6 +33,7 @@ def test_copies_are_measured_and_what_they_gain_is_told(
     bundle = write_focus_bundle(tmp_path)
     monkeypatch.setattr(unit_focus, "fabricated_psf", _copy)
     monkeypatch.setattr(unit_focus, "refocusable", lambda bundle, _: (bundle, 40.0))
+    monkeypatch.setattr(unit_focus, "blend_errors", lambda *_: {})
     (tmp_path / "in").mkdir()
     for name in "ab":
         picture = np.rint(texture(96, 112, seed=ord(name)) * 255).astype(np.uint8)
@@ -48,7 +49,7 @@ def test_copies_are_measured_and_what_they_gain_is_told(
     (three,) = found["outliers"]["each"]
     assert one["focus_um"] == pytest.approx(30, abs=1)
     assert three["focus_um"] == pytest.approx(-25, abs=1)
-    assert "the nominal one" in two["why"]
+    assert "from the nominal one" in two["why"]
     for judged in (one, three):
         assert judged["transfer_error"]["unit"] < 0.2 * judged["transfer_error"]["nominal"]
         assert judged["gain"]["alone"]["mean_db"] > 0.05
@@ -72,3 +73,7 @@ def test_kernels_of_a_moved_sensor_join_a_built_in_bundle() -> None:
     assert bundle.psf.focus_um.tolist() == [-30.0, 30.0]
     assert unit_focus.transfer_error(bundle, bundle.psf, 0.0) == 0
     assert unit_focus.transfer_error(bundle, bundle.psf, 20.0) > 0.03
+    blend = unit_focus.blend_errors(bundle, reach_um)
+    assert set(blend) == {"-15", "15"}
+    for errors in blend.values():
+        assert errors["linear"] < errors["nominal"] / 5

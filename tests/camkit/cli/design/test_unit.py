@@ -57,7 +57,7 @@ def test_a_camera_in_focus_and_one_without_kernels_are_refused(
 ) -> None:
     camkit_command("simulate", "squares:1", "--bundle", "focused.camkit", "-o", "1.dng")
     outcome = camkit_command("freeze", "focused.camkit", "1.dng", "--unit", "-o", "u.toml")
-    assert "the unit needs no file" in outcome.err
+    assert "from the nominal one: leave the unit out" in outcome.err
     write_focus_bundle(tmp_path, "plain", moved=False)
     outcome = camkit_command("freeze", "plain.camkit", "1.dng", "--unit", "-o", "u.toml")
     assert "knows the nominal focus alone: freeze it with --focus-um" in outcome.err
