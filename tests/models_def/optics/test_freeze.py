@@ -10,12 +10,13 @@ import pytest
 from camkit.bundle.psf_file import read_psf
 from camkit.bundle.sensor import BayerSensor, nested_sensor
 from camkit.bundle.stages import Wiener
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics import freeze as freeze_module
 from camkit.models_def.optics import sampling
 from camkit.models_def.optics.freeze import between_mm, choose_depths
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.lens_optics import LensOptics
+from camkit.models_def.optics.measured import MeasuredOptics
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.optics.sampling import (
     Bench,
@@ -26,7 +27,11 @@ from camkit.models_def.optics.sampling import (
 )
 from tests.together_factory import TOGETHER
 
+
+from tests.bundle_factory import tiny_psf
+
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
+
 DUET = MODELS / "prescriptions" / "duet.toml"
 SETTINGS = Wiener(prior_scale=3e-4, prior_exponent=2.5)
 SMALL = FreezeGrid()
@@ -102,6 +107,7 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
         settings=SETTINGS.model_copy(update={"block_px": 384, "together": TOGETHER}),
         limit_db=20.0,
         grid=SMALL,
+        focus_um=40.0,
         tell=said.append,
     )
     assert said[1].startswith("3 wavelengths, 9 fields: ")
@@ -114,6 +120,10 @@ def test_freezing_writes_the_psf_and_reports_what_it_cost(
     assert report.loss_db <= 20.0
     told = json.loads(json.dumps(report.to_json()))
     assert (told["block_px"], told["efl_mm"]) == (384, pytest.approx(50, abs=0.1))
+    assert said[4].endswith("with its sensor moved by 40 um to both sides")
+    assert psf.focus_um is not None
+    assert psf.focus_um.tolist() == [-40.0, 40.0]
+    assert (told["focus_um"], told["focus_energy_kept"] > 0.98) == (40.0, True)
 
 
 def test_loss_that_no_grid_can_keep_is_an_error(
@@ -212,6 +222,8 @@ def test_freezing_at_several_depths_reports_those_kept_and_the_loss_between(
     assert psf.kernels.shape[:3] == (5, 2, 3)
     assert report.to_json()["depths_mm"] == "20000, inf"
     assert report.between_loss_db > 0
+    assert psf.focus_um is None
+    assert "focus_um" not in report.to_json()
 
 
 def test_without_depths_a_lens_is_frozen_at_its_own_distance(
@@ -227,6 +239,7 @@ def test_without_depths_a_lens_is_frozen_at_its_own_distance(
     assert freeze(near, sensor, grid).psf.depths_mm.tolist() == [3e4]
 
 
+<<<<<<< HEAD
 def test_blocks_are_judged_by_the_bank_of_the_recipe(bench: Bench) -> None:
     """One that restores colours together mistrusts its kernel by the height of its place."""
     losses = []
@@ -237,3 +250,9 @@ def test_blocks_are_judged_by_the_bank_of_the_recipe(bench: Bench) -> None:
             _shrink(patch)
             losses.append(block_loss(bench.nominal, bench, grid).mean_db)
     assert losses[0] != losses[1]
+=======
+def test_only_a_lens_has_kernels_of_a_moved_sensor(sensor: BayerSensor, tmp_path: Path) -> None:
+    optics = MeasuredOptics(psf=tiny_psf(), name="measured")
+    with pytest.raises(UnsupportedError, match="only a lens is traced with its sensor moved"):
+        freeze_module.freeze_optics(optics, tmp_path / "p", sensor=sensor, focus_um=10.0)
+>>>>>>> c70647e (What the focus of a unit is worth to the bank: nothing for most copies, 0.5 to 0.8 dB for outliers; decision 23)

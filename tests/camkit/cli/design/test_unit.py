@@ -2,13 +2,20 @@
 
 import json
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from camkit.bundle.reader import Bundle
+from camkit.bundle.reader import PRESCRIPTION, Bundle, find_bundle, open_bundle
 from camkit.cli.exit_code import ExitCode
+from camkit.models_def.optics import optics_file
+from camkit.models_def.optics.frozen import FreezeGrid, freeze
+from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.lens_optics import LensOptics
+from camkit.runtime.twin.simulate import SimulationOptions, simulate, write_capture
 from camkit.runtime.unit import format_unit, lens_hash, read_unit
+from camkit.scenes.squares import squares_scene
 from tests.focus_bundle import LENS, write_focus_bundle
 
 
@@ -102,3 +109,28 @@ def test_only_a_lens_is_traced_with_its_sensor_moved(camkit_command, tmp_path: P
     assert "frozen at its nominal focus" in camkit_command(*words, "20").err
     unit = ("freeze", "streak-4", tmp_path / "a.dng", "--unit", "-o", tmp_path / "u.toml")
     assert "measured with a lens or a bundle; streak-4 is neither" in camkit_command(*unit).err
+
+
+def test_a_lens_is_traced_to_measure_with(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The body is the lens with its sensor moved, photographed through kernels of its own."""
+    few_rays = partial(LensOptics, rays=300)
+    monkeypatch.setattr(optics_file, "LensOptics", few_rays)
+    bundle = open_bundle(find_bundle("duet"))
+    lens = few_rays(lens=find_lens("duet")).refocused(35.0)
+    sensor = bundle.manifest.sensor
+    assert sensor.type == "bayer"
+    psf = freeze(lens, sensor, FreezeGrid(fields=5, wavelengths=5, least_energy=0.9)).psf
+    names = []
+    for number, origin_px in enumerate(((2700, 1700), (600, 400))):
+        options = SimulationOptions(seed=number, origin_px=origin_px)
+        taken = simulate(squares_scene(number, 640, 640), sensor, psf, options)
+        names.append(tmp_path / f"{number}.dng")
+        write_capture(names[-1], taken, sensor, "duet")
+    out = tmp_path / "unit.toml"
+    outcome = camkit_command("freeze", "duet", "--unit", *names, "-o", out, "--focus-um", "60")
+    assert outcome.code == 0, outcome.err
+    unit = read_unit(out)
+    assert unit.focus_um == pytest.approx(35, abs=4)
+    assert unit.lens_sha256 == lens_hash(bundle.member(PRESCRIPTION))
