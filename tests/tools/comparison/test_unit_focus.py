@@ -34,6 +34,7 @@ def test_copies_are_measured_and_what_they_gain_is_told(
     monkeypatch.setattr(unit_focus, "fabricated_psf", _copy)
     monkeypatch.setattr(unit_focus, "refocusable", lambda bundle, _: (bundle, 40.0))
     monkeypatch.setattr(unit_focus, "blend_errors", lambda *_: {})
+    monkeypatch.setattr(unit_focus, "TARGET_SHARES", (0.0, 0.9))
     (tmp_path / "in").mkdir()
     for name in "ab":
         picture = np.rint(texture(96, 112, seed=ord(name)) * 255).astype(np.uint8)

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from camkit.bundle.reader import PRESCRIPTION, Bundle, find_bundle, open_bundle
+from camkit.cli.design import unit as unit_module
 from camkit.cli.exit_code import ExitCode
-from camkit.models_def.optics import optics_file
+from camkit.models_def.optics import frozen, optics_file
 from camkit.models_def.optics.frozen import FreezeGrid, freeze
 from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.lens_optics import LensOptics
@@ -117,6 +118,8 @@ def test_a_lens_is_traced_to_measure_with(
     """The body is the lens with its sensor moved, photographed through kernels of its own."""
     few_rays = partial(LensOptics, rays=300)
     monkeypatch.setattr(optics_file, "LensOptics", few_rays)
+    monkeypatch.setattr(frozen, "FINE_WAVELENGTHS", 7)
+    monkeypatch.setattr(unit_module, "STEPS", (-1.0, 1.0))
     bundle = open_bundle(find_bundle("duet"))
     lens = few_rays(lens=find_lens("duet")).refocused(35.0)
     sensor = bundle.manifest.sensor
