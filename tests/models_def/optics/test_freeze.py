@@ -25,10 +25,8 @@ from camkit.models_def.optics.sampling import (
     make_bench,
     mean_kernel_loss,
 )
-from tests.together_factory import TOGETHER
-
-
 from tests.bundle_factory import tiny_psf
+from tests.together_factory import TOGETHER
 
 MODELS = Path(__file__).resolve().parents[3] / "models_def"
 
@@ -239,7 +237,6 @@ def test_without_depths_a_lens_is_frozen_at_its_own_distance(
     assert freeze(near, sensor, grid).psf.depths_mm.tolist() == [3e4]
 
 
-<<<<<<< HEAD
 def test_blocks_are_judged_by_the_bank_of_the_recipe(bench: Bench) -> None:
     """One that restores colours together mistrusts its kernel by the height of its place."""
     losses = []
@@ -250,9 +247,9 @@ def test_blocks_are_judged_by_the_bank_of_the_recipe(bench: Bench) -> None:
             _shrink(patch)
             losses.append(block_loss(bench.nominal, bench, grid).mean_db)
     assert losses[0] != losses[1]
-=======
+
+
 def test_only_a_lens_has_kernels_of_a_moved_sensor(sensor: BayerSensor, tmp_path: Path) -> None:
     optics = MeasuredOptics(psf=tiny_psf(), name="measured")
     with pytest.raises(UnsupportedError, match="only a lens is traced with its sensor moved"):
         freeze_module.freeze_optics(optics, tmp_path / "p", sensor=sensor, focus_um=10.0)
->>>>>>> c70647e (What the focus of a unit is worth to the bank: nothing for most copies, 0.5 to 0.8 dB for outliers; decision 23)
