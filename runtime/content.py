@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel, cfa_channels
@@ -97,6 +96,8 @@ class Content:
     @property
     def blurred_detail(self) -> CellArray:
         """Give the detail (row, column) that blur leaves in a cell: its own and its neighbours'."""
+        import scipy.ndimage
+
         around = scipy.ndimage.maximum_filter(self.detail, size=3, mode="nearest")
         return np.asarray(self.detail + SPILL * around)
 

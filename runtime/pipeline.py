@@ -17,7 +17,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.reader import Bundle, find_bundle, is_built_in, open_bundle
 from camkit.bundle.stages import Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
@@ -32,7 +32,6 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.kind import kind_without_bundle, part_of, runtime_part
 from camkit.runtime.maker import Made, Maker, Making
 from camkit.runtime.network.engine import NetworkEngine, available_threads
-from camkit.runtime.network.graph import check_graph
 from camkit.runtime.network.tiling import Progress
 from camkit.runtime.options import (
     DEFAULT_MAX_MEM_BYTES,
@@ -491,7 +490,10 @@ def _engine(
             else f"bundle {bundle.manifest.name} holds no network; use method wiener"
         )
     data = bundle.network_bytes(role, size, fp16=options.dtype == "fp16")
-    check_graph(data, sizes[size])
+    if not is_built_in(bundle):  # theirs were checked when they were made, as the code was
+        from camkit.runtime.network.graph import check_graph
+
+        check_graph(data, sizes[size])
     return NetworkEngine(
         data, threads=threads, provider=options.provider, scale=sizes[size].output_scale
     )

@@ -13,8 +13,6 @@ import logging
 import math
 import os
 import subprocess
-import sys
-import tempfile
 import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,11 +21,11 @@ from typing import IO, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-import camkit
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.decoder import given
 from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
 from camkit.runtime.files.regular_file import check_regular
@@ -166,27 +164,14 @@ def _read_picture(path: Path, mosaic: MosaicOptions | None, *, keep_codes: bool)
 
 def _read_isolated(path: Path, limits: _Limits, said: MosaicOptions) -> Capture:
     """Decode in a child; the hash is computed here while it works."""
-    command = [
-        sys.executable,
-        "-P",  # the folder the user happens to be in must not provide modules
-        "-m",
-        "camkit.runtime.raw_worker",
+    order = [
         str(path.resolve()),
         str(limits.max_memory_mb),
         str(os.getpid()),
         json.dumps([said.black_level, said.white_level]),
     ]
-    with (
-        tempfile.TemporaryFile() as complaints,
-        subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=complaints,
-            env=_child_environment(),
-            process_group=0,  # an interrupt is for the parent, which then ends the child
-        ) as child,
-    ):
+    with given(order) as decoder:
+        child = decoder.child
         expired = threading.Event()
         timer = threading.Timer(limits.timeout_s, _expire, (child, expired))
         timer.start()
@@ -201,7 +186,7 @@ def _read_isolated(path: Path, limits: _Limits, said: MosaicOptions) -> Capture:
             child.kill()
         if expired.is_set():
             raise DecodeError(f"decoding took longer than {limits.timeout_s:g} s and was stopped")
-        raise DecodeError(_death(child.wait(), complaints))
+        raise DecodeError(_death(child.wait(), decoder.complaints))
 
 
 def _expire(child: subprocess.Popen[bytes], expired: threading.Event) -> None:
@@ -216,21 +201,6 @@ def _death(code: int, complaints: IO[bytes]) -> str:
     cause = f"signal {-code}" if code < 0 else f"exit code {code}"
     last = f" ({lines[-1][:200]})" if lines else ""
     return f"the decoder died with {cause}{last}; the file is damaged or LibRaw cannot handle it"
-
-
-def _child_environment() -> dict[str, str]:
-    """Let the child find this camkit also when it runs from a checkout that is not installed.
-
-    Threads reserve address space (stacks, arenas), which on a machine with many cores would fill
-    the memory limit by itself; decoding uses few of them anyway. LibRaw takes the date of a file
-    through the time zone, which must not change with the machine.
-    """
-    environment = {"OMP_NUM_THREADS": "4", **os.environ, "OPENBLAS_NUM_THREADS": "1", "TZ": "UTC"}
-    root = str(Path(camkit.__file__).resolve().parents[1])
-    if not root.endswith(("site-packages", "dist-packages")):
-        known = environment.get("PYTHONPATH")
-        environment["PYTHONPATH"] = os.pathsep.join([*([known] if known else []), root])
-    return environment
 
 
 def _receive(child: subprocess.Popen[bytes]) -> Capture | None:

@@ -2,6 +2,8 @@
 
     python -P -m camkit.runtime.raw_worker PATH MAX_MEMORY_MB PARENT [BLACK, WHITE]
       -> stdout: one line of JSON, then the samples as plain bytes
+    python -P -m camkit.runtime.raw_worker PARENT
+      the same, once its arguments came as a line of JSON on stdin
 
 Run as a process of its own so that a crash, a hang or an allocation storm in LibRaw costs one
 file. Imports numpy and rawpy only, since its start is part of every photograph's time. The pixels
@@ -355,8 +357,22 @@ def end_with(parent: int) -> None:
         os._exit(1)
 
 
+def _awaited(parent: str) -> list[str]:
+    """Give the arguments that come once the parent knows them; none if it ends before."""
+    import rawpy  # noqa: F401 - what takes time is done while the parent is not ready
+
+    end_with(int(parent))
+    with sys.stdin.buffer as orders:
+        line = orders.readline()
+    return [str(word) for word in json.loads(line)] if line else []
+
+
 def main(arguments: Sequence[str]) -> int:
     """Decode one file for the parent; every refusal becomes a line of JSON."""
+    if len(arguments) == 1:
+        arguments = _awaited(arguments[0])
+        if not arguments:
+            return 0
     path, max_memory_mb = Path(arguments[0]), int(arguments[1])
     black, white = json.loads(arguments[3])
     said = MosaicOptions(black_level=black, white_level=white)

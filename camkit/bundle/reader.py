@@ -11,6 +11,7 @@ import hashlib
 import importlib.resources
 import math
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -40,6 +41,7 @@ PLATE_HEIGHTS: Final = "plate.safetensors"
 CARD: Final = "card.md"
 PREVIEW: Final = "preview.png"
 
+CHECKED_AT_ONCE: Final = 2
 _MAX_MANIFEST_BYTES: Final = 2**20
 _PITCH_RTOL: Final = 1e-6
 
@@ -166,8 +168,14 @@ def bundle_from_bytes(data: bytes, *, path: Path, max_bytes: int = MAX_BUNDLE_BY
 
 def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
-    for name, member in manifest.members.items():
-        _check_member(container, name, member.size, member.sha256)
+    # Unpacking and hashing leave Python's lock to others.
+    with ThreadPoolExecutor(CHECKED_AT_ONCE) as pool:
+        checks = [
+            pool.submit(_check_member, container, name, member.size, member.sha256)
+            for name, member in manifest.members.items()
+        ]
+    for check in checks:
+        check.result()
     return Bundle(
         path=path, manifest=manifest, _container=container, _optics=_optics_of(container, manifest)
     )
@@ -280,6 +288,12 @@ def built_in_bundles() -> dict[str, Path]:
     """Give the bundles that come with camkit, name -> path."""
     folder = Path(str(importlib.resources.files("camkit.bundles")))
     return {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
+
+
+def is_built_in(bundle: Bundle) -> bool:
+    """Tell whether a bundle lies where those that come with camkit do."""
+    known = built_in_bundles().get(bundle.path.stem)
+    return known is not None and bundle.path.resolve() == known.resolve()
 
 
 def find_bundle(name_or_path: str | Path) -> Path:

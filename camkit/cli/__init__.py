@@ -9,6 +9,12 @@ are options that several commands share. A new command is a file in the folder o
 line in `app`.
 """
 
+import os
+
+# Where numpy multiplies small matrices, OpenBLAS's threads would go on asking for work for 30 ms
+# after each product, at the cost of everybody else's. It reads this when numpy is imported.
+os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
+
 from camkit.cli.app import main
 
 __all__ = ["main"]

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray

@@ -8,7 +8,7 @@ Groups follow from the capture alone.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.ndimage
+import scipy
 from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]

@@ -7,7 +7,7 @@ or column that no coarse one covers goes with its neighbour.
 from typing import Any, Final
 
 import numpy as np
-import scipy.ndimage
+import scipy
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray

@@ -7,7 +7,6 @@ this bright", and both follow the noise.
 from typing import Final
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from camkit.bundle.stages import Wiener
@@ -180,6 +179,6 @@ def _divergence(down: FloatArray, across: FloatArray) -> FloatArray:
 
 def _gradient_power(size: int) -> NDArray[np.float32]:
     """Give |D|^2 of the periodic forward differences, (b, b // 2 + 1)."""
-    fy, fx = scipy.fft.fftfreq(size)[:, None], scipy.fft.rfftfreq(size)[None, :]
+    fy, fx = np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None, :]
     power = 4 * (np.sin(np.pi * fy) ** 2 + np.sin(np.pi * fx) ** 2)
     return np.asarray(power, dtype=np.float32)

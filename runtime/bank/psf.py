@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, FrozenPsf, Symmetry, depth_weights, focus_weights
@@ -311,6 +310,8 @@ def _catmull_rom(t: FloatGrid) -> tuple[FloatGrid, FloatGrid, FloatGrid, FloatGr
 
 def _scaled(kernels: FloatArray, ratio: float) -> FloatArray:
     """Scale (field, c, h, w) kernels."""
+    import scipy.ndimage
+
     sides = kernels.shape[-2:]
     halves = [max(1, int(np.ceil((side // 2) * ratio))) for side in sides]
     # Blurring to the coarser grid first keeps energy that falls between the new samples.

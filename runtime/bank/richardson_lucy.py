@@ -1,7 +1,7 @@
 """Richardson-Lucy on one periodic block: positive, at ease with highlights and missing samples."""
 
+import cv2
 import numpy as np
-import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, NoiseModel
@@ -65,7 +65,6 @@ def background_of(noise: NoiseModel) -> FloatArray:
 def spread_clipped(saturated: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Widen a (c, h, w) mask of clipped samples to all that the demosaic made of them."""
     side = 2 * CLIPPED_REACH_PX + 1
-    wide = scipy.ndimage.maximum_filter(
-        saturated.astype(np.uint8), size=(1, side, side), mode="constant"
-    )
-    return np.asarray(wide, dtype=np.bool_)
+    square = np.ones((side, side), dtype=np.uint8)
+    wide = [cv2.dilate(np.ascontiguousarray(mask, np.uint8), square) for mask in saturated]
+    return np.asarray(np.stack(wide), dtype=np.bool_)

@@ -24,7 +24,6 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from camkit.bundle.stages import Together
@@ -62,7 +61,7 @@ class Shapes:
 @lru_cache(maxsize=4)
 def shapes_of(together: Together, block_px: int) -> Shapes:
     """Give the shapes of a block."""
-    fy, fx = scipy.fft.fftfreq(block_px)[:, None], scipy.fft.rfftfreq(block_px)[None, :]
+    fy, fx = np.fft.fftfreq(block_px)[:, None], np.fft.rfftfreq(block_px)[None, :]
     f2 = fy * fy + fx * fx
     samples = float(block_px) ** 2
     fall = samples * (f2 + CORNER_FREQUENCY**2) ** (-together.exponent / 2)

@@ -14,7 +14,6 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from camkit.bundle.stages import Wiener
@@ -83,7 +82,7 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
 @lru_cache(maxsize=4)
 def _prior_rise(block_px: int, exponent: float) -> FloatArray:
     """Give 1 / S(f) for a prior scale and level of one, (b, b // 2 + 1)."""
-    fy, fx = scipy.fft.fftfreq(block_px)[:, None], scipy.fft.rfftfreq(block_px)[None, :]
+    fy, fx = np.fft.fftfreq(block_px)[:, None], np.fft.rfftfreq(block_px)[None, :]
     rise = ((fy * fy + fx * fx + CORNER_FREQUENCY**2) ** (exponent / 2)).astype(np.float32)
     rise.flags.writeable = False
     return np.asarray(rise)

@@ -5,6 +5,7 @@ exif_tags     what a photograph says of itself, from EXIF anywhere
 raw_metadata  the same of a RAW file, with LibRaw's help
 raw_tags      noise, colour and place of a RAW file from its tags
 in_memory     bytes and open files, stored while they are read
+decoder       the child that decodes RAW files, also started ahead
 raw_checks    refuses unbelievable decodes
 lone_pixels   hot or damaged pixels counted
 doubts        what of a decode is not likely, as notes

@@ -3,6 +3,7 @@
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.runtime.geometry.sensor_window import FloatGrid, SensorWindow
@@ -74,7 +75,8 @@ def divide_illumination(
 class IlluminationGain:
     """One over the relative illumination of a window.
 
-    Looked up by the squared field height; on a grid of fields, computed band by band.
+    Sampled by the squared field height: looked up in a table where the picture has more pixels
+    than that, else computed for each pixel. On a grid of fields, computed band by band.
     """
 
     def __init__(self, psf: FrozenPsf, window: SensorWindow) -> None:
@@ -86,17 +88,18 @@ class IlluminationGain:
         """
         self._psf = psf
         self._window = window
-        self._table = np.zeros(0, np.float32)
+        self._table: FloatArray | None = None
         if psf.symmetry == "grid":
             return
         width, height = window.size_px
         x_mm, y_mm = window.to_mm(np.arange(width), np.arange(height))
         end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
-        squares = np.linspace(0.0, end, TABLE_SAMPLES)
-        coarse = np.interp(squares, psf.field_heights_mm**2, psf.relative_illumination)
-        # Rounded one by one, the two indices of a pixel may sum to one more than the last.
-        fine = np.linspace(0.0, end, GAIN_SAMPLES + 1)
-        self._table = (1 / np.interp(fine, squares, coarse)).astype(np.float32)
+        self._squares = np.linspace(0.0, end, TABLE_SAMPLES)
+        self._coarse = np.interp(self._squares, psf.field_heights_mm**2, psf.relative_illumination)
+        self._step = end / GAIN_SAMPLES
+        if width * height > GAIN_SAMPLES:
+            # Rounded one by one, the two indices of a pixel may sum to one more than the last.
+            self._table = self._gains(np.arange(GAIN_SAMPLES + 1))
         scale = (GAIN_SAMPLES - 1) / end
         self._columns = np.rint(x_mm**2 * scale).astype(np.intp)
         self._rows = np.rint(y_mm**2 * scale).astype(np.intp)
@@ -110,6 +113,11 @@ class IlluminationGain:
         if self._psf.symmetry == "grid":
             light = illumination_band(self._psf, self._window, top, bottom)
             return np.asarray(np.divide(band, light, out=out))
-        rows = self._rows[top:bottom, None]
-        gain = self._table.take(rows + self._columns, mode="clip")
+        index = self._rows[top:bottom, None] + self._columns
+        gain = self._gains(index) if self._table is None else self._table.take(index, mode="clip")
         return np.asarray(np.multiply(band, gain, out=out))
+
+    def _gains(self, index: NDArray[np.intp]) -> FloatArray:
+        """Give the samples of these numbers."""
+        gains = 1 / np.interp(index * self._step, self._squares, self._coarse)
+        return np.asarray(gains, dtype=np.float32)

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-import scipy.fft
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
@@ -101,6 +100,8 @@ def scatter_uniform(
     Raises:
         ContractError: If a kernel reaches beyond the margin, or the planes are all margin.
     """
+    import scipy.fft
+
     sides = kernels.shape[1:]
     height, width = (side - 2 * margin_px for side in planes.shape[1:])
     if max(sides) > 2 * margin_px + 1 or min(height, width) < 1:
@@ -149,6 +150,8 @@ def convolve_full(block: FloatArray, kernels: FloatArray, *, workers: int = 1) -
         kernels: (c, kh, kw) float32.
         workers: Threads of the FFT.
     """
+    import scipy.fft
+
     full = tuple(b + k - 1 for b, k in zip(block.shape[1:], kernels.shape[1:], strict=True))
     size = [scipy.fft.next_fast_len(n, real=True) for n in full]
     spectrum = scipy.fft.rfft2(kernels, size, workers=workers)

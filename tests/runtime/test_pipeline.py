@@ -1,6 +1,7 @@
 """The pipeline as an application uses it: same bits however it runs, clear refusals."""
 
 import pickle
+import shutil
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,13 @@ import numpy as np
 import pytest
 
 from camkit.bundle.frozen_optics import FrozenOptics
-from camkit.bundle.reader import Bundle
+from camkit.bundle.reader import Bundle, built_in_bundles, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.batch import process
 from camkit.runtime.cancel import Cancelled
+from camkit.runtime.network import graph
 from camkit.runtime.options import Options
 from camkit.runtime.output.dng import DngTags, write_bayer_dng
 from camkit.runtime.pipeline import Pipeline, load
@@ -382,3 +384,20 @@ def test_samples_that_are_no_light_give_a_finite_picture_without_a_warning(
     broken.ravel()[np.random.default_rng(0).choice(broken.size, 300, replace=False)] = value
     assert np.isfinite(load(bundle).process_array(broken, iso=iso)).all()
     assert np.isfinite(load(bundle).process_array(np.stack([broken / 1023] * 3), iso=iso)).all()
+
+
+def test_graphs_of_built_in_bundles_are_sound_so_that_no_process_looks_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for path in built_in_bundles().values():
+        known = open_bundle(path)
+        for role, sizes in known.manifest.networks.items():
+            for size, facts in sizes.items():
+                graph.check_graph(known.network_bytes(role, size), facts)
+    looked: list[object] = []
+    monkeypatch.setattr(graph, "check_graph", lambda *told: looked.append(told))
+    for path in built_in_bundles().values():
+        load(path)
+    assert looked == []
+    load(shutil.copy(built_in_bundles()["duet"], tmp_path))
+    assert len(looked) == 1

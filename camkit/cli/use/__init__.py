@@ -7,5 +7,6 @@
     calibrate what a camera is, measured: its PSF
     info      what a bundle or a capture is
 
-`mosaic` holds the options of headerless mosaics, for `process`, `info` and `merge`.
+`decoding_ahead` has the decoder of `process` start first. `mosaic` holds the options of headerless
+mosaics, for `process`, `info` and `merge`.
 """

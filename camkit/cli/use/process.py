@@ -8,6 +8,7 @@ import typer
 from camkit.cli.choices import Debug, DepthM, MaxErrorDb, MaxSeconds, Quality, whole_pair
 from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
+from camkit.cli.use.decoding_ahead import decoding_ahead
 from camkit.cli.use.kind_options import with_kind_options
 from camkit.errors import ContractError
 
@@ -15,6 +16,7 @@ Files = Annotated[list[str], typer.Argument(help="Captures, folders or globs.", 
 
 
 @with_kind_options
+@decoding_ahead
 def process(
     files: Files,
     bundle: Annotated[

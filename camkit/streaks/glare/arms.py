@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy.linalg
-import scipy.ndimage
+import scipy
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray

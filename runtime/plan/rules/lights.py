@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
@@ -52,6 +51,8 @@ def _near(lights: NDArray[np.bool_], reach_px: int, shape: tuple[int, int]) -> N
 
     The reach holds the ramp to cells without a network, so that it lies where nothing changes.
     """
+    import scipy.ndimage
+
     squares = -(-reach_px // LIGHT_PX)
     wide = scipy.ndimage.maximum_filter(lights, size=2 * squares + 1, mode="constant")
     per_cell = CELL_PX // LIGHT_PX

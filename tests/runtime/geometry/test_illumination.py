@@ -5,6 +5,7 @@ import pytest
 
 from camkit.contracts import FrozenPsf
 from camkit.runtime.geometry.illumination import (
+    GAIN_SAMPLES,
     IlluminationGain,
     divide_illumination,
     illumination_band,
@@ -75,6 +76,16 @@ def test_the_gain_is_one_over_the_illumination_wherever_a_band_begins() -> None:
     np.testing.assert_allclose(whole * light, ones, rtol=2e-6)
     for top, bottom in ((0, 1), (13, 40), (63, 64)):
         np.testing.assert_array_equal(gain.divide(ones[:, top:bottom], top), whole[:, top:bottom])
+
+
+def test_a_picture_is_looked_up_or_computed_with_the_same_bits() -> None:
+    sensor = make_sensor()
+    psf, window = make_psf(sensor), whole_window(sensor)
+    gain = IlluminationGain(psf, window)
+    computed = gain.divide(np.ones((3, 64, 96), dtype=np.float32), 0)
+    gain._table = gain._gains(np.arange(GAIN_SAMPLES + 1))
+    looked_up = gain.divide(np.ones((3, 64, 96), dtype=np.float32), 0)
+    np.testing.assert_array_equal(looked_up, computed)
 
 
 AXIS_PX = (20.0, 50.0)
