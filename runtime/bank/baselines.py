@@ -15,7 +15,7 @@ from camkit.errors import UnsupportedError
 from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
 from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, inverse, transform
-from camkit.runtime.bank.wiener import wiener_filter
+from camkit.runtime.bank.wiener import place_knowledge, wiener_filter
 
 # Tuned on development pictures behind the first camera, never on test pictures.
 RL_ROUNDS_PER_SNR: Final = 0.7
@@ -54,6 +54,7 @@ def restoration_bank(
         block_px=settings.block_px,
         overlap_px=settings.overlap_px,
         threads=threads,
+        knowledge=place_knowledge(settings) if method == "wiener" else None,
     )
 
 

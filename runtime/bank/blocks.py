@@ -50,15 +50,19 @@ class Block:
         otf: (c, b, b // 2 + 1) complex64, the local PSF's; its centre is the origin.
         unknown: (1 or c, b, b), true where the sensor clipped; None if nowhere.
         height_mm: Field height of its place.
+        known: What `PlaceKnowledge` gave for that place, where the bank has one.
     """
 
     samples: FloatArray
     otf: ComplexArray
     unknown: NDArray[np.bool_] | None = None
     height_mm: float = 0.0
+    known: object = None
 
 
 BlockFilter = Callable[[Block], FloatArray]
+PlaceKnowledge = Callable[[ComplexArray, float], object]
+"""(OTF, field height in mm) -> what a filter knows of a place before it sees a block there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,7 +231,7 @@ def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatAr
     if ring == 0:
         return samples
     shrink = TAPER_SHRINK if size % TAPER_SHRINK == 0 else 1
-    small = _shrink(_shrink(samples, shrink).swapaxes(1, 2), shrink).swapaxes(1, 2)
+    small = _shrink(_shrink(samples, shrink, axis=1), shrink, axis=2)
     n = size // shrink
     half = otf[:, :, : n // 2 + 1]
     low = np.concatenate([half[:, : n - n // 2], half[:, size - n // 2 :]], axis=1)
@@ -242,7 +246,10 @@ def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatAr
         (inner, slice(size - ring, size)),
     ):
         part = _grow(blurred, shrink, rows, cols)
-        tapered[:, rows, cols] = part + keep[rows, cols] * (tapered[:, rows, cols] - part)
+        ringed = tapered[:, rows, cols]
+        ringed -= part
+        ringed *= keep[rows, cols]
+        ringed += part
     return tapered
 
 
@@ -253,11 +260,12 @@ def _grow(small: FloatArray, factor: int, rows: slice, cols: slice) -> FloatArra
     return np.asarray(wide.take(down - down[0], axis=1))
 
 
-def _shrink(planes: FloatArray, factor: int) -> FloatArray:
-    """Average every `factor` rows."""
-    total = np.array(planes[:, ::factor])
+def _shrink(planes: FloatArray, factor: int, *, axis: int) -> FloatArray:
+    """Average every `factor` rows (axis 1) or columns (axis 2)."""
+    before = (slice(None),) * axis
+    total = np.array(planes[(*before, slice(None, None, factor))])
     for i in range(1, factor):
-        total += planes[:, i::factor]
+        total += planes[(*before, slice(i, None, factor))]
     total *= np.float32(1 / factor)
     return total
 
@@ -284,6 +292,7 @@ class BlockBank:
         block_px: int,
         overlap_px: int,
         threads: int = 1,
+        knowledge: PlaceKnowledge | None = None,
     ) -> None:
         """Plan the grid.
 
@@ -293,7 +302,10 @@ class BlockBank:
             block_px: Side of a block, at least that of the kernels.
             overlap_px: Overlap of neighbouring blocks.
             threads: Blocks restored at a time; no influence on the bits.
+            knowledge: Made once for a place and those that mirror it; their blocks are mirrored
+                then, not their OTF.
         """
+        self._knowledge = knowledge
         self._psf = psf
         self._filter = block_filter
         self._block_px = block_px
@@ -343,9 +355,11 @@ class BlockBank:
         done = 0
         for i, span in enumerate(self._rows):
             top, bottom = min(tops[i:]), int(span.index.max()) + 1
-            rows = source.read(top, bottom)
+            index = span.index - top
+            rows = _taken(source.read(top, bottom), index, axis=1)
             mask = None if saturated is None else saturated(top, bottom)
-            strip = _Strip(rows, mask, top, span, plain)
+            mask = None if mask is None else _taken(mask, index, axis=mask.ndim - 2)
+            strip = _Strip(rows, mask, span, plain)
             total = _lengthened(total, span.start + span.inner.stop - done)
             self._add_blocks(strip, total[:, span.start + span.inner.start - done :], cancel)
             last = i + 1 == len(self._rows)
@@ -382,31 +396,43 @@ class BlockBank:
             return (abs(place_mm[0]), abs(place_mm[1])) if turns else place_mm
 
         keys = sorted({key_of(place) for place in filtered})
-        # The pool takes tasks in order: no block waits for an OTF that nobody is making.
-        otfs = {key: pool.submit(self._otf, key) for key in keys}
+        # The pool takes tasks in order: no block waits for a place that nobody is making.
+        made = {key: pool.submit(self._place, key) for key in keys}
 
         def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
             check_cancelled(cancel)
             window = strip.span.weights[:, None] * column.weights
             if strip.is_plain(column):
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
-            x_mm, y_mm = place_mm
-            otf = mirror_otf(
-                otfs[key_of(place_mm)].result(),
-                flip_x=turns and x_mm < 0,
-                flip_y=turns and y_mm < 0,
-            )
-            samples, unknown = strip.cut(column)
-            samples = taper_edges(samples, otf, self._guard_px)
-            height_mm = float(np.hypot(x_mm, y_mm))
-            block = Block(samples=samples, otf=otf, unknown=unknown, height_mm=height_mm)
-            sharp = self._filter(block)[:, strip.span.inner, column.inner]
-            return sharp * window
+            sharp = self._filtered(strip.cut(column), made[key_of(place_mm)].result(), place_mm)
+            return sharp[:, strip.span.inner, column.inner] * window
 
         return pool.map(restore, self._columns, places)
 
-    def _otf(self, place_mm: tuple[float, float]) -> ComplexArray:
-        return to_otf(self._psf.kernels.at(*place_mm), self._block_px)
+    def _place(self, place_mm: tuple[float, float]) -> "_Place":
+        """Give the OTF of a place, and what the filter knows of it."""
+        otf = to_otf(self._psf.kernels.at(*place_mm), self._block_px)
+        # Kernels of one field are those of many heights.
+        if self._knowledge is None or self._psf.kernels.field_heights_mm.size == 1:
+            return _Place(otf=otf)
+        return _Place(otf=otf, known=self._knowledge(otf, float(np.hypot(*place_mm))))
+
+    def _filtered(self, cut: "_Cut", place: "_Place", place_mm: tuple[float, float]) -> FloatArray:
+        """Filter what was cut for a block, with the OTF of its place or of one that mirrors it."""
+        samples, unknown = cut
+        across, down = (self._psf.kernels.turns and along_mm < 0 for along_mm in place_mm)
+        mirrored = np.s_[..., :: -1 if down else 1, :: -1 if across else 1]
+        otf = place.otf
+        if place.known is None:
+            otf, mirrored = mirror_otf(otf, flip_x=across, flip_y=down), np.s_[..., ::1, ::1]
+        block = Block(
+            samples=taper_edges(samples[mirrored], otf, self._guard_px),
+            otf=otf,
+            unknown=None if unknown is None else unknown[mirrored],
+            height_mm=float(np.hypot(*place_mm)),
+            known=place.known,
+        )
+        return self._filter(block)[mirrored]
 
 
 def _lengthened(planes: FloatArray, rows: int) -> FloatArray:
@@ -416,13 +442,23 @@ def _lengthened(planes: FloatArray, rows: int) -> FloatArray:
     return longer
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    """The OTF of a place, and what the filter knows of it."""
+
+    otf: ComplexArray
+    known: object = None
+
+
+_Cut = tuple[FloatArray, NDArray[np.bool_] | None]
+
+
 @dataclass(frozen=True, slots=True)
 class _Strip:
-    """The rows of one block row, and their clipped samples."""
+    """The rows of one block row, mirrored past the borders, and their clipped samples."""
 
     rows: FloatArray
     saturated: NDArray[np.bool_] | None
-    top: int
     span: Span
     plain: PlainBlock | None = None
 
@@ -430,17 +466,19 @@ class _Strip:
         """Tell whether a block stays as it is."""
         return self.plain is not None and self.plain(self.span, column)
 
-    def cut(self, column: Span) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+    def cut(self, column: Span) -> _Cut:
         """Give samples and clipped samples of one block."""
-        samples = self._take(self.rows, column)
+        samples = _taken(self.rows, column.index, axis=2)
         if self.saturated is None:
             return samples, None
         mask = self.saturated if self.saturated.ndim == 3 else self.saturated[None]
-        unknown = self._take(mask, column)
+        unknown = _taken(mask, column.index, axis=2)
         return samples, unknown if unknown.any() else None
 
-    def _take(self, planes: NDArray[Any], column: Span) -> NDArray[Any]:
-        across, down = column.index, self.span.index - self.top
-        if (np.diff(across) == 1).all() and (np.diff(down) == 1).all():
-            return planes[:, down[0] : down[-1] + 1, across[0] : across[-1] + 1]
-        return planes[:, down][:, :, across]
+
+def _taken(planes: NDArray[Any], index: NDArray[np.intp], *, axis: int) -> NDArray[Any]:
+    """Take some rows or columns: a view where they follow each other."""
+    first, last = int(index[0]), int(index[-1])
+    if last - first == index.size - 1 and (np.diff(index) == 1).all():
+        return planes[(slice(None),) * axis + (slice(first, last + 1),)]
+    return planes.take(index, axis=axis)

@@ -272,14 +272,12 @@ def _blend(kernels: FloatArray, heights_mm: FloatGrid, height_mm: float) -> Floa
 def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
     """Turn a (3, h, w) kernel so that its +y points along the unit vector (out_x, out_y)."""
     c, h, w = kernel.shape
-    dy, dx = np.mgrid[-(h // 2) : h // 2 + 1, -(w // 2) : w // 2 + 1].astype(np.float64)
+    dy = np.arange(-(h // 2), h // 2 + 1, dtype=np.float64)[:, None]
+    dx = np.arange(-(w // 2), w // 2 + 1, dtype=np.float64)
     rows = dx * out_x + dy * out_y + h // 2
     cols = dx * out_y - dy * out_x + w // 2
     row0, col0 = np.floor(rows), np.floor(cols)
-    row_weights, col_weights = (
-        [weight.astype(np.float32) for weight in _catmull_rom(t)]
-        for t in (rows - row0, cols - col0)
-    )
+    row_weights, col_weights = (_catmull_rom(t) for t in (rows - row0, cols - col0))
     padded = np.pad(kernel, ((0, 0), (PAD_PX, PAD_PX), (PAD_PX, PAD_PX))).reshape(c, -1)
     width = w + 2 * PAD_PX
     first_row = np.clip(row0, 1 - PAD_PX, h + 1).astype(np.intp) + (PAD_PX - 1)
@@ -297,15 +295,21 @@ def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
     return turned
 
 
-def _catmull_rom(t: FloatGrid) -> tuple[FloatGrid, FloatGrid, FloatGrid, FloatGrid]:
-    """Give the weights of the samples -1, 0, 1, 2 for positions t in 0..1."""
-    t2, t3 = t * t, t * t * t
-    return (
-        0.5 * (2 * t2 - t3 - t),
-        0.5 * (3 * t3 - 5 * t2 + 2),
-        0.5 * (4 * t2 - 3 * t3 + t),
-        0.5 * (t3 - t2),
-    )
+def _catmull_rom(t: FloatGrid) -> list[FloatArray]:
+    """Give the weights of the samples -1, 0, 1, 2 for positions t in 0..1.
+
+    They are 1/2 of 2 t^2 - t^3 - t, 3 t^3 - 5 t^2 + 2, 4 t^2 - 3 t^3 + t and t^3 - t^2.
+    """
+    t2 = t * t
+    t3 = t2 * t
+    weights = [2 * t2, 3 * t3, 4 * t2, t3 - t2]
+    weights[0] -= t3
+    weights[0] -= t
+    weights[1] -= 5 * t2
+    weights[1] += 2
+    weights[2] -= np.multiply(t3, 3, out=t3)
+    weights[2] += t
+    return [np.multiply(weight, 0.5, out=weight).astype(np.float32) for weight in weights]
 
 
 def _scaled(kernels: FloatArray, ratio: float) -> FloatArray:

@@ -9,6 +9,9 @@ in its first (and last) column; all others lie as pairs (re, im) between them:
 
     packed   | column 0 | re 1 | im 1 | re 2 | im 2 | ... | column w / 2 |
     half     |    0     |      1      |      2      | ... |     w / 2    |
+
+Whoever weighs a spectrum by real numbers alone does so in packed planes, in which a weight stands
+at both parts of its frequency (`spread_weights`): nothing is sorted, and no product is complex.
 """
 
 from typing import Final
@@ -33,7 +36,7 @@ def transform(planes: FloatArray) -> ComplexArray:
     Returns:
         (c, h, w // 2 + 1) complex64.
     """
-    packed = _pack(planes)
+    packed = to_packed(planes)
     c, h, w = planes.shape
     half = np.empty((c, h, w // 2 + 1), dtype=np.complex64)
     half[:, :, 1 : 1 + (w - 1) // 2] = _pairs(packed)
@@ -52,11 +55,7 @@ def inverse(half: ComplexArray, width: int) -> FloatArray:
     Returns:
         (c, h, w) float32.
     """
-    packed = np.empty((*half.shape[:2], width), dtype=np.float32)
-    _pairs(packed)[:] = half[:, :, 1 : 1 + (width - 1) // 2]
-    for column, frequency in _packed_columns(width):
-        packed[:, :, column] = _pack_column(half[:, :, frequency])
-    return _unpack(packed)
+    return from_packed(packed_spectrum(half, width))
 
 
 def apply_transfer(samples: FloatArray, transfer: ComplexArray) -> FloatArray:
@@ -69,29 +68,80 @@ def apply_transfer(samples: FloatArray, transfer: ComplexArray) -> FloatArray:
     Returns:
         (c, h, w) float32.
     """
-    packed = _pack(samples)
+    packed = to_packed(samples)
     width = samples.shape[2]
     pairs = _pairs(packed)
     pairs *= transfer[:, :, 1 : 1 + (width - 1) // 2]
     for column, frequency in _packed_columns(width):
         line = _unpack_column(packed[:, :, column])
         packed[:, :, column] = _pack_column(line * transfer[:, :, frequency])
-    return _unpack(packed)
+    return from_packed(packed)
 
 
-def _pack(planes: FloatArray) -> FloatArray:
+def to_packed(planes: FloatArray) -> FloatArray:
+    """Give the spectra of real planes (c, h, w) float32 in packed planes of the same shape."""
     packed = np.empty(planes.shape, dtype=np.float32)
     for plane, out in zip(planes, packed, strict=True):
         cv2.dft(np.ascontiguousarray(plane), dst=out)
     return packed
 
 
-def _unpack(packed: FloatArray) -> FloatArray:
+def from_packed(packed: FloatArray) -> FloatArray:
+    """Undo `to_packed`."""
     planes = np.empty_like(packed)
     for plane, out in zip(packed, planes, strict=True):
         cv2.dft(plane, dst=out, flags=_INVERSE)
     planes *= np.float32(1 / (planes.shape[1] * planes.shape[2]))
     return planes
+
+
+def packed_spectrum(half: ComplexArray, width: int) -> FloatArray:
+    """Give the half spectrum (c, h, w // 2 + 1) of real planes in packed planes (c, h, w)."""
+    packed = np.empty((*half.shape[:2], width), dtype=np.float32)
+    _pairs(packed)[:] = half[:, :, 1 : 1 + (width - 1) // 2]
+    for column, frequency in _packed_columns(width):
+        packed[:, :, column] = _pack_column(half[:, :, frequency])
+    return packed
+
+
+def spread_weights(half: FloatArray, width: int) -> FloatArray:
+    """Give real weights (c, h, w // 2 + 1), alike at f and -f, for packed planes (c, h, w)."""
+    inner, height = (width - 1) // 2, half.shape[1]
+    spread = np.empty((*half.shape[:2], width), dtype=np.float32)
+    for weights, plane in zip(half[:, :, 1 : 1 + inner], spread, strict=True):
+        if inner:  # OpenCV merges no empty planes
+            plane[:, 1 : 1 + 2 * inner] = cv2.merge((weights, weights)).reshape(height, -1)
+    rows = (np.arange(height) + 1) // 2  # 0, 1, 1, 2, 2, ..., [h / 2]
+    for column, frequency in _packed_columns(width):
+        spread[:, :, column] = half[:, rows, frequency]
+    return spread
+
+
+def packed_places(
+    rows: NDArray[np.intp], columns: NDArray[np.intp], size: tuple[int, int]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Give where real and imaginary parts of frequencies lie in a packed plane, flattened.
+
+    Args:
+        rows: Of the half spectrum.
+        columns: Likewise; below half of w.
+        size: (h, w) of the planes; no frequency given may be its own mirror image.
+
+    Returns:
+        Places of the real parts and of the imaginary ones, the latter up to their sign.
+    """
+    height, width = size
+    first = np.minimum(rows, height - rows)
+    real = np.where(columns > 0, rows * width + 2 * columns - 1, (2 * first - 1) * width)
+    return real, np.where(columns > 0, real + 1, real + width)
+
+
+def multiply_conjugate(packed: FloatArray, other: FloatArray) -> FloatArray:
+    """Multiply spectra by the conjugates of others, all in packed planes (c, h, w)."""
+    product = np.empty_like(packed)
+    for a, b, out in zip(packed, other, product, strict=True):
+        cv2.mulSpectrums(a, b, 0, out, conjB=True)
+    return product
 
 
 def _pairs(packed: FloatArray) -> ComplexArray:

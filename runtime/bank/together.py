@@ -1,61 +1,100 @@
 """The Wiener filter of all colours together: what is sharp in one colour helps the others.
 
     x_c = a_c l + d_c        l: light that all colours share, of power S; d_c: what c has of its own
-    S = scale m^2 (f^2 + f0^2)^(-exponent / 2) k^follow,   power of d_c: own S a_c^2
+    S = s F,   F = (f^2 + f0^2)^(-exponent / 2),   s = scale m^2 k^follow
+    power of d_c: own S a_c^2
 
 A lens blurs its colours differently, and a filter of one colour alone wastes what a sharper one
 knows. a_c is the level of a colour over the mean level m of the block, k the measured over the
 expected power of the estimate L in the band `BAND`, found with k = 1: a smooth block is given a
-weak prior, a block of leaves a strong one. With u_c = a_c H_c and
+weak prior, a block of leaves a strong one. With the transfer H_c and
 
-    D_c = (own |u_c|^2 + mistrust V_c a_c^2) S + N_c,   N_c = variance exp(noise_c + 4 rise_c f^2)
+    D_c = (own |H_c|^2 + mistrust V_c) F + variance / (a_c^2 s) exp(noise_c + 4 rise_c f^2)
+    G_c = conj(H_c) Y_c / D_c,   Q_c = |H_c|^2 F / D_c
 
 the best linear estimate is
 
-    q = sum conj(u_c) Y_c / D_c,   r = sum |u_c|^2 / D_c,   L = S q / (1 + S r)
-    X_c = a_c L + own S a_c^2 conj(H_c) (Y_c - u_c L) / D_c
+    L = F / (1 + sum Q_c) sum G_c / a_c
+    X_c = a_c (1 - own Q_c) L + own F G_c
 
-V_c is the variance of the transfer over fabricated copies at the block's field height: what the
-frozen transfer cannot promise counts as noise that grows with the scene. Frequency 0 stays.
+All weights but conj(H_c) are real, so everything is done in packed planes (`spectrum`). V_c is the
+variance of the transfer over fabricated copies at the block's field height: what the frozen
+transfer cannot promise counts as noise that grows with the scene. Frequency 0 stays.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.stages import Together
 from camkit.bundle.stages.together import BAND, BAND_STEP, Spread
 from camkit.contracts import FloatArray
-from camkit.runtime.bank.spectrum import ComplexArray, inverse, transform
+from camkit.runtime.bank.spectrum import (
+    ComplexArray,
+    from_packed,
+    multiply_conjugate,
+    packed_places,
+    packed_spectrum,
+    spread_weights,
+    to_packed,
+)
 
 CORNER_FREQUENCY: Final = 1 / 512
 """f0 in cycles/pixel: below it the prior no longer rises."""
 LEAST_SHARE: Final = 1e-3
 """Of the mean level: a colour darker than that is taken to be as bright."""
 LEAST_MEASURED: Final = 1e-6
-COARSE: Final = np.s_[..., ::BAND_STEP, ::BAND_STEP]
+
+Places = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shapes:
-    """What depends on the size of a block alone; arrays of its half spectrum are float32.
+    """What depends on the size of a block alone; float32.
 
     Attributes:
-        fall: S for a scale and level of one.
-        noise: (c, ...) N for a variance of one.
-        band: Of the coarse frequencies, those measured.
-        low: Number of the table's frequency below each one.
+        fall: (b, b // 2 + 1) F, times the samples of a block.
+        spread_fall: (b, b) the same for packed planes.
+        noise: (c, b, b) noise for a variance of one, times those samples; for packed planes.
+        low: (b, b // 2 + 1) number of the table's frequency below each one.
         part: How far each lies from there to the next.
+        band: Places of the real and imaginary parts of the frequencies that are measured, in packed
+            planes.
+        band_fall: (n,) F there, times the samples.
+        band_noise: (c, n) the noise there.
     """
 
     fall: FloatArray
+    spread_fall: FloatArray
     noise: FloatArray
-    band: NDArray[np.bool_]
-    low: NDArray[np.intp]
+    low: Places
     part: FloatArray
+    band: tuple[Places, Places]
+    band_fall: FloatArray
+    band_noise: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transfer:
+    """What depends on the place of a block too; (c, b, b) float32, packed planes.
+
+    Attributes:
+        otf: H.
+        seen: |H|^2 F.
+        doubt: (own |H|^2 + mistrust V) F.
+        band_seen: (c, n) of the frequencies that are measured.
+        band_doubt: Likewise.
+    """
+
+    otf: FloatArray
+    seen: FloatArray
+    doubt: FloatArray
+    band_seen: FloatArray
+    band_doubt: FloatArray
 
 
 @lru_cache(maxsize=4)
@@ -64,23 +103,58 @@ def shapes_of(together: Together, block_px: int) -> Shapes:
     fy, fx = np.fft.fftfreq(block_px)[:, None], np.fft.rfftfreq(block_px)[None, :]
     f2 = fy * fy + fx * fx
     samples = float(block_px) ** 2
-    fall = samples * (f2 + CORNER_FREQUENCY**2) ** (-together.exponent / 2)
+    fall = (samples * (f2 + CORNER_FREQUENCY**2) ** (-together.exponent / 2)).astype(np.float32)
     lines = zip(together.noise, together.noise_rise, strict=True)
     noise = samples * np.exp(np.stack([n + 4 * rise * f2 for n, rise in lines]))
-    coarse = f2[COARSE]
     places = np.array(together.spread.frequencies)
     at = np.minimum(np.sqrt(f2), places[-1])
     low = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
+    steps = [np.arange(0, side, BAND_STEP) for side in f2.shape]
+    rows, columns = np.meshgrid(*steps, indexing="ij")
+    in_band = (f2[rows, columns] >= BAND[0] ** 2) & (f2[rows, columns] <= BAND[1] ** 2)
+    band = packed_places(rows[in_band], columns[in_band], (block_px, block_px))
+    spread_fall = spread_weights(fall[None], block_px)
+    spread_noise = spread_weights(noise.astype(np.float32), block_px)
     return Shapes(
-        fall=fall.astype(np.float32),
-        noise=noise.astype(np.float32),
-        band=np.asarray((coarse >= BAND[0] ** 2) & (coarse <= BAND[1] ** 2)),
+        fall=fall,
+        spread_fall=spread_fall[0],
+        noise=spread_noise,
         low=low,
         part=((at - places[low]) / (places[low + 1] - places[low])).astype(np.float32),
+        band=band,
+        band_fall=_at(spread_fall, band[0])[0],
+        band_noise=_at(spread_noise, band[0]),
     )
 
 
-def spread_at(spread: Spread, height_mm: float, shapes: Shapes) -> FloatArray:
+def transfer_of(otf: ComplexArray, height_mm: float, together: Together) -> Transfer:
+    """Give what the filter needs to know of a place.
+
+    Args:
+        otf: (c, b, b // 2 + 1) complex64.
+        height_mm: Its field height.
+        together: The model.
+    """
+    block_px = otf.shape[1]
+    shapes = shapes_of(together, block_px)
+    power = np.square(otf.real)
+    power += np.square(otf.imag)
+    doubt = _spread_at(together.spread, height_mm, shapes)
+    doubt *= np.float32(together.mistrust)
+    doubt += np.float32(together.own) * power
+    doubt *= shapes.fall
+    power *= shapes.fall
+    seen, doubt = spread_weights(power, block_px), spread_weights(doubt, block_px)
+    return Transfer(
+        otf=packed_spectrum(otf, block_px),
+        seen=seen,
+        doubt=doubt,
+        band_seen=_at(seen, shapes.band[0]),
+        band_doubt=_at(doubt, shapes.band[0]),
+    )
+
+
+def _spread_at(spread: Spread, height_mm: float, shapes: Shapes) -> FloatArray:
     """Give V of a field height, (c, b, b // 2 + 1); linear between the table's places."""
     table, heights = _table(spread)
     place = float(np.interp(height_mm, heights, np.arange(len(heights))))
@@ -88,12 +162,10 @@ def spread_at(spread: Spread, height_mm: float, shapes: Shapes) -> FloatArray:
     above = min(below + 1, len(heights) - 1)
     lines = (table[below] + (place - below) * (table[above] - table[below])).astype(np.float32)
     steps = np.diff(lines, axis=1)
-    return np.stack(
-        [
-            line[shapes.low] + step[shapes.low] * shapes.part
-            for line, step in zip(lines, steps, strict=True)
-        ]
-    )
+    found: FloatArray = steps.take(shapes.low, axis=1)
+    found *= shapes.part
+    found += lines.take(shapes.low, axis=1)
+    return found
 
 
 @lru_cache(maxsize=4)
@@ -104,104 +176,80 @@ def _table(spread: Spread) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def restore_together(
     samples: FloatArray,
-    otf: ComplexArray,
+    transfer: Transfer,
     *,
     level: NDArray[np.float64],
     variance: NDArray[np.float64],
-    height_mm: float,
     together: Together,
 ) -> FloatArray:
     """Deconvolve a periodic block.
 
     Args:
         samples: (c, b, b) float32.
-        otf: (c, b, b // 2 + 1).
+        transfer: Of its place.
         level: (c,) > 0, of the block.
         variance: (c,) of its noise.
-        height_mm: Field height of the block.
         together: The model.
 
     Returns:
         (c, b, b) float32.
     """
-    block_px = samples.shape[-1]
-    shapes = shapes_of(together, block_px)
+    shapes = shapes_of(together, samples.shape[-1])
     mean = float(level.mean())
-    share = np.maximum(level / mean, LEAST_SHARE).astype(np.float32)[:, None, None]
-    spectrum = transform(samples)
-    noise = variance.astype(np.float32)[:, None, None] * shapes.noise
-    prior = np.float32(together.scale * mean * mean) * shapes.fall
-    power = share * share * (np.square(otf.real) + np.square(otf.imag))
-    doubt = spread_at(together.spread, height_mm, shapes)
-    doubt *= np.float32(together.mistrust) * share * share
-    doubt += np.float32(together.own) * power
+    share = np.maximum(level / mean, LEAST_SHARE)
+    scale = together.scale * mean * mean
+    spectrum = to_packed(samples)
+    crossed = multiply_conjugate(spectrum, transfer.otf)
+    noise = variance / (share * share * scale)
     if together.follow:
-        seen = _shared(
-            spectrum[COARSE],
-            otf[COARSE],
-            share,
-            power[COARSE],
-            doubt[COARSE],
-            prior[COARSE],
-            noise[COARSE],
-        )
-        measured = _measured(seen, prior[COARSE], shapes.band)
-        prior *= np.float32(measured**together.follow)
-    found = _shared(spectrum, otf, share, power, doubt, prior, noise)
-    light = found.light
-    rest = share * otf
-    rest *= light
-    np.subtract(spectrum, rest, out=rest)
-    rest *= found.taken
-    rest *= np.float32(together.own) * prior
-    rest += light
-    rest *= share
-    rest[:, 0, 0] = spectrum[:, 0, 0]
-    return inverse(rest, block_px)
+        noise /= _measured(crossed, transfer, shapes, (share, noise, scale)) ** together.follow
+    zero, found = spectrum[:, 0, 0].copy(), spectrum
+    light, rest = np.zeros_like(shapes.spread_fall), np.ones_like(shapes.spread_fall)
+    for c, seen in enumerate(found):  # plane by plane: what is at hand stays in cache
+        cv2.scaleAdd(shapes.noise[c], float(noise[c]), transfer.doubt[c], dst=seen)
+        np.reciprocal(seen, out=seen)
+        np.multiply(crossed[c], seen, out=crossed[c])
+        cv2.scaleAdd(crossed[c], float(1 / share[c]), light, dst=light)
+        np.multiply(seen, transfer.seen[c], out=seen)
+        np.add(rest, seen, out=rest)
+    light *= np.divide(shapes.spread_fall, rest, out=rest)
+    own = np.multiply(shapes.spread_fall, np.float32(together.own), out=rest)
+    for c, plane in enumerate(found):
+        np.multiply(plane, np.float32(-together.own * share[c]), out=plane)
+        np.add(plane, np.float32(share[c]), out=plane)
+        np.multiply(plane, light, out=plane)
+        np.multiply(crossed[c], own, out=crossed[c])
+        np.add(plane, crossed[c], out=plane)
+    found[:, 0, 0] = zero
+    return from_packed(found)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Shared:
-    """The light that all colours share.
+def _measured(
+    crossed: FloatArray,
+    transfer: Transfer,
+    shapes: Shapes,
+    block: tuple[NDArray[np.float64], NDArray[np.float64], float],
+) -> float:
+    """Give the measured over the expected power of the light, in the band.
 
-    Attributes:
-        light: L.
-        seen: r.
-        taken: (c, ...) conj(u_c) / D_c.
+    Args:
+        crossed: (c, b, b) conj(H) Y.
+        transfer: Of the place.
+        shapes: Of the block's size.
+        block: (c,) a, (c,) variance / (a^2 s) and s for k = 1.
     """
-
-    light: ComplexArray
-    seen: FloatArray
-    taken: ComplexArray
-
-
-def _shared(
-    spectrum: ComplexArray,
-    otf: ComplexArray,
-    share: FloatArray,
-    power: FloatArray,
-    doubt: FloatArray,
-    prior: FloatArray,
-    noise: FloatArray,
-) -> _Shared:
-    weight = doubt * prior
-    weight += noise
-    np.reciprocal(weight, out=weight)
-    seen = np.einsum("cij,cij->ij", power, weight)
-    weight *= share
-    taken = np.conj(otf)
-    taken *= weight
-    light = np.einsum("cij,cij->ij", taken, spectrum)
-    light *= prior / (1 + prior * seen)
-    return _Shared(light=light, seen=seen, taken=taken)
+    share, noise, scale = block
+    weight = noise[:, None] * shapes.band_noise
+    weight += transfer.band_doubt
+    seen = (transfer.band_seen / weight).sum(axis=0)
+    fall = shapes.band_fall / (1 + seen)
+    weight *= share[:, None]
+    lights = [(_at(crossed, places) / weight).sum(axis=0) * fall for places in shapes.band]
+    measured = sum(np.dot(light, light) for light in lights)
+    expected = scale * np.dot(fall, seen)
+    return max(float(measured / expected), LEAST_MEASURED) if expected > 0 else 1.0
 
 
-def _measured(found: _Shared, prior: FloatArray, band: NDArray[np.bool_]) -> float:
-    """Give the measured over the expected power of the light."""
-    light, seen, scene = found.light[band], found.seen[band], prior[band]
-    expected = scene * scene * seen / (1 + scene * seen)
-    measured = np.square(light.real) + np.square(light.imag)
-    total = float(expected.sum(dtype=np.float64))
-    if total <= 0:
-        return 1.0
-    return max(float(measured.sum(dtype=np.float64)) / total, LEAST_MEASURED)
+def _at(planes: FloatArray, places: Places) -> FloatArray:
+    """Give the samples (c, n) of planes at some places."""
+    return planes.reshape(len(planes), -1).take(places, axis=1)

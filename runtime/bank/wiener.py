@@ -16,13 +16,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.stages import Wiener
+from camkit.bundle.stages import Together, Wiener
 from camkit.contracts import FloatArray, NoiseModel
-from camkit.runtime.bank.blocks import Block, BlockFilter
+from camkit.runtime.bank.blocks import Block, BlockFilter, PlaceKnowledge
 from camkit.runtime.bank.lights import explain_lights
 from camkit.runtime.bank.richardson_lucy import background_of, spread_clipped
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
-from camkit.runtime.bank.together import restore_together
+from camkit.runtime.bank.together import Transfer, restore_together, transfer_of
 
 CORNER_FREQUENCY: Final = 1 / 512
 """f0 in cycles/pixel: below it the prior no longer rises."""
@@ -57,10 +57,9 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
             if settings.together is not None:
                 return restore_together(
                     samples,
-                    block.otf,
+                    _known(block, settings.together),
                     level=np.sqrt(power),
                     variance=variance,
-                    height_mm=block.height_mm,
                     together=settings.together,
                 )
             rise = _prior_rise(samples.shape[-1], settings.prior_exponent)
@@ -77,6 +76,19 @@ def wiener_filter(settings: Wiener, noise: NoiseModel, kernel_px: int | None = N
         return lights + deconvolved(residual, variance)
 
     return restore
+
+
+def place_knowledge(settings: Wiener) -> PlaceKnowledge | None:
+    """Give what the filter knows of a place once for all blocks there; None if that is nothing."""
+    if (together := settings.together) is None:
+        return None
+    return lambda otf, height_mm: transfer_of(otf, height_mm, together)
+
+
+def _known(block: Block, together: Together) -> Transfer:
+    if isinstance(block.known, Transfer):
+        return block.known
+    return transfer_of(block.otf, block.height_mm, together)
 
 
 @lru_cache(maxsize=4)

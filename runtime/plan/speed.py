@@ -12,7 +12,7 @@ from camkit.bundle.stages import Wiener
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.bank.blocks import Block, taper_edges
-from camkit.runtime.bank.wiener import wiener_filter
+from camkit.runtime.bank.wiener import place_knowledge, wiener_filter
 from camkit.runtime.network.engine import NetworkEngine
 
 WINDOW_PX: Final = 320
@@ -105,9 +105,14 @@ def _block_seconds(settings: Wiener, block_px: int, *, clipped: bool) -> float:
     if clipped:
         unknown = np.zeros((1, block_px, block_px), dtype=np.bool_)
         unknown[0, block_px // 2] = True
-    return _best(
-        lambda: restore(Block(samples=taper_edges(samples, otf, ring), otf=otf, unknown=unknown))
-    )
+    know = place_knowledge(settings)
+    known = None if know is None else know(otf, 0.0)
+
+    def block() -> object:
+        tapered = taper_edges(samples, otf, ring)
+        return restore(Block(samples=tapered, otf=otf, unknown=unknown, known=known))
+
+    return _best(block)
 
 
 def _best(call: Callable[[], object]) -> float:

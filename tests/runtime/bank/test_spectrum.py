@@ -2,7 +2,17 @@ import cv2
 import numpy as np
 import pytest
 
-from camkit.runtime.bank.spectrum import apply_transfer, inverse, transform
+from camkit.runtime.bank.spectrum import (
+    apply_transfer,
+    from_packed,
+    inverse,
+    multiply_conjugate,
+    packed_places,
+    packed_spectrum,
+    spread_weights,
+    to_packed,
+    transform,
+)
 
 SIZES = [(1, 1), (2, 2), (1, 5), (3, 1), (6, 4), (5, 8), (37, 37), (96, 96), (97, 60)]
 FLOAT32 = 1e-6
@@ -62,3 +72,36 @@ def test_opencv_keeps_its_own_number_of_threads():
     before = cv2.getNumThreads()
     transform(planes_of((64, 64)))
     assert cv2.getNumThreads() == before
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_real_weights_in_packed_planes_are_those_of_the_half_spectrum(size):
+    planes = planes_of(size)
+    fy, fx = np.fft.fftfreq(size[0])[:, None], np.fft.rfftfreq(size[1])[None]
+    weights = np.exp(-3 * np.stack([fy**2 + fx**2] * 3)).astype(np.float32)
+    wanted = inverse(transform(planes) * weights, size[1])
+    packed = packed_spectrum(transform(planes), size[1])
+    np.testing.assert_array_equal(packed, to_packed(planes))
+    given = from_packed(packed * spread_weights(weights, size[1]))
+    np.testing.assert_allclose(given, wanted, atol=5e-6)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_product_with_a_conjugate_is_that_of_the_half_spectra(size):
+    planes, other = planes_of(size), planes_of(size, seed=1)
+    wanted = inverse(transform(planes) * np.conj(transform(other)), size[1])
+    given = from_packed(multiply_conjugate(to_packed(planes), to_packed(other)))
+    np.testing.assert_allclose(given, wanted, atol=FLOAT32 * max(1, np.abs(wanted).max()))
+
+
+@pytest.mark.parametrize("size", [(6, 4), (37, 37), (96, 96), (97, 60)])
+def test_places_in_packed_planes_are_those_of_their_frequencies(size):
+    planes = planes_of(size)
+    half, packed = transform(planes), to_packed(planes)
+    rows, columns = np.indices(half.shape[1:])
+    own = ((rows == 0) | (2 * rows == size[0])) & ((columns == 0) | (2 * columns == size[1]))
+    asked = ~own & (2 * columns < size[1])
+    real, imaginary = packed_places(rows[asked], columns[asked], size)
+    flat = packed.reshape(3, -1)
+    np.testing.assert_array_equal(flat[:, real], half.real[:, asked])
+    np.testing.assert_array_equal(np.abs(flat[:, imaginary]), np.abs(half.imag[:, asked]))

@@ -9,12 +9,15 @@ from pydantic import ValidationError
 from camkit.bundle.stages import Together, Wiener
 from camkit.bundle.stages.together import BAND, BAND_STEP, Spread
 from camkit.contracts import FloatArray
-from camkit.runtime.bank.blocks import Block, to_otf
-from camkit.runtime.bank.together import CORNER_FREQUENCY, restore_together
+from camkit.runtime.bank.baselines import restoration_bank
+from camkit.runtime.bank.blocks import Block, BlockBank, to_otf
+from camkit.runtime.bank.together import CORNER_FREQUENCY, restore_together, transfer_of
 from camkit.runtime.bank.wiener import wiener_filter
 from tests.psf_factory import (
     ISO_100,
     blur_periodic,
+    coma_kernels,
+    local_psf,
     psnr_db,
     texture,
     with_noise,
@@ -83,9 +86,8 @@ def test_it_is_the_best_linear_estimate_of_its_model(height_mm: float) -> None:
     planes = with_noise(
         blur_periodic(texture(SIZE, SIZE, seed=1), _kernels()), ISO_100, np.random.default_rng(0)
     )
-    found = restore_together(
-        planes, otf, level=LEVEL, variance=VARIANCE, height_mm=height_mm, together=TOGETHER
-    )
+    known = transfer_of(otf, height_mm, TOGETHER)
+    found = restore_together(planes, known, level=LEVEL, variance=VARIANCE, together=TOGETHER)
     expected = _by_matrices(planes, otf, height_mm)
     np.testing.assert_allclose(found, expected, atol=2e-4 * np.abs(expected).max())
 
@@ -94,9 +96,8 @@ def test_a_height_beyond_the_table_is_that_of_its_end() -> None:
     otf, planes = to_otf(_kernels(), SIZE), texture(SIZE, SIZE, seed=1)
 
     def at(height_mm: float) -> FloatArray:
-        return restore_together(
-            planes, otf, level=LEVEL, variance=VARIANCE, height_mm=height_mm, together=TOGETHER
-        )
+        known = transfer_of(otf, height_mm, TOGETHER)
+        return restore_together(planes, known, level=LEVEL, variance=VARIANCE, together=TOGETHER)
 
     np.testing.assert_array_equal(at(10.0), at(25.0))
     assert np.abs(at(0.0) - at(10.0)).max() > 1e-5
@@ -117,6 +118,30 @@ def test_a_blurred_colour_learns_from_a_sharp_one() -> None:
     alone, together = (wiener_filter(bank, ISO_100)(block) for bank in _banks())
     assert psnr_db(together[0], scene[0]) > psnr_db(alone[0], scene[0]) + 3
     assert psnr_db(together, scene) > psnr_db(alone, scene) + 2
+
+
+def test_a_place_serves_the_blocks_that_mirror_it_whatever_the_threads() -> None:
+    psf, planes = local_psf(*coma_kernels(radius_px=6), (150, 110)), texture(110, 150)
+    mask = planes[:1] > 0.75
+    bank = _banks()[1].model_copy(
+        update={"block_px": 48, "overlap_px": 16, "clip_iterations": 2, "clip_reach_px": 8}
+    )
+    whole = restoration_bank(psf, bank, ISO_100).restore_array(planes, mask)
+    shared = restoration_bank(psf, bank, ISO_100, threads=3).restore_array(planes, mask)
+    np.testing.assert_array_equal(shared, whole)
+    # Without a tapered ring, whose coarse picture is no mirror image at its highest frequency.
+    bare = bank.model_copy(update={"overlap_px": 2, "clip_reach_px": None})
+    whole = restoration_bank(psf, bare, ISO_100).restore_array(planes, mask)
+    alone = BlockBank(psf, wiener_filter(bare, ISO_100), block_px=48, overlap_px=2)
+    np.testing.assert_allclose(alone.restore_array(planes, mask), whole, atol=2e-6)
+
+
+def test_kernels_of_one_field_still_mistrust_by_height() -> None:
+    psf, planes = local_psf(_kernels(), np.zeros(1), (150, 110)), texture(110, 150)
+    bank = _banks()[1].model_copy(update={"block_px": 48, "overlap_px": 16})
+    filter_ = wiener_filter(bank, ISO_100)
+    alone = BlockBank(psf, filter_, block_px=48, overlap_px=16).restore_array(planes)
+    np.testing.assert_array_equal(restoration_bank(psf, bank, ISO_100).restore_array(planes), alone)
 
 
 def test_mean_levels_and_black_blocks_stay() -> None:
