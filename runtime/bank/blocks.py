@@ -362,12 +362,12 @@ class BlockBank:
             strip = _Strip(rows, mask, span, plain)
             total = _lengthened(total, span.start + span.inner.stop - done)
             self._add_blocks(strip, total[:, span.start + span.inner.start - done :], cancel)
+            # What is not needed again must not wait here while the network works.
+            del strip, rows, mask
             last = i + 1 == len(self._rows)
             ready = height if last else self._rows[i + 1].start + self._rows[i + 1].inner.start
             finished, total = total[:, : ready - done].copy(), total[:, ready - done :].copy()
             done = ready
-            # What is not needed again must not wait here while the network works.
-            del strip, rows, mask
             yield finished
             del finished
 

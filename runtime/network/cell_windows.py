@@ -26,13 +26,15 @@ from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.network.tiling import (
-    BANDS_HELD,
     PixelCost,
     Progress,
     Run,
 )
 from camkit.runtime.rows import RowSource
 
+STRIPS_HELD: Final = 3
+"""Strips of the output in memory at a time: one that is filled, one that is read, and what is still
+needed of the one before."""
 RAMP_PX: Final = 32
 _CALL_PX: Final = 20_000
 """What starting a window costs, in pixels."""
@@ -135,7 +137,7 @@ class CellLayout:
     def needed_bytes(self, costs: Sequence[PixelCost]) -> int:
         """Estimate the memory: rows and output strips held, every network's largest window."""
         width = self.padded_px[1]
-        strips = BANDS_HELD * self.strip_cells * self.cell_px
+        strips = STRIPS_HELD * self.strip_cells * self.cell_px
         ends = costs[0] if costs else PixelCost()
         held = _FLOAT_BYTES * (ends.channels * self.buffer_rows + ends.outputs * strips) * width
         largest = [0] * len(costs)

@@ -33,9 +33,11 @@ from camkit.runtime.rows import RowSource
 DEFAULT_MAX_BYTES: Final = 640 * 2**20
 _FLOAT_BYTES: Final = 4
 _MOST_COUNTS: Final = 64
-BANDS_HELD: Final = 3
-"""Output bands of a network in memory at a time: the one being filled, the one that the next stage
-reads, and what it still needs of the one before."""
+PIECE_ROWS: Final = 64
+"""A band is given away in pieces of about so many rows, each of which may be forgotten alone."""
+BANDS_HELD: Final = 2
+"""Output bands of a network in memory at a time: the one being filled, and no more than as much of
+the one before, of which the next stage still needs some pieces."""
 
 Run = Callable[[FloatArray], FloatArray]
 Progress = Callable[[int, int], None]
@@ -299,7 +301,7 @@ def infer_bands(
         scale: s, samples along a side of the output for one pixel of the input.
 
     Yields:
-        (k, s rows, s w) float32 bands, consecutive, together the whole picture.
+        (k, rows, s w) float32 pieces of bands, consecutive, together the whole picture.
 
     Raises:
         ContractError: If layout and source differ in size, or the network gives NaN or inf.
@@ -317,7 +319,7 @@ def infer_bands(
     done = 0
     for i, row in enumerate(layout.rows):
         held = buffer.move_to(row.origin_px)
-        band: FloatArray | None = None
+        pieces: list[FloatArray] = []
         for j, column in enumerate(layout.columns):
             check_cancelled(cancel)
             filled = _filled(window, held, column.origin_px)
@@ -327,15 +329,29 @@ def infer_bands(
                 kept = guard.check(kept, given, partial(_describe, i, j, row, column))
             elif not is_finite(kept):
                 raise ContractError(_not_finite_message(i, j, row, column))
-            if band is None:
-                band = np.empty((kept.shape[0], kept.shape[1], scale * width), np.float32)
-            band[:, :, scale * column.start_px : scale * min(column.stop_px, width)] = kept
+            pieces = pieces or _pieces(kept.shape[0], kept.shape[1], scale * width)
+            _fill(pieces, kept, scale * column.start_px)
             done += 1
             if progress is not None:
                 progress(done, layout.window_count)
-        assert band is not None
-        yield band
-        del band  # the rows of the next windows are made before their band is
+        del kept
+        while pieces:  # the rows of the next windows are made before their band is
+            yield pieces.pop(0)
+
+
+def _pieces(outputs: int, rows: int, width: int) -> list[FloatArray]:
+    """Give empty pieces of a band, (outputs, rows of the piece, width), from top to bottom."""
+    cuts = [*range(0, rows, PIECE_ROWS), rows]
+    return [np.empty((outputs, b - a, width), np.float32) for a, b in pairwise(cuts)]
+
+
+def _fill(pieces: list[FloatArray], kept: FloatArray, left: int) -> None:
+    """Copy what a window keeps to its columns of a band."""
+    top = 0
+    for piece in pieces:
+        bottom = top + piece.shape[1]
+        piece[:, :, left : left + kept.shape[2]] = kept[:, top:bottom]
+        top = bottom
 
 
 def _filled(window: FloatArray | None, held: FloatArray, left: int) -> FloatArray:

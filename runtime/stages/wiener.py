@@ -42,7 +42,7 @@ LIGHTS_AT_LEAST: Final = 1 / 7
 PLANES_HELD: Final = 5
 PLANES_PER_BLOCK: Final = 5
 """Block-sized planes of every channel: kept, and per block that is being restored (measured)."""
-BYTES_PER_BLOCK_ROW: Final = 80
+BYTES_PER_BLOCK_ROW: Final = 56
 """Of a row of blocks, per column of the picture and row of a block (measured)."""
 
 

@@ -18,7 +18,7 @@ from camkit.runtime.job.job import Job
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
-from camkit.runtime.job.walker import Walk
+from camkit.runtime.job.walker import FIXED_BYTES, Walk
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -589,4 +589,4 @@ def test_memory_of_the_walk_is_that_of_its_running_stages(bundle: Bundle) -> Non
     walk = Walk(job)
     walk.settle()
     assert walk.needed_bytes() < with_network
-    assert walk.needed_bytes() >= 260_000_000 + job.capture.resident_bytes
+    assert walk.needed_bytes() >= FIXED_BYTES + job.capture.resident_bytes

@@ -1,6 +1,7 @@
 """Tiling: plans that keep every pixel once, and tiles that equal the whole bit for bit."""
 
 import threading
+import weakref
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -15,6 +16,7 @@ from camkit.runtime.cancel import Cancelled
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.tiling import (
     BANDS_HELD,
+    PIECE_ROWS,
     PixelCost,
     Span,
     TileLayout,
@@ -234,13 +236,22 @@ def test_every_row_is_read_once_from_top_to_bottom_and_no_earlier_than_needed() 
     source = _Watched(_picture(333, 50))
     layout = lay_windows(333, 50, _limits(tile_px=64))
     bands = infer_bands(lambda w: w[:, 3:], source, layout)
-    next(bands)
+    first = next(bands)
     assert source.reads[-1][1] == layout.window_height_px
     rest = list(bands)
     assert source.reads[0][0] == 0
     assert source.reads[-1][1] == 333
     assert all(a[1] == b[0] for a, b in pairwise(source.reads))
-    assert len(rest) == len(layout.rows) - 1
+    assert sum(piece.shape[1] for piece in (first, *rest)) == 333
+    assert all(piece.shape[1] <= PIECE_ROWS for piece in (first, *rest))
+
+
+def test_pieces_of_a_band_are_let_go_of_one_by_one() -> None:
+    layout = lay_windows(333, 50, _limits(tile_px=240))
+    bands = infer_bands(lambda w: w[:, 3:].copy(), _Watched(_picture(333, 50)), layout)
+    given = [weakref.ref(piece) for piece in bands]
+    assert len(given) > len(layout.rows)
+    assert [ref() for ref in given[:-1]] == [None] * (len(given) - 1)
 
 
 @given(height=st.integers(1, 300), width=st.integers(1, 100), tile=st.integers(1, 90))
