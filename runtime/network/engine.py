@@ -6,7 +6,6 @@ import os
 import sys
 import threading
 from collections.abc import Iterable, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -234,30 +233,8 @@ def _check_version(version: str) -> None:
         )
 
 
-@cache
-def _register_arena() -> None:
-    """Let sessions that ask for it share an arena that grows by what is asked of it.
-
-    The arena of a session grows by powers of two: a sixth more than a window of M touches.
-    """
-    info = ort.OrtMemoryInfo(
-        "Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT
-    )
-    settings = {
-        "max_mem": 0,
-        "arena_extend_strategy": 1,
-        "initial_chunk_size_bytes": -1,
-        "max_dead_bytes_per_chunk": -1,
-    }
-    try:
-        ort.create_and_register_allocator(info, ort.OrtArenaCfg(settings))
-    except (RuntimeError, *_ORT_ERRORS) as error:
-        logger.debug("another arena is registered, which is taken: %s", error)
-
-
 def _create_session(model: bytes, threads: int, provider: str = "cpu") -> Any:
     chosen = _chosen_providers(provider)
-    _register_arena()
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
@@ -265,7 +242,6 @@ def _create_session(model: bytes, threads: int, provider: str = "cpu") -> Any:
     options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
     options.enable_mem_pattern = False
     options.enable_cpu_mem_arena = True
-    options.add_session_config_entry("session.use_env_allocators", "1")
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4  # errors reach the caller as exceptions, not on stderr
     try:
