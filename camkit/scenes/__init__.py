@@ -4,6 +4,7 @@ texture       colours and textures with the spectrum of nature
 leaves        dead leaves: what the statistics of natural images are made of
 lettering     lines of made-up glyphs
 procedural    `procedural:SEED`, a bit of everything
+clean         edges, stars and discs whose truth is known to the last pixel
 night         `night:SEED`, dark surfaces and lights up to 256 times white
 slanted_edge  a sharp edge, to measure an MTF on
 squares       `squares:SEED`, dark squares on white, to measure the focus of a unit on

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from camkit.colorimetry import decode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
-from camkit.models_def.training.clean_scenes import edges, night
 from camkit.scenes import procedural_scene
+from camkit.scenes.clean import edges, night
 
 PICTURE_ENDINGS: Final = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
 SCENE_SEED: Final = 7_000_000

@@ -23,9 +23,9 @@ from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
-from camkit.models_def.training.clean_scenes import night
 from camkit.report.fabricated_psf import fabricated_psf
 from camkit.report.quality import FABRICATION_SEEDS, FIELD_SHARES, Shot, list_set, read_picture
+from camkit.scenes.clean import night
 from tools.comparison.photograph import bundle_restorer, photograph
 
 SIDE_PX: Final = 256

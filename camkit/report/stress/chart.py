@@ -1,6 +1,7 @@
 """One picture per scenario: PSNR of every method over the knob, chi^2 below, breaks marked."""
 
 import io
+import textwrap
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
@@ -15,6 +16,8 @@ from camkit.report.stress.rig import BEFORE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+ROW_IN: Final = 1.7
+LABEL_LETTERS: Final = 18
 RIVAL_COLOURS: Final = ("#888888", "#d08a00", "#8a6d3b")
 JUDGED_COLOURS: Final = ("#5aa9e6", "#1f4e9c", "#7b2d8b", "#2a9d5c")
 """In the order of the methods; one beside it, of another bundle, has the colour of its namesake."""
@@ -28,16 +31,16 @@ def draw_curve(curve: Curve, breaks: Sequence[Break]) -> bytes:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     rows = [(curve.psnr_db, "PSNR (dB)"), (curve.chi2, "chi² per pixel")]
     rows = [row for row in rows if any(np.isfinite(g).any() for g in row[0].values())]
     rows += [(grids, name.replace("_", " ")) for name, grids in curve.extra.items()]
+    figure = Figure(figsize=(6.4, max(4.6, ROW_IN * len(rows))), layout="constrained")
     axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (grids, label) in zip(axes, rows, strict=True):
         common = _common(list(grids.values()))
         for method, grid in grids.items():
             _line(axis, curve, method, (grid, common))
-        axis.set_ylabel(label)
+        axis.set_ylabel(textwrap.fill(label, LABEL_LETTERS))
         axis.grid(alpha=0.25)
         for found in breaks:
             if found.point is not None and BEFORE not in found.method:

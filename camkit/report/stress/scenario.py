@@ -26,6 +26,7 @@ Shoot = Callable[[Any, Any, float], Any]
 """(examiner, scene, value) -> a capture that the examiner scores; all three those of the kind."""
 Measure = Callable[[Any, Any, float], Verdict]
 Applies = Callable[[Bundle], str | None]
+LEAST_ROOM_PX: Final = 128
 
 
 def photographs(bundle: Bundle) -> str | None:
@@ -48,6 +49,14 @@ def varies_over_field(bundle: Bundle) -> str | None:
     optics = bundle.manifest.optics
     if optics is not None and optics.symmetry == "uniform":
         return "its PSF is the same over the field"
+    return photographs(bundle)
+
+
+def has_room(bundle: Bundle) -> str | None:
+    """Say why a bundle cannot take scenarios that look at what surrounds things; None if it can."""
+    sensor = bundle.manifest.sensor
+    if min(sensor.width_px, sensor.height_px) < LEAST_ROOM_PX:
+        return f"its sensor has fewer than {LEAST_ROOM_PX} px along a side"
     return photographs(bundle)
 
 

@@ -5,6 +5,8 @@ darkened back to the exposure of the scene, with the border cut off.
 """
 
 import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -33,6 +35,9 @@ BEST_DB: Final = 120.0
 PATCH_PX: Final = 96
 LEAST_SHARE: Final = 0.02
 """A PSNR needs at least this share of the picture."""
+
+Numbers = Callable[[FloatArray, FloatArray], Mapping[str, float]]
+"""(picture, truth), both (3, h, w) linear Rec.709 -> numbers of a scenario, by name with unit."""
 
 
 class Judge:
@@ -107,6 +112,15 @@ class Judge:
             outcomes[method] = Outcome(psnr_db=None, fault=fault)
         return outcomes
 
+    def examine(self, shot: Shot, numbers: Numbers) -> Verdict:
+        """Judge a capture of a scene of its own, chi^2 aside, with numbers that belong to it."""
+        compare, restored = Comparison(shot), self.rig.restore(shot)
+        outcomes = self.judge(shot, restored, with_chi2=False)
+        for method, picture in restored.pictures.items():
+            found = numbers(compare.level(picture), compare.truth)
+            outcomes[method] = replace(outcomes[method], extra=found)
+        return Verdict(outcomes=outcomes, seen=see(self.rig, shot))
+
     def scale(self, method: str, scene: Scene) -> Scale:
         """Give how chi^2 of a method is counted on a scene, from its nominal capture."""
         if (method, scene.name) not in self._scales:
@@ -157,17 +171,23 @@ class Comparison:
     """A capture's truth, against which pictures are rated.
 
     Attributes:
-        sharp: (3, h, w) sRGB values.
+        truth: (3, h, w) linear Rec.709.
+        sharp: (3, h, w) sRGB values of it.
     """
 
     def __init__(self, shot: Shot) -> None:
         self._exposure = np.float32(shot.exposure)
-        self.sharp = encode_srgb(true_picture(shot.light.clean, shot.sensor))
+        self.truth = true_picture(shot.light.clean, shot.sensor)
+        self.sharp = encode_srgb(self.truth)
         self._judged = _judged_pixels(shot)
 
     def finish(self, picture: FloatArray) -> FloatArray:
         """Give sRGB values (3, h, w) of linear Rec.709, at the brightness of the scene."""
-        return encode_srgb(picture / self._exposure)
+        return encode_srgb(self.level(picture))
+
+    def level(self, picture: FloatArray) -> FloatArray:
+        """Give linear Rec.709 (3, h, w) at the brightness of the scene."""
+        return picture / self._exposure
 
     def errors(self, picture: FloatArray) -> NDArray[np.float64]:
         """Give (h, w) squared errors of linear Rec.709, the mean over the colours."""

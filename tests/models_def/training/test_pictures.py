@@ -69,3 +69,16 @@ def test_missing_empty_and_broken_sources_are_refused(tmp_path):
     for name in ("x.png", "empty.png"):
         with pytest.raises(DecodeError, match="cannot be decoded"):
             read_picture(tmp_path / name)
+
+
+def test_a_source_draws_edges_and_nights_as_often_as_it_is_told() -> None:
+    def drawn(**shares: float) -> list[np.ndarray]:
+        source = open_source(None, picture_share=0, scenes=2, scene_px=96, **shares)
+        rng = np.random.default_rng(0)
+        return [source.draw_crop(rng, 48) for _ in range(60)]
+
+    flat = [np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn(edge_share=0.5)]
+    assert 15 < sum(flat) < 45
+    assert not any(np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn())
+    dark = [np.median(crop) < 0.01 for crop in drawn(night_share=1.0)]
+    assert np.mean(dark) > 0.5

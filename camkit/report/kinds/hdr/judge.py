@@ -21,7 +21,7 @@ from camkit.report.kinds.hdr.capture import clipped_planes, developer
 from camkit.report.kinds.hdr.lights import exposed_night
 from camkit.report.stress.rig import INPUT, Restored, Rig
 from camkit.report.stress.scene import Scene
-from camkit.report.stress.score import Judge, see, worst_patch
+from camkit.report.stress.score import Judge, Numbers, see, worst_patch
 from camkit.report.stress.shot import Shot
 from camkit.report.stress.verdict import Outcome, Verdict
 from camkit.runtime.capture import Capture
@@ -95,6 +95,10 @@ class HdrJudge:
     ) -> dict[str, Outcome]:
         """Judge a capture of a common scenario; see `Judge.judge`."""
         return self._common.judge(shot, restored, with_chi2=with_chi2)
+
+    def examine(self, shot: Shot, numbers: Numbers) -> Verdict:
+        """Judge a capture of a scene of its own; see `Judge.examine`."""
+        return self._common.examine(shot, numbers)
 
     def lit(self, scene: Scene, share: float = SATURATED) -> Scene:
         """Give the lights that belong to a scene, exposed so that a share of it saturates."""

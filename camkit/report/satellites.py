@@ -1,0 +1,115 @@
+"""What a picture shows around stars that the sky does not hold: satellites, as a share of a star.
+
+    a star: core | annulus where there should be sky | ring that tells what the sky is
+
+Light above the sky and light that lacks below it are counted apart, since a ripple has both and
+its sum is none. Noise has both alike: what it adds to each on average, by the median deviation of
+the sky far from all stars, is taken off.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import scipy.ndimage
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+
+CORE_PX: Final = 3.0
+"""A star of the scenes ends within it."""
+ANNULUS_PX: Final = 12.0
+RING_PX: Final = 16.0
+APART_PX: Final = ANNULUS_PX + RING_PX
+"""Stars at least this far from each other do not disturb each other's numbers."""
+LEAST_STAR: Final = 0.02
+"""Of the brightest pixel of a picture of stars: the brightest of a star."""
+MEDIAN_OF_NORMAL: Final = 0.6745
+"""Median of |x| of a normal distribution of variance 1."""
+
+Grid = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Satellites:
+    """Light around stars, in shares of their true light.
+
+    Attributes:
+        above: (n,) more than the sky, >= 0.
+        below: (n,) less than the sky, as a number >= 0.
+    """
+
+    above: Grid
+    below: Grid
+
+
+def satellites(picture: FloatArray, truth: FloatArray) -> Satellites:
+    """Measure what lies around stars, all colours added up.
+
+    Args:
+        picture: (3, h, w) linear.
+        truth: (3, h, w) linear: stars on a dark sky, `APART_PX` from each other. Those that have
+            no sky all around them are left out.
+    """
+    stars = find_stars(truth)
+    noise = _noise(picture, stars)
+    above, below = np.empty(len(stars)), np.empty(len(stars))
+    for i, place in enumerate(stars):
+        window, away = _around(place)
+        annulus = (away > CORE_PX) & (away <= ANNULUS_PX)
+        ring = (away > ANNULUS_PX) & (away <= RING_PX)
+        seen, true = (_above_sky(p[window], ring) for p in (picture, truth))
+        light = true[:, away <= ANNULUS_PX].sum()
+        expected = noise * np.count_nonzero(annulus)
+        above[i] = (np.maximum(seen[:, annulus], 0).sum() - expected) / light
+        below[i] = (np.maximum(-seen[:, annulus], 0).sum() - expected) / light
+    return Satellites(above=np.maximum(above, 0), below=np.maximum(below, 0))
+
+
+def find_stars(truth: FloatArray) -> Grid:
+    """Give (n, 2) (y, x), the middles of stars with sky all around them."""
+    plane = truth.sum(axis=0, dtype=np.float64)
+    plane -= np.median(plane)
+    reach = int(CORE_PX) + 1
+    brightest = scipy.ndimage.maximum_filter(plane, 2 * reach + 1) == plane
+    peaks = np.argwhere(brightest & (plane > LEAST_STAR * plane.max()))
+    edge = int(RING_PX) + 2
+    inside = ((peaks >= edge) & (peaks < np.array(plane.shape) - edge)).all(axis=1)
+    offset = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    middles = []
+    for y, x in peaks[inside]:
+        spot = plane[y - reach : y + reach + 1, x - reach : x + reach + 1]
+        middles.append(np.array([y, x]) + (offset * spot).sum(axis=(1, 2)) / spot.sum())
+    return np.array(middles).reshape(-1, 2)
+
+
+def _around(place: Grid) -> tuple[tuple[slice, ...], Grid]:
+    """Give the window of a star, and how far its pixels are from it."""
+    reach = int(RING_PX) + 1
+    top, left = (round(float(v)) - reach for v in place)
+    side = 2 * reach + 1
+    y, x = np.mgrid[top : top + side, left : left + side]
+    window = np.s_[:, top : top + side, left : left + side]
+    return window, np.hypot(y - place[0], x - place[1])
+
+
+def _above_sky(window: FloatArray, ring: NDArray[np.bool_]) -> Grid:
+    sky = np.median(window[:, ring], axis=1)
+    return np.asarray(window.astype(np.float64) - sky[:, None, None])
+
+
+def _noise(picture: FloatArray, stars: Grid) -> float:
+    """Give what noise alone adds above the sky in a pixel, all colours added up."""
+    height, width = picture.shape[1:]
+    far = np.ones((height, width), dtype=bool)
+    edge = int(RING_PX)
+    far[:edge] = far[-edge:] = far[:, :edge] = far[:, -edge:] = False
+    for place in stars:
+        window, away = _around(place)
+        far[window[1:]] &= away > RING_PX
+    if not far.any():
+        return 0.0
+    sky = picture[:, far].astype(np.float64)
+    middle = np.median(sky, axis=1, keepdims=True)
+    sigma = np.median(np.abs(sky - middle), axis=1) / MEDIAN_OF_NORMAL
+    return float(sigma.sum() / np.sqrt(2 * np.pi))
