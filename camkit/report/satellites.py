@@ -37,10 +37,12 @@ class Satellites:
     Attributes:
         above: (n,) more than the sky, >= 0.
         below: (n,) less than the sky, as a number >= 0.
+        core: (n,) what is left of the star itself.
     """
 
     above: Grid
     below: Grid
+    core: Grid
 
 
 def satellites(picture: FloatArray, truth: FloatArray) -> Satellites:
@@ -53,7 +55,7 @@ def satellites(picture: FloatArray, truth: FloatArray) -> Satellites:
     """
     stars = find_stars(truth)
     noise = _noise(picture, stars)
-    above, below = np.empty(len(stars)), np.empty(len(stars))
+    above, below, core = np.empty((3, len(stars)))
     for i, place in enumerate(stars):
         window, away = _around(place)
         annulus = (away > CORE_PX) & (away <= ANNULUS_PX)
@@ -63,7 +65,8 @@ def satellites(picture: FloatArray, truth: FloatArray) -> Satellites:
         expected = noise * np.count_nonzero(annulus)
         above[i] = (np.maximum(seen[:, annulus], 0).sum() - expected) / light
         below[i] = (np.maximum(-seen[:, annulus], 0).sum() - expected) / light
-    return Satellites(above=np.maximum(above, 0), below=np.maximum(below, 0))
+        core[i] = seen[:, away <= CORE_PX].sum() / light
+    return Satellites(above=np.maximum(above, 0), below=np.maximum(below, 0), core=core)
 
 
 def find_stars(truth: FloatArray) -> Grid:

@@ -40,6 +40,7 @@ def test_the_truth_has_no_satellites(truth: np.ndarray) -> None:
     found = satellites(truth, truth)
     assert found.above.max() < 0.03
     assert found.below.max() < 1e-6
+    np.testing.assert_allclose(found.core + found.above, 1, atol=1e-4)
 
 
 @pytest.mark.parametrize("away_px", [5, 10])
@@ -48,6 +49,7 @@ def test_satellites_are_counted_in_shares_of_their_star(truth: np.ndarray, away_
     found = satellites(_with_spots(truth, 0.2, away_px), truth)
     np.testing.assert_allclose(found.above - own, 0.2, atol=2e-3)
     np.testing.assert_allclose(found.below, 0.1, atol=2e-3)
+    np.testing.assert_allclose(found.core, satellites(truth, truth).core, atol=2e-3)
 
 
 def test_what_lies_beyond_the_ring_belongs_to_no_star(truth: np.ndarray) -> None:

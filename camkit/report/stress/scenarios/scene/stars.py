@@ -33,11 +33,12 @@ def starry(scene: Scene, light: float) -> Scene:
 def numbers(picture: FloatArray, truth: FloatArray) -> dict[str, float]:
     """Give the satellites of a scene as a report has them."""
     found = satellites(picture, truth)
-    return {
+    satellite_light = {
         f"satellites_{part}_{rank}_percent": 100 * float(np.quantile(shares, share))
         for part, shares in (("above", found.above), ("below", found.below))
         for rank, share in (("median", 0.5), ("p90", 0.9))
     }
+    return satellite_light | {"core_median_percent": 100 * float(np.median(found.core))}
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
@@ -63,5 +64,6 @@ SCENARIO = Scenario(
     applies=has_room,
     note="Lone stars on a sky of 0.1 % of white. Satellites: light above, and apart light below "
     "the sky around a star, 3 to 12 px from it, in percent of the star's true light, all colours "
-    "added up; median and 90th percentile over the stars. The light of the input there is blur.",
+    "added up; median and 90th percentile over the stars. Core: the light up to 3 px. The light of "
+    "the input around it is blur.",
 )
