@@ -58,7 +58,7 @@ Tell = Callable[[str], None]
 
 LOSS_LIMIT_DB: Final = 0.05
 DEPTH_SHARE: Final = 0.75
-BLOCK_TOLERANCE_DB: Final = 0.02
+BLOCK_TOLERANCE_DB: Final = 0.05
 FIELD_COUNTS: Final = (7, 9, 11, 13, 17, 21, 25)
 WAVELENGTH_COUNTS: Final = (3, 5, 7, 9, 11, 13)
 BLOCKS: Final = (
@@ -69,6 +69,7 @@ BLOCKS: Final = (
     (384, 192),
     (320, 112),
     (256, 96),
+    (240, 80),
     (216, 96),
 )
 

@@ -135,7 +135,7 @@ def test_loss_that_no_grid_can_keep_is_an_error(
 
 @pytest.mark.parametrize(
     ("losses_db", "chosen_px"),
-    [((0.01, 0.0), 768), ((0.5, 0.01), 384), ((0.9, 0.3), 384), ((0.31, 0.3), 768)],
+    [((0.01, 0.0), 768), ((0.5, 0.01), 384), ((0.9, 0.3), 384), ((0.34, 0.3), 768)],
 )
 def test_cheapest_block_grid_that_loses_little_is_taken(
     losses_db: tuple[float, float],
