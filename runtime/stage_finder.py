@@ -10,6 +10,7 @@ A module defines
     check(entry, manifest, max_bytes)    optional: refuses, when a bundle is loaded, what asks too
                                          much of a machine
     FACTS                                optional: facts of a camera body that it knows, by name
+    tuning(entry, method)                optional: how one of its ways was tuned (`plan.tuning`)
 """
 
 import importlib

@@ -4,6 +4,7 @@ They exist to be compared with. Neither clips a highlight; both treat clipped sa
 this bright", and both follow the noise.
 """
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -17,7 +18,8 @@ from camkit.runtime.bank.richardson_lucy import background_of, richardson_lucy, 
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer, inverse, transform
 from camkit.runtime.bank.wiener import place_knowledge, wiener_filter
 
-# Tuned on development pictures behind the first camera, never on test pictures.
+TUNED_ON: Final = "development pictures behind the first camera, never test pictures"
+"""What the next six numbers were tuned on."""
 RL_ROUNDS_PER_SNR: Final = 0.7
 RL_LEAST_ROUNDS: Final = 10
 RL_MOST_ROUNDS: Final = 80
@@ -73,6 +75,23 @@ def block_filter(
     if method == "admm-tv":
         return admm_tv_filter(noise)
     raise UnsupportedError(f"method must be wiener, rl or admm-tv; got {method!r}")
+
+
+def method_numbers(method: str) -> Mapping[str, float]:
+    """Give the numbers by which a method other than the filter works, by name.
+
+    Raises:
+        UnsupportedError: If the method is unknown.
+    """
+    if method == "rl":
+        return {
+            "rounds_per_snr": RL_ROUNDS_PER_SNR,
+            "least_rounds": RL_LEAST_ROUNDS,
+            "most_rounds": RL_MOST_ROUNDS,
+        }
+    if method == "admm-tv":
+        return {"tv_weight": TV_WEIGHT, "tv_step": TV_STEP, "iterations": ADMM_ITERATIONS}
+    raise UnsupportedError(f"method must be rl or admm-tv; got {method!r}")
 
 
 def richardson_lucy_filter(noise: NoiseModel, *, rounds: int | None = None) -> BlockFilter:

@@ -8,6 +8,7 @@ rules/        the rules themselves
 speed         how fast this machine is, measured in a few milliseconds
 estimate      seconds and peak memory of a piece of work
 planner       quality and budgets -> rules -> work, decisions, estimate
+tuning        how a method was tuned, as far as bundle and code state it
 
 Rules see the capture and the bundle alone, so what they decide does not depend on tile size,
 memory cap or threads; only `--max-seconds` looks at the speed of the machine.

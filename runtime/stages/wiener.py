@@ -10,7 +10,7 @@ from camkit.bundle.manifest import Manifest
 from camkit.bundle.stages import Wiener
 from camkit.contracts import depth_name
 from camkit.errors import ContractError
-from camkit.runtime.bank.baselines import restoration_bank
+from camkit.runtime.bank.baselines import TUNED_ON, method_numbers, restoration_bank
 from camkit.runtime.bank.blocks import (
     BlockBank,
     LocalPsf,
@@ -30,11 +30,13 @@ from camkit.runtime.machine.limits import BANK_WORK
 from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
+from camkit.runtime.plan.tuning import Tuning, stated_numbers
 from camkit.runtime.unit import FOCUS
 
 METHODS: Final = ("wiener", "rl", "admm-tv")
 OPTIONS: Final = ("depth_m",)
 FACTS: Final = (FOCUS,)
+FOLLOWS: Final = "noise and level of every block, hence the ISO"
 KERNEL_BLOCKS: Final = 3.2
 """A kernel of another place with its transform, in blocks that are only filtered (measured)."""
 LIGHTS_AT_LEAST: Final = 1 / 7
@@ -105,6 +107,24 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         block_bytes(block_px, len(bundle.manifest.sensor.channels), threads=threads),
     )
     return StageWork(run=run, held_bytes=held)
+
+
+def tuning(entry: Wiener, method: str) -> Tuning:
+    """Say how a method was tuned: the bank by what its bundle states, the others by camkit."""
+    if method == METHODS[0]:
+        values = stated_numbers(entry)
+        if entry.together is not None:
+            values |= {f"together_{k}": v for k, v in stated_numbers(entry.together).items()}
+        source = "stage wiener of the bundle"
+        fitted = "" if entry.together is None else "; those of together by camkit fit-bank"
+        return Tuning(values=values, source=source + fitted, follows=FOLLOWS)
+    grid = {name: getattr(entry, name) for name in ("block_px", "overlap_px")}
+    return Tuning(
+        values=grid | dict(method_numbers(method)),
+        source="grid: stage wiener of the bundle; all else: camkit, the same for every camera",
+        captures=f"{TUNED_ON}; which ones is not recorded",
+        follows=FOLLOWS,
+    )
 
 
 def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:

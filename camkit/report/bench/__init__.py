@@ -16,8 +16,11 @@ metrics/        what is measured on a result; a new metric is one new file
 accuracy        every method on every known capture
 edge            how sharp captures and pictures are, by one slanted edge
 crops           the same patch of every method
-row             all that is known about a trial as one flat record
+split           accuracy by ISO and by place in the field
+row             all that is known about a trial as one record
+tuning          how every method was tuned
 run             the whole bench
-pareto, chart   who is beaten by nobody; time against PSNR
-page, output    one page for people; all files written
+pareto          who is beaten by nobody
+shown/          the chart and the page for people
+output          all files written
 """

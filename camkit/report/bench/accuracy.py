@@ -29,16 +29,37 @@ OnResult = Callable[[Key, KnownCapture, FloatArray], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Taken:
+    """What one method made of one capture.
+
+    Attributes:
+        picture: Name of the picture.
+        iso: Sensitivity.
+        field_share: Where the capture lies, see `KnownCapture`.
+        field_mm: Likewise.
+        values: Column -> value.
+    """
+
+    picture: str
+    iso: float
+    field_share: float | None
+    field_mm: float | None
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scores:
     """Scores of one method.
 
     Attributes:
         by_picture: Picture -> column -> values, one per capture.
+        taken: The same capture by capture, with what distinguishes them.
         psf: Lenses of the captures.
         error: Why there is none.
     """
 
     by_picture: dict[str, dict[str, list[float]]] = field(default_factory=dict)
+    taken: list[Taken] = field(default_factory=list)
     psf: set[str] = field(default_factory=set)
     error: str | None = None
 
@@ -150,14 +171,25 @@ def _add(
 ) -> None:
     scores.psf.add(known.psf)
     values = scores.by_picture.setdefault(known.picture, {})
+    of_capture: dict[str, float] = {}
     for metric in metrics:
         there = metric.product in known.truths and metric.product in restored
         if not there or not all(name in beside for name in metric.needs):
             continue
         named = {n: beside[n] for n in (*metric.needs, *metric.takes) if n in beside}
         found = metric.measure(restored[metric.product], known.truths[metric.product], **named)
+        of_capture |= found
         for name, value in found.items():
             values.setdefault(name, []).append(value)
+    scores.taken.append(
+        Taken(
+            picture=known.picture,
+            iso=known.iso,
+            field_share=known.field_share,
+            field_mm=known.field_mm,
+            values=of_capture,
+        )
+    )
 
 
 def mean_and_spread(values: Iterable[float]) -> tuple[float | None, float | None]:

@@ -7,6 +7,7 @@ pictures   of a folder, at the field positions and sensitivities of the kind of 
            (`camkit.report.quality`)
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -17,7 +18,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.golden import IMAGE, golden_from_bytes
+from camkit.bundle.golden import IMAGE, GoldenArrays, golden_from_bytes
+from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, PRESCRIPTION, Bundle
 from camkit.bundle.sensor import ColorSensor
 from camkit.colorimetry import encode_srgb
@@ -34,6 +36,7 @@ from camkit.report.quality import (
     list_set,
     read_picture,
 )
+from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.twin.light import stated_balance
 from camkit.runtime.twin.saturation import exposure_for_share
 from camkit.runtime.twin.truth import light_sensor, picture_scale
@@ -65,6 +68,9 @@ class KnownCapture:
         truths: Product -> what a perfect camera would give; for `image` (3, h, w) float32 sRGB
             values.
         extras: What metrics may need beside, by name, see `camkit.report.quality.Exposed`.
+        field_share: Where its middle lies on the way from the middle of the sensor to that of a
+            capture that touches a corner; None where the sensor has no stated size.
+        field_mm: Distance of its middle from the optical axis; likewise.
     """
 
     picture: str
@@ -77,12 +83,15 @@ class KnownCapture:
     undistort: bool
     truths: Mapping[str, FloatArray]
     extras: Mapping[str, Any] = field(default_factory=dict)
+    field_share: float | None = None
+    field_mm: float | None = None
 
 
 def golden_captures(bundle: Bundle) -> list[KnownCapture]:
     """Give the golden cases of a bundle that are large enough to be judged."""
     cases = bundle.manifest.golden
     arrays = golden_from_bytes(bundle.member(GOLDEN)) if cases else {}
+    places = {case.name: _golden_place(bundle, arrays, case) for case in cases}
     return [
         KnownCapture(
             picture=case.name,
@@ -95,10 +104,43 @@ def golden_captures(bundle: Bundle) -> list[KnownCapture]:
             undistort=True,
             truths={IMAGE: encode_srgb(arrays[case.name].reference)},
             extras={"linear": arrays[case.name].reference},
+            field_share=places[case.name][0],
+            field_mm=places[case.name][1],
         )
         for case in cases
         if min(arrays[case.name].reference.shape[1:]) >= LEAST_PX
     ]
+
+
+def _golden_place(
+    bundle: Bundle, arrays: Mapping[str, GoldenArrays], case: GoldenCase
+) -> tuple[float | None, float | None]:
+    """Give field share and distance of a golden case; None where the sensor has no size."""
+    extent = bundle.manifest.sensor.extent
+    if extent is None:
+        return None, None
+    height, width = arrays[case.name].capture.shape[-2:]
+    window = SensorWindow(
+        size_px=(width, height),
+        origin_px=case.origin_px,
+        sensor_size_px=(extent.width_px, extent.height_px),
+        pitch_um=extent.pixel_pitch_um,
+        axis_px=extent.optical_centre_px,
+    )
+    return round(_field_share(window), 2), _distance_mm(window)
+
+
+def _field_share(window: SensorWindow) -> float:
+    """Give how far a window lies from the middle of its sensor; 1 touches a corner."""
+    spare = [
+        whole - side for whole, side in zip(window.sensor_size_px, window.size_px, strict=True)
+    ]
+    shifts = [2 * at - free for at, free in zip(window.origin_px, spare, strict=True)]
+    return math.hypot(*shifts) / (math.hypot(*spare) or 1.0)
+
+
+def _distance_mm(window: SensorWindow) -> float:
+    return math.hypot(*(float(v) for v in window.centre_mm))
 
 
 def picture_captures(
@@ -231,4 +273,6 @@ def known_capture(shot: Shot, exposed: Exposed) -> KnownCapture:
         undistort=False,
         truths=exposed.truths,
         extras=exposed.extras,
+        field_share=share,
+        field_mm=_distance_mm(simulation.window),
     )

@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from camkit.report.bench.chart import draw_chart
-from camkit.report.bench.page import to_html
 from camkit.report.bench.row import Row
 from camkit.report.bench.run import Result
+from camkit.report.bench.shown.chart import draw_chart
+from camkit.report.bench.shown.page import to_html
 
 NAME = "bench"
 
@@ -52,6 +52,6 @@ def write_csv(path: Path, rows: list[Row]) -> None:
 
 
 def flatten(row: Row) -> dict[str, Any]:
-    """Give a row without nesting: `stages` becomes columns `stage_NAME_s`, `pictures` goes."""
-    flat = {name: value for name, value in row.items() if name not in ("stages", "pictures")}
+    """Give a row without nesting: `stages` becomes columns `stage_NAME_s`; the other parts go."""
+    flat = {name: value for name, value in row.items() if not isinstance(value, dict | list)}
     return flat | {f"stage_{name}_s": value for name, value in row.get("stages", {}).items()}

@@ -16,6 +16,7 @@ from camkit.report.bench.accuracy import (
 )
 from camkit.report.bench.edge import Edges
 from camkit.report.bench.metric import Metric
+from camkit.report.bench.split import split_columns
 from camkit.report.bench.timed.process_run import Run
 from camkit.report.bench.timed.timing import Spread, is_noisy, paired_ratio, quantile, spread_of
 from camkit.report.bench.trial import Trial
@@ -163,6 +164,7 @@ def _accuracy(trial: Trial, facts: Facts) -> Row:
                 count = sum(len(v.get(name, ())) for v in scores.by_picture.values())
                 row["captures"] = max(row["captures"], count)
         row |= {} if metric.notes is None else metric.notes()
+    row |= split_columns(scores, of_input, facts.metrics)
     return row | _each_picture(facts.metrics, scores, of_input)
 
 

@@ -32,6 +32,7 @@ from camkit.report.bench.timed.capture import SCENE_TEXT, timed_capture
 from camkit.report.bench.timed.process_run import Job, Run, run_job
 from camkit.report.bench.timed.timing import interleaved
 from camkit.report.bench.trial import BASE_SIZE, Entrant, Ground, Skip, Trial
+from camkit.report.bench.tuning import tuning_table
 from camkit.report.kind_finder import camera_of, check_photographs, find_part
 from camkit.report.quality import LIGHT_SUFFIXES, list_set, read_picture
 from camkit.runtime.kind import part_of
@@ -353,6 +354,7 @@ def _join(
             }
             for label, camera in cameras.items()
         },
+        "tuning": tuning_table(trials, bundles),
         "rows": rows,
         "skipped": [{"what": skip.what, "reason": skip.reason} for skip in found.skips],
     }

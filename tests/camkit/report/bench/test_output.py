@@ -11,14 +11,14 @@ from xml.etree import ElementTree as ET
 import cv2
 import pytest
 
-from camkit.report.bench import chart
 from camkit.report.bench.accuracy import INPUT
-from camkit.report.bench.chart import draw_chart, plottable
 from camkit.report.bench.crops import SHARP, Patch
 from camkit.report.bench.output import write_bench
-from camkit.report.bench.page import to_html
 from camkit.report.bench.row import make_row
 from camkit.report.bench.run import Result
+from camkit.report.bench.shown import chart
+from camkit.report.bench.shown.chart import draw_chart, plottable
+from camkit.report.bench.shown.page import to_html
 from tests.bench_factory import make_facts, make_run, make_scores, make_trial
 
 NAMES = ("S", "M <b>", "wiener")

@@ -9,6 +9,7 @@ from camkit.report.bench.crops import SHARP, Patch
 from camkit.report.bench.pareto import pareto_front
 from camkit.report.bench.row import Row
 from camkit.report.bench.run import Result
+from camkit.report.bench.shown.tables import split_tables, tuning_table
 from camkit.report.bench.timed.timing import LEAST_N_OF_P99, NOISY_LOAD, NOISY_SPREAD
 
 
@@ -68,6 +69,7 @@ th{cursor:pointer;background:#f3f3f3;user-select:none}
 th[aria-sort=ascending]::after{content:" \\25B2"}th[aria-sort=descending]::after{content:" \\25BC"}
 tr.front td:first-child{font-weight:bold}
 td.bad{color:#b3421a}
+td.words{white-space:normal;text-align:left;min-width:12rem;vertical-align:top}
 .patches{display:flex;flex-wrap:wrap;gap:.8rem}
 figure{margin:0;width:192px}figure img{width:192px;height:192px;image-rendering:pixelated}
 figcaption{font-size:12px;line-height:1.3}
@@ -117,7 +119,9 @@ def to_html(result: Result, chart_svg_base64: str | None) -> str:
         parts.append(f'<img class="chart" alt="seconds against PSNR" src="{source}">')
     for camera in report["cameras"]:
         parts += _table(report, camera)
+        parts += split_tables(report, camera)
         parts += _patches(result.patches.get(camera, []), _labels(result, camera))
+    parts += tuning_table(report.get("tuning", ()))
     parts += _skipped(report["skipped"])
     parts += _machine(report)
     parts += _reading()

@@ -1,0 +1,80 @@
+"""PSNR over the field, a panel for every ISO; only where every picture was taken everywhere."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from camkit.report.bench.row import Row
+from camkit.report.bench.shown.looks import Looks
+from camkit.runtime.plan.decision import DEVELOP
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes as Panel
+
+Cell = dict[str, Any]
+
+
+def field_isos(rows: Iterable[Row]) -> tuple[float, ...]:
+    """Give the ISOs of which there are panels: none where the field was not swept by pictures.
+
+    Golden cases differ in what they show too, so a line through them would say nothing.
+    """
+    grids = [_grid(row) for row in rows]
+    isos = dict.fromkeys(iso for grid in grids for iso in grid)
+    return tuple(sorted(isos))
+
+
+def _grid(row: Row) -> dict[float, list[Cell]]:
+    """Give ISO -> cells by place, if every ISO has all places, and there are two or more."""
+    grid: dict[float, list[Cell]] = {}
+    for cell in row.get("by_iso_and_field", ()):
+        if cell["field_mm"] is not None and cell.get("psnr_db") is not None:
+            grid.setdefault(cell["iso"], []).append(cell)
+    shares = {tuple(cell["field_share"] for cell in cells) for cells in grid.values()}
+    full = len(shares) == 1 and len(next(iter(shares))) > 1
+    return grid if full else {}
+
+
+def shown_rows(rows: Sequence[Row]) -> list[Row]:
+    """Choose what a panel can show: all plain methods of one camera; of several the best two each.
+
+    Those are the best method with a network and the best one without.
+    """
+    plain = [row for row in rows if not row["variant"] and row["method"] != DEVELOP]
+    cameras = dict.fromkeys(row["camera"] for row in plain)
+    if len(cameras) == 1:
+        return plain
+    found: list[Row] = []
+    for camera in cameras:
+        own = [row for row in plain if row["camera"] == camera and row["bundle"] == camera]
+        for group in ([r for r in own if r["size"]], [r for r in own if not r["size"]]):
+            found += sorted(group, key=lambda row: -float(row["psnr_db"]))[:1]
+    return found
+
+
+def draw_field_panel(panel: "Panel", rows: Sequence[Row], iso: float, looks: Looks) -> None:
+    """Draw one ISO.
+
+    Args:
+        panel: Empty.
+        rows: Those that are shown.
+        iso: Sensitivity.
+        looks: Of their cameras and methods.
+    """
+    done: set[str] = set()
+    for row in rows:
+        cells = _grid(row).get(iso, [])
+        color = looks.color(row)
+        if cells and row["camera"] not in done:
+            done.add(row["camera"])
+            _draw_line(panel, cells, "input_psnr_db", color=color, linestyle="--", alpha=0.7)
+        _draw_line(panel, cells, "psnr_db", color=color, marker=looks.marker(row), markersize=5)
+    panel.set_title(f"ISO {iso:g}", fontsize=9, loc="left")
+    panel.set_xlabel("distance from the axis, mm", fontsize=9)
+    panel.grid(visible=True, color="#dddddd", linewidth=0.5)
+    panel.set_axisbelow(True)
+    panel.tick_params(labelsize=8)
+
+
+def _draw_line(panel: "Panel", cells: Sequence[Cell], key: str, **look: Any) -> None:
+    known = [cell for cell in cells if cell.get(key) is not None]
+    panel.plot([c["field_mm"] for c in known], [c[key] for c in known], linewidth=1.2, **look)

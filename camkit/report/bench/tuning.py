@@ -1,0 +1,64 @@
+"""How every method of a bench was tuned, by what bundles and camkit record; nothing is guessed."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from camkit.bundle.reader import Bundle
+from camkit.report.bench.trial import Trial
+from camkit.runtime.plan.decision import DEVELOP
+from camkit.runtime.plan.tuning import Tuning, stage_tuning
+
+
+def tuning_table(trials: Iterable[Trial], bundles: Mapping[str, Bundle]) -> list[dict[str, Any]]:
+    """Say of every method how it was tuned, once, however many rows vary it.
+
+    Args:
+        trials: All of them.
+        bundles: By label.
+
+    Returns:
+        Plain JSON values: camera, bundle, method, size; and as `Tuning` has them values, source,
+        captures, follows.
+    """
+    found: dict[tuple[str, str, str, str | None], Tuning] = {}
+    for trial in trials:
+        key = (trial.camera, trial.bundle, trial.method, trial.size)
+        if key not in found:
+            found[key] = tuning_of(trial, bundles[trial.bundle])
+    return [
+        {
+            **dict(zip(("camera", "bundle", "method", "size"), key, strict=True)),
+            "values": dict(tuning.values),
+            "source": tuning.source,
+            "captures": tuning.captures,
+            "follows": tuning.follows,
+        }
+        for key, tuning in found.items()
+    ]
+
+
+def tuning_of(trial: Trial, bundle: Bundle) -> Tuning:
+    """Say how the method of a trial was tuned.
+
+    Args:
+        trial: The trial.
+        bundle: The one that does the work.
+    """
+    if trial.method == DEVELOP:
+        return Tuning(source="nothing is tuned: no bank, no network", captures="none")
+    if trial.size is not None:
+        return _of_network(trial.size, bundle)
+    known = stage_tuning(bundle.manifest.stages, trial.method)
+    return known or Tuning(source="no stage of the bundle says so")
+
+
+def _of_network(size: str, bundle: Bundle) -> Tuning:
+    """Say what the networks of a size were trained on, in the words of the manifest."""
+    manifest = bundle.manifest
+    roles = [role for role, sizes in manifest.networks.items() if size in sizes]
+    weights = sum(bundle.network_facts(role, size).parameters for role in roles)
+    return Tuning(
+        values={"parameters": weights},
+        source=f"weights in {manifest.name} {manifest.version}, {', '.join(roles)}",
+        captures=manifest.training_data,
+    )

@@ -1,0 +1,54 @@
+"""How a method of a stage was tuned, as far as bundle and code state it; nothing is guessed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from camkit.bundle.entry import Entry
+from camkit.bundle.stages import Stage
+from camkit.runtime.stage_finder import stage_module
+
+Value = float | int | str | None
+NOT_RECORDED = "not recorded"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tuning:
+    """How a method was tuned.
+
+    Attributes:
+        values: Its parameters by name, units behind; empty if it has none.
+        source: Where they come from.
+        captures: What they were tuned on, in the words of whoever recorded it.
+        follows: What they follow from capture to capture, such as its noise; empty for nothing.
+    """
+
+    values: Mapping[str, Value] = field(default_factory=dict)
+    source: str
+    captures: str = NOT_RECORDED
+    follows: str = ""
+
+
+def stage_tuning(stages: Sequence[Stage], method: str) -> Tuning | None:
+    """Give how a method was tuned by the last stage that has it; None where no stage has it.
+
+    A stage whose module defines `tuning(entry, method)` says it itself; of any other the numbers
+    that the bundle states for it are told.
+    """
+    found = [stage for stage in stages if method in stage_module(stage.type).METHODS]
+    if not found:
+        return None
+    stage = found[-1]
+    own = getattr(stage_module(stage.type), "tuning", None)
+    if own is not None:
+        told: Tuning = own(stage, method)
+        return told
+    values = stated_numbers(stage)
+    if not values:
+        return Tuning(source=f"stage {stage.type} states no parameter; its constants are camkit's")
+    return Tuning(values=values, source=f"stage {stage.type} of the bundle")
+
+
+def stated_numbers(entry: Entry) -> dict[str, Value]:
+    """Give the single numbers that an entry of a manifest states, by name."""
+    fields = entry.model_dump(mode="json")
+    return {name: value for name, value in fields.items() if isinstance(value, int | float)}
