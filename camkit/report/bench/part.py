@@ -46,10 +46,12 @@ class OwnRows:
     Attributes:
         rows: Plain JSON values, each row with the columns of its sort.
         skips: What was asked for, or is usual, and could not be measured.
+        beside: Other bundles whose networks took part.
     """
 
     rows: Sequence[Mapping[str, Any]]
     skips: Sequence[Skip] = ()
+    beside: Sequence[Bundle] = ()
 
 
 Measure = Callable[[Bundle, OwnSettings, Tell], OwnRows]

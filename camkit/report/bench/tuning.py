@@ -6,7 +6,7 @@ from typing import Any
 from camkit.bundle.reader import Bundle
 from camkit.report.bench.trial import Trial
 from camkit.runtime.plan.decision import DEVELOP
-from camkit.runtime.plan.tuning import Tuning, stage_tuning
+from camkit.runtime.plan.tuning import Tuning, stage_tuning, stated_numbers
 
 
 def tuning_table(trials: Iterable[Trial], bundles: Mapping[str, Bundle]) -> list[dict[str, Any]]:
@@ -25,16 +25,37 @@ def tuning_table(trials: Iterable[Trial], bundles: Mapping[str, Bundle]) -> list
         key = (trial.camera, trial.bundle, trial.method, trial.size)
         if key not in found:
             found[key] = tuning_of(trial, bundles[trial.bundle])
-    return [
-        {
-            **dict(zip(("camera", "bundle", "method", "size"), key, strict=True)),
-            "values": dict(tuning.values),
-            "source": tuning.source,
-            "captures": tuning.captures,
-            "follows": tuning.follows,
-        }
-        for key, tuning in found.items()
+    return [_told(key, tuning) for key, tuning in found.items()]
+
+
+def whole_tuning(camera: str, bundle: Bundle) -> list[dict[str, Any]]:
+    """Say the same of all networks of a bundle, and of its other stages by their types.
+
+    Args:
+        camera: Whose captures it works on.
+        bundle: One whose kind measures itself.
+    """
+    name, manifest = bundle.manifest.name, bundle.manifest
+    found = [
+        _told((camera, name, "net", size), _of_network(size, bundle)) for size in manifest.sizes
     ]
+    for stage in manifest.stages:
+        if values := stated_numbers(stage):
+            role = getattr(stage, "role", None)
+            source = f"stage {stage.type} of the bundle" + ("" if role is None else f", {role}")
+            tuning = Tuning(values=values, source=source)
+            found.append(_told((camera, name, stage.type, None), tuning))
+    return found
+
+
+def _told(key: tuple[str, str, str, str | None], tuning: Tuning) -> dict[str, Any]:
+    return {
+        **dict(zip(("camera", "bundle", "method", "size"), key, strict=True)),
+        "values": dict(tuning.values),
+        "source": tuning.source,
+        "captures": tuning.captures,
+        "follows": tuning.follows,
+    }
 
 
 def tuning_of(trial: Trial, bundle: Bundle) -> Tuning:

@@ -9,6 +9,7 @@ from camkit.report.bench.machine import describe_machine
 from camkit.report.bench.part import BenchPart, Measure, OwnSettings, Tell
 from camkit.report.bench.settings import Settings
 from camkit.report.bench.trial import Axes
+from camkit.report.bench.tuning import whole_tuning
 from camkit.report.kind_finder import find_part
 
 OPTIONS: Final = "--data, --images, --sizes, --repeat, --quick"
@@ -44,7 +45,7 @@ def measure_own(
         tell: Called with a line whenever something begins.
 
     Returns:
-        Plain JSON values: machine, settings, bundles, rows, skipped.
+        Plain JSON values: machine, settings, bundles, tuning, rows, skipped.
 
     Raises:
         ContractError: If something is asked for that means nothing to such a kind.
@@ -64,8 +65,11 @@ def measure_own(
     )
     rows: list[dict[str, Any]] = []
     skipped: list[dict[str, str]] = []
+    tuning: list[dict[str, Any]] = []
     for bundle, measure in zip(bundles, measures, strict=True):
         found = measure(bundle, own, tell)
+        for other in (bundle, *found.beside):
+            tuning += whole_tuning(bundle.manifest.name, other)
         rows += [{"bundle": bundle.manifest.name, **row} for row in found.rows]
         skipped += [{"what": skip.what, "reason": skip.reason} for skip in found.skips]
     return {
@@ -78,6 +82,7 @@ def measure_own(
             "repeat": own.repeat,
         },
         "bundles": {bundle.manifest.name: bundle.sha256 for bundle in bundles},
+        "tuning": tuning,
         "rows": rows,
         "skipped": skipped,
     }

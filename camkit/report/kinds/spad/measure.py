@@ -60,7 +60,8 @@ def measure(bundle: Bundle, settings: OwnSettings, tell: Tell) -> OwnRows:
             skips.append(found)
         else:
             rows.append(found)
-    return OwnRows(rows=rows, skips=skips)
+    beside = {id(other.bundle): other.bundle for other in baselines.cameras.values()}
+    return OwnRows(rows=rows, skips=skips, beside=tuple(beside.values()))
 
 
 def _sizes(camera: FineCamera, asked: Sequence[str] | None) -> tuple[tuple[str, ...], list[Skip]]:

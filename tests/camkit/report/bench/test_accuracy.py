@@ -92,6 +92,12 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
         score = judge(restored, taken.sharp)
         assert found["psnr_db"][3] == pytest.approx(score.psnr_db, abs=1e-3)
         assert found["ssim"][3] == pytest.approx(score.ssim, abs=1e-4)
+        fourth = scores[key].taken[3]
+        assert (fourth.iso, fourth.field_share) == (1600.0, 0.25)
+        assert fourth.values["psnr_db"] == found["psnr_db"][3]
+        away_mm = [t.field_mm for t in scores[key].taken]
+        assert away_mm == sorted(away_mm)
+        assert away_mm[0] < 0.01 < away_mm[-1]
     assert scores[INPUT].psf == {"bundle"}
 
 
@@ -173,6 +179,10 @@ def test_golden_cases_are_judged_against_their_stored_truth(tmp_path: Path) -> N
     bundle = open_bundle(path)
     (known,) = golden_captures(bundle)
     assert (known.picture, known.origin_px, known.undistort) == ("large", (8, 6), True)
+    assert known.field_share is not None
+    assert known.field_mm is not None
+    assert 0 < known.field_share < 1
+    assert known.field_mm > 0
     stored = arrays.reference.astype(np.float16).astype(np.float32)  # as bundles store it
     np.testing.assert_allclose(decode_srgb(known.truths[IMAGE]), stored, atol=1e-5)
     np.testing.assert_array_equal(known.extras["linear"], stored)

@@ -65,6 +65,9 @@ def test_a_kind_that_measures_itself_gives_machine_settings_and_rows(
     assert report["settings"]["data"] == tmp_path.name
     assert [row["bundle"] for row in report["rows"]] == ["tiny", "tiny"]
     assert report["skipped"] == [{"what": "three", "reason": "too dark"}]
+    tuned = {(entry["method"], entry["size"]): entry for entry in report["tuning"]}
+    assert tuned["net", "M"]["captures"] == "untrained"
+    assert tuned["wiener", None]["source"] == "stage wiener of the bundle"
     assert str(tmp_path) not in json.dumps(report)
 
 

@@ -64,7 +64,14 @@ def test_a_bench_measures_seconds_and_accuracy_of_every_row(tmp_path: Path) -> N
         assert 0 < row["share_of_gemm_peak"] < 1
         assert (row["psf"], row["images"], row["captures"]) == ("bundle", 1, 10)
         assert row["psnr_db"] != row["input_psnr_db"]
+        assert [cell["captures"] for cell in row["by_iso"]] == [5, 5]
+        assert [cell["field_share"] for cell in row["by_field"]] == [0, 0.25, 0.5, 0.75, 1]
+        assert len(row["by_iso_and_field"]) == 10
     assert own["psnr_db"] == rival["psnr_db"]  # the same network
+    assert {(t["bundle"], t["captures"]) for t in result.report["tuning"]} == {
+        ("tiny", "untrained"),
+        ("rival", "untrained"),
+    }
     assert len(result.patches["tiny"]) == 4
     assert result.report["machine"]["gemm_gmac_per_s"]["1"] > 0
     assert "tiny: timing M (1/2)" in told
