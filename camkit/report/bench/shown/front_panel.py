@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
 FRONT_ALPHA: Final = 0.35
+APART: Final = "not judged on the same pictures: compare methods of one camera, not cameras"
 FEW_TICKS_FROM: Final = 20.0
 """Ratio of the ends of the time axis from which on fewer ticks are told."""
 
@@ -74,6 +75,8 @@ def title(report: dict[str, Any], rows: Sequence[Row]) -> str:
         lines = [texts[cameras[0]] if cameras[1:] else f"{cameras[0]}: {texts[cameras[0]]}"]
     else:
         lines = [f"{camera}: {text}" for camera, text in texts.items()]
+    if len({report["cameras"][camera]["accuracy"] for camera in cameras}) > 1:
+        lines.append(APART)
     noisy = sum(bool(row["noisy"]) for row in rows)
     if noisy:
         lines.append(f"{noisy} of {len(rows)} times are noisy")
@@ -138,8 +141,10 @@ def _tidy_axis(panel: "Panel") -> None:
 def label_front_panel(panel: "Panel", rows: Sequence[Row], looks: Looks) -> None:
     """Write beside every marker what it is, and at every input line whose it is."""
     taken = [box for row in rows for box in _drawn_boxes(panel, row)]
+    inputs = _input_labels(panel, rows, looks)
+    taken += [_line_box(panel, label.point[1]) for label in inputs]
     ordered = sorted(rows, key=lambda r: (r["variant"], seconds_per_mp(r)))
-    place_labels(panel, [*_input_labels(panel, rows, looks), *map(_label(looks), ordered)], taken)
+    place_labels(panel, [*inputs, *map(_label(looks), ordered)], taken)
 
 
 def _label(looks: Looks) -> Any:
@@ -174,6 +179,14 @@ def _input_labels(panel: "Panel", rows: Sequence[Row], looks: Looks) -> list[Lab
                 )
             )
     return found
+
+
+def _line_box(panel: "Panel", level: float) -> "Bbox":
+    """Give what the line of an input covers on the canvas."""
+    from matplotlib.transforms import Bbox
+
+    y = float(panel.transData.transform((panel.get_xlim()[0], level))[1])
+    return Bbox.from_extents(panel.bbox.x0, y - 1, panel.bbox.x1, y + 1)
 
 
 def _drawn_boxes(panel: "Panel", row: Row) -> "list[Bbox]":

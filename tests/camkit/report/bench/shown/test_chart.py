@@ -11,7 +11,12 @@ from matplotlib.figure import Figure
 from camkit.report.bench.row import Row, make_row
 from camkit.report.bench.shown.chart import draw_chart
 from camkit.report.bench.shown.field_panels import draw_field_panel, field_isos, shown_rows
-from camkit.report.bench.shown.front_panel import draw_front_panel, label_front_panel, title
+from camkit.report.bench.shown.front_panel import (
+    APART,
+    draw_front_panel,
+    label_front_panel,
+    title,
+)
 from camkit.report.bench.shown.looks import CAMERA_COLORS, looks_of, method_name, seconds_per_mp
 from camkit.report.bench.shown.tables import split_tables, tuning_table
 from tests.bench_factory import make_facts, make_run, make_trial
@@ -130,10 +135,12 @@ def test_captures_that_were_not_swept_over_the_field_have_no_panel(report: dict[
 
 def test_a_title_says_once_what_all_cameras_share(report: dict[str, Any]) -> None:
     assert title(report, report["rows"]).startswith("3 pictures; ")
+    assert APART not in title(report, report["rows"])
     report["cameras"]["trio"]["accuracy"] = "8 scenes"
     lines = title(report, report["rows"])
     assert "duet: 3 pictures; " in lines
     assert "trio: 8 scenes; " in lines
+    assert lines.endswith(APART)
 
 
 def test_a_table_shows_every_plain_method_by_iso_and_place(report: dict[str, Any]) -> None:
