@@ -30,6 +30,10 @@ STAR_SIGMA_PX: Final = (0.35, 0.7)
 STAR_REACH_PX: Final = 4
 DISC_SHARE: Final = (0.05, 0.6)
 """Radius over the side."""
+MOST_LAMPS: Final = 3
+LAMP_LIGHT: Final = (2.0, 200.0)
+"""1 the white of the picture."""
+LAMP_RADIUS_PX: Final = (0.7, 6.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +77,16 @@ def night(rng: Generator, side_px: int) -> FloatArray:
         sigma_px = rng.uniform(*STAR_SIGMA_PX)
         _add_star(scene, place, sigma_px, _colour(rng, _log_uniform(rng, STAR_LIGHT)))
     return np.asarray(scene, np.float32)
+
+
+def with_lamps(rng: Generator, scene: FloatArray) -> FloatArray:
+    """Put one to three lamps, discs far brighter than white, into a (3, h, w) scene."""
+    lit = scene.astype(np.float64)
+    for _ in range(int(rng.integers(1, MOST_LAMPS + 1))):
+        y, x = rng.uniform(0, scene.shape[1:])
+        disc = Disc(center_px=(y, x), radius_px=_log_uniform(rng, LAMP_RADIUS_PX))
+        _add_disc(lit, disc, _colour(rng, _log_uniform(rng, LAMP_LIGHT)))
+    return np.asarray(lit, np.float32)
 
 
 def star_field(

@@ -17,7 +17,7 @@ from camkit.colorimetry import decode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.scenes import procedural_scene
-from camkit.scenes.clean import edges, night
+from camkit.scenes.clean import edges, night, with_lamps
 
 PICTURE_ENDINGS: Final = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
 SCENE_SEED: Final = 7_000_000
@@ -74,6 +74,7 @@ class SceneSource:
         scene_px: Their side.
         edge_share: Probability of clean edges instead of either.
         night_share: Probability of stars and discs on black.
+        lamp_share: Probability of lamps in whatever else is drawn.
     """
 
     pictures: Sequence[Path]
@@ -83,6 +84,7 @@ class SceneSource:
     _held: dict[int, NDArray[Any]]
     edge_share: float = 0.0
     night_share: float = 0.0
+    lamp_share: float = 0.0
 
     def draw_crop(self, rng: Generator, side_px: int) -> FloatArray:
         """Cut a random crop, the livelier of two candidates of one picture.
@@ -90,6 +92,11 @@ class SceneSource:
         Returns:
             (3, side_px, side_px) float32 linear Rec.709; a smaller picture is mirrored outwards.
         """
+        lit = self.lamp_share > 0 and rng.random() < self.lamp_share
+        crop = self._draw_unlit(rng, side_px)
+        return with_lamps(rng, crop) if lit else crop
+
+    def _draw_unlit(self, rng: Generator, side_px: int) -> FloatArray:
         if clean := self.edge_share + self.night_share:
             drawn = rng.random()  # only where asked for: other recipes keep their samples
             if drawn < clean:
@@ -126,6 +133,7 @@ def open_source(
     scene_px: int,
     edge_share: float = 0.0,
     night_share: float = 0.0,
+    lamp_share: float = 0.0,
 ) -> SceneSource:
     """Open a source of crops; without a folder it is procedural only."""
     return SceneSource(
@@ -136,6 +144,7 @@ def open_source(
         _held={},
         edge_share=edge_share,
         night_share=night_share,
+        lamp_share=lamp_share,
     )
 
 

@@ -95,6 +95,7 @@ class BayerDataRecipe(DataRecipe):
             for equally often.
         edge_share: Share of samples of clean edges, which photographs have few of.
         night_share: Share of samples of stars and discs on black.
+        lamp_share: Share of all samples into which lamps far beyond white are put.
         known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
             `camkit process --depth-m` gives it; the others' has the mean kernel.
     """
@@ -114,12 +115,14 @@ class BayerDataRecipe(DataRecipe):
     known_depth_share: float = 0.0
     edge_share: float = 0.0
     night_share: float = 0.0
+    lamp_share: float = 0.0
 
     def __post_init__(self) -> None:
         DataRecipe.__post_init__(self)
         check_share("data.edge_share + data.night_share", self.edge_share + self.night_share)
         if min(self.edge_share, self.night_share) < 0:
             raise ContractError("data.edge_share and data.night_share must be >= 0")
+        check_share("data.lamp_share", self.lamp_share)
         check_share("data.known_depth_share", self.known_depth_share)
         check_share("data.border_share", self.border_share)
         check_share("data.drift_share", self.drift_share)

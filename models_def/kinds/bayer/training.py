@@ -62,6 +62,7 @@ class BayerMaker:
             scene_px=recipe.data.scene_px,
             edge_share=recipe.data.edge_share,
             night_share=recipe.data.night_share,
+            lamp_share=recipe.data.lamp_share,
         )
 
     def make(self, index: int) -> Sample:

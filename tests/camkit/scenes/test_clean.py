@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter
 
-from camkit.scenes.clean import BRIGHTEST, SKY, Disc, disc_on_black, edges, night, star_field
+from camkit.scenes.clean import (
+    BRIGHTEST,
+    LAMP_RADIUS_PX,
+    MOST_LAMPS,
+    SKY,
+    Disc,
+    disc_on_black,
+    edges,
+    night,
+    star_field,
+    with_lamps,
+)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -54,3 +65,13 @@ def test_a_disc_covers_its_area() -> None:
     scene = disc_on_black(np.random.default_rng(0), (100, 120), disc, light=0.5, sky=1e-3)
     inside, sky = scene[0, 50, 62], scene[0, 0, 0]
     assert ((scene[0] - sky) / (inside - sky)).sum() == pytest.approx(np.pi * 20.4**2, rel=1e-3)
+
+
+def test_lamps_are_small_and_beyond_white_and_leave_the_rest() -> None:
+    scene = np.full((3, 64, 64), 0.1, np.float32)
+    for seed in range(20):
+        lit = with_lamps(np.random.default_rng(seed), scene)
+        changed = (lit != scene).any(axis=0)
+        assert 0 < changed.sum() < MOST_LAMPS * np.pi * (LAMP_RADIUS_PX[1] + 1) ** 2
+        assert lit.max() > 0.3
+    assert (scene == np.float32(0.1)).all()

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -82,3 +84,11 @@ def test_a_source_draws_edges_and_nights_as_often_as_it_is_told() -> None:
     assert not any(np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn())
     dark = [np.median(crop) < 0.01 for crop in drawn(night_share=1.0)]
     assert np.mean(dark) > 0.5
+
+
+def test_lamps_are_put_into_as_many_crops_as_it_is_told(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "grey.png"), np.full((64, 64, 3), 90, np.uint8))
+    source = open_source(tmp_path, picture_share=1, scenes=1, scene_px=64, lamp_share=0.5)
+    rng = np.random.default_rng(0)
+    lit = [source.draw_crop(rng, 48).max() > 1 for _ in range(60)]
+    assert 15 < sum(lit) < 45

@@ -48,6 +48,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("data__drift_scale", 0.5, "data.drift_scale must be in"),
         ("data__edge_share", 1.2, "data.edge_share . data.night_share must lie in 0..1"),
         ("data__night_share", -0.1, "data.edge_share"),
+        ("data__lamp_share", 1.1, "data.lamp_share must lie in 0..1"),
         ("schedule__overshoot", -1.0, "schedule.overshoot must be >= 0"),
         ("schedule__loss", "l3", "schedule.loss must be one of"),
         ("schedule__precision", "float8", "schedule.precision must be one of"),
