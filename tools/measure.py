@@ -160,7 +160,8 @@ def _tiling_error(network: SizedNetwork, height: int, width: int) -> tuple[int, 
     layout = lay_windows(height, width, limits)
     whole = TileLimits(stride_px=facts.stride_px, halo_px=0, max_bytes=sys.maxsize, whole=True)
     one_layout, scale = lay_windows(height, width, whole), facts.output_scale
-    (one,) = infer_bands(network.run, planes, one_layout, scale=scale)
+    bands = infer_bands(network.run, planes, one_layout, scale=scale)
+    one = np.concatenate(list(bands), axis=1)
     worst, top = 0.0, 0
     for band in infer_bands(network.run, planes, layout, scale=scale):
         difference = np.abs(band - one[:, top : top + band.shape[1]])

@@ -38,6 +38,7 @@ from camkit.models_def.optics.sampling import (
     block_loss,
     frozen_loss,
     make_bench,
+    make_probes,
     mean_kernel_loss,
 )
 from camkit.models_def.sensors.wiener import PRIOR_EXPONENT, PRIOR_SCALE
@@ -229,14 +230,17 @@ def choose_blocks(psf: FrozenPsf, bench: Bench, *, tell: Tell = _silent) -> tupl
     Tried are `BLOCKS` and the grid of the bench's own settings. The cost of a grid is the area
     filtered per area answered for. A small block may gain, since its prior is that of its place.
     """
-    tried: list[tuple[Wiener, Loss]] = []
     grids = {*BLOCKS, (bench.settings.block_px, bench.settings.overlap_px)}
-    for block_px, overlap_px in sorted(grids, key=lambda b: ((b[0] / (b[0] - b[1])) ** 2, b)):
-        settings = bench.settings.model_copy(
-            update={"block_px": block_px, "overlap_px": overlap_px}
-        )
-        loss = block_loss(psf, bench, settings)
-        tell(f"blocks of {block_px} px, overlap {overlap_px}: {loss.mean_db:.3f} dB")
+    cheapest_first = [
+        bench.settings.model_copy(update={"block_px": block_px, "overlap_px": overlap_px})
+        for block_px, overlap_px in sorted(grids, key=lambda b: ((b[0] / (b[0] - b[1])) ** 2, b))
+    ]
+    probes = make_probes(psf, bench, cheapest_first)
+    tried: list[tuple[Wiener, Loss]] = []
+    for settings in cheapest_first:
+        loss = block_loss(psf, bench, settings, probes)
+        grid = f"blocks of {settings.block_px} px, overlap {settings.overlap_px}"
+        tell(f"{grid}: {loss.mean_db:.3f} dB")
         tried.append((settings, loss))
     allowed_db = min(loss.mean_db for _, loss in tried) + BLOCK_TOLERANCE_DB
     return next(pair for pair in tried if pair[1].mean_db <= allowed_db)

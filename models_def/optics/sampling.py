@@ -7,6 +7,7 @@ loss is 10 log10 of the ratio of the mean squared errors, averaged over copies, 
 these stand for equal areas of the picture.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -35,7 +36,8 @@ OFFSETS: Final = (-0.8, 0.0, 0.8)
 BLOCK_HEIGHTS: Final = (0.35, 0.65, 0.9)
 PROBE_PX: Final = 64
 GOLDEN_ANGLE_RAD: Final = 2.399963
-LARGER_PX: Final = 256
+PROBE_SCENES: Final = 3
+REFERENCE_PX: Final = 640
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,89 +206,134 @@ def _compare(pairs: list[tuple[Tensor, Tensor]], bench: Bench) -> Loss:
     return replace(loss, by_depth_db=tuple(_loss(ratios).mean_db for ratios in by_depth))
 
 
-def block_loss(psf: FrozenPsf, bench: Bench, settings: Wiener) -> Loss:
-    """Measure what one kernel per block, and the block's own border, cost.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Probe:
+    """A place where blocks are judged: a scene through a copy, and what can be had there.
 
-    Blocks at three places of the diagonal are probed at nine points of the area they answer
-    for. The other restoration uses the kernel of the probed point and a larger block. The scene
-    lies at the focus.
+    Attributes:
+        noisy: (1, c, s, s), the place in its middle.
+        sharp: (1, c, PROBE_PX, PROBE_PX) of the middle.
+        at_mm: x and y of the place.
+        shot: (c,) of the noise.
+        read_variance: (c,) of the noise.
+        error: Mean squared error with the kernel of the place itself, in a block of REFERENCE_PX.
+    """
+
+    noisy: Tensor
+    sharp: Tensor
+    at_mm: FloatGrid
+    shot: Tensor
+    read_variance: Tensor
+    error: float
+
+
+def make_probes(psf: FrozenPsf, bench: Bench, grids: Sequence[Wiener]) -> tuple[Probe, ...]:
+    """Photograph the places where block grids are judged, the same for all of them.
+
+    Three places of the diagonal, each with several scenes, at the focus.
 
     Args:
         psf: The frozen PSF.
-        bench: Sensor and a copy that blurs.
+        bench: Sensor, a copy that blurs, and the filter.
+        grids: Blocks and overlaps that will be judged.
+    """
+    sensor = bench.sensor
+    side_px = max(REFERENCE_PX, *(_reach_px(grid) for grid in grids))
+    half_mm = np.array([sensor.width_px, sensor.height_px]) / 2 * _pitch_mm(sensor)
+    places = np.stack([share * half_mm for share in BLOCK_HEIGHTS])
+    at = places[:, 0], places[:, 1]
+    kernels, trues = (_kernels(p, sensor, at, bench.focus_mm) for p in (psf, bench.copies[0]))
+    scenes = _scenes(PROBE_SCENES, side_px, bench.seed, len(sensor.channels))
+    probes = []
+    for i, at_mm in enumerate(places):
+        for scene in scenes[:, None]:
+            blurred = _convolve(scene, trues[i : i + 1])
+            noisy, shot, read = _noisy(blurred, sensor, 1.0, bench.seed)
+            sharp = _middle(scene, PROBE_PX)
+            probe = Probe(
+                noisy=noisy, sharp=sharp, at_mm=at_mm, shot=shot, read_variance=read, error=0.0
+            )
+            known = kernels[i : i + 1], at_mm
+            error = _block_error(probe, known, np.zeros(2), REFERENCE_PX, bench.settings)
+            probes.append(replace(probe, error=error))
+    return tuple(probes)
+
+
+def block_loss(
+    psf: FrozenPsf, bench: Bench, settings: Wiener, probes: Sequence[Probe] = ()
+) -> Loss:
+    """Measure what one kernel per block, and the block's own border, cost.
+
+    Every probe is seen from blocks that lie off it by nine offsets within the area that a block
+    answers for, each with the kernel of its own middle.
+
+    Args:
+        psf: The frozen PSF.
+        bench: Sensor and filter.
         settings: Block and overlap under test.
+        probes: Of `make_probes`; made here if there are none.
     """
     half = (settings.block_px - settings.overlap_px) / 2
-    sensor = bench.sensor
-    corner_px = np.array([sensor.width_px, sensor.height_px]) / 2
-    places = [
-        (share * corner_px, np.array([dx, dy]) * half)
-        for share in BLOCK_HEIGHTS
-        for dy in OFFSETS
-        for dx in OFFSETS
-    ]
-    pitch_mm = sensor.pixel_pitch_um / UM_PER_MM
-    centres = np.stack([centre for centre, _ in places]) * pitch_mm
-    probed = centres + np.stack([offset for _, offset in places]) * pitch_mm
-    blocks, locals_, trues = (
-        _kernels(p, sensor, (at[:, 0], at[:, 1]), bench.focus_mm)
-        for p, at in ((psf, centres), (psf, probed), (bench.copies[0], probed))
-    )
-    heights_mm = np.hypot(*centres.T), np.hypot(*probed.T)
-    scene = _scenes(1, settings.block_px + LARGER_PX, bench.seed, len(sensor.channels))
-    ratios = [
-        _probe(
-            (
-                _Known(kernel=blocks[i : i + 1], height_mm=float(heights_mm[0][i])),
-                _Known(kernel=locals_[i : i + 1], height_mm=float(heights_mm[1][i])),
-            ),
-            trues[i : i + 1],
-            scene,
-            offset,
-            (bench, settings),
-        )
-        for i, (_, offset) in enumerate(places)
-    ]
+    offsets = [np.array([dx, dy]) * half for dy in OFFSETS for dx in OFFSETS]
+    pitch_mm = _pitch_mm(bench.sensor)
+    ratios = []
+    for probe in probes or make_probes(psf, bench, [settings]):
+        middles = np.stack([probe.at_mm - offset * pitch_mm for offset in offsets])
+        at = middles[:, 0], middles[:, 1]
+        kernels = _kernels(psf, bench.sensor, at, bench.focus_mm)
+        errors = [
+            _block_error(probe, (kernels[i : i + 1], at_mm), offset, settings.block_px, settings)
+            for i, (at_mm, offset) in enumerate(zip(middles, offsets, strict=True))
+        ]
+        ratios += [error / probe.error for error in errors]
     return _loss(torch.tensor(ratios))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Known:
-    """What a filter is told of its place: kernel (1, c, kh, kw) and field height."""
-
-    kernel: Tensor
-    height_mm: float
-
-
-def _probe(
-    known: tuple[_Known, _Known],
-    true_kernel: Tensor,
-    scene: Tensor,
+def _block_error(
+    probe: Probe,
+    known: tuple[Tensor, FloatGrid],
     offset_px: FloatGrid,
-    by: tuple[Bench, Wiener],
+    block_px: int,
+    settings: Wiener,
 ) -> float:
-    """Give the ratio of squared errors at an offset: as the block knows the place over as it is."""
-    bench, settings = by
-    large = scene.shape[-1]
-    noisy, shot, read = _noisy(_convolve(scene, true_kernel), bench.sensor, 1.0, bench.seed)
-    top, left = (int(large / 2 + o - PROBE_PX / 2) for o in (offset_px[1], offset_px[0]))
-    sharp = scene[..., top : top + PROBE_PX, left : left + PROBE_PX]
-    errors = []
-    for side, told in zip((settings.block_px, large), known, strict=True):
-        start = (large - side) // 2
-        window = slice(start, start + side)
-        restored = wiener_restore(
-            noisy[..., window, window],
-            told.kernel,
-            shot,
-            read,
-            settings,
-            height_mm=told.height_mm,
-        )
-        rows = slice(top - start, top - start + PROBE_PX)
-        columns = slice(left - start, left - start + PROBE_PX)
-        errors.append(float((restored[..., rows, columns] - sharp).square().mean()))
-    return errors[0] / errors[1]
+    """Give the mean squared error of a probe in a block that it lies off the middle of.
+
+    Args:
+        probe: With its scene.
+        known: Kernel (1, c, kh, kw) and place of the block's middle.
+        offset_px: (x, y) of the probe from the block's middle.
+        block_px: Side of the block.
+        settings: Of the filter.
+    """
+    kernel, at_mm = known
+    side = probe.noisy.shape[-1]
+    left, top = (round((side - block_px) / 2 - float(offset)) for offset in offset_px)
+    restored = wiener_restore(
+        probe.noisy[..., top : top + block_px, left : left + block_px],
+        kernel,
+        probe.shot,
+        probe.read_variance,
+        settings,
+        height_mm=float(np.hypot(*at_mm)),
+    )
+    first = (side - PROBE_PX) // 2
+    rows, columns = (slice(first - a, first - a + PROBE_PX) for a in (top, left))
+    return float((restored[..., rows, columns] - probe.sharp).square().mean())
+
+
+def _reach_px(grid: Wiener) -> int:
+    """Give the side of a scene that holds all blocks of a grid that see its middle."""
+    off = max(OFFSETS) * (grid.block_px - grid.overlap_px)
+    return 2 * int(np.ceil((grid.block_px + off) / 2)) + 2
+
+
+def _middle(planes: Tensor, size_px: int) -> Tensor:
+    first = (planes.shape[-1] - size_px) // 2
+    return planes[..., first : first + size_px, first : first + size_px]
+
+
+def _pitch_mm(sensor: ColorSensor) -> float:
+    return sensor.pixel_pitch_um / UM_PER_MM
 
 
 def _loss(ratios: Tensor) -> Loss:

@@ -45,7 +45,8 @@ def _shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(sampling, "TRUE_WAVELENGTHS", 5)
     patch.setattr(sampling, "OFFSETS", (-0.8, 0.8))
     patch.setattr(sampling, "BLOCK_HEIGHTS", (0.9,))
-    patch.setattr(sampling, "LARGER_PX", 128)
+    patch.setattr(sampling, "PROBE_SCENES", 1)
+    patch.setattr(sampling, "REFERENCE_PX", 512)
 
 
 @pytest.fixture(scope="module")
@@ -145,10 +146,13 @@ def test_cheapest_block_grid_that_loses_little_is_taken(
 ) -> None:
     known = dict(zip((768, 384), losses_db, strict=True))
     monkeypatch.setattr(freeze_module, "BLOCKS", ((384, 160), (768, 160)))
+    monkeypatch.setattr(freeze_module, "make_probes", lambda *_: ())
     monkeypatch.setattr(
         freeze_module,
         "block_loss",
-        lambda _psf, _bench, grid: sampling.Loss(mean_db=known[grid.block_px], worst_db=1.0),
+        lambda _psf, _bench, grid, _probes: sampling.Loss(
+            mean_db=known[grid.block_px], worst_db=1.0
+        ),
     )
     own = replace(bench, settings=bench.settings.model_copy(update={"block_px": 384}))
     settings, loss = freeze_module.choose_blocks(bench.nominal, own)

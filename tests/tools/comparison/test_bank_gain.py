@@ -33,8 +33,9 @@ def test_gains_are_told_with_their_error_by_iso_copy_and_place(
     assert found["captures"] == 2 * 2 * 2
     assert set(found["psnr_db"]) == {"alone", "together", "admm_tv"}
     whole = found["gain_db"]["alone"]["mean"]
+    # levels are kept to four digits
     assert whole == pytest.approx(
-        found["psnr_db"]["together"] - found["psnr_db"]["alone"], abs=1e-3
+        found["psnr_db"]["together"] - found["psnr_db"]["alone"], abs=0.01
     )
     assert set(found["by_iso"]) == {"100", "1600"}
     assert set(found["by_copy"]) == {"2001", "2002"}

@@ -173,7 +173,7 @@ def test_freeze_writes_psf_stress_psf_and_report(camkit_command, tmp_path, monke
     assert json.loads(outcome.out)["block_px"] == 512
     assert (folder / "stress.safetensors").stat().st_size > 100
     assert seen["sensor"].width_px == 6000, "the camera of the default recipe"
-    assert seen["settings"].clip_iterations == 6, "its Wiener bank measures the loss"
+    assert seen["settings"].clip_iterations == 3, "its Wiener bank measures the loss"
 
 
 def test_export_finds_what_lies_beside_the_checkpoint(
