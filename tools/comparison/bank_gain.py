@@ -131,13 +131,18 @@ def together_of(recipe: Path) -> Together:
     return Together.model_validate(table["together"])
 
 
-def restorers(bundle: Bundle, together: Together) -> dict[str, Restorer]:
-    """Give every way."""
+def restoring_together(bundle: Bundle, together: Together) -> Bundle:
+    """Give a bundle whose bank restores colours together; its hash stays."""
     stages = tuple(
         stage.model_copy(update={"together": together}) if isinstance(stage, Wiener) else stage
         for stage in bundle.manifest.stages
     )
-    other = replace(bundle, manifest=bundle.manifest.model_copy(update={"stages": stages}))
+    return replace(bundle, manifest=bundle.manifest.model_copy(update={"stages": stages}))
+
+
+def restorers(bundle: Bundle, together: Together) -> dict[str, Restorer]:
+    """Give every way."""
+    other = restoring_together(bundle, together)
     tuned = tuned_from_json(json.loads(TUNED.read_text(encoding="utf-8"))["tuned"]["values"])
 
     def peer(taken: Photograph) -> Any:

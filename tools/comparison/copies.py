@@ -1,38 +1,57 @@
 """How far the transfer of a copy of a lens lies off the frozen one."""
 
+import math
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.sensor import ColorSensor
-from camkit.contracts import FrozenPsf
-from camkit.runtime.bank.blocks import to_otf
+from camkit.contracts import FloatArray, FrozenPsf
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
-from camkit.runtime.bank.spectrum import ComplexArray
 
-GRID_PX: Final = 384
+HEIGHTS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Of the largest height that is known."""
+GRID_PX: Final = 256
 JUDGED_BELOW: Final = 0.3
 """Cycles per pixel; above it lenses of this kind transfer little."""
 
+Transfer = NDArray[np.complex128]
 
-def transfer_error(frozen: FrozenPsf, copy: FrozenPsf, sensor: ColorSensor) -> float:
-    """Give the root of the mean |H_copy - H|^2 over that of |H|^2, of all colours and heights.
+
+def transfer_error(
+    frozen: FrozenPsf, copy: FrozenPsf, sensor: ColorSensor, *, focus_um: float = 0.0
+) -> float:
+    """Give the relative RMS error of the frozen transfer against that of a copy.
 
     Args:
-        frozen: What methods know.
-        copy: A radial PSF whose field heights are the places of the comparison.
-        sensor: Whose colours weight the wavelengths; of several depths the mean kernel is taken.
+        frozen: What methods know; of several depths the mean kernel is taken.
+        copy: As traced.
+        sensor: Whose colours weight the wavelengths.
+        focus_um: Of the unit, where the frozen PSF knows such.
     """
-    known, own = (color_kernels(psf, *sensor.response_arrays()) for psf in (frozen, copy))
-    frequency = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX)[None])
-    inside = (frequency > 0) & (frequency < JUDGED_BELOW)
-    error = power = 0.0
-    for height_mm in copy.field_heights_mm.tolist():
-        there, nominal = (_transfer(kernels, height_mm)[:, inside] for kernels in (own, known))
-        error += float(np.square(np.abs(there - nominal)).sum(dtype=np.float64))
-        power += float(np.square(np.abs(nominal)).sum(dtype=np.float64))
-    return float(np.sqrt(error / power))
+    response = sensor.response_arrays()
+    known = color_kernels(frozen, *response, focus_um=focus_um)
+    return relative_error(transfers(known), transfers(color_kernels(copy, *response)))
 
 
-def _transfer(kernels: FieldKernels, height_mm: float) -> ComplexArray:
-    return to_otf(kernels.at(0.0, height_mm), GRID_PX)
+def relative_error(ours: Transfer, theirs: Transfer) -> float:
+    """Give the root of the mean square of the difference over that of `theirs`."""
+    wrong, power = (float(np.square(np.abs(part)).sum()) for part in (ours - theirs, theirs))
+    return math.sqrt(wrong / power)
+
+
+def transfers(kernels: FieldKernels) -> Transfer:
+    """Give the transfers (height, c, n) at some shares of the largest height."""
+    heights_mm = np.array(HEIGHTS) * kernels.field_heights_mm[-1]
+    return np.stack([_transfer(kernels.at(0.0, float(at_mm))) for at_mm in heights_mm])
+
+
+def _transfer(kernels: FloatArray) -> Transfer:
+    """Give the transfer (c, n) below the highest frequency that counts, about the middle pixel."""
+    h, w = kernels.shape[-2:]
+    wide = np.zeros((len(kernels), GRID_PX, GRID_PX))
+    wide[:, :h, :w] = kernels
+    wide = np.roll(wide, (-(h // 2), -(w // 2)), axis=(-2, -1))
+    cycles = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX))
+    return np.asarray(np.fft.rfft2(wide)[:, cycles < JUDGED_BELOW])

@@ -20,18 +20,14 @@ import json
 import math
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
 
 from camkit.bundle.manifest import format_of
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import PRESCRIPTION, Bundle, bundle_from_bytes, find_bundle, open_bundle
-from camkit.bundle.stages import Together, Wiener
 from camkit.bundle.writer import bundle_to_bytes
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
@@ -41,6 +37,7 @@ from camkit.models_def.optics.prescription import parse_prescription
 from camkit.report.bench.machine import describe_machine
 from camkit.report.fabricated_psf import fabricated_psf
 from camkit.report.quality import (
+    FABRICATION_SEEDS,
     FIELD_SHARES,
     QUADRANTS,
     Shot,
@@ -51,7 +48,7 @@ from camkit.report.quality import (
     psnr,
     read_picture,
 )
-from camkit.runtime.bank.psf import FieldKernels, color_kernels
+from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.calibration.focus import EdgeCamera, MeasuredFocus, measure_focus
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options
@@ -60,19 +57,15 @@ from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from camkit.runtime.unit import FOCUS, Unit
 from camkit.scenes.squares import squares_scene
 from tools.capture.simulated import captured, color_sensor
-from tools.comparison.bank_gain import ALONE, TOGETHER, together_of
+from tools.comparison.bank_gain import ALONE, TOGETHER, restoring_together, together_of
 from tools.comparison.compact_json import to_compact_json
+from tools.comparison.copies import relative_error, transfer_error, transfers
 
-COPIES: Final = (2001, 2002, 2003, 3001, 3002, 3003, 3004, 3005)
 ISOS: Final = (100.0, 1600.0)
 TARGET_PX: Final = 640
 MOST_PX: Final = 768
 """Of a side of a picture; its middle is taken."""
 TARGET_SHARES: Final = (0.0, 0.35, 0.65, 0.95)
-HEIGHTS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
-MOST_CYCLES: Final = 0.3
-_SPECTRUM_PX: Final = 256
-Transfer = NDArray[np.complex128]
 DIGITS: Final = 4
 
 
@@ -111,7 +104,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--recipe", type=Path, help="with [wiener.together]")
     parser.add_argument("--data", type=Path, required=True, help="folder of sharp pictures")
     parser.add_argument("--pictures", type=int, help="the first of them by name")
-    parser.add_argument("--copies", type=int, nargs="*", default=COPIES, help="seeds")
+    parser.add_argument("--copies", type=int, nargs="*", default=FABRICATION_SEEDS, help="seeds")
     parser.add_argument("--outliers", type=int, nargs="*", default=(), help="seeds, told apart")
     parser.add_argument("--focus-um", type=float, help="reach of the kernels; default: auto")
     parser.add_argument("--work-dir", type=Path, default=Path("runs/quality"), help="traced PSFs")
@@ -156,15 +149,6 @@ def _lens_of(bundle: Bundle) -> LensOptics:
     return LensOptics(lens=parse_prescription(bundle.member(PRESCRIPTION).decode("utf-8")))
 
 
-def restoring_together(bundle: Bundle, together: Together) -> Bundle:
-    """Give a bundle whose bank restores colours together; its hash stays."""
-    stages = tuple(
-        stage.model_copy(update={"together": together}) if isinstance(stage, Wiener) else stage
-        for stage in bundle.manifest.stages
-    )
-    return replace(bundle, manifest=bundle.manifest.model_copy(update={"stages": stages}))
-
-
 def judge(
     copy: int, lens: FrozenPsf, banks: Mapping[str, Bundle], pictures: Sequence[Path]
 ) -> Judged:
@@ -180,7 +164,11 @@ def judge(
     except ContractError as refused:
         why = str(refused)
     focus_um = 0.0 if found is None else found.focus_um
-    error = transfer_error(bundle, lens, 0.0), transfer_error(bundle, lens, focus_um)
+    sensor = color_sensor(bundle)
+    error = (
+        transfer_error(bundle.psf, lens, sensor),
+        transfer_error(bundle.psf, lens, sensor, focus_um=focus_um),
+    )
     # who needs no file gains nothing
     gains = {bank: (0.0,) * (len(pictures) * len(ISOS)) for bank in banks}
     if found is not None:
@@ -245,50 +233,22 @@ def blend_errors(bundle: Bundle, range_um: float) -> dict[str, dict[str, float]]
     lens, sensor = _lens_of(bundle), color_sensor(bundle)
     response = sensor.response_arrays()
     low, nominal, high = (
-        _transfers(color_kernels(bundle.psf, *response, focus_um=at))
+        transfers(color_kernels(bundle.psf, *response, focus_um=at))
         for at in (-range_um, 0.0, range_um)
     )
     halves = (-range_um / 2, range_um / 2)
     there, _ = with_focus(bundle.psf, halves, lens.refocused, sensor)
     found = {}
     for half_um, end, other in zip(halves, (low, high), (high, low), strict=True):
-        traced = _transfers(color_kernels(there, *response, focus_um=half_um))
+        traced = transfers(color_kernels(there, *response, focus_um=half_um))
         linear = (nominal + end) / 2
         parabola = 0.75 * nominal + 0.375 * end - 0.125 * other
         found[f"{half_um:g}"] = {
-            "linear": _relative_error(linear, traced),
-            "parabola": _relative_error(parabola, traced),
-            "nominal": _relative_error(nominal, traced),
+            "linear": relative_error(linear, traced),
+            "parabola": relative_error(parabola, traced),
+            "nominal": relative_error(nominal, traced),
         }
     return found
-
-
-def transfer_error(bundle: Bundle, lens: FrozenPsf, focus_um: float) -> float:
-    """Give the relative RMS error of the bundle's transfer at a focus against that of a copy."""
-    response = color_sensor(bundle).response_arrays()
-    known = color_kernels(bundle.psf, *response, focus_um=focus_um)
-    return _relative_error(_transfers(known), _transfers(color_kernels(lens, *response)))
-
-
-def _relative_error(ours: Transfer, theirs: Transfer) -> float:
-    wrong, power = (float(np.square(np.abs(part)).sum()) for part in (ours - theirs, theirs))
-    return math.sqrt(wrong / power)
-
-
-def _transfers(kernels: FieldKernels) -> Transfer:
-    """Give the transfers (height, c, n) at some shares of the largest height."""
-    heights_mm = np.array(HEIGHTS) * kernels.field_heights_mm[-1]
-    return np.stack([_transfer(kernels.at(0.0, float(at_mm))) for at_mm in heights_mm])
-
-
-def _transfer(kernels: FloatArray) -> Transfer:
-    """Give the transfer (c, n) below the highest frequency that counts, about the middle pixel."""
-    h, w = kernels.shape[-2:]
-    wide = np.zeros((len(kernels), _SPECTRUM_PX, _SPECTRUM_PX))
-    wide[:, :h, :w] = kernels
-    wide = np.roll(wide, (-(h // 2), -(w // 2)), axis=(-2, -1))
-    cycles = np.hypot(np.fft.fftfreq(_SPECTRUM_PX)[:, None], np.fft.rfftfreq(_SPECTRUM_PX))
-    return np.asarray(np.fft.rfft2(wide)[:, cycles < MOST_CYCLES])
 
 
 def gain(each_db: Sequence[float]) -> dict[str, float] | None:

@@ -16,7 +16,9 @@ from camkit.runtime.bank.psf import _in_focus
 from tests.focus_bundle import write_focus_bundle
 from tests.psf_factory import texture
 from tests.together_factory import TOGETHER
+from tools.capture.simulated import color_sensor
 from tools.comparison import unit_focus
+from tools.comparison.copies import transfer_error
 
 FOCUS_UM = {1: 30.0, 2: 0.0, 3: -25.0}
 
@@ -72,8 +74,9 @@ def test_kernels_of_a_moved_sensor_join_a_built_in_bundle() -> None:
     assert reach_um == 30.0
     assert bundle.psf.focus_um is not None
     assert bundle.psf.focus_um.tolist() == [-30.0, 30.0]
-    assert unit_focus.transfer_error(bundle, bundle.psf, 0.0) == 0
-    assert unit_focus.transfer_error(bundle, bundle.psf, 20.0) > 0.03
+    assert transfer_error(bundle.psf, bundle.psf, color_sensor(bundle)) == 0
+    moved = transfer_error(bundle.psf, bundle.psf, color_sensor(bundle), focus_um=20.0)
+    assert moved > 0.03
     blend = unit_focus.blend_errors(bundle, reach_um)
     assert set(blend) == {"-15", "15"}
     for errors in blend.values():

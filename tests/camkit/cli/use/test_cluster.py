@@ -128,6 +128,15 @@ def test_a_scheduler_without_workers_is_refused(captures: Path, tmp_path: Path) 
     assert "has no workers" in done.stderr
 
 
+@pytest.fixture
+def heeds_interrupts() -> Iterator[None]:
+    """What a shell runs in the background ignores interrupts, and its children inherit that."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeds_interrupts")
 @pytest.mark.parametrize("when", ["starting", "working"])
 def test_an_interrupt_ends_it_in_seconds_and_leaves_nothing_half_done(
     tmp_path: Path, when: str
