@@ -33,6 +33,7 @@ WINDOW_COST: Final = 1.3
 """Of a sample in a window against one in a block."""
 
 Mask = NDArray[np.bool_]
+Cells = tuple[tuple[int, int], ...]
 
 
 def explain_lights(
@@ -72,11 +73,13 @@ def explain_lights(
     weight = np.zeros(clipped.shape, dtype=np.float32)
     left = np.zeros(len(samples))
     parts = []
-    for row, column in zip(*np.nonzero(cells), strict=True):
+    waiting = clipped.copy()
+    for row, column in cells:
         own = np.zeros_like(clipped)
-        cell = np.s_[:, row * core : (row + 1) * core, column * core : (column + 1) * core]
-        own[cell] = clipped[cell]
-        top, first = (int(np.clip(i * core - MARGIN_PX, 0, side - size)) for i in (row, column))
+        cell = np.s_[:, row : row + core, column : column + core]
+        own[cell] = waiting[cell]
+        waiting[cell] = False
+        top, first = (int(np.clip(i - MARGIN_PX, 0, side - size)) for i in (row, column))
         place = np.s_[:, top : top + size, first : first + size]
         near = nearness(own[place], reach_px)
         cut = np.ascontiguousarray(unknown[place])
@@ -93,39 +96,50 @@ def explain_lights(
 
 def choose_windows(
     clipped: Mask, side_px: int, kernel_px: int | None, *, step_px: int = 1
-) -> tuple[int, Mask] | None:
+) -> tuple[int, Cells] | None:
     """Choose windows that cost less than the whole block.
 
     Args:
         clipped: (b, b) of a block, or of its squares of `step_px`.
         side_px: b.
         kernel_px: Side of the kernel; None for one that fits no window.
-        step_px: Side of the squares; divides every cell.
+        step_px: Side of the squares.
 
     Returns:
-        Side of the windows and (row, column) of their cells, of side - 2 MARGIN_PX, that hold
-        clipped samples; None where the whole block is the least work.
+        Side of the windows and the first (row, column), in samples, of the cells, of side - 2
+        MARGIN_PX, that cover the clipped samples; None where the whole block is the least work.
     """
     best, least = None, float(side_px * side_px)
     for shrink in () if kernel_px is None else SHRINKS:
         size = side_px // shrink
         core = size - 2 * MARGIN_PX
-        if (
-            side_px % shrink
-            or size % 4
-            or size < KERNEL_SHARE * (kernel_px or 0)
-            or core < step_px
-            or core % step_px
-        ):
+        narrow = size < KERNEL_SHARE * (kernel_px or 0) or core < step_px
+        if narrow or side_px % shrink or size % 4:
             continue
-        count, part = -(-side_px // core), core // step_px
-        padded = np.zeros((count * part, count * part), dtype=np.bool_)
-        padded[: clipped.shape[0], : clipped.shape[1]] = clipped
-        cells = np.asarray(padded.reshape(count, part, count, part).any(axis=(1, 3)))
-        work = float(np.count_nonzero(cells)) * size * size * WINDOW_COST
-        if work < least:
-            best, least = (size, cells), work
+        cost = size * size * WINDOW_COST
+        cells = _cover(clipped, core // step_px, most=int(least / cost))
+        if cells is not None and len(cells) * cost < least:
+            best = size, tuple((row * step_px, column * step_px) for row, column in cells)
+            least = len(cells) * cost
     return best
+
+
+def _cover(clipped: Mask, core: int, *, most: int) -> Cells | None:
+    """Cover what is clipped with squares of `core`, each from its first row and column on.
+
+    Returns:
+        First (row, column) of each square; None where it takes more than `most`.
+    """
+    waiting = clipped.copy()
+    cells: list[tuple[int, int]] = []
+    while waiting.any():
+        if len(cells) == most:
+            return None
+        row = int(waiting.any(axis=1).argmax())
+        column = int(waiting[row : row + core].any(axis=0).argmax())
+        waiting[row : row + core, column : column + core] = False
+        cells.append((row, column))
+    return tuple(cells)
 
 
 def light_share(clipped: Mask, side_px: int, kernel_px: int | None, *, step_px: int) -> float:
@@ -134,7 +148,7 @@ def light_share(clipped: Mask, side_px: int, kernel_px: int | None, *, step_px: 
     if chosen is None:
         return 1.0
     size, cells = chosen
-    return float(np.count_nonzero(cells)) * WINDOW_COST * (size / side_px) ** 2
+    return len(cells) * WINDOW_COST * (size / side_px) ** 2
 
 
 def window_px(settings: Wiener, kernel_px: int | None) -> int | None:

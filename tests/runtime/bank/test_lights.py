@@ -78,8 +78,7 @@ def test_windows_are_chosen_by_kernel_and_work(
     else:
         assert chosen is not None
         assert chosen[0] == size
-        assert np.count_nonzero(chosen[1]) == 1
-        assert chosen[1].shape == (-(-SIDE // (size - 2 * MARGIN_PX)),) * 2
+        assert chosen[1] == ((10, 10),)
         share = light_share(mask, SIDE, kernel_px, step_px=1)
         assert share == pytest.approx(WINDOW_COST * (size / SIDE) ** 2)
 
@@ -148,3 +147,23 @@ def test_away_from_lights_a_block_is_what_the_filter_alone_makes_of_it() -> None
     around = np.s_[:, 50:90, 60:100]
     error, plain_error = (np.abs(x[around] - scene[around]).mean() for x in (explained, plain))
     assert error < 0.95 * plain_error
+
+
+def test_a_light_takes_one_window_wherever_it_lies() -> None:
+    """Windows lay on a grid once: a light on its lines took four, or the whole block."""
+    for place in (64, 128, 190):
+        mask = np.zeros((SIDE, SIDE), dtype=bool)
+        mask[place - 2 : place + 2, place - 2 : place + 2] = True
+        assert choose_windows(mask, SIDE, 105) == (128, ((place - 2, place - 2),))
+
+
+def test_cells_cover_every_clipped_sample_once() -> None:
+    mask = np.random.default_rng(0).random((SIDE, SIDE)) < 1e-5
+    chosen = choose_windows(mask, SIDE, KERNEL_PX)
+    assert chosen is not None
+    size, cells = chosen
+    core = size - 2 * MARGIN_PX
+    for row, column in cells:
+        assert mask[row : row + core, column : column + core].any()
+        mask[row : row + core, column : column + core] = False
+    assert not mask.any()
