@@ -14,6 +14,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -106,29 +107,49 @@ def _process(
 def measure_trees(arguments: argparse.Namespace) -> None:
     """Compare `camkit process` of this checkout and another, each with its own bundle, in turn."""
     trees = {"other": arguments.other, "this": Path(camkit.__file__).parents[1]}
-    print("| size | CPU s, other | this | median of ratios | peak MB, other | this |")
-    print("|" + "---|" * 6)
+    heads = [f"{what}, other | this | ratio" for what in ("CPU s", "seconds", "in neither")]
+    print(f"| size | {' | '.join(heads)} | peak MB, other | this |")
+    print("|" + "---|" * (3 * len(heads) + 3))
     with tempfile.TemporaryDirectory() as folder:
         for size in arguments.sizes.split(","):
-            cpu_s: dict[str, list[float]] = {name: [] for name in trees}
-            peak_mb: dict[str, list[float]] = {name: [] for name in trees}
+            found: dict[str, list[_Cost]] = {name: [] for name in trees}
             for run in range(arguments.runs):
                 for name in list(trees)[:: -1 if run % 2 else 1]:
-                    before = os.times()
-                    result = _process(arguments, size, folder, trees[name])
-                    after = os.times()
-                    cpu_s[name].append(
-                        after.children_user
-                        + after.children_system
-                        - before.children_user
-                        - before.children_system
-                    )
-                    peak_mb[name].append(result["peak_rss_mb"])
-            ratios = [new / old for old, new in zip(cpu_s["other"], cpu_s["this"], strict=True)]
-            cells = [f"{statistics.median(cpu_s[name]):.1f}" for name in trees]
-            cells += [f"{statistics.median(ratios):.3f}"]
-            cells += [f"{statistics.median(peak_mb[name]):.0f}" for name in trees]
-            print(f"| {size} | " + " | ".join(cells) + " |")
+                    found[name].append(_cost(arguments, size, folder, trees[name]))
+            cells = []
+            for what in ("cpu_s", "seconds", "neither_s"):
+                old, new = ([getattr(cost, what) for cost in found[name]] for name in trees)
+                ratios = [b / a for a, b in zip(old, new, strict=True)]
+                cells += [f"{statistics.median(values):.1f}" for values in (old, new)]
+                cells += [f"{statistics.median(ratios):.3f}"]
+            for name in trees:
+                cells += [f"{statistics.median(cost.peak_mb for cost in found[name]):.0f}"]
+            print(f"| {size} | {' | '.join(cells)} |", flush=True)
+
+
+@dataclass(frozen=True)
+class _Cost:
+    """What one process took: of all its threads, by the clock, in neither network nor bank."""
+
+    cpu_s: float
+    seconds: float
+    neither_s: float
+    peak_mb: float
+
+
+def _cost(arguments: argparse.Namespace, size: str, folder: str, tree: Path) -> _Cost:
+    before = os.times()
+    result = _process(arguments, size, folder, tree)
+    after = os.times()
+    user_s = after.children_user - before.children_user
+    system_s = after.children_system - before.children_system
+    stages: dict[str, float] = result["seconds"]
+    return _Cost(
+        cpu_s=user_s + system_s,
+        seconds=after.elapsed - before.elapsed,
+        neither_s=sum(taken for name, taken in stages.items() if name not in TRANSFORMS),
+        peak_mb=result["peak_rss_mb"],
+    )
 
 
 def measure_tiling(arguments: argparse.Namespace) -> None:
