@@ -4,8 +4,8 @@
 
 Farther from the lights nothing is gained by an explanation, and detail is lost: Richardson-Lucy in
 few rounds leaves more unexplained than the noise (measured by tools/clipped_lights.py).
-Where few samples are clipped, small windows do: nearly all of the kernel must fit one, and its OTF
-there is the block's at every second, third or fourth frequency.
+Where few samples are clipped, small windows do: most of the kernel must fit one, and its OTF there
+is the block's at every second, third or fourth frequency.
 """
 
 from functools import lru_cache
@@ -21,16 +21,17 @@ from camkit.runtime.bank.blocks import Block, taper_edges
 from camkit.runtime.bank.richardson_lucy import richardson_lucy
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
 
-MARGIN_PX: Final = 32
+MARGIN_PX: Final = 20
 """Surroundings that a window sees around the samples it explains."""
-RING_PX: Final = 16
+RING_PX: Final = 8
 """Of the margin is tapered: a window is no periodic picture."""
 SHRINKS: Final = (4, 3, 2)
 """Sides of windows, as parts of a block's side."""
-KERNEL_SHARE: Final = 0.95
-"""Of a kernel must fit a window: the rest wraps around it, far from the lights in its middle."""
-WINDOW_COST: Final = 1.3
-"""Of a sample in a window against one in a block."""
+KERNEL_SHARE: Final = 0.5
+"""Of a kernel's side must fit a window. The rest, some hundredths of its light, wraps around to
+where the explanation no longer counts; half as much was no better (tools/clipped_lights.py)."""
+WINDOW_EXTRA: Final = 64**2
+"""Samples that take as long as what every window takes besides its own (measured)."""
 
 Mask = NDArray[np.bool_]
 Cells = tuple[tuple[int, int], ...]
@@ -116,7 +117,7 @@ def choose_windows(
         narrow = size < KERNEL_SHARE * (kernel_px or 0) or core < step_px
         if narrow or side_px % shrink or size % 4:
             continue
-        cost = size * size * WINDOW_COST
+        cost = size * size + WINDOW_EXTRA
         cells = _cover(clipped, core // step_px, most=int(least / cost))
         if cells is not None and len(cells) * cost < least:
             best = size, tuple((row * step_px, column * step_px) for row, column in cells)
@@ -148,13 +149,13 @@ def light_share(clipped: Mask, side_px: int, kernel_px: int | None, *, step_px: 
     if chosen is None:
         return 1.0
     size, cells = chosen
-    return len(cells) * WINDOW_COST * (size / side_px) ** 2
+    return len(cells) * (size * size + WINDOW_EXTRA) / side_px**2
 
 
 def window_px(settings: Wiener, kernel_px: int | None) -> int | None:
     """Give the side that windows must have at least; None where whole blocks are explained."""
     reach_px = settings.clip_reach_px
-    return None if reach_px is None or reach_px > MARGIN_PX // 2 else kernel_px
+    return None if reach_px is None or reach_px > MARGIN_PX - RING_PX // 2 else kernel_px
 
 
 def nearness(clipped: Mask, reach_px: int | None) -> FloatArray:

@@ -7,7 +7,7 @@ from camkit.bundle.stages import Wiener
 from camkit.runtime.bank.blocks import Block, taper_edges, to_otf
 from camkit.runtime.bank.lights import (
     MARGIN_PX,
-    WINDOW_COST,
+    WINDOW_EXTRA,
     choose_windows,
     explain_lights,
     light_share,
@@ -58,9 +58,9 @@ def test_nearness_falls_from_one_to_nothing_by_distance() -> None:
     ("cells", "kernel_px", "size"),
     [
         ([(10, 10)], 21, 96),
-        ([(10, 10)], 105, 128),
-        ([(10, 10)], 150, 192),
-        ([(10, 10)], 210, None),
+        ([(10, 10)], 210, 128),
+        ([(10, 10)], 300, 192),
+        ([(10, 10)], 386, None),
         ([(10, 10)], None, None),
         ([(i, j) for i in range(0, 384, 8) for j in range(0, 384, 8)], 21, None),
     ],
@@ -80,7 +80,7 @@ def test_windows_are_chosen_by_kernel_and_work(
         assert chosen[0] == size
         assert chosen[1] == ((10, 10),)
         share = light_share(mask, SIDE, kernel_px, step_px=1)
-        assert share == pytest.approx(WINDOW_COST * (size / SIDE) ** 2)
+        assert share == pytest.approx((size**2 + WINDOW_EXTRA) / SIDE**2)
 
 
 def test_windows_explain_what_the_whole_block_explains() -> None:
@@ -124,12 +124,12 @@ def test_a_round_of_the_second_power_goes_about_twice_as_far() -> None:
     assert misfit(7, 1.0) < misfit(3, 2.0) < misfit(4, 1.0)
 
 
-def test_a_kernel_a_little_wider_than_a_window_still_fits_it() -> None:
+def test_a_kernel_twice_as_wide_as_a_window_still_fits_it() -> None:
     mask = np.zeros((SIDE, SIDE), dtype=bool)
     mask[60, 70] = True
     half = SIDE // 2
-    assert choose_windows(mask, SIDE, int(half / 0.96)) is not None
-    assert choose_windows(mask, SIDE, int(half / 0.9)) is None
+    assert choose_windows(mask, SIDE, 2 * half) is not None
+    assert choose_windows(mask, SIDE, 2 * half + 2) is None
 
 
 def test_away_from_lights_a_block_is_what_the_filter_alone_makes_of_it() -> None:
@@ -154,7 +154,7 @@ def test_a_light_takes_one_window_wherever_it_lies() -> None:
     for place in (64, 128, 190):
         mask = np.zeros((SIDE, SIDE), dtype=bool)
         mask[place - 2 : place + 2, place - 2 : place + 2] = True
-        assert choose_windows(mask, SIDE, 105) == (128, ((place - 2, place - 2),))
+        assert choose_windows(mask, SIDE, 210) == (128, ((place - 2, place - 2),))
 
 
 def test_cells_cover_every_clipped_sample_once() -> None:
