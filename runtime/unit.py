@@ -133,11 +133,19 @@ def read_unit(path: Path) -> Unit:
     if not isinstance(table.get("measured", {}), dict):
         raise ContractError(f"{path}: measured must be a table")
     for key, value in facts.items():
-        if not isinstance(value, int | float) or isinstance(value, bool) or not isfinite(value):
+        if not isinstance(value, int | float) or isinstance(value, bool) or not _is_finite(value):
             raise ContractError(f"{path}: facts.{key} must be a number; got {value!r}")
     return Unit(
         name=name, facts={key: float(v) for key, v in facts.items()}, **_identity(table, path)
     )
+
+
+def _is_finite(value: float) -> bool:
+    """Tell whether a number is one that fits a float."""
+    try:
+        return isfinite(value)
+    except OverflowError:
+        return False
 
 
 def _identity(table: Mapping[str, Any], path: Path) -> dict[str, str]:
@@ -163,7 +171,8 @@ def format_unit(name: str, identity: Mapping[str, str], measured: Mapping[str, f
         identity: `bundle_sha256` or `lens_sha256`.
         measured: Numbers by name with unit: its focus among the facts, the rest beside them.
     """
-    lines = [f"{key} = {json.dumps(value)}" for key, value in (*identity.items(), ("name", name))]
+    texts = *identity.items(), ("name", name)
+    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in texts]
     facts = {key: value for key, value in measured.items() if key == FOCUS}
     rest = {key: value for key, value in measured.items() if key != FOCUS}
     for title, table in (("facts", facts), ("measured", rest)):

@@ -265,7 +265,7 @@ def chosen_methods(arguments: argparse.Namespace, bundle: Bundle) -> list[str]:
     """Give the methods asked for, or the usual ones and every size that the bundle holds."""
     if arguments.methods:
         return str(arguments.methods).split(",")
-    return [*DEFAULT_METHODS, *(size for size in SIZES if size in bundle.manifest.networks)]
+    return [*DEFAULT_METHODS, *(size for size in SIZES if size in bundle.manifest.sizes)]
 
 
 def isos_of(arguments: argparse.Namespace) -> list[float]:

@@ -52,7 +52,8 @@ class Disc:
 def edges(rng: Generator, side_px: int) -> FloatArray:
     """Draw one to three straight edges between even colours, (3, side, side) linear Rec.709.
 
-    Every edge falls within one pixel: pixels hold the area that lies on either side.
+    Every edge falls within one pixel, by its distance from the middle of the pixel: up to 0.04 of
+    the step from the area that lies on either side.
     """
     y, x = np.mgrid[:side_px, :side_px] - (side_px - 1) / 2
     dark = _log_uniform(rng, DARK)

@@ -52,6 +52,7 @@ class FreezeGrid:
             the optics.
         energy: Least share of the light of every colour that the kernels must hold.
         max_side_px: Largest odd kernel side.
+        least_side_px: Smallest one.
         least_energy: What kernels of that side must hold where they do not hold `energy`; None:
             `energy`.
     """
@@ -61,6 +62,7 @@ class FreezeGrid:
     depths_mm: tuple[float, ...] = ()
     energy: float = 0.995
     max_side_px: int = 151
+    least_side_px: int = 3
     least_energy: float | None = None
 
     def __post_init__(self) -> None:
@@ -68,10 +70,9 @@ class FreezeGrid:
             raise ContractError(f"a PSF needs 2 fields and 1 wavelength; got {self}")
         if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
             raise ContractError(f"depths must increase from above 0 mm; got {self.depths_mm}")
-        if self.max_side_px % 2 == 0 or not 0 < self.energy <= 1:
-            raise ContractError(
-                f"need an odd side and an energy in 0..1; got {self.max_side_px}, {self.energy}"
-            )
+        sides = self.least_side_px, self.max_side_px
+        if not all(side % 2 for side in sides) or not 0 < self.energy <= 1:
+            raise ContractError(f"need odd sides and an energy in 0..1; got {sides}, {self.energy}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +172,7 @@ def with_focus(
     grid = FreezeGrid(
         wavelengths=psf.wavelengths_um.size,
         depths_mm=tuple(psf.depths_mm.tolist()),
-        energy=1.0,
+        least_side_px=side_px,
         max_side_px=side_px,
         least_energy=0.0,
     )
@@ -268,7 +269,7 @@ def _smallest_side(traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid) -
     full = torch.stack([t.kernels * t.energy_kept[..., None, None] for t in traced])
     colours = torch.einsum("cw,dfwij->dfcij", weights, full)
     kept = 0.0
-    for side_px in range(3, grid.max_side_px + 1, 2):
+    for side_px in range(grid.least_side_px, grid.max_side_px + 1, 2):
         kept = float(_centre(colours, side_px).sum((-2, -1)).min())
         if kept >= grid.energy:
             return side_px, kept

@@ -10,14 +10,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol, cast
 
+from pydantic import ValidationError
+
 from camkit.bundle.stages import Together
+from camkit.bundle.stages.together import Spread
 from camkit.errors import ContractError, UnsupportedError
 from camkit.kinds import find_kind
 
-WIENER: Final = re.compile(r"^\[wiener\]\n(?:(?!\[).*\n|\n)*", re.MULTILINE)
-TOGETHER: Final = re.compile(
-    r"^\[wiener\.together(?:\.spread)?\]\n(?:(?!\[).*\n|\n)*", re.MULTILINE
+_REST: Final = r"[ \t]*(?:#.*)?\n(?:(?!\[).*\n|\n)*"
+WIENER: Final = re.compile(r"^\[wiener\]" + _REST, re.MULTILINE)
+TOGETHER: Final = re.compile(r"^\[wiener\.together(?:\.spread)?\]" + _REST, re.MULTILINE)
+_TRIED: Final = Together(
+    noise=(0.0,),
+    noise_rise=(0.0,),
+    scale=1.0,
+    exponent=2.0,
+    follow=0.0,
+    own=1.0,
+    mistrust=0.0,
+    spread=Spread(heights_mm=(0.0,), frequencies=(0.0, 1.0), variance=(((0.0, 0.0),),)),
 )
+"""Numbers to try whether a recipe takes any."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +40,7 @@ class BankFitOptions:
     Attributes:
         pictures: Folder to draw scenes from; None for procedural ones.
         recipe_folder: For a lens that the recipe names by its path.
+        output_folder: Where the recipe with the numbers will lie; None for the same.
         cache_folder: Where traced kernels are kept.
         samples: How many are photographed.
         steps: Of the descent.
@@ -39,11 +53,13 @@ class BankFitOptions:
     samples: int = 240
     steps: int = 160
     seed: int = 0
+    output_folder: Path | None = None
 
     def __post_init__(self) -> None:
-        if self.samples < 1 or self.steps < 1:
+        if self.samples < 1 or self.steps < 1 or self.seed < 0:
             raise ContractError(
-                f"samples and steps must be >= 1; got {self.samples} and {self.steps}"
+                "samples and steps must be >= 1, the seed >= 0; got "
+                f"{self.samples}, {self.steps}, {self.seed}"
             )
 
 
@@ -84,13 +100,22 @@ def bank_fitting_kind(name: str) -> BankFittingKind:
     return cast("BankFittingKind", part.BANK_FITTING)
 
 
+def check_text(recipe: str) -> None:
+    """Try whether a recipe takes numbers, before they are sought.
+
+    Raises:
+        ContractError: As `with_bank`.
+    """
+    with_bank(recipe, _TRIED)
+
+
 def with_bank(recipe: str, together: Together) -> str:
     """Give the text of a recipe with these numbers in its table [wiener], and nothing else changed.
 
     Raises:
         ContractError: If it has no such table, or says them in another way than this writes them.
     """
-    plain = TOGETHER.sub("", recipe)
+    plain = TOGETHER.sub("", recipe if recipe.endswith("\n") else recipe + "\n")
     found = WIENER.search(plain)
     if found is None:
         raise ContractError("the recipe has no table [wiener] to put the numbers into")
@@ -100,7 +125,11 @@ def with_bank(recipe: str, together: Together) -> str:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ContractError(f"the recipe states its bank in a way of its own: {error}") from error
-    if Together.model_validate(table["wiener"].get("together")) != together:
+    try:
+        written = Together.model_validate(table["wiener"].get("together"))
+    except ValidationError:
+        written = None
+    if written != together:
         raise ContractError("the recipe states its bank in a way of its own; take that out first")
     return text
 

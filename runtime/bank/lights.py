@@ -62,7 +62,7 @@ def explain_lights(
     clipped = block.unknown
     rounds, reach_px = settings.clip_iterations, settings.clip_reach_px
     power = settings.clip_power
-    chosen = choose_windows(np.asarray(clipped.any(axis=0)), side, window_px(settings, kernel_px))
+    chosen = choose_windows(np.asarray(clipped.any(axis=0)), side, fitted_px(settings, kernel_px))
     if chosen is None or reach_px is None:
         near = nearness(clipped, reach_px)
         found = richardson_lucy(samples, block.otf, background, rounds, unknown, power=power)
@@ -152,8 +152,8 @@ def light_share(clipped: Mask, side_px: int, kernel_px: int | None, *, step_px: 
     return len(cells) * (size * size + WINDOW_EXTRA) / side_px**2
 
 
-def window_px(settings: Wiener, kernel_px: int | None) -> int | None:
-    """Give the side that windows must have at least; None where whole blocks are explained."""
+def fitted_px(settings: Wiener, kernel_px: int | None) -> int | None:
+    """Give the side of the kernel to choose windows by; None where whole blocks are explained."""
     reach_px = settings.clip_reach_px
     return None if reach_px is None or reach_px > MARGIN_PX - RING_PX // 2 else kernel_px
 

@@ -13,9 +13,9 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Final
@@ -57,19 +57,20 @@ class Decoder:
         self.complaints.close()
 
 
-_AHEAD: ContextVar[list[Decoder] | None] = ContextVar("decoder_ahead", default=None)
+_AHEAD: Final[deque[Decoder]] = deque()
+"""Children that wait, for whichever thread is first; taking one of a deque is atomic."""
 
 
 @contextmanager
 def decoder_ahead() -> Iterator[None]:
-    """Have a child make itself ready; the first order within the block is given to it."""
-    waiting = [_started([str(os.getpid())], stdin=subprocess.PIPE)]
-    token = _AHEAD.set(waiting)
+    """Have a child make itself ready; the first order of any thread is given to it."""
+    decoder = _started([str(os.getpid())], stdin=subprocess.PIPE)
+    _AHEAD.append(decoder)
     try:
         yield
     finally:
-        _AHEAD.reset(token)
-        for decoder in waiting:
+        with contextlib.suppress(ValueError):  # it was given an order, which ends it
+            _AHEAD.remove(decoder)
             decoder.end()
 
 
@@ -89,12 +90,11 @@ def given(order: Sequence[str]) -> Iterator[Decoder]:
 
 def _waiting(order: Sequence[str]) -> Decoder | None:
     """Give the child that was started ahead, with its order; None without one."""
-    waiting = _AHEAD.get()
     try:
-        decoder = waiting.pop() if waiting else None
-    except IndexError:  # another thread was faster
+        decoder = _AHEAD.pop()
+    except IndexError:
         return None
-    if decoder is None or decoder.take(order):
+    if decoder.take(order):
         return decoder
     decoder.end()
     return None

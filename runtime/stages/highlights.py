@@ -125,7 +125,12 @@ def _kernels(job: Job) -> StreakKernels:
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # its counts never join
-    kernels = color_kernels(bundle.psf, *sensor.response_arrays(), depth_mm=job.options.depth_mm)
+    kernels = color_kernels(
+        bundle.psf,
+        *sensor.response_arrays(),
+        depth_mm=job.options.depth_mm,
+        focus_um=job.options.focus_um,
+    )
     scaled = kernels.scaled(job.placement.kernel_scale)
     reach_px = round(bundle.streaks.reach_px * job.placement.kernel_scale)
     return streak_kernels(scaled.at(0.0, 0.0), sample_sites(job.capture.cfa), reach_px)

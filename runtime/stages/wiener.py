@@ -19,7 +19,7 @@ from camkit.runtime.bank.blocks import (
     cut_block_px,
     lay_spans,
 )
-from camkit.runtime.bank.lights import light_share, window_px
+from camkit.runtime.bank.lights import fitted_px, light_share
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.content import LIGHT_PX
 from camkit.runtime.job.job import Job
@@ -171,7 +171,7 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     set_up = 1 + KERNEL_BLOCKS * _kernel_share(subject, columns)
     blocks = np.full((len(rows), len(columns)), set_up * speed.block_s)
     if subject.content is not None and entry.clip_iterations:
-        kernel_px = window_px(entry, max(subject.bundle.psf.kernels.shape[-2:]))
+        kernel_px = fitted_px(entry, max(subject.bundle.psf.kernels.shape[-2:]))
         work_share = _light_work(subject.content.lights, (rows, columns), block_px, kernel_px)
         blocks += work_share * (speed.clipped_block_s - speed.block_s)
     if work.labels is not None:

@@ -51,6 +51,7 @@ def test_a_unit_without_a_name_has_that_of_its_file(tmp_path: Path) -> None:
         (f'bundle_sha256 = "{HASH}"\nfacts = 3', "facts a table"),
         (f'bundle_sha256 = "{HASH}"\n[facts]\na = "b"', r"facts\.a must be a number; got 'b'"),
         (f'bundle_sha256 = "{HASH}"\n[facts]\na = true', r"facts\.a must be a number; got True"),
+        (f'lens_sha256 = "{HASH}"\n[facts]\na = 1{"0" * 400}', r"facts\.a must be a number"),
         ("no toml at all", "is no TOML"),
     ],
 )
@@ -156,3 +157,11 @@ def test_the_bank_takes_the_kernels_of_the_unit_and_says_so(tmp_path: Path) -> N
     other, said = restored(moved, 25.0)
     assert said["focus_um"] == 25.0
     assert np.abs(other - nominal).max() > 0.01
+
+
+def test_a_name_may_have_any_letters(tmp_path: Path) -> None:
+    path = tmp_path / "unit.toml"
+    path.write_text(
+        format_unit('é \U0001f4f7 "x"', {"lens_sha256": HASH}, {"focus_um": 3.0}), encoding="utf-8"
+    )
+    assert read_unit(path).name == 'é \U0001f4f7 "x"'

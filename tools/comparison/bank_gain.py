@@ -10,7 +10,6 @@ gains are paired, with their standard error over captures, and told by ISO, copy
 
 import argparse
 import json
-import math
 import statistics
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -34,6 +33,7 @@ from camkit.report.quality import (
     read_picture,
 )
 from tools.comparison.compact_json import to_compact_json
+from tools.comparison.paired import mean_and_error
 from tools.comparison.peers import PEERS
 from tools.comparison.photograph import (
     Photograph,
@@ -160,13 +160,13 @@ def _psnr_db(restore: Restorer, taken: Photograph) -> float:
     return psnr(*inner_srgb(restore(taken), taken.sharp))
 
 
-def gains(found: Sequence[Judged]) -> dict[str, dict[str, float]]:
-    """Give what `together` gains over the others, with its standard error."""
+def gains(found: Sequence[Judged]) -> dict[str, dict[str, float | None]]:
+    """Give what `together` gains over the others, with its standard error over copies."""
     told = {}
     for other in (ALONE, PEER):
         each = [one.psnr_db[TOGETHER] - one.psnr_db[other] for one in found]
-        error = statistics.stdev(each) / math.sqrt(len(each)) if len(each) > 1 else 0.0
-        told[other] = {"mean": statistics.fmean(each), "se": error}
+        mean_db, error_db = mean_and_error(each, [one.copy for one in found])
+        told[other] = {"mean": mean_db, "se": error_db}
     return told
 
 

@@ -27,6 +27,7 @@ from camkit.report.fabricated_psf import fabricated_psf
 from camkit.report.quality import FABRICATION_SEEDS, FIELD_SHARES, Shot, list_set, read_picture
 from camkit.scenes.clean import night
 from tools.comparison.photograph import bundle_restorer, photograph
+from tools.comparison.rows import check_camera
 
 SIDE_PX: Final = 256
 ENLARGED: Final = 2
@@ -64,6 +65,7 @@ def main(words: Sequence[str] | None = None) -> None:
 def make(arguments: argparse.Namespace) -> None:
     """Write the pictures and the key."""
     bundles = [open_bundle(find_bundle(name)) for name in (arguments.before, arguments.after)]
+    check_camera(*bundles)
     restore = [bundle_restorer(bundle, size=arguments.size) for bundle in bundles]
     rng = np.random.default_rng(arguments.seed)
 
@@ -101,10 +103,11 @@ def counted(folder: Path) -> dict[str, int]:
     """Give how often each was found better.
 
     Raises:
-        ContractError: If a vote is none.
+        ContractError: If a vote is none, or a picture has two or none.
     """
     key = json.loads((folder / KEY).read_text(encoding="utf-8"))
     found = {"before": 0, "after": 0, "equal": 0}
+    waiting = set(key)
     for line in (folder / VOTES).read_text(encoding="utf-8").splitlines():
         name, _, vote = (word.strip() for word in line.partition(":"))
         if not line.strip():
@@ -113,9 +116,14 @@ def counted(folder: Path) -> dict[str, int]:
             raise ContractError(
                 f"a vote is NN: left, right or equal, of a picture in {folder.name}; got {line!r}"
             )
+        if name not in waiting:
+            raise ContractError(f"{name} has two votes")
+        waiting.remove(name)
         left = key[name]["left"]
         right = "after" if left == "before" else "before"
         found[{"left": left, "right": right}.get(vote, vote)] += 1
+    if waiting:
+        raise ContractError(f"no vote for {', '.join(sorted(waiting))}")
     return found
 
 

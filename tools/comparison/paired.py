@@ -5,7 +5,7 @@ error is that of the mean over pictures, each with its own mean over captures.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -120,12 +120,28 @@ def _split(
 
 
 def _gain(gains: Sequence[tuple[Measurement, float]]) -> dict[str, Any]:
-    pictures: dict[tuple[str, str], list[float]] = {}
-    for m, gain in gains:
-        pictures.setdefault((m.set_name, m.picture), []).append(gain)
-    means = [float(np.mean(values)) for values in pictures.values()]
-    mean = {"db": round(float(np.mean([gain for _, gain in gains])), 3), "captures": len(gains)}
-    if len(means) < 2:
-        return mean
-    error = float(np.std(means, ddof=1)) / math.sqrt(len(means))
-    return mean | {"error_db": round(error, 3)}
+    mean_db, error_db = mean_and_error(
+        [gain for _, gain in gains], [(m.set_name, m.picture) for m, _ in gains]
+    )
+    mean = {"db": round(mean_db, 3), "captures": len(gains)}
+    return mean if error_db is None else mean | {"error_db": round(error_db, 3)}
+
+
+def mean_and_error(
+    gains: Sequence[float], groups: Sequence[Hashable]
+) -> tuple[float, float | None]:
+    """Give a mean, and its standard error from the means of groups that are independent.
+
+    Args:
+        gains: Of captures.
+        groups: What each belongs to: its picture, or its copy of the lens.
+
+    Returns:
+        The error is None with fewer than two groups.
+    """
+    parts: dict[Hashable, list[float]] = {}
+    for gain, group in zip(gains, groups, strict=True):
+        parts.setdefault(group, []).append(gain)
+    means = [float(np.mean(part)) for part in parts.values()]
+    error = float(np.std(means, ddof=1)) / math.sqrt(len(means)) if len(means) > 1 else None
+    return float(np.mean(gains)), error

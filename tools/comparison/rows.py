@@ -83,12 +83,12 @@ def make_rows(
     )
     rows = [_row(bundle, name, tuned, isos, base) for name in methods]
     if before is not None:
-        _check_camera(before, bundle)
+        check_camera(before, bundle)
         old = [n for n in methods if n in BANK_METHODS or n in before.manifest.sizes]
         found = (_row(before, name, tuned, isos, identity_of(base, BEFORE)) for name in old)
         rows += [replace(row, name=row.name + BEFORE) for row in found]
     for rival in rivals:
-        _check_camera(rival.bundle, bundle)
+        check_camera(rival.bundle, bundle)
         rows.append(
             Row(
                 name=rival.label,
@@ -99,7 +99,12 @@ def make_rows(
     return rows
 
 
-def _check_camera(other: Bundle, bundle: Bundle) -> None:
+def check_camera(other: Bundle, bundle: Bundle) -> None:
+    """Refuse two bundles that are not of one camera.
+
+    Raises:
+        ContractError: If their sensors differ.
+    """
     if other.manifest.sensor != bundle.manifest.sensor:
         raise ContractError(
             f"{other.path.name} is another camera than {bundle.path.name}; compare bundles of one "

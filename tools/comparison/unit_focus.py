@@ -17,8 +17,6 @@ that are blended, linearly as in use or by a parabola: the same error, at a half
 
 import argparse
 import json
-import math
-import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,6 +58,7 @@ from tools.capture.simulated import captured, color_sensor
 from tools.comparison.bank_gain import ALONE, TOGETHER, restoring_together, together_of
 from tools.comparison.compact_json import to_compact_json
 from tools.comparison.copies import relative_error, transfer_error, transfers
+from tools.comparison.paired import mean_and_error
 
 ISOS: Final = (100.0, 1600.0)
 TARGET_PX: Final = 640
@@ -91,7 +90,10 @@ class Judged:
         """Give plain JSON values."""
         said = {"why": self.why} if self.found is None else self.found.to_json()
         error = {"nominal": self.error[0], "unit": self.error[1]}
-        gains = {bank: gain(each) for bank, each in self.gains_db.items()}
+        pictures = {
+            bank: [i // len(ISOS) for i in range(len(g))] for bank, g in self.gains_db.items()
+        }
+        gains = {bank: gain(each, pictures[bank]) for bank, each in self.gains_db.items()}
         return {"copy": self.copy, **said, "transfer_error": error, "gain": gains}
 
 
@@ -129,7 +131,13 @@ def main(words: Sequence[str] | None = None) -> None:
         "blend": blend_errors(bundle, range_um),
     }
     for part, judged in parts.items():
-        gains = {bank: gain([db for one in judged for db in one.gains_db[bank]]) for bank in banks}
+        gains = {
+            bank: gain(
+                [db for one in judged for db in one.gains_db[bank]],
+                [one.copy for one in judged for _ in one.gains_db[bank]],
+            )
+            for bank in banks
+        }
         record[part] = {"gain": gains, "each": [one.to_json() for one in judged]}
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     arguments.output.write_text(to_compact_json(record, DIGITS) + "\n", encoding="utf-8")
@@ -251,12 +259,12 @@ def blend_errors(bundle: Bundle, range_um: float) -> dict[str, dict[str, float]]
     return found
 
 
-def gain(each_db: Sequence[float]) -> dict[str, float] | None:
-    """Give the mean gain with its standard error; None of nothing."""
+def gain(each_db: Sequence[float], groups: Sequence[int]) -> dict[str, float | None] | None:
+    """Give the mean gain with its standard error over groups; None of nothing."""
     if not each_db:
         return None
-    error = statistics.stdev(each_db) / math.sqrt(len(each_db)) if len(each_db) > 1 else 0.0
-    return {"mean_db": statistics.fmean(each_db), "se_db": error, "captures": len(each_db)}
+    mean_db, error_db = mean_and_error(each_db, groups)
+    return {"mean_db": mean_db, "se_db": error_db, "captures": len(each_db)}
 
 
 if __name__ == "__main__":

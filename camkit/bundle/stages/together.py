@@ -5,7 +5,7 @@ from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
-from camkit.bundle.entry import Entry, NonNegative, Positive
+from camkit.bundle.entry import Entry, NonNegative
 
 BAND: Final = (0.015, 0.25)
 """Cycles per pixel in which the power of a block is measured."""
@@ -13,6 +13,7 @@ BAND_STEP: Final = 3
 """Of every so many frequencies along either axis one is measured."""
 
 Line = tuple[float, ...]
+Logarithm = Annotated[float, Field(ge=-20, le=20)]
 
 
 class Spread(Entry):
@@ -58,13 +59,13 @@ class Together(Entry):
         spread: That variance.
     """
 
-    noise: Line
-    noise_rise: Line
-    scale: Positive
-    exponent: NonNegative
+    noise: tuple[Logarithm, ...]
+    noise_rise: tuple[Logarithm, ...]
+    scale: Annotated[float, Field(gt=0, le=1e6)]
+    exponent: Annotated[float, Field(ge=0, le=8)]
     follow: Annotated[float, Field(ge=0, le=1)]
-    own: NonNegative
-    mistrust: NonNegative
+    own: Annotated[float, Field(gt=0, le=1e6)]
+    mistrust: Annotated[float, Field(ge=0, le=1e6)]
     spread: Spread
 
     @model_validator(mode="after")

@@ -15,7 +15,7 @@ class Undistort(StageEntry):
     """Removal of the radial distortion of the frozen PSF, per channel.
 
     Attributes:
-        interpolation: Between pixels: lanczos (8x8), as before, or cubic (4x4) for a quarter of
+        interpolation: Between pixels: lanczos (8x8), as before, or cubic (4x4) for a third of
             its time (format 2.4).
     """
 

@@ -19,7 +19,7 @@ def fit_bank(
     ] = None,
     samples: Annotated[int, typer.Option(help="Samples that are photographed.")] = 240,
     steps: Annotated[int, typer.Option(help="Steps of the descent.")] = 160,
-    seed: Annotated[int, typer.Option(help="Of samples and descent.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of samples and descent.")] = 0,
     cache_dir: Annotated[Path, typer.Option(help="Folder for traced kernels.")] = Path("runs"),
     overwrite: Overwrite = False,
     json_: Json = False,
@@ -33,17 +33,21 @@ def fit_bank(
     from camkit.models_def.training.bank_fitting import (
         BankFitOptions,
         bank_fitting_kind,
+        check_text,
         with_bank,
     )
     from camkit.models_def.training.kind import read_recipe
     from camkit.runtime.output.part_file import atomic_output
 
-    plan = read_recipe(recipe)
+    plan, text = read_recipe(recipe), recipe.read_text(encoding="utf-8")
+    check_text(text)
+    output.parent.mkdir(parents=True, exist_ok=True)
     found = bank_fitting_kind(plan.kind).fit(
         plan,
         BankFitOptions(
             pictures=data,
             recipe_folder=recipe.parent,
+            output_folder=output.parent,
             cache_folder=cache_dir,
             samples=samples,
             steps=steps,
@@ -51,9 +55,8 @@ def fit_bank(
         ),
         lambda line: say(line, err=True),
     )
-    text = with_bank(recipe.read_text(encoding="utf-8"), found.together)
     with atomic_output(output) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_text(with_bank(text, found.together), encoding="utf-8")
     numbers = found.together.model_dump(mode="json", exclude={"spread"})
     told = {"samples": found.samples, "steps": found.steps, "gain_db": round(found.gain_db, 3)}
     print_report({"output": str(output), **told, **numbers}, json_)

@@ -4,9 +4,10 @@ With `--unit` it measures one camera body instead (unit.py).
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 import typer
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from camkit.models_def.optics.diffraction.freezing import PlateReport
     from camkit.models_def.optics.freeze import FreezeGrid, FreezeReport
     from camkit.models_def.optics.optics import Optics
+
+LIMIT_DB: Final = 0.05
 
 
 def freeze(
@@ -53,7 +56,7 @@ def freeze(
         str | None,
         typer.Option(help="Object distances, near to far, such as 500,700,1500; default: lens's."),
     ] = None,
-    limit_db: Annotated[float, typer.Option(help="Mean loss allowed for the samples.")] = 0.05,
+    limit_db: Annotated[float, typer.Option(help="Mean loss allowed for the samples.")] = LIMIT_DB,
     energy: Annotated[
         float | None,
         typer.Option(
@@ -86,9 +89,21 @@ def freeze(
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
     refuse_existing([out, stress_out, report], overwrite=overwrite)
-    depths, recipe = _depths(depths_mm), _default_recipe() if recipe is None else recipe
+    depths = _depths(depths_mm)
     if unit or captures:
-        _check_unit(unit=unit, beside=stress_out or report)
+        from camkit.bundle.reader import SUFFIX
+
+        beside = {
+            "--stress-out": stress_out,
+            "--report": report,
+            "--limit-db": None if limit_db == LIMIT_DB else limit_db,
+            "--energy": energy,
+            "--max-side-px": max_side_px,
+            "--recipe": recipe if optics.suffix.lower() == SUFFIX else None,
+        }
+        _check_unit(unit=unit, beside=[name for name, value in beside.items() if value is not None])
+    recipe = _default_recipe() if recipe is None else recipe
+    if unit or captures:
         from camkit.cli.design.unit import measure_unit
 
         print_report(measure_unit(optics, captures or [], out, recipe, depths, focus_um), json_)
@@ -168,11 +183,11 @@ def _camera_of(recipe: Path) -> "tuple[ColorSensor, Wiener | None]":
     return chosen.sensor, next((stage for stage in stages if isinstance(stage, Wiener)), None)
 
 
-def _check_unit(*, unit: bool, beside: Path | None) -> None:
+def _check_unit(*, unit: bool, beside: Sequence[str]) -> None:
     if not unit:
         raise ContractError("captures are for --unit, which measures the camera that took them")
-    if beside is not None:
-        raise ContractError("--unit writes the unit alone; leave --stress-out and --report out")
+    if beside:
+        raise ContractError(f"--unit freezes nothing; leave {', '.join(beside)} out")
 
 
 def _tell(line: str) -> None:

@@ -1,7 +1,7 @@
 """The numbers of a Wiener bank that restores colours together, fitted to a camera.
 
     copies of the lens -> spread of the transfer
-    training scenes -> photographed, developed -> descent on what the bank leaves -> numbers
+    pictures, drawn scenes -> photographed, developed -> descent on what the bank leaves -> numbers
 
 The loss is that of training: squared errors of stabilised planes, a sample's error by its
 logarithm, so that dark and bright samples, the axis and the corner, count alike. Samples with
@@ -61,6 +61,8 @@ FIRST: Final = Together(
 RATE: Final = 0.04
 LAST_RATE: Final = 0.002
 BATCH: Final = 6
+FOLLOW: Final = -4
+"""Place of `follow` among the values that the descent moves."""
 HELD_OUT: Final = 4
 """Every so many samples one is kept to judge by."""
 
@@ -107,20 +109,20 @@ def spread_of(bank: PsfBank) -> Spread:
 def transfer_errors(bank: PsfBank) -> tuple[float, ...]:
     """Give how far the transfer of every copy lies off the frozen one, those to train on first.
 
-    Root of the mean |H_copy - H|^2 over that of |H|^2, below 0.3 cycles per pixel, over all fields
-    and colours (and depths of a copy).
+    Root of the mean |H_copy - H|^2 over that of |H_copy|^2, below 0.3 cycles per pixel, over all
+    fields and colours (and depths of a copy); tools/comparison/copies.py has it of frozen PSFs.
     """
     places = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX)[None])
-    inside = torch.from_numpy((places > 0) & (places < JUDGED_BELOW))
-    squares, powers = np.zeros(len(bank.copies)), 0.0
+    inside = torch.from_numpy(places < JUDGED_BELOW)
+    squares, powers = np.zeros(len(bank.copies)), np.zeros(len(bank.copies))
     for height in bank.copy_heights_mm.tolist():
         frozen = to_otf(bank.frozen_kernels(0.0, height), (GRID_PX, GRID_PX))[..., inside]
-        powers += float(frozen.abs().square().sum())
         for copy in range(len(bank.copies)):
             own = to_otf(bank.blur_kernels(copy, 0.0, height), (GRID_PX, GRID_PX))[..., inside]
             squares[copy] += float((own - frozen).abs().square().sum())
-    of_copies = squares.reshape(-1, bank.depths).mean(axis=1)
-    return tuple(float(error) for error in np.sqrt(of_copies / powers))
+            powers[copy] += float(own.abs().square().sum())
+    wrong, whole = (sums.reshape(-1, bank.depths).sum(axis=1) for sums in (squares, powers))
+    return tuple(float(error) for error in np.sqrt(wrong / whole))
 
 
 def _line(values: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[float, ...]:
@@ -170,6 +172,8 @@ def fit_bank(recipe: BayerRecipe, bank: PsfBank, options: BankFitOptions, tell: 
         ]
         torch.stack(losses).mean().backward()  # type: ignore[no-untyped-call]
         optimiser.step()
+        with torch.no_grad():  # at an end of its range it may turn back
+            values[FOLLOW].clamp_(0, 1)
         if (step + 1) % max(steps // 5, 1) == 0:
             tell(f"step {step + 1}: {_gain_db(held, first, values, alone):.2f} dB over alone")
     together = _rounded(first, values.detach())
@@ -298,11 +302,23 @@ def _rounded(first: Together, values: Tensor) -> Together:
     )
 
 
+def _check_folder(prescription: str, options: BankFitOptions) -> None:
+    """Refuse to part a recipe from a lens file that it names by a path relative to itself."""
+    own, other = options.recipe_folder.resolve(), options.output_folder
+    if other is None or other.resolve() == own or Path(prescription).is_absolute():
+        return
+    if (own / prescription).is_file():
+        raise ContractError(
+            f"the recipe names its lens {prescription} relative to itself; write to {own}"
+        )
+
+
 class BayerBankFitting:
     """Fulfils `camkit.models_def.training.bank_fitting.BankFittingKind`."""
 
     def fit(self, recipe: BayerRecipe, options: BankFitOptions, tell: Tell) -> BankFit:
         """Trace the lens, or read what was traced before, and fit."""
+        _check_folder(recipe.lens.prescription, options)
         material = trace_material(recipe, options.recipe_folder, options.cache_folder)
         return fit_bank(recipe, material.bank, options, tell)
 

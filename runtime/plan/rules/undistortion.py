@@ -13,8 +13,8 @@ ORDER: Final = 60
 LEAST_SHIFT_PX: Final = 0.5
 NOTHING_PX: Final = 1e-3
 """What rounding leaves of no distortion at all; the warp itself knows steps of 1/32 px."""
-CUBIC: Final = "; by cubic interpolation, which costs a restored picture 0.02 dB at most"
-"""See `python -m tools.plan.undistortion`."""
+CUBIC: Final = "; by cubic interpolation, a third of the time"
+"""Its cost in dB: `python -m tools.plan.undistortion`."""
 _NODES: Final = 33
 
 

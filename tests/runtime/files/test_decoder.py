@@ -1,6 +1,7 @@
 """The decoding child: ready ahead of its order, replaced where it died, gone with the block."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -70,3 +71,15 @@ def test_the_child_finds_a_checkout_that_is_not_installed(monkeypatch: pytest.Mo
     monkeypatch.setenv("PYTHONPATH", "elsewhere")
     found = child_environment()["PYTHONPATH"].split(os.pathsep)
     assert found[0] == "elsewhere"
+
+
+def test_the_child_that_waits_serves_any_thread(
+    tmp_path: Path, started: list[decoder.Decoder]
+) -> None:
+    mosaic = write_scene(tmp_path / "x.dng")
+    with decoder_ahead(), ThreadPoolExecutor(2) as pool:
+        captures = list(pool.map(read_capture, [tmp_path / "x.dng"] * 2))
+    for capture in captures:
+        np.testing.assert_array_equal(capture.samples, mosaic)
+    assert len(started) == 2
+    assert all(one.child.returncode == 0 for one in started)

@@ -48,6 +48,12 @@ def test_votes_are_counted_by_the_key(tmp_path: Path, capsys: pytest.CaptureFixt
     votes.write_text("00: both\n", encoding="utf-8")
     with pytest.raises(ContractError, match="left, right or equal"):
         blind.counted(tmp_path)
+    votes.write_text("00: left\n00: left\n", encoding="utf-8")
+    with pytest.raises(ContractError, match="00 has two votes"):
+        blind.counted(tmp_path)
+    votes.write_text("01: left\n", encoding="utf-8")
+    with pytest.raises(ContractError, match="no vote for 00, 02"):
+        blind.counted(tmp_path)
 
 
 def test_what_is_missing_is_named(capsys: pytest.CaptureFixture[str]) -> None:

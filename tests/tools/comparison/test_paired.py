@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from tools.comparison.measurement import Measurement
-from tools.comparison.paired import best_classical, paired_gains, pairs_of, to_lines
+from tools.comparison.paired import (
+    best_classical,
+    mean_and_error,
+    paired_gains,
+    pairs_of,
+    to_lines,
+)
 
 MEASUREMENT = Measurement(
     psf="fresh",
@@ -84,3 +90,10 @@ def test_the_best_classical_method_is_the_one_with_the_highest_mean() -> None:
     found = [replace(MEASUREMENT, method=name, psnr_db=db) for name, db in levels.items()]
     assert best_classical(found) == "admm_tv"
     assert best_classical(found[2:]) is None
+
+
+def test_captures_of_a_group_are_one_observation() -> None:
+    mean, error = mean_and_error([1.0, 1.0, 1.0, 3.0], ["a", "a", "a", "b"])
+    assert mean == 1.5
+    assert error == pytest.approx(1.0)  # of the means 1 and 3
+    assert mean_and_error([1.0, 2.0], [0, 0]) == (1.5, None)

@@ -57,14 +57,15 @@ def test_copies_are_measured_and_what_they_gain_is_told(
         assert judged["transfer_error"]["unit"] < 0.2 * judged["transfer_error"]["nominal"]
         assert judged["gain"]["alone"]["mean_db"] > 0.05
         assert judged["gain"]["alone"]["captures"] == 4
+        assert judged["gain"]["alone"]["se_db"] > 0
     assert two["gain"]["together"]["mean_db"] == 0
     mean = (one["gain"]["together"]["mean_db"] + 0) / 2
     assert found["copies"]["gain"]["together"]["mean_db"] == pytest.approx(mean, abs=1e-3)
 
 
 def test_without_captures_there_is_no_gain() -> None:
-    assert unit_focus.gain(()) is None
-    assert unit_focus.gain((0.5,)) == {"mean_db": 0.5, "se_db": 0.0, "captures": 1}
+    assert unit_focus.gain((), ()) is None
+    assert unit_focus.gain((0.5,), (1,)) == {"mean_db": 0.5, "se_db": None, "captures": 1}
 
 
 def test_kernels_of_a_moved_sensor_join_a_built_in_bundle() -> None:

@@ -23,9 +23,24 @@ def field_isos(rows: Iterable[Row]) -> tuple[float, ...]:
     return tuple(sorted(isos))
 
 
+def is_swept(rows: Iterable[Row]) -> bool:
+    """Tell whether every picture was taken at every ISO and place."""
+    for row in rows:
+        cells = row.get("by_iso_and_field")
+        if not cells:
+            continue
+        whole = len({c["iso"] for c in cells}) * len({c["field_share"] for c in cells})
+        counts = {c["captures"] for c in cells}
+        if len(cells) != whole or len(counts) > 1 or min(counts) < row["images"]:
+            return False
+    return True
+
+
 def _grid(row: Row) -> dict[float, list[Cell]]:
-    """Give ISO -> cells by place, if every ISO has all places, and there are two or more."""
+    """Give ISO -> cells by place, if all pictures were taken at all of two or more places."""
     grid: dict[float, list[Cell]] = {}
+    if not is_swept([row]):
+        return grid
     for cell in row.get("by_iso_and_field", ()):
         if cell["field_mm"] is not None and cell.get("psnr_db") is not None:
             grid.setdefault(cell["iso"], []).append(cell)

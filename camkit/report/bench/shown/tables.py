@@ -5,6 +5,7 @@ from html import escape
 from typing import Any, Final
 
 from camkit.report.bench.row import Row
+from camkit.report.bench.shown.field_panels import is_swept
 
 Cell = Mapping[str, Any]
 Tuned = Mapping[str, Any]
@@ -29,7 +30,7 @@ def split_tables(report: Mapping[str, Any], camera: str) -> list[str]:
     if not isos and not places:
         return []
     heads = "".join(f"<th>{escape(text)}</th>" for text in ("method", *isos, *places))
-    note = SPLIT_NOTE + ("" if _is_swept(rows) else GOLDEN_NOTE)
+    note = SPLIT_NOTE + ("" if is_swept(rows) else GOLDEN_NOTE)
     lines = [
         f"<h3>{escape(camera)} by ISO and by place in the field</h3>",
         f'<p class="small">{escape(note)}</p>',
@@ -79,16 +80,6 @@ def _td(cell: Cell | None) -> str:
         return '<td data-value="">-</td>'
     text = " / ".join(format(value, form) for value, form in known)
     return f'<td data-value="{known[0][0]}">{text}</td>'
-
-
-def _is_swept(rows: Iterable[Row]) -> bool:
-    """Tell whether all ISOs have the same places and every cell as many captures."""
-    for row in rows:
-        cells = row.get("by_iso_and_field", ())
-        whole = len({c["iso"] for c in cells}) * len({c["field_share"] for c in cells})
-        if len(cells) != whole or len({c["captures"] for c in cells}) > 1:
-            return False
-    return True
 
 
 def tuning_table(tuning: Iterable[Tuned]) -> list[str]:

@@ -52,3 +52,12 @@ def test_a_sensor_without_surroundings_is_left_out(judge: Judge, tmp_path: Path)
     side_px = LEAST_ROOM_PX - 2
     write_bundle(path, tiny_manifest(sensor=tiny_sensor(320, side_px)), tiny_members())
     assert f"fewer than {LEAST_ROOM_PX} px" in str(has_room(open_bundle(path)))
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_the_smallest_sensor_has_room_for_the_disc(number: int) -> None:
+    """A disc with its surroundings must fit, whatever its size and place."""
+    black = np.zeros((3, LEAST_ROOM_PX, LEAST_ROOM_PX), np.float32)
+    scene = Scene(name="black", number=number, linear=black)
+    shown = limb.moonlit(scene, 0.6).linear
+    assert limb.numbers(shown, shown)["wobble_px"] < 0.01
