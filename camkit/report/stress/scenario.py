@@ -26,8 +26,8 @@ Shoot = Callable[[Any, Any, float], Any]
 """(examiner, scene, value) -> a capture that the examiner scores; all three those of the kind."""
 Measure = Callable[[Any, Any, float], Verdict]
 Applies = Callable[[Bundle], str | None]
-LEAST_ROOM_PX: Final = 192
-"""A disc on black takes 160; some stars beside each other as much."""
+LEAST_ROOM_PX: Final = 160
+"""What a disc on black takes with its surroundings, wherever it lies."""
 
 
 def photographs(bundle: Bundle) -> str | None:

@@ -54,7 +54,7 @@ def test_a_sensor_without_surroundings_is_left_out(judge: Judge, tmp_path: Path)
     assert f"fewer than {LEAST_ROOM_PX} px" in str(has_room(open_bundle(path)))
 
 
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(16))
 def test_the_smallest_sensor_has_room_for_the_disc(number: int) -> None:
     """A disc with its surroundings must fit, whatever its size and place."""
     black = np.zeros((3, LEAST_ROOM_PX, LEAST_ROOM_PX), np.float32)
