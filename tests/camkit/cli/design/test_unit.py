@@ -82,7 +82,10 @@ def test_a_camera_in_focus_and_one_without_kernels_are_refused(
         (("--unit", "-o", "u.toml"), "--unit needs captures of a target"),
         (("--unit", "1.dng", "-o", "u.safetensors"), "a unit is TOML"),
         (("1.dng", "-o", "u.toml"), "captures are for --unit"),
-        (("1.dng", "--unit", "-o", "u.toml", "--report", "r.json"), "freezes nothing; leave --report out"),
+        (
+            ("1.dng", "--unit", "-o", "u.toml", "--report", "r.json"),
+            "freezes nothing; leave --report out",
+        ),
         (("1.dng", "--unit", "-o", "u.toml", "--focus-um", "9"), "holds its kernels already"),
         (("1.dng", "--unit", "-o", "u.toml", "--depths-mm", "1,2"), "lies at one distance"),
     ],
