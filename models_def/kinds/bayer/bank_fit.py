@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from torch import Tensor
 
 from camkit.bundle.stages import Together
@@ -288,18 +289,21 @@ def _rounded(first: Together, values: Tensor) -> Together:
     def short(value: Tensor) -> float:
         return float(f"{float(value):.{DIGITS}g}")
 
-    if not bool(torch.isfinite(values).all()) or float(numbers.exponent) < 0:
-        raise ContractError("the descent did not find numbers for the bank; raise --samples")
-    return Together(
-        noise=tuple(short(v) for v in numbers.noise),
-        noise_rise=tuple(short(v) for v in numbers.noise_rise),
-        scale=short(numbers.scale),
-        exponent=short(numbers.exponent),
-        follow=short(numbers.follow),
-        own=short(numbers.own),
-        mistrust=short(numbers.mistrust),
-        spread=first.spread,
-    )
+    try:
+        return Together(
+            noise=tuple(short(v) for v in numbers.noise),
+            noise_rise=tuple(short(v) for v in numbers.noise_rise),
+            scale=short(numbers.scale),
+            exponent=short(numbers.exponent),
+            follow=short(numbers.follow),
+            own=short(numbers.own),
+            mistrust=short(numbers.mistrust),
+            spread=first.spread,
+        )
+    except ValidationError as error:
+        raise ContractError(
+            "the descent did not find numbers for the bank; raise --samples"
+        ) from error
 
 
 def _check_folder(prescription: str, options: BankFitOptions) -> None:

@@ -8,7 +8,8 @@ import pytest
 
 from camkit.bundle.stages import Together
 from camkit.errors import ContractError, UnsupportedError
-from camkit.models_def.kinds.bayer.bank_fit import fit_bank, spread_of, transfer_errors
+from camkit.models_def.kinds.bayer import bank_fit
+from camkit.models_def.kinds.bayer.bank_fit import FIRST, fit_bank, spread_of, transfer_errors
 from camkit.models_def.kinds.bayer.samples import draw_exposure, photograph, scene_side_px
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.models_def.training.bank_fitting import (
@@ -137,3 +138,12 @@ def test_kinds_without_a_bank_say_so():
     with pytest.raises(UnsupportedError, match="'spad' have no bank"):
         bank_fitting_kind("spad")
     assert hasattr(bank_fitting_kind("bayer"), "fit")
+
+
+@pytest.mark.parametrize("exponent", [float("nan"), -1.0, 9.0])
+def test_a_descent_that_leaves_the_range_of_a_number_ends_in_one_line(exponent: float) -> None:
+    values = bank_fit._to_values(FIRST)
+    assert bank_fit._rounded(FIRST, values).exponent == FIRST.exponent
+    values[6] = exponent
+    with pytest.raises(ContractError, match="raise --samples"):
+        bank_fit._rounded(FIRST, values)
