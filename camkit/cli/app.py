@@ -17,6 +17,7 @@ from camkit.cli.design.lens.app import lens_app
 from camkit.cli.design.plate.app import plate_app
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
+from camkit.cli.interrupts import none_is_lost
 from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
@@ -86,7 +87,7 @@ def run(arguments: Sequence[str]) -> int:
     """
     debug = DEBUG_FLAG in arguments
     try:
-        with _messages(shown=debug):
+        with _messages(shown=debug), none_is_lost():
             app(list(arguments), prog_name="camkit")
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else ExitCode.INPUT_FAILED

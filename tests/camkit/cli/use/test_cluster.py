@@ -159,7 +159,7 @@ def test_an_interrupt_ends_it_in_seconds_and_leaves_nothing_half_done(
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process
     _, told = process.communicate(timeout=60)
     assert time.monotonic() - began < 40
-    assert process.returncode == 130
+    assert process.returncode == 130, told
     assert told.splitlines()[-1] == "camkit: interrupted"
     assert "Traceback" not in told
     if out.exists():

@@ -1,0 +1,47 @@
+"""A Ctrl-C that Python would lose.
+
+An interrupt that comes while Python runs the callback of a weak reference or a finaliser, as it
+often does while it imports, is told to `sys.unraisablehook` and forgotten: the program goes on.
+"""
+
+import _thread
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
+AGAIN_S: Final = 0.02
+"""Later than the callback's end, or it would be lost again."""
+
+
+@contextmanager
+def none_is_lost() -> Iterator[None]:
+    """Raise in the main thread, a moment later, what was lost while the block runs."""
+    before = sys.unraisablehook
+
+    def tell(lost: "UnraisableHookArgs") -> None:
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            before(lost)
+            return
+        again = threading.Timer(AGAIN_S, _interrupt)
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = tell
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
+def _interrupt() -> None:
+    """Interrupt the main thread, also out of a wait where signals end waits."""
+    if hasattr(signal, "pthread_kill") and (main := threading.main_thread().ident) is not None:
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
