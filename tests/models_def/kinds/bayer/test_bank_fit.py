@@ -18,7 +18,9 @@ from camkit.models_def.training.bank_fitting import (
     with_bank,
 )
 from camkit.models_def.training.kind import read_recipe
+from camkit.runtime.bank.psf import FieldKernels
 from tests.together_factory import TOGETHER
+from tools.comparison.copies import relative_error, transfers
 
 
 @pytest.fixture
@@ -70,6 +72,25 @@ def test_a_fitted_bank_beats_the_one_of_each_colour_alone(recipe, coloured, tmp_
         for of in (recipe, fitted)
     ]
     assert errors[1] < 0.8 * errors[0]
+
+
+def test_the_error_of_a_copy_is_that_by_which_methods_are_compared(coloured):
+    """One definition for training (torch, many heights) and comparisons (numpy, frozen PSFs)."""
+    heights_mm = coloured.copy_heights_mm.tolist()
+    frozen = _transfers(coloured.frozen_kernels(0.0, height) for height in heights_mm)
+    wanted = [
+        relative_error(
+            frozen, _transfers(coloured.blur_kernels(copy, 0.0, height) for height in heights_mm)
+        )
+        for copy in range(len(coloured.copies))
+    ]
+    assert transfer_errors(coloured) == pytest.approx(wanted, rel=1e-4)
+    assert max(wanted) > 2 * min(wanted)
+
+
+def _transfers(kernels):
+    alone = {"field_heights_mm": np.zeros(1), "symmetry": "uniform"}
+    return np.stack([transfers(FieldKernels(kernels=of.numpy(), **alone)) for of in kernels])
 
 
 def test_the_spread_is_that_of_the_copies(coloured):
