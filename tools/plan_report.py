@@ -4,11 +4,13 @@
     python -m tools.plan_report calibrate ... --write camkit/bundles/duet.camkit
     python -m tools.plan_report report --bundle duet --data DATA --out-dir out/plan
     python -m tools.plan_report overhead --bundle duet
+    python -m tools.plan_report work --bundle duet
 
 `calibrate` simulates captures of pictures and procedural scenes, measures per lattice cell what
 less than the exact result loses, fits the loss model and writes it as the manifest's `plan`:
 into a JSON file, which `camkit export --plan` takes, and with --write into a bundle.
-`report` measures saving and loss on the scenes of tools/plan/scenes.py.
+`report` measures saving and loss on the scenes of tools/plan/scenes.py; `work` the constants by
+which the plan weighs bank and network against one another.
 """
 
 import argparse
@@ -35,6 +37,7 @@ from camkit.runtime.plan.tiers import TierWork
 from tools.plan.cells import CaptureCells, measure_cells, photograph, pipelines, start
 from tools.plan.fit import Calibration, fit_model, saving_of_the_all_knowing
 from tools.plan.scenes import GENERATORS, proof_scenes
+from tools.plan.work import measure_work
 
 ISOS = (100.0, 400.0, 1600.0)
 SIDE_PX = 1280
@@ -67,15 +70,18 @@ def main() -> int:
     report.add_argument("--limit", type=int, default=0, help="only so many scenes")
     report.add_argument("--kinds", default="", help="only these kinds, with commas")
     report.add_argument("--runs", type=int, default=1, help="timed runs per capture and quality")
-    overhead = commands.add_parser("overhead", help="CPU seconds where nothing can be skipped")
-    overhead.add_argument("--bundle", default="duet", help="name or path")
-    overhead.add_argument("--runs", type=int, default=20, help="interleaved runs of both")
-    overhead.add_argument("--width", type=int, default=1536)
-    overhead.add_argument("--height", type=int, default=1024)
+    for name, told, runs in (
+        ("overhead", "CPU seconds where nothing can be skipped", 20),
+        ("work", "work of bank and network, in multiplications of a network", 7),
+    ):
+        timed = commands.add_parser(name, help=told)
+        timed.add_argument("--bundle", default="duet", help="name or path")
+        timed.add_argument("--runs", type=int, default=runs, help="in turn")
+        timed.add_argument("--width", type=int, default=1536)
+        timed.add_argument("--height", type=int, default=1024)
     options = parser.parse_args()
-    return {"calibrate": _calibrate, "report": _report, "overhead": _overhead}[options.command](
-        options
-    )
+    run = {"calibrate": _calibrate, "report": _report, "overhead": _overhead, "work": _measure_work}
+    return run[options.command](options)
 
 
 def _calibrate(options: argparse.Namespace) -> int:
@@ -192,9 +198,7 @@ def _report(options: argparse.Namespace) -> int:
 def _overhead(options: argparse.Namespace) -> int:
     """Compare the CPU seconds of adaptive and exact, in turn, where all is texture."""
     bundle = open_bundle(find_bundle(options.bundle))
-    rng = np.random.default_rng(PROCEDURAL_SEED)
-    scene = rng.uniform(0.05, 0.9, (3, options.height, options.width)).astype(np.float32)
-    simulation = photograph(bundle, scene, number=0, iso=100.0)
+    simulation = photograph(bundle, _texture(options, 0.9), number=0, iso=100.0)
     made = {
         quality: Pipeline(bundle, Options(quality=quality, undistort=False, threads=1))
         for quality in ("exact", "adaptive")
@@ -215,6 +219,28 @@ def _overhead(options: argparse.Namespace) -> int:
         f"{np.median(seconds['adaptive']):.2f} CPU s, median ratio {np.median(ratios):.4f}"
     )
     return 0
+
+
+def _measure_work(options: argparse.Namespace) -> int:
+    """Print what the tiers cost where no sample is clipped."""
+    bundle = open_bundle(find_bundle(options.bundle))
+    work, small = _work(bundle)
+    if small is None or work.small_mac is None:
+        raise ContractError(f"{bundle.manifest.name} has one size; two tell the work of a network")
+    simulation = photograph(bundle, _texture(options, 0.5), number=0, iso=100.0)
+    macs = (work.full_mac, work.small_mac)
+    made = measure_work(bundle, simulation, small, macs, runs=options.runs)
+    print(
+        f"bank {made.bank:,.0f} and network {made.fixed:,.0f} per pixel besides its own, in "
+        f"multiplications of {made.ns:.4f} CPU ns"
+    )
+    return 0
+
+
+def _texture(options: argparse.Namespace, brightest: float) -> FloatArray:
+    rng = np.random.default_rng(PROCEDURAL_SEED)
+    shape = (3, options.height, options.width)
+    return rng.uniform(0.05, brightest, shape).astype(np.float32)
 
 
 if __name__ == "__main__":

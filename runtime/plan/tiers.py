@@ -20,9 +20,11 @@ from camkit.errors import ContractError
 from camkit.runtime.content import CELL_PX, CellArray
 from camkit.runtime.plan.decision import FULL, PLAIN, SMALL, WIENER, Labels
 
-BANK_MAC: Final = 11_000.0
-"""Work of the bank per pixel, in multiplications of a network that take as long (measured)."""
-NETWORK_FIXED_MAC: Final = 5_700.0
+BANK_MAC: Final = 17_000.0
+"""Work of the bank per pixel, in multiplications of a network that take as long
+(measured: `python -m tools.plan_report work`).
+"""
+NETWORK_FIXED_MAC: Final = 4_500.0
 """What a network costs per pixel besides its multiplications, in the same unit (measured)."""
 LEAST_SAVING: Final = 0.05
 """Below this share of the work nothing is skipped."""
