@@ -44,8 +44,11 @@ class Checkpoint:
         cpu_s: CPU time so far, workers included.
         valid_db: Last validation PSNR of the average, None before the first.
         weights: The weights that are being trained.
-        average: Their average, which is validated and exported.
+        average: Their average, which is validated.
         optimizer: State of AdamW.
+        best: The average that validated best; empty before the first validation, and in
+            checkpoints of before.
+        best_db: What it validated at.
     """
 
     recipe_toml: str
@@ -63,6 +66,13 @@ class Checkpoint:
     optimizer: dict[str, Any]
     designed: dict[str, bytes] = field(default_factory=dict)
     role: str = DEFAULT_ROLE
+    best: State = field(default_factory=dict)
+    best_db: float | None = None
+
+    @property
+    def chosen(self) -> State:
+        """Give the weights that are exported and that others begin with."""
+        return self.best or self.average
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
@@ -110,7 +120,7 @@ def to_checkpoint(path: Path, table: dict[str, Any]) -> Checkpoint:
     Raises:
         ContractError: If it is of another format.
     """
-    entries = {"designed": {}, "role": DEFAULT_ROLE} | table
+    entries = {"designed": {}, "role": DEFAULT_ROLE, "best": {}, "best_db": None} | table
     if entries.pop("format", None) != FORMAT:
         raise ContractError(f"{path} is no checkpoint of format {FORMAT}; train again")
     lens_toml = entries.pop("lens_toml", "")  # what older ones have in place of `designed`
@@ -143,7 +153,7 @@ def recipe_of(checkpoint: Checkpoint) -> Recipe:
 
 
 def load_network(checkpoint: Checkpoint) -> nn.Module:
-    """Build the network with the averaged weights, ready to export.
+    """Build the network with the chosen weights, ready to export.
 
     Raises:
         ContractError: If the weights do not fit the network.
@@ -151,7 +161,7 @@ def load_network(checkpoint: Checkpoint) -> nn.Module:
     kind = training_kind(recipe_of(checkpoint).kind)
     network = kind.build_network(checkpoint.network, **checkpoint.config)
     try:
-        network.load_state_dict(checkpoint.average)
+        network.load_state_dict(checkpoint.chosen)
     except RuntimeError as error:
         raise ContractError(f"the weights do not fit {checkpoint.network}: {error}") from error
     return network.eval()

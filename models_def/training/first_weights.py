@@ -71,7 +71,7 @@ def read_first_weights(source: Path, size: str, role: str = DEFAULT_ROLE) -> Fir
         source=str(source),
         whose=f"{recipe_of(saved).name} {saved.size}",
         training_data=saved.training_data,
-        state=saved.average,
+        state=saved.chosen,
     )
 
 

@@ -18,6 +18,7 @@ from camkit.errors import ContractError
 from camkit.models_def.networks.catalog import check_patch
 from camkit.models_def.training.checkpoint import (
     Checkpoint,
+    State,
     read_checkpoint,
     write_checkpoint,
 )
@@ -124,7 +125,7 @@ class TrainResult:
         elapsed_s: Wall time, earlier runs included.
         cpu_s: CPU time, workers and earlier runs included.
         baselines: What the network must beat: name -> validation dB.
-        valid_db: Of the network.
+        valid_db: Of the weights that are exported.
     """
 
     checkpoint: Path
@@ -285,6 +286,10 @@ class _Run:
         self.path = checkpoint_path(self.recipe, options, refinement)
         self.step, self.elapsed_before_s, self.cpu_before_s = 0, 0.0, 0.0
         self.valid: Score | None = None
+        # a loss of its own, an adversary say, wants something else than the decibels
+        self.picks_best = refinement is None and own is None
+        self.best: State = {}
+        self.best_db: float | None = None
         if options.resume:
             self._restore(read_checkpoint(self.path))
         until = self.step if options.resume else None
@@ -303,6 +308,7 @@ class _Run:
         added = "" if self.data in saved.training_data else f"; then {self.data}"
         self.data = saved.training_data + added
         self.step = saved.step
+        self.best, self.best_db = saved.best, saved.best_db
         self.elapsed_before_s, self.cpu_before_s = saved.elapsed_s, saved.cpu_s
 
     def elapsed_s(self) -> float:
@@ -361,6 +367,8 @@ class _Run:
 
     def _validate(self, pool: SamplePool) -> None:
         self.valid = self.judge.score(self.fitter.restore)
+        if self.picks_best and (self.best_db is None or self.valid.mean_db > self.best_db):
+            self.best, self.best_db = self.fitter.average(), self.valid.mean_db
         entry: dict[str, Any] = {
             "step": self.step,
             "seconds": self.elapsed_s(),
@@ -390,6 +398,8 @@ class _Run:
             weights=self.fitter.weights(),
             average=self.fitter.average(),
             optimizer=self.fitter.optimizer_state(),
+            best=self.best,
+            best_db=self.best_db,
         )
         write_checkpoint(self.path, saved)
 
@@ -402,5 +412,5 @@ class _Run:
             elapsed_s=saved.elapsed_s,
             cpu_s=saved.cpu_s,
             baselines=self.baselines,
-            valid_db=float(saved.valid_db or 0.0),
+            valid_db=float(saved.best_db or saved.valid_db or 0.0),
         )

@@ -7,12 +7,14 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.material import BayerMaterial
+from camkit.models_def.kinds.bayer.validation import BayerJudge
 from camkit.models_def.training.checkpoint import (
     load_network,
     read_checkpoint,
     recipe_of,
     write_checkpoint,
 )
+from camkit.models_def.training.kind import Score
 from camkit.models_def.training.log import plot_logs, read_log
 from camkit.models_def.training.trainer import TrainOptions, train
 from tests.gaussian_bank import gaussian_bank
@@ -125,13 +127,35 @@ def test_weights_of_another_network_are_refused(tmp_path, recipe_path, material,
         options(tmp_path, start=whole.checkpoint, resume=True)
 
 
+def test_the_average_that_validates_best_is_kept_over_interruptions(
+    tmp_path, recipe_path, material, monkeypatch
+):
+    decibels = {3: 20.0, 4: 22.0, 5: 21.0, 6: 19.0, 7: 21.5, 8: 20.5}
+    scores = iter(decibels.values())
+    monkeypatch.setattr(BayerJudge, "score", lambda *_: Score(mean_db=next(scores), parts={}))
+    monkeypatch.setattr(BayerJudge, "baselines", lambda _: {})
+    for end in decibels:  # each run validates once, at its end
+        result = train(
+            recipe_path, options(tmp_path, stop_at_step=end, resume=end > 3), material=material
+        )
+        if end == 4:
+            at_best = read_checkpoint(result.checkpoint)
+    saved = read_checkpoint(result.checkpoint)
+    assert (saved.step, saved.valid_db, saved.best_db, result.valid_db) == (8, 20.5, 22.0, 22.0)
+    chosen = load_network(saved).state_dict()
+    assert all(torch.equal(chosen[k], v) for k, v in at_best.average.items())
+    assert any(not torch.equal(chosen[k], v) for k, v in saved.average.items())
+
+
 def test_network_from_a_checkpoint_has_the_averaged_weights(whole):
     saved = read_checkpoint(whole.checkpoint)
     network = load_network(saved)
     assert all(torch.equal(v, saved.average[k]) for k, v in network.state_dict().items())
+    older = load_network(replace(saved, best={}))  # as checkpoints of before
+    assert all(torch.equal(v, saved.average[k]) for k, v in older.state_dict().items())
     planes = torch.from_numpy(np.random.default_rng(0).random((1, 6, 32, 32), dtype=np.float32))
     assert network(planes).shape == (1, 3, 32, 32)
-    wrong = replace(saved, average={})
+    wrong = replace(saved, average={}, best={})
     with pytest.raises(ContractError, match="do not fit"):
         load_network(wrong)
 
