@@ -1,5 +1,6 @@
 """`camkit calibrate`: what a camera is, measured on photographs of something known.
 
-app  the commands joined
-psf  the point spread function, from a bracket of a point light
+app      the commands joined
+outputs  the files that a command leaves, and what it says
+psf      the point spread function, from a bracket of a point light
 """

@@ -1,0 +1,4 @@
+"""What a calibration found, on one page.
+
+page  sections of words, tables and pictures as one HTML file
+"""
