@@ -1,4 +1,5 @@
 """What a calibration found, on one page.
 
-page  sections of words, tables and pictures as one HTML file
+page        sections of words, tables and pictures as one HTML file
+noise_page  photon transfer of every ISO
 """

@@ -3,4 +3,5 @@
 app      the commands joined
 outputs  the files that a command leaves, and what it says
 psf      the point spread function, from a bracket of a point light
+noise    gain, read noise and fixed patterns, from pairs of dark and flat frames
 """
