@@ -2,6 +2,7 @@
 
 import typer
 
+from camkit.cli.use.calibrate.flat import flat
 from camkit.cli.use.calibrate.noise import noise
 from camkit.cli.use.calibrate.psf import psf
 
@@ -10,6 +11,7 @@ calibrate_app = typer.Typer(
 )
 calibrate_app.command()(psf)
 calibrate_app.command()(noise)
+calibrate_app.command()(flat)
 
 
 @calibrate_app.callback()
