@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.errors import ContractError, DecodeError
-from camkit.runtime.calibration.flat.picture import FlatPicture, read_flat
+from camkit.errors import ContractError
+from camkit.runtime.calibration.flat.picture import FlatPicture, check_one_camera, read_flat
 from camkit.runtime.calibration.flat.pose import Pose, orientation_turn_deg, poses_of
 from camkit.runtime.calibration.flat.separate import MOST_OFFSET, Parts, Views, separate
 from camkit.runtime.capture import Capture, MosaicOptions
@@ -116,7 +116,8 @@ def measure_flat(
     poses_of(shifts, turns, [0.0] * len(files))  # refuses what is wrong before any work
     pictures = [read_flat(path, mosaic) for path in files]
     poses = poses_of(shifts, turns, [orientation_turn_deg(p.like.orientation) for p in pictures])
-    _check_alike(pictures)
+    for picture in pictures[1:]:
+        check_one_camera(pictures[0].like, files[0], picture.like, picture.path)
     like = pictures[0].like
     pitch_um = pixel_pitch_um or like.pixel_pitch_um
     if pitch_um is None:
@@ -146,21 +147,6 @@ def measure_flat(
         rest_maps=parts.rest.reshape(shape),
         notes=tuple(_notes(parts, len(pictures))),
     )
-
-
-def _check_alike(pictures: Sequence[FlatPicture]) -> None:
-    one = pictures[0]
-    for other in pictures[1:]:
-        mine, its = ((p.like.width, p.like.height, p.like.cfa) for p in (one, other))
-        if mine != its:
-            raise DecodeError(
-                f"pictures differ: {one.path.name} is {_kind(one.like)}, {other.path.name} "
-                f"{_kind(other.like)}; give pictures of one camera"
-            )
-
-
-def _kind(like: Capture) -> str:
-    return f"{like.width}x{like.height} {like.cfa or 'planes'}"
 
 
 def _views(pictures: Sequence[FlatPicture], poses: Sequence[Pose], radius_px: float) -> Views:

@@ -1,8 +1,8 @@
 """A picture as the mean light of green in blocks; noise, dust and single lights are averaged."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from camkit.contracts import cfa_channels
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.merging.merge import clipped_rows
-from camkit.runtime.merging.survey import read_frame
+from camkit.runtime.merging.survey import read_frame, without_pixels
 
 FloatGrid = NDArray[np.float64]
 
@@ -77,8 +77,7 @@ def read_flat(path: Path, mosaic: MosaicOptions | None) -> FlatPicture:
     y_px, x_px = (
         (np.arange(count) * side + (side - 1) / 2) * cell + (cell - 1) / 2 for count in light.shape
     )
-    one: NDArray[Any] = np.zeros((), dtype=capture.samples.dtype)
-    like = replace(capture, samples=np.broadcast_to(one, capture.samples.shape))
+    like = without_pixels(capture)
     return FlatPicture(path=path, like=like, light=light, x_px=x_px, y_px=y_px)
 
 
@@ -97,6 +96,23 @@ def green_of(capture: Capture) -> tuple[FloatGrid, NDArray[np.bool_], int]:
     sites = [np.s_[dy:high:2, dx:wide:2] for dy, dx in greens.tolist()]
     mean = sum(light[site].astype(np.float64) for site in sites) / len(sites)
     return np.asarray(mean), np.logical_or.reduce([clipped[site] for site in sites]), 2
+
+
+def check_one_camera(one: Capture, named: Path, other: Capture, path: Path) -> None:
+    """Refuse a picture that another camera took; exposure and levels may differ.
+
+    Raises:
+        DecodeError: If it differs in size or mosaic.
+    """
+    if (one.width, one.height, one.cfa) != (other.width, other.height, other.cfa):
+        raise DecodeError(
+            f"pictures differ: {named.name} is {_kind(one)}, {path.name} {_kind(other)}; give "
+            "pictures of one camera"
+        )
+
+
+def _kind(like: Capture) -> str:
+    return f"{like.width}x{like.height} {like.cfa or 'planes'}"
 
 
 def _block_means(plane: FloatGrid, side: int) -> FloatGrid:

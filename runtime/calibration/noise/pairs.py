@@ -1,7 +1,7 @@
 """Pairs of frames read one after the other: what is kept of each is what they tell of noise."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,7 +12,7 @@ from camkit.contracts import cfa_channels
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.noise.site import BLOCK_PX, FloatGrid, SitePair, site_pair
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.merging.survey import check_alike, read_frame
+from camkit.runtime.merging.survey import check_alike, read_frame, without_pixels
 from camkit.runtime.raw import is_picture
 
 MOST_CLIPPED: Final = 1e-3
@@ -174,7 +174,7 @@ class PairReader:
         used = np.flatnonzero(np.bincount(_plane_of(capture).ravel()))
         return Frame(
             path=path,
-            like=_without_pixels(capture),
+            like=without_pixels(capture),
             iso=float(iso),
             step=int(np.gcd.reduce(np.diff(used))) if used.size > 1 else 0,
         )
@@ -192,11 +192,6 @@ class PairReader:
                 f"{frame.path.name} has {its.width}x{its.height} pixels; noise needs "
                 f"{2 * BLOCK_PX}x{2 * BLOCK_PX}"
             )
-
-
-def _without_pixels(capture: Capture) -> Capture:
-    one: NDArray[Any] = np.zeros((), dtype=capture.samples.dtype)
-    return replace(capture, samples=np.broadcast_to(one, capture.samples.shape))
 
 
 def _plane_of(capture: Capture) -> NDArray[Any]:
