@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.flat.picture import FlatPicture, check_one_camera, read_flat
 from camkit.runtime.calibration.flat.pose import Pose, orientation_turn_deg, poses_of
 from camkit.runtime.calibration.flat.separate import MOST_OFFSET, Parts, Views, separate
@@ -150,13 +150,22 @@ def measure_flat(
 
 
 def _views(pictures: Sequence[FlatPicture], poses: Sequence[Pose], radius_px: float) -> Views:
-    """Give the pictures in units of half their diagonal, from their middle."""
+    """Give the pictures in units of half their diagonal, from their middle.
+
+    Raises:
+        DecodeError: If the optical centre lies outside of them.
+    """
     one = pictures[0]
     x, y = np.meshgrid(
         (one.x_px - (one.like.width - 1) / 2) / radius_px,
         (one.y_px - (one.like.height - 1) / 2) / radius_px,
     )
     centre = _sensor_middle(one.like, radius_px)
+    if abs(centre[0]) > float(x.max()) or abs(centre[1]) > float(y.max()):
+        raise DecodeError(
+            f"{one.path.name} is a crop that the optical centre does not lie in; give pictures of "
+            "the whole sensor"
+        )
     scaled = tuple(
         Pose(
             shift_px=(pose.shift_px[0] / radius_px, pose.shift_px[1] / radius_px),

@@ -96,6 +96,7 @@ class PairReader:
         """Take what the caller says in place of the files: mosaic, levels, and ISO."""
         self._mosaic, self._iso = mosaic, iso
         self._one: Frame | None = None
+        self._by_iso: dict[float, Frame] = {}
         self._hashes: dict[str, Path] = {}
 
     def dark(self, paths: tuple[Path, Path]) -> Pair:
@@ -182,11 +183,13 @@ class PairReader:
     def _check_sensor(self, frame: Frame) -> None:
         one = self._one = self._one or frame
         mine, its = one.like, frame.like
+        alike = self._by_iso.setdefault(frame.iso, frame)
         if (mine.width, mine.height, mine.cfa) != (its.width, its.height, its.cfa):
             raise DecodeError(
                 f"{frame.path.name} is {its.width}x{its.height} {its.cfa}, {one.path.name} "
                 f"{mine.width}x{mine.height} {mine.cfa}; give frames of one sensor"
             )
+        check_alike(alike.like, alike.path, its, frame.path)
         if min(mine.width, mine.height) < 2 * BLOCK_PX:
             raise DecodeError(
                 f"{frame.path.name} has {its.width}x{its.height} pixels; noise needs "

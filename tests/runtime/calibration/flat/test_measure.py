@@ -98,6 +98,15 @@ def test_a_crop_knows_pitch_and_middle_of_its_sensor(tmp_path: Path) -> None:
     assert _error(facts, lens) < TOLERANCE
 
 
+def test_a_crop_without_the_optical_centre_is_refused(tmp_path: Path) -> None:
+    place = camkit_description(
+        bundle="b", origin_px=(0, 0), sensor_size_px=(4000, 300), pixel_pitch_um=PITCH_UM
+    )
+    files = LENS.write(tmp_path, GOOD, description=place)
+    with pytest.raises(DecodeError, match=r"0\.dng is a crop that the optical centre does not lie in"):  # noqa: E501 # fmt: skip
+        measure_flat(files, *LENS.said(GOOD))
+
+
 def test_heights_are_in_proportion_to_the_pitch(tmp_path: Path) -> None:
     files = LENS.write_planes(tmp_path, GOOD)
     twice = measure_flat(files, *LENS.said(GOOD), pixel_pitch_um=2 * PITCH_UM)

@@ -179,6 +179,9 @@ def test_wrong_company_is_refused_and_named(tmp_path: Path, small: Sensor) -> No
     tiny = [tmp_path / "tiny-a.dng", tmp_path / "tiny-b.dng"]
     for path in tiny:
         write_raw(path, small.frame(0.0)[:40, :40], 400)
+    deep = [tmp_path / "deep-a.dng", tmp_path / "deep-b.dng"]
+    for path in deep:
+        write_raw(path, small.frame(0.3) * np.uint16(4), 400, white=4 * (WHITE + 1) - 1)
     copy = tmp_path / "copy.dng"
     copy.write_bytes(dark[0].read_bytes())
     cases = [
@@ -187,6 +190,7 @@ def test_wrong_company_is_refused_and_named(tmp_path: Path, small: Sensor) -> No
         (other_flat, "flat-200-0-a.dng has ISO 200, the dark frames 400"),
         (flat[:2], "ISO 400 has 1 pairs of flats"),
         ([flat[0], wide], "frames differ in size"),
+        ([*flat, *deep], "frames differ in white level: dark-400-0.dng has 4095.0, deep-a"),
     ]
     for flats, told in cases:
         with pytest.raises(DecodeError, match=told):
