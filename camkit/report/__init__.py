@@ -14,6 +14,8 @@
     stress/          where methods fail
     lens/            one lens on one page
     plate/           one plate on one page
+    calibration/     what a calibration found, on one page
+    style            how the pages of lenses, plates and calibrations look
 
 Test pictures are only ever measured on.
 """

@@ -6,4 +6,8 @@ light    the point light of a merged bracket found: its place, its core, the dar
 trim     how far its light stands out of the noise, and the noise itself smoothed
 psf      all of it: a bracket of a point light to a frozen PSF
 dots     one through a plate of dots to the PSF that an array of small pixels sees
+flat/    pictures of an uneven display to relative illumination
+noise/   pairs of frames to gain, read noise and fixed patterns of every ISO
+tone     pictures of grey steps to the tone curve of a display
+record   what a calibration found, as TOML
 """

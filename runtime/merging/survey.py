@@ -98,7 +98,7 @@ def survey(
         frame = Frame(path=path, time_s=time_s, sha256=capture.sha256, noise=capture.noise)
         if found:
             check_alike(found[0][1], found[0][0].path, capture, path)
-        found.append((frame, _without_pixels(capture), _lattice(capture)))
+        found.append((frame, without_pixels(capture), _lattice(capture)))
     if times_s is None:
         _check_settings([(frame.path, capture) for frame, capture, _ in found])
     found.sort(key=lambda one: (-one[0].time_s, str(one[0].path)))
@@ -198,7 +198,7 @@ def _notes(told: Sequence[tuple[Path, tuple[str, ...]]]) -> tuple[str, ...]:
     )
 
 
-def _without_pixels(capture: Capture) -> Capture:
+def without_pixels(capture: Capture) -> Capture:
     """Keep what a capture says of itself: its samples become views of one number."""
     one: NDArray[Any] = np.zeros((), dtype=capture.samples.dtype)
     return replace(capture, samples=np.broadcast_to(one, capture.samples.shape))

@@ -4,7 +4,7 @@
     plan      what `process` would do, why, and what it would take (`plan_text`)
     simulate  the digital twin: a scene to a DNG
     merge     a bracket of exposures to one linear EXR
-    calibrate what a camera is, measured: its PSF
+    calibrate what a camera is, measured: its PSF, noise, vignetting; a display
     info      what a bundle or a capture is
 
 `decoding_ahead` has the decoder of `process` start first. `mosaic` holds the options of headerless

@@ -8,8 +8,8 @@ from typing import Final
 
 from camkit.models_def.optics.diffraction.plate_optics import REFERENCE_UM
 from camkit.models_def.optics.diffraction.shares import CORE_PX, HALF_WIDTH_PX
-from camkit.report.lens.page import STYLE
 from camkit.report.plate.facts import HELD, PlateFacts
+from camkit.report.style import STYLE
 from camkit.units import MM_PER_M
 
 TITLES: Final = {

@@ -2,12 +2,18 @@
 
 import typer
 
+from camkit.cli.use.calibrate.flat import flat
+from camkit.cli.use.calibrate.noise import noise
 from camkit.cli.use.calibrate.psf import psf
+from camkit.cli.use.calibrate.tone import tone
 
 calibrate_app = typer.Typer(
     name="calibrate", help="Measure a camera on photographs.", no_args_is_help=True
 )
 calibrate_app.command()(psf)
+calibrate_app.command()(noise)
+calibrate_app.command()(flat)
+calibrate_app.command()(tone)
 
 
 @calibrate_app.callback()

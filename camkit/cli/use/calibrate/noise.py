@@ -1,0 +1,64 @@
+"""`camkit calibrate noise`: pairs of dark and flat frames to gain and read noise of every ISO."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
+from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.runtime.calibration.noise.measure import IsoFacts
+
+
+def noise(
+    dark: Annotated[
+        list[Path],
+        typer.Option(help="A frame without light; given again, two by two, pairs of every ISO."),
+    ],
+    flat: Annotated[
+        list[Path],
+        typer.Option(
+            help="A frame of even light; given again, two by two, pairs of one light and setting, "
+            "two levels or more for every ISO."
+        ),
+    ],
+    out: Out,
+    page: Page = None,
+    iso: Annotated[
+        float | None, typer.Option(help="Of files that state none.", show_default=False)
+    ] = None,
+    mosaic: MosaicCfa = None,
+    black_level: BlackLevel = None,
+    white_level: WhiteLevel = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Measure gain, read noise and fixed patterns of a sensor on pairs of RAW frames."""
+    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
+    if iso is not None and not 0 < iso < float("inf"):
+        raise ContractError(f"--iso must be > 0; got {iso:g}")
+    from camkit.cli.use.mosaic import mosaic_options
+    from camkit.runtime.calibration.noise.measure import measure_sensor
+
+    found = measure_sensor(dark, flat, mosaic_options(mosaic, black_level, white_level), iso)
+
+    def shown() -> str:
+        from camkit.report.calibration.noise_page import noise_html
+
+        return noise_html(found)
+
+    outputs.write(found.to_record(), [_line(facts) for facts in found.isos], shown)
+
+
+def _line(facts: "IsoFacts") -> str:
+    below = "" if facts.read.resolved else "below "
+    return (
+        f"  ISO {facts.iso:g}: {facts.gain_e_per_dn:.4g} e-/DN ({100 * facts.gain_error:.2g} %), "
+        f"read noise {below}{facts.read_noise_e:.3g} e-, PRNU {100 * facts.prnu:.2g} %, "
+        f"{facts.pairs} levels"
+    )

@@ -1,0 +1,83 @@
+"""What a command of `camkit calibrate` leaves: a TOML, a page if one is asked for, what is said."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import typer
+
+from camkit.cli.say import say
+from camkit.errors import ContractError
+
+Out = Annotated[Path, typer.Option("-o", "--out", help="What was found (.toml).")]
+Page = Annotated[
+    Path | None, typer.Option(help="Also show it on a page (.html), complete in itself.")
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outputs:
+    """Where the results go; made by `asked`, before any work.
+
+    Attributes:
+        out: The TOML.
+        page: The page; None for none.
+        as_json: Print one object instead of lines.
+    """
+
+    out: Path
+    page: Path | None
+    as_json: bool
+
+    @classmethod
+    def asked(cls, out: Path, page: Path | None, *, overwrite: bool, as_json: bool) -> Self:
+        """Take the wishes of a command.
+
+        Raises:
+            ContractError: If a name is of another kind, or a file is there and may not be replaced.
+        """
+        if out.suffix.lower() != ".toml":
+            raise ContractError(f"a calibration is TOML; expected a name in .toml, got {out}")
+        if page is not None and page.suffix.lower() != ".html":
+            raise ContractError(f"a page is HTML; expected a name in .html, got {page}")
+        for path in (out, page):
+            if path is not None and path.exists() and not overwrite:
+                raise ContractError(f"{path} exists; say --overwrite or another name")
+        return cls(out=out, page=page, as_json=as_json)
+
+    def write(
+        self, record: Mapping[str, Any], lines: Sequence[str], page: Callable[[], str]
+    ) -> None:
+        """Write the files, all or none, and say what was found.
+
+        Args:
+            record: What goes into the TOML and, with the names of the files, into the JSON; its
+                `notes`, if any, are said on stderr before the lines.
+            lines: What is said without --json, after the name of the TOML.
+            page: Gives the page's HTML; called only where one is asked for.
+
+        Raises:
+            ContractError: If the record holds what TOML cannot.
+        """
+        from camkit.runtime.calibration.record import to_toml
+        from camkit.runtime.output.part_file import atomic_outputs
+
+        texts = {self.out: to_toml(record)}
+        if self.page is not None:
+            texts[self.page] = page()
+        for path in texts:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_outputs(*texts) as parts:
+            for part, text in zip(parts, texts.values(), strict=True):
+                part.write_text(text, encoding="utf-8")
+        named = {"out": self.out, "page": self.page}
+        files = {name: str(path) for name, path in named.items() if path is not None}
+        if self.as_json:
+            say(json.dumps({**record, **files}, allow_nan=False))
+            return
+        for note in record.get("notes", ()):
+            say(f"note: {note}", err=True)
+        for line in (f"{', '.join(files.values())}:", *lines):
+            say(line)

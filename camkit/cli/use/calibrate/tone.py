@@ -1,0 +1,47 @@
+"""`camkit calibrate tone`: pictures of grey steps to the tone curve of a display."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
+from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
+
+
+def tone(
+    files: Annotated[
+        list[Path], typer.Argument(help="Linear pictures, each of one grey that fills a display.")
+    ],
+    levels: Annotated[
+        str,
+        typer.Option(help="What the display was told, such as 0,16,255, in the order of FILES."),
+    ],
+    out: Out,
+    page: Page = None,
+    mosaic: MosaicCfa = None,
+    black_level: BlackLevel = None,
+    white_level: WhiteLevel = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Measure luminance over level of a display that shows grey steps."""
+    outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
+    from camkit.cli.use.mosaic import mosaic_options
+    from camkit.runtime.calibration.tone import levels_of, measure_tone
+
+    said = mosaic_options(mosaic, black_level, white_level)
+    found = measure_tone(files, levels_of(levels, len(files)), said)
+
+    def shown() -> str:
+        from camkit.report.calibration.tone_page import tone_html
+
+        return tone_html(found)
+
+    record = found.to_record()
+    line = f"  {len(files)} steps, black {found.luminance[0]:.3g} of the brightest"
+    if "gamma" in record:
+        line += f", gamma {record['gamma']:.3g} to {record['residual_percent']:.2g} %"
+    outputs.write(record, [line], shown)
