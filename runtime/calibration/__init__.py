@@ -9,5 +9,6 @@ dots     one through a plate of dots to the PSF that an array of small pixels se
 flat/    pictures of an uneven display to relative illumination
 noise/   pairs of frames to gain, read noise and fixed patterns of every ISO
 tone     pictures of grey steps to the tone curve of a display
+geometry/  focal length, optical centre and distortion, from a checkerboard
 record   what a calibration found, as TOML
 """

@@ -1,7 +1,9 @@
 """What a calibration found, on one page.
 
-page        sections of words, tables and pictures as one HTML file
-noise_page  photon transfer of every ISO
-flat_page   relative illumination, the display, what both leave
-tone_page   luminance over level
+page             sections of words, tables and pictures as one HTML file
+geometry         what those of a camera's geometry are
+geometry_charts  residuals, covered area, distortion
+noise_page       photon transfer of every ISO
+flat_page        relative illumination, the display, what both leave
+tone_page        luminance over level
 """

@@ -1,9 +1,10 @@
 """`camkit calibrate`: what a camera is, measured on photographs of something known.
 
-app      the commands joined
-outputs  the files that a command leaves, and what it says
-psf      the point spread function, from a bracket of a point light
-flat     relative illumination, from pictures of an uneven display in several poses
-noise    gain, read noise and fixed patterns, from pairs of dark and flat frames
-tone     the tone curve of a display, from pictures of grey steps
+app       the commands joined
+outputs   the files that a command leaves, and what it says
+psf       the point spread function, from a bracket of a point light
+geometry  focal length, optical centre and distortion, from photographs of a checkerboard
+flat      relative illumination, from pictures of an uneven display in several poses
+noise     gain, read noise and fixed patterns, from pairs of dark and flat frames
+tone      the tone curve of a display, from pictures of grey steps
 """

@@ -3,6 +3,7 @@
 import typer
 
 from camkit.cli.use.calibrate.flat import flat
+from camkit.cli.use.calibrate.geometry import geometry
 from camkit.cli.use.calibrate.noise import noise
 from camkit.cli.use.calibrate.psf import psf
 from camkit.cli.use.calibrate.tone import tone
@@ -14,6 +15,7 @@ calibrate_app.command()(psf)
 calibrate_app.command()(noise)
 calibrate_app.command()(flat)
 calibrate_app.command()(tone)
+calibrate_app.command()(geometry)
 
 
 @calibrate_app.callback()

@@ -1,0 +1,275 @@
+"""All of it: photographs of a board to the geometry of a camera, judged by pictures left out."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.errors import DecodeError
+from camkit.runtime.calibration.geometry.adjustment import rms
+from camkit.runtime.calibration.geometry.board import Board
+from camkit.runtime.calibration.geometry.camera import Camera, FloatGrid, distance
+from camkit.runtime.calibration.geometry.choice import (
+    LEAST_VIEWS,
+    Judged,
+    judge_all,
+)
+from camkit.runtime.calibration.geometry.coverage import Coverage
+from camkit.runtime.calibration.geometry.detector import find_corners
+from camkit.runtime.calibration.geometry.grey import read_grey
+from camkit.runtime.calibration.geometry.profile import (
+    Profile,
+    RadialFit,
+    fit_radial,
+)
+from camkit.runtime.calibration.geometry.unfolded import unfolded
+from camkit.runtime.raw import file_sha256
+
+MOST_PICTURES: Final = 256
+MOST_ERROR: Final = 2e-3
+"""Held-out error, of the diagonal, beyond which nothing was explained."""
+WORST_FOCAL: Final = 0.1
+WEAK_FOCAL: Final = 0.01
+"""Standard error of the focal length, of itself: refused, and worth a word."""
+MISSED_PX: Final = 0.2
+"""By the polynomial, from which on it is worth a word."""
+_OFF_MIDDLE: Final = 0.002
+"""Of the diagonal, from which on the optical centre is said to be off the middle."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """A picture in which the board was looked for.
+
+    Attributes:
+        path: The file.
+        size: Width and height, px.
+        corners: (corner, 2) x, y; None where there is no board.
+    """
+
+    path: Path
+    size: tuple[int, int]
+    corners: FloatGrid | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Geometry:
+    """The geometry of a camera.
+
+    Attributes:
+        board: What was photographed.
+        views: All pictures, in the order given.
+        size: Width and height, px.
+        tried: All models, from simple to rich.
+        chosen: The one taken.
+        coverage: Where the board was seen.
+        profile: Distortion along a radius.
+        radial: The same as the polynomial of `undistort`.
+        notes: What people should know.
+    """
+
+    board: Board
+    views: tuple[View, ...]
+    size: tuple[int, int]
+    tried: tuple[Judged, ...]
+    chosen: Judged
+    coverage: Coverage
+    profile: Profile
+    radial: RadialFit
+    notes: tuple[str, ...]
+
+    @property
+    def camera(self) -> Camera:
+        """Give the camera."""
+        return self.chosen.fit.camera
+
+    @property
+    def corners(self) -> FloatGrid:
+        """Give (view, corner, 2) of the views with a board, as `chosen` has them."""
+        return np.stack([view.corners for view in self.views if view.corners is not None])
+
+    def to_record(self) -> dict[str, Any]:
+        """Give plain values."""
+        return {
+            "board": str(self.board),
+            "width_px": self.size[0],
+            "height_px": self.size[1],
+            "model": self.camera.model.name,
+            "focal_px": round(self.camera.focal_px, 4),
+            "centre_px": [round(at, 4) for at in self.camera.centre_px],
+            "coefficients": self.camera.coefficients.tolist(),
+            "rms_px": round(self.chosen.fit.rms_px, 5),
+            "held_out_rms_px": round(self.chosen.rms_px, 5),
+            "held_out_worst_px": round(self.chosen.worst_px, 5),
+            "covered_radius_px": round(self.coverage.radius_px, 3),
+            "notes": list(self.notes),
+            "radial": self.radial.to_record(),
+            "pictures": self._pictures(),
+        }
+
+    def _pictures(self) -> list[dict[str, Any]]:
+        records: list[dict[str, Any]] = []
+        fit, seen = self.chosen.fit, 0
+        for view in self.views:
+            record: dict[str, Any] = {"file": view.path.name, "found": view.corners is not None}
+            if view.corners is not None:
+                record["rms_px"] = round(rms(fit.residuals[seen]), 5)
+                if self.board.square_mm is not None:
+                    squares = distance(fit.poses[seen], self.board.points.mean(axis=0))
+                    record["distance_mm"] = round(squares * self.board.square_mm, 2)
+                seen += 1
+            records.append(record)
+        return records
+
+
+def calibrate_geometry(files: Sequence[Path], board: Board) -> Geometry:
+    """Measure the geometry of a camera.
+
+    Args:
+        files: Photographs of a flat board at one setting of lens and focus, at every place of the
+            picture and tilted.
+        board: The board.
+
+    Raises:
+        DecodeError: If a file cannot be read or is given twice, sizes differ, fewer than three
+            pictures show the board, they contradict each other, or what explains them folds.
+    """
+    views = look_for(files, board)
+    seen = [view for view in views if view.corners is not None]
+    corners = np.stack([view.corners for view in seen if view.corners is not None])
+    size = views[0].size
+    judged, outliers = judge_all(corners, board.points, size)
+    _check_agree(judged, outliers, seen, size)
+    chosen, coverage, profile = unfolded(judged, corners, size)
+    _check_focal(chosen)
+    radial = fit_radial(profile, float(np.hypot(*size)) / 2, coverage.corner_px)
+    return Geometry(
+        board=board,
+        views=tuple(views),
+        size=size,
+        tried=tuple(judged),
+        chosen=chosen,
+        coverage=coverage,
+        profile=profile,
+        radial=radial,
+        notes=_notes(views, size, chosen, coverage, radial),
+    )
+
+
+def look_for(files: Sequence[Path], board: Board) -> list[View]:
+    """Read pictures one after the other and look for the board.
+
+    Raises:
+        DecodeError: If a file cannot be read or is given twice, sizes differ, or fewer than three
+            pictures show the board.
+    """
+    if len(files) > MOST_PICTURES:
+        raise DecodeError(f"expected at most {MOST_PICTURES} pictures; got {len(files)}")
+    views: list[View] = []
+    hashes: dict[str, Path] = {}
+    for path in files:
+        grey = read_grey(path)
+        sha256 = file_sha256(path)
+        if sha256 in hashes:
+            raise DecodeError(
+                f"{hashes[sha256]} and {path} are the same picture; give every picture once"
+            )
+        hashes[sha256] = path
+        size = (grey.shape[1], grey.shape[0])
+        views.append(View(path=path, size=size, corners=find_corners(grey, board)))
+    _check_sizes(views)
+    found = sum(view.corners is not None for view in views)
+    if found < LEAST_VIEWS:
+        what = f"a board of {board} inner corners"
+        told = f"{found} of {len(views)} pictures show {what}" if found else f"no picture shows {what}"  # noqa: E501 # fmt: skip
+        raise DecodeError(
+            f"{told}, {LEAST_VIEWS} are needed: check --board (inner corners, not squares), and "
+            "show the whole board with white around it"
+        )
+    return views
+
+
+def _check_sizes(views: Sequence[View]) -> None:
+    (usual, _), *others = Counter(view.size for view in views).most_common()
+    if others:
+        odd = next(view for view in views if view.size != usual)
+        raise DecodeError(
+            f"{odd.path.name} has {odd.size[0]}x{odd.size[1]} px, others {usual[0]}x{usual[1]}: "
+            "give pictures of one camera"
+        )
+
+
+def _check_agree(
+    judged: Sequence[Judged],
+    outliers: Mapping[int, float],
+    seen: Sequence[View],
+    size: tuple[int, int],
+) -> None:
+    """Refuse views that contradict each other."""
+    if not judged:
+        raise DecodeError("no camera explains the corners: the pictures are not of one flat board")
+    if outliers:
+        told = ", ".join(f"{seen[n].path.name} ({off:.2f} px rms)" for n, off in outliers.items())
+        raise DecodeError(
+            f"the camera that the other pictures show does not fit {told}: check --board, "
+            "leave it out, or photograph one flat board at one setting of lens and focus"
+        )
+    best = min(judged, key=lambda one: one.rms_px)
+    if best.rms_px > MOST_ERROR * np.hypot(*size):
+        worst = seen[int(best.of_views_px.argmax())].path.name
+        raise DecodeError(
+            f"the pictures contradict each other: left out, corners are off by {best.rms_px:.2f} "
+            f"px rms, most in {worst}; check --board, photograph one flat board at one setting, "
+            "and 10 pictures or more"
+        )
+
+
+def _focal_error(chosen: Judged) -> float:
+    """Give the standard error of the focal length, of itself."""
+    fit = chosen.fit
+    variance = float(fit.spread[0, 0]) * fit.rms_px**2 / 2
+    return float(np.sqrt(max(variance, 0.0))) / fit.camera.focal_px
+
+
+def _check_focal(chosen: Judged) -> None:
+    error = _focal_error(chosen)
+    if not error <= WORST_FOCAL:
+        raise DecodeError(
+            f"the pictures do not tell the focal length ({error:.0%} uncertain): tilt the board, "
+            "to every side"
+        )
+
+
+def _notes(
+    views: Sequence[View],
+    size: tuple[int, int],
+    chosen: Judged,
+    coverage: Coverage,
+    radial: RadialFit,
+) -> tuple[str, ...]:
+    notes = [f"{view.path.name}: no board found" for view in views if view.corners is None]
+    if not coverage.is_whole:
+        notes.append(
+            f"corners were seen to {coverage.radius_px:.0f} px from the optical centre, the "
+            f"picture reaches to {coverage.corner_px:.0f} px ({coverage.share:.0%} of it lay "
+            "within a board); the distortion beyond is a guess: do not use it"
+        )
+    error = _focal_error(chosen)
+    if error > WEAK_FOCAL:
+        notes.append(f"the focal length is uncertain by {error:.1%}: tilt the board more")
+    middle = ((size[0] - 1) / 2, (size[1] - 1) / 2)
+    off = float(np.hypot(*np.subtract(chosen.fit.camera.centre_px, middle)))
+    if off > _OFF_MIDDLE * np.hypot(*size):
+        notes.append(
+            f"the optical centre lies {off:.1f} px off the middle of the picture, about which a "
+            "bundle undistorts"
+        )
+    if radial.residual_px > MISSED_PX:
+        notes.append(
+            f"the radial polynomial misses the model by up to {radial.residual_px:.2f} px within "
+            "what was seen"
+        )
+    return tuple(notes)

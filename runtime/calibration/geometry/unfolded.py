@@ -1,0 +1,51 @@
+"""The model among those whose distortion does not fold inside the picture.
+
+A profile that turns back has no inverse there: two directions fall on one place. Often it does so
+where nothing was seen, and another model, as good where corners were, does not.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from camkit.errors import DecodeError
+from camkit.runtime.calibration.geometry.camera import FloatGrid
+from camkit.runtime.calibration.geometry.choice import Judged, simplest
+from camkit.runtime.calibration.geometry.coverage import Coverage, coverage_of
+from camkit.runtime.calibration.geometry.profile import Profile, profile_of
+
+FOLDED: Final = 1.25
+"""Times the held-out error that a model may have to take the place of one that folds."""
+
+
+def unfolded(
+    judged: Sequence[Judged], corners: FloatGrid, size: tuple[int, int]
+) -> tuple[Judged, Coverage, Profile]:
+    """Choose among the models whose profile grows to the corners of the picture.
+
+    Args:
+        judged: All models, from simple to rich.
+        corners: (view, corner, 2) as seen, px.
+        size: Width and height.
+
+    Raises:
+        DecodeError: If none of them is about as good as the best that folds.
+    """
+    every = [(one, *_seen(one, corners, size)) for one in judged]
+    usable = [found for found in every if found[2].fold_px >= found[1].corner_px]
+    best = simplest(judged)
+    if usable:
+        chosen = simplest([one for one, _, _ in usable])
+        if chosen.rms_px <= FOLDED * best.rms_px:
+            return next(found for found in usable if found[0] is chosen)
+    _, coverage, profile = next(found for found in every if found[0] is best)
+    raise DecodeError(
+        f"the distortion that explains the corners ({best.fit.camera.model.name}) folds back at "
+        f"{profile.fold_px:.0f} px from the optical centre, inside the picture, whose corner lies "
+        f"at {coverage.corner_px:.0f} px; corners were seen to {coverage.radius_px:.0f} px: "
+        "photograph the board farther out"
+    )
+
+
+def _seen(one: Judged, corners: FloatGrid, size: tuple[int, int]) -> tuple[Coverage, Profile]:
+    coverage = coverage_of(corners, one.fit.camera.centre_px, size)
+    return coverage, profile_of(one.fit.camera, coverage.radius_px)

@@ -1,0 +1,47 @@
+"""Models whose distortion folds are not taken."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from camkit.errors import DecodeError
+from camkit.runtime.calibration.geometry.camera import MODELS, FloatGrid, project
+from camkit.runtime.calibration.geometry.choice import Judged, judge_all
+from camkit.runtime.calibration.geometry.unfolded import unfolded
+from tests.runtime.calibration.geometry.board_factory import BOARD, camera_of, poses_around
+
+SIZE = (400, 300)
+FOLD_PX = 340 * np.sqrt(1 / (3 * 0.45)) * 2 / 3
+"""Of r (1 - 0.45 r^2), inside the picture, whose corner lies at 250 px."""
+
+
+@pytest.fixture(scope="module")
+def seen() -> tuple[FloatGrid, list[Judged]]:
+    """Corners in the middle of the picture only."""
+    camera = camera_of(MODELS[1], 340, (199.5, 149.5), -0.45)
+    poses = poses_around(camera, SIZE, 8, seed=1, span=0.3, reach=0.3)
+    corners = np.stack([project(camera, pose, BOARD.points)[0] for pose in poses])
+    corners += np.random.default_rng(0).normal(0, 0.02, corners.shape)
+    return corners, judge_all(corners, BOARD.points, SIZE)[0]
+
+
+def test_a_model_that_folds_is_refused_and_says_where(
+    seen: tuple[FloatGrid, list[Judged]],
+) -> None:
+    corners, judged = seen
+    told = rf"radial_1\) folds back at {FOLD_PX:.0f} px .* whose corner lies at 250 px"
+    with pytest.raises(DecodeError, match=told):
+        unfolded(judged[:2], corners, SIZE)
+
+
+def test_another_that_is_about_as_good_takes_its_place(
+    seen: tuple[FloatGrid, list[Judged]],
+) -> None:
+    corners, (straight, folding, *_) = seen
+    same = replace(straight, held_out=folding.held_out * 1.2)
+    chosen, coverage, profile = unfolded([same, folding], corners, SIZE)
+    assert chosen is same
+    assert profile.fold_px >= coverage.corner_px
+    with pytest.raises(DecodeError, match="folds back"):
+        unfolded([replace(same, held_out=folding.held_out * 1.3), folding], corners, SIZE)
