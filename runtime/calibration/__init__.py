@@ -1,14 +1,14 @@
 """What a camera is, from photographs of something known.
 
-darks    what a sensor shows without light, taken off every exposure
-lattice  the samples of one colour on their own lattice, and their values anywhere
-light    the point light of a merged bracket found: its place, its core, the dark around it
-trim     how far its light stands out of the noise, and the noise itself smoothed
-psf      all of it: a bracket of a point light to a frozen PSF
-dots     one through a plate of dots to the PSF that an array of small pixels sees
-flat/    pictures of an uneven display to relative illumination
-noise/   pairs of frames to gain, read noise and fixed patterns of every ISO
-tone     pictures of grey steps to the tone curve of a display
+darks      what a sensor shows without light, taken off every exposure
+lattice    the samples of one colour on their own lattice, and their values anywhere
+light      the point light of a merged bracket found: its place, its core, the dark around it
+trim       how far its light stands out of the noise, and the noise itself smoothed
+psf        all of it: a bracket of a point light to a frozen PSF
+dots       one through a plate of dots to the PSF that an array of small pixels sees
+flat/      pictures of an uneven display to relative illumination
+noise/     pairs of frames to gain, read noise and fixed patterns of every ISO
+tone       pictures of grey steps to the tone curve of a display
 geometry/  focal length, optical centre and distortion, from a checkerboard
-record   what a calibration found, as TOML
+record     what a calibration found, as TOML
 """
