@@ -10,5 +10,6 @@ flat/      pictures of an uneven display to relative illumination
 noise/     pairs of frames to gain, read noise and fixed patterns of every ISO
 tone       pictures of grey steps to the tone curve of a display
 geometry/  focal length, optical centre and distortion, from a checkerboard
+display/   what a display shows, and captures of it as pairs for training
 record     what a calibration found, as TOML
 """

@@ -165,7 +165,7 @@ def measure_tone(
         captures.append(without_pixels(capture))
         check_one_camera(captures[0], files[0], capture, path)
         found.append((path, level, light, error))
-    exposures, notes = _exposures(files, captures)
+    exposures, notes = exposures_of(files, captures)
     steps = [
         Step(path=path, level=level, light=light / t, error=error / t, exposure=t)
         for (path, level, light, error), t in zip(found, exposures, strict=True)
@@ -211,7 +211,9 @@ def _middle(path: Path, capture: Capture) -> tuple[float, float]:
     return float(seen.mean()), noise / float(np.sqrt(seen.size))
 
 
-def _exposures(files: Sequence[Path], captures: Sequence[Capture]) -> tuple[list[float], list[str]]:
+def exposures_of(
+    files: Sequence[Path], captures: Sequence[Capture]
+) -> tuple[list[float], list[str]]:
     """Give relative exposures, and what is to be said of them.
 
     Raises:

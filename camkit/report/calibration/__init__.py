@@ -6,4 +6,5 @@ geometry_charts  residuals, covered area, distortion
 noise_page       photon transfer of every ISO
 flat_page        relative illumination, the display, what both leave
 tone_page        luminance over level
+pairs_page       how well shown pictures lie on their captures
 """

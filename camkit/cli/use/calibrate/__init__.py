@@ -6,5 +6,8 @@ psf       the point spread function, from a bracket of a point light
 geometry  focal length, optical centre and distortion, from photographs of a checkerboard
 flat      relative illumination, from pictures of an uneven display in several poses
 noise     gain, read noise and fixed patterns, from pairs of dark and flat frames
+targets   what a display shows to be photographed
+pairs     captures of it as pairs for training
+folder    the folder that those two fill, all or nothing
 tone      the tone curve of a display, from pictures of grey steps
 """

@@ -5,7 +5,9 @@ import typer
 from camkit.cli.use.calibrate.flat import flat
 from camkit.cli.use.calibrate.geometry import geometry
 from camkit.cli.use.calibrate.noise import noise
+from camkit.cli.use.calibrate.pairs import pairs
 from camkit.cli.use.calibrate.psf import psf
+from camkit.cli.use.calibrate.targets import targets
 from camkit.cli.use.calibrate.tone import tone
 
 calibrate_app = typer.Typer(
@@ -16,6 +18,8 @@ calibrate_app.command()(noise)
 calibrate_app.command()(flat)
 calibrate_app.command()(tone)
 calibrate_app.command()(geometry)
+calibrate_app.command()(targets)
+calibrate_app.command()(pairs)
 
 
 @calibrate_app.callback()

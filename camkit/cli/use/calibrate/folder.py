@@ -1,0 +1,93 @@
+"""A folder that a command of `camkit calibrate` fills: all of it or nothing."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from camkit.errors import ContractError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Folder:
+    """A folder to be filled; made by `asked`, before any work.
+
+    Attributes:
+        path: The folder.
+        within: Folders of it that hold nothing but what is written, "." for itself.
+        overwrite: Whether what is there may be replaced.
+    """
+
+    path: Path
+    within: tuple[str, ...]
+    overwrite: bool
+
+    @classmethod
+    def asked(
+        cls, path: Path, marks: Sequence[str], within: Sequence[str], *, overwrite: bool
+    ) -> Self:
+        """Take the wish of a command.
+
+        Args:
+            path: The folder.
+            marks: Files that a former run of the command leaves: with none of them, what is in
+                the folder is somebody else's.
+            within: Its parts that must hold nothing else.
+            overwrite: Whether files that are there may be replaced.
+
+        Raises:
+            ContractError: If it is no folder, or holds something that may not be replaced.
+        """
+        if path.exists() and not path.is_dir():
+            raise ContractError(f"{path} is a file; expected a folder")
+        if path.is_dir() and any(path.iterdir()):
+            if not overwrite:
+                raise ContractError(f"{path} is not empty; say --overwrite or another folder")
+            if not any((path / mark).exists() for mark in marks):
+                raise ContractError(
+                    f"{path} holds files of another kind, without {marks[0]}; give another folder"
+                )
+        return cls(path=path, within=tuple(within), overwrite=overwrite)
+
+    @contextmanager
+    def writing(self, names: Sequence[str]) -> Iterator[tuple[Path, ...]]:
+        """Give the paths to write to; files appear when the block ends well, all or none.
+
+        Args:
+            names: Paths in the folder.
+
+        Raises:
+            ContractError: If a part of the folder holds pictures or lists of other names, which
+                would be mixed up with these.
+        """
+        from camkit.runtime.output.part_file import atomic_outputs
+
+        paths = [self.path / name for name in names]
+        for part in self.within:
+            here = self.path / part
+            if not here.is_dir():
+                continue
+            for found in sorted(here.iterdir()):
+                if found.is_file() and found not in paths:
+                    raise ContractError(
+                        f"{found} is none of the files to be written; remove it or give another "
+                        "folder"
+                    )
+        made = _missing(paths)
+        try:
+            for folder in made:
+                folder.mkdir(exist_ok=True)
+            with atomic_outputs(*paths) as parts:
+                yield parts
+        except BaseException:
+            for folder in reversed(made):
+                if folder.is_dir() and not any(folder.iterdir()):
+                    folder.rmdir()
+            raise
+
+
+def _missing(paths: Sequence[Path]) -> list[Path]:
+    """Give the folders to be made, outer ones first."""
+    missing = {folder for path in paths for folder in path.parents if not folder.exists()}
+    return sorted(missing, key=lambda folder: len(folder.parts))

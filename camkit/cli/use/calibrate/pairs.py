@@ -1,0 +1,102 @@
+"""`camkit calibrate pairs`: captures of shown pictures to pairs for training."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
+from camkit.cli.use.calibrate.folder import Folder
+from camkit.cli.use.calibrate.outputs import Page
+from camkit.errors import ContractError
+
+if TYPE_CHECKING:
+    from camkit.runtime.calibration.display.pairs import Pairs
+
+SETTINGS = "pairs.toml"
+REGISTRATION = "registration.toml"
+
+
+def pairs(
+    captures: Annotated[
+        list[Path], typer.Argument(help="Captures of the screen, in any order, linear.")
+    ],
+    targets: Annotated[Path, typer.Option(help="Folder that camkit calibrate targets wrote.")],
+    geometry: Annotated[
+        Path, typer.Option(help="The camera: a TOML of camkit calibrate geometry.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for train --pairs.")],
+    tone: Annotated[
+        Path | None,
+        typer.Option(help="The display: a TOML of camkit calibrate tone. Default: sRGB."),
+    ] = None,
+    flat: Annotated[
+        Path | None, typer.Option(help="The vignetting: a TOML of camkit calibrate flat.")
+    ] = None,
+    most_residual_px: Annotated[
+        float, typer.Option(help="By which pictures may miss their captures, RMS.")
+    ] = 0.5,
+    page: Page = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Lay shown pictures over their captures, as pairs that `camkit train --pairs` reads."""
+    if page is not None and page.suffix.lower() != ".html":
+        raise ContractError(f"a page is HTML; expected a name in .html, got {page}")
+    if page is not None and page.exists() and not overwrite:
+        raise ContractError(f"{page} exists; say --overwrite or another name")
+    within = (".", "capture", "reference")
+    folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
+    from camkit.runtime.calibration.display.camera_file import Lens, Tone
+    from camkit.runtime.calibration.display.pairs import Given, draw_pairs, find_pairs
+    from camkit.runtime.calibration.display.targets import Targets
+    from camkit.runtime.calibration.record import to_toml
+    from camkit.runtime.output.part_file import atomic_output
+    from camkit.runtime.output.pixels import png_bytes, tiff_bytes
+
+    given = Given(
+        folder=targets,
+        targets=Targets.read(targets),
+        lens=Lens.read(geometry),
+        tone=Tone.read(tone),
+        flat=flat,
+        most_residual_px=most_residual_px,
+    )
+    found = find_pairs(captures, given)
+    names = [pair.target.name for pair in found.pairs]
+    files = [f"{kind}/{n}{end}" for n in names for kind, end in (("capture", ".tiff"), ("reference", ".png"))]  # noqa: E501 # fmt: skip
+    html = None if page is None else _html(found)
+    with folder.writing([*files, REGISTRATION, SETTINGS]) as parts:
+        for n, (counts, codes) in enumerate(draw_pairs(found, given)):
+            parts[2 * n].write_bytes(tiff_bytes(counts))
+            parts[2 * n + 1].write_bytes(png_bytes(codes))
+        parts[-2].write_text(to_toml(found.to_record()), encoding="utf-8")
+        parts[-1].write_text(to_toml(found.settings()), encoding="utf-8")
+    if page is not None and html is not None:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_output(page) as part:
+            part.write_text(html, encoding="utf-8")
+    _tell(found, out, page, as_json=json_)
+
+
+def _tell(found: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> None:
+    if as_json:
+        shown = {} if page is None else {"page": str(page)}
+        say(json.dumps({**found.to_record(), "out": str(out), **shown}, allow_nan=False))
+        return
+    for note in found.notes:
+        say(f"note: {note}", err=True)
+    say(f"{out}: {len(found.pairs)} pairs at ISO {found.iso:g}")
+    worst = max(found.pairs, key=lambda pair: pair.residual_px)
+    say(f"  at worst {worst.residual_px:.3f} px RMS, in {worst.path.name}")
+    if found.primaries is not None:
+        say(f"  colours of the display to {100 * found.primaries.residual:.2g} % of white")
+
+
+def _html(found: "Pairs") -> str:
+    from camkit.report.calibration.pairs_page import pairs_html
+
+    return pairs_html(found)

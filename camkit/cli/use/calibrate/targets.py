@@ -1,0 +1,59 @@
+"""`camkit calibrate targets`: what a display shows while a camera is measured on it."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.say import say
+from camkit.cli.use.calibrate.folder import Folder
+
+LEVELS = "0,16,32,48,64,96,128,160,192,224,255"
+
+
+def targets(
+    screen: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the display in px.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for PNGs and their list.")],
+    pictures: Annotated[
+        list[Path] | None, typer.Argument(help="Sharp pictures to be shown, sRGB or Adobe RGB.")
+    ] = None,
+    board: Annotated[
+        str, typer.Option(help="COLUMNSxROWS of the checkerboard's inner corners.")
+    ] = "9x6",
+    levels: Annotated[str, typer.Option(help="Of the grey steps, 0..255.")] = LEVELS,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Write what a display shows: checkerboard, grey steps, colours, pictures with marks."""
+    from camkit.runtime.calibration.display.screen import Screen
+    from camkit.runtime.calibration.display.targets import (
+        LIST,
+        draw_targets,
+        levels_of_steps,
+        plan_targets,
+    )
+    from camkit.runtime.calibration.geometry.board import Board
+    from camkit.runtime.calibration.record import to_toml
+    from camkit.runtime.output.pixels import png_bytes
+
+    given = pictures or []
+    asked = Screen.read(screen), Board.read(board), levels_of_steps(levels)
+    folder = Folder.asked(out, (LIST,), (".",), overwrite=overwrite)
+    planned = plan_targets(given, *asked)
+    names = [*(target.file for target in planned.targets), LIST]
+    with folder.writing(names) as parts:
+        for part, codes in zip(parts, draw_targets(planned, given), strict=False):
+            part.write_bytes(png_bytes(codes))
+        parts[-1].write_text(to_toml(planned.to_record()), encoding="utf-8")
+    if json_:
+        say(json.dumps({**planned.to_record(), "out": str(out)}))
+        return
+    kinds = [target.kind for target in planned.targets]
+    say(f"{out}: {len(kinds)} targets of {planned.screen} px")
+    say(
+        f"  a board of {planned.board} corners, {kinds.count('grey')} grey steps, "
+        f"{kinds.count('colour')} colours, {kinds.count('picture')} pictures"
+    )
