@@ -21,8 +21,8 @@ AGAIN_S: Final = 0.02
 
 @contextmanager
 def none_is_lost() -> Iterator[None]:
-    """Raise in the main thread, a moment later, what was lost while the block runs."""
-    before = sys.unraisablehook
+    """Raise in the main thread, a moment later, what was lost; never after the block."""
+    before, coming = sys.unraisablehook, list[threading.Timer]()
 
     def tell(lost: "UnraisableHookArgs") -> None:
         if not issubclass(lost.exc_type, KeyboardInterrupt):
@@ -30,6 +30,7 @@ def none_is_lost() -> Iterator[None]:
             return
         again = threading.Timer(AGAIN_S, _interrupt)
         again.daemon = True
+        coming.append(again)
         again.start()
 
     sys.unraisablehook = tell
@@ -37,6 +38,8 @@ def none_is_lost() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
+        for again in coming:
+            again.cancel()
 
 
 def _interrupt() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from camkit.cli.interrupts import none_is_lost
+from camkit.cli.interrupts import AGAIN_S, none_is_lost
 
 
 class _Gone:
@@ -36,6 +36,13 @@ def test_an_interrupt_in_a_callback_ends_what_runs() -> None:
     with pytest.raises(KeyboardInterrupt), none_is_lost():
         _interrupted_in_a_callback(then_s=20.0)
     assert time.monotonic() - began < 10.0
+
+
+@pytest.mark.usefixtures("_default_handler")
+def test_none_comes_when_what_ran_has_ended() -> None:
+    with none_is_lost():
+        _interrupted_in_a_callback()
+    time.sleep(5 * AGAIN_S)
 
 
 @pytest.mark.usefixtures("_default_handler")
