@@ -38,6 +38,7 @@ class FlatFacts:
         poses: Of the pictures.
         heights_mm: (height,) distances from the optical centre on the sensor.
         relative_illumination: (height,) 1 at the centre.
+        pixel_pitch_um: By which heights are those of the pictures.
         centre_px: (x, y) of the optical centre in the pictures.
         centre_found: Whether it was fitted.
         separated: Whether lens and display were told apart.
@@ -52,6 +53,7 @@ class FlatFacts:
     poses: tuple[Pose, ...]
     heights_mm: FloatGrid
     relative_illumination: FloatGrid
+    pixel_pitch_um: float
     centre_px: tuple[float, float]
     centre_found: bool
     separated: bool
@@ -71,6 +73,7 @@ class FlatFacts:
             "separated": self.separated,
             "heights_mm": [round(float(h), 5) for h in self.heights_mm],
             "relative_illumination": [round(float(v), 5) for v in self.relative_illumination],
+            "pixel_pitch_um": self.pixel_pitch_um,
             "display_percent": round(100 * self.display, 3),
             "residual_percent": round(100 * self.rest, 4),
             "centre_px": [round(part, 2) for part in self.centre_px],
@@ -136,6 +139,7 @@ def measure_flat(
         poses=tuple(poses),
         heights_mm=radii * radius_px * to_mm(pitch_um),
         relative_illumination=parts.illumination(radii),
+        pixel_pitch_um=float(pitch_um),
         centre_px=(
             (like.width - 1) / 2 + parts.centre[0] * radius_px,
             (like.height - 1) / 2 + parts.centre[1] * radius_px,

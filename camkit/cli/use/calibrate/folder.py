@@ -55,7 +55,7 @@ class Folder:
         """Give the paths to write to; files appear when the block ends well, all or none.
 
         Args:
-            names: Paths in the folder.
+            names: Paths in the folder; an absolute one may lie elsewhere.
 
         Raises:
             ContractError: If a part of the folder holds pictures or lists of other names, which

@@ -40,11 +40,8 @@ class Outputs:
         """
         if out.suffix.lower() != ".toml":
             raise ContractError(f"a calibration is TOML; expected a name in .toml, got {out}")
-        if page is not None and page.suffix.lower() != ".html":
-            raise ContractError(f"a page is HTML; expected a name in .html, got {page}")
-        for path in (out, page):
-            if path is not None and path.exists() and not overwrite:
-                raise ContractError(f"{path} exists; say --overwrite or another name")
+        check_page(page, overwrite=overwrite)
+        _check_free(out, overwrite=overwrite)
         return cls(out=out, page=page, as_json=as_json)
 
     def write(
@@ -81,3 +78,21 @@ class Outputs:
             say(f"note: {note}", err=True)
         for line in (f"{', '.join(files.values())}:", *lines):
             say(line)
+
+
+def check_page(page: Path | None, *, overwrite: bool) -> None:
+    """Refuse a page that is no HTML, or is there and may not be replaced.
+
+    Raises:
+        ContractError: If so.
+    """
+    if page is None:
+        return
+    if page.suffix.lower() != ".html":
+        raise ContractError(f"a page is HTML; expected a name in .html, got {page}")
+    _check_free(page, overwrite=overwrite)
+
+
+def _check_free(path: Path, *, overwrite: bool) -> None:
+    if path.exists() and not overwrite:
+        raise ContractError(f"{path} exists; say --overwrite or another name")

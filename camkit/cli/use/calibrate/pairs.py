@@ -9,8 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.folder import Folder
-from camkit.cli.use.calibrate.outputs import Page
-from camkit.errors import ContractError
+from camkit.cli.use.calibrate.outputs import Page, check_page
 
 if TYPE_CHECKING:
     from camkit.runtime.calibration.display.pairs import Pairs
@@ -44,17 +43,13 @@ def pairs(
     _debug: Debug = False,
 ) -> None:
     """Lay shown pictures over their captures, as pairs that `camkit train --pairs` reads."""
-    if page is not None and page.suffix.lower() != ".html":
-        raise ContractError(f"a page is HTML; expected a name in .html, got {page}")
-    if page is not None and page.exists() and not overwrite:
-        raise ContractError(f"{page} exists; say --overwrite or another name")
+    check_page(page, overwrite=overwrite)
     within = (".", "capture", "reference")
     folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
     from camkit.runtime.calibration.display.camera_file import Lens, Tone
     from camkit.runtime.calibration.display.pairs import Given, draw_pairs, find_pairs
     from camkit.runtime.calibration.display.targets import Targets
     from camkit.runtime.calibration.record import to_toml
-    from camkit.runtime.output.part_file import atomic_output
     from camkit.runtime.output.pixels import png_bytes, tiff_bytes
 
     given = Given(
@@ -68,17 +63,15 @@ def pairs(
     found = find_pairs(captures, given)
     names = [pair.target.name for pair in found.pairs]
     files = [f"{kind}/{n}{end}" for n in names for kind, end in (("capture", ".tiff"), ("reference", ".png"))]  # noqa: E501 # fmt: skip
-    html = None if page is None else _html(found)
-    with folder.writing([*files, REGISTRATION, SETTINGS]) as parts:
+    shown = [] if page is None else [str(page.absolute())]
+    with folder.writing([*files, *shown, REGISTRATION, SETTINGS]) as parts:
         for n, (counts, codes) in enumerate(draw_pairs(found, given)):
             parts[2 * n].write_bytes(tiff_bytes(counts))
             parts[2 * n + 1].write_bytes(png_bytes(codes))
+        if shown:
+            parts[-3].write_text(_html(found), encoding="utf-8")
         parts[-2].write_text(to_toml(found.to_record()), encoding="utf-8")
         parts[-1].write_text(to_toml(found.settings()), encoding="utf-8")
-    if page is not None and html is not None:
-        page.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_output(page) as part:
-            part.write_text(html, encoding="utf-8")
     _tell(found, out, page, as_json=json_)
 
 

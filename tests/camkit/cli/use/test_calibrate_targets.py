@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from camkit.cli.exit_code import ExitCode
+from camkit.cli.use.calibrate.folder import Folder
 from camkit.runtime.calibration.display.marks import find_marks
 from camkit.runtime.calibration.display.targets import Targets
 
@@ -88,3 +89,22 @@ def test_a_folder_of_other_things_is_left_alone(camkit_command, picture, tmp_pat
     assert "say --overwrite" in camkit_command(*asked).err
     assert "holds files of another kind" in camkit_command(*asked, "--overwrite").err
     assert [path.name for path in out.iterdir()] == ["letter.txt"]
+
+
+def test_a_file_beside_the_folder_appears_with_it_or_not_at_all(tmp_path):
+    beside = tmp_path / "pages" / "page.html"
+    folder = Folder.asked(tmp_path / "made", ("list",), (".",), overwrite=False)
+    names = ["list", str(beside)]
+
+    def fill(error: Exception | None) -> None:
+        with folder.writing(names) as parts:
+            for part in parts:
+                part.write_text("all")
+            if error is not None:
+                raise error
+
+    with pytest.raises(OSError, match="full"):
+        fill(OSError("full"))
+    assert list(tmp_path.iterdir()) == []
+    fill(None)
+    assert (beside.read_text(), (tmp_path / "made" / "list").read_text()) == ("all", "all")

@@ -15,6 +15,7 @@ def _facts(count: int, *, separated: bool) -> FlatFacts:
         poses=(Pose(),) * count,
         heights_mm=np.linspace(0, 10, 17),
         relative_illumination=np.linspace(1, 0.5, 17),
+        pixel_pitch_um=4.0,
         centre_px=(100.0, 80.0),
         centre_found=separated,
         separated=separated,

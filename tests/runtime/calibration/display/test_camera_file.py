@@ -82,3 +82,6 @@ def test_illumination_is_read_over_the_height(tmp_path):
     assert found.at(np.array([[10.0, 20.0], [60.0, 20.0]])) == pytest.approx([1.0, 0.75])
     with pytest.raises(DecodeError, match="no pixel pitch"):
         Illumination.read(path, None)
+    path.write_text(path.read_text() + "pixel_pitch_um = 10.0\n")
+    stated = Illumination.read(path, None)  # as `calibrate flat` writes it
+    assert stated.at(np.array([60.0, 20.0])) == pytest.approx(0.75)

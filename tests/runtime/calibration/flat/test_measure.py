@@ -116,6 +116,7 @@ def test_heights_are_in_proportion_to_the_pitch(tmp_path: Path) -> None:
 def test_the_record_is_plain_and_holds_what_was_said(tmp_path: Path) -> None:
     record = _measured(LENS.write_planes(tmp_path, GOOD), GOOD).to_record()
     assert record["separated"] is True
+    assert record["pixel_pitch_um"] == PITCH_UM
     assert len(record["heights_mm"]) == len(record["relative_illumination"]) == 17
     assert record["pictures"][3] == {"file": "3.png", "shift_px": [0.0, 0.0], "turn_deg": 90.0}
     assert {"display_percent", "residual_percent", "centre_px", "centre_found"} <= set(record)
