@@ -9,6 +9,7 @@ from torch import Tensor, nn
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights, take_first_weights
 from camkit.models_def.training.losses import overshoots, patch_errors, training_loss
+from camkit.models_def.training.precision import half_precision
 from camkit.models_def.training.recipe import NetworkRecipe
 from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
@@ -94,8 +95,7 @@ class Fitter:
 
     def run(self, planes: Tensor, progress: float) -> Tensor:
         """Run the network that is being trained; float32 on its device comes back."""
-        schedule = self.schedule
-        half = schedule.precision == "bfloat16" and progress < 1 - schedule.float32_share
+        half = half_precision(self.schedule, self.device, progress)
         planes = planes.to(self.device, memory_format=torch.channels_last)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=half):
             output: Tensor = self.network(planes)

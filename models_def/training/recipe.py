@@ -94,7 +94,8 @@ class ScheduleRecipe:
         ema_decay: Decay of the weight average that is validated and exported.
         loss: log_mse or mse, both in the square-root domain of the signal.
         overshoot: Weight of squared overshoots beside squared errors, against halos.
-        precision: bfloat16 multiplies (weights stay float32) or float32.
+        precision: float32, or bfloat16: multiplies in it where the processor has instructions for
+            that, and in float32 elsewhere (weights stay float32).
         float32_share: Share of the schedule, at its end, computed in float32 anyway.
         seed: Seed of weights, samples and order.
     """

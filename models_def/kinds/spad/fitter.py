@@ -13,6 +13,7 @@ from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.fitter import Fits, Fitter
 from camkit.models_def.training.fitting import FitRequest, OwnFitting
 from camkit.models_def.training.losses import training_loss
+from camkit.models_def.training.precision import half_precision
 from camkit.models_def.training.sample import Batch
 
 VALID_SEED: Final = 606
@@ -31,7 +32,7 @@ class PlateFitter:
         sharp, deviation = batch.planes[:, :1], batch.planes[:, 1:, :1, :1]
         network = cast("JointCamera", inner.network)
         light = count_softly(network.see(sharp), deviation.square().reciprocal(), generator)
-        half = schedule.precision == "bfloat16" and progress < 1 - schedule.float32_share
+        half = half_precision(schedule, inner.device, progress)
         with torch.autocast(inner.device.type, torch.bfloat16, enabled=half):
             found = network.read(light, deviation)
         errors = (found.float() - batch.target).square().mean((1, 2, 3))
