@@ -1,6 +1,7 @@
 """Small DNGs for the decoder tests, written with the project's own writer."""
 
 import struct
+from typing import Any
 
 import numpy as np
 import tifffile
@@ -26,6 +27,19 @@ def dng_tags(**change):
         "description": camkit_description(
             bundle="duet", origin_px=(3, 4), sensor_size_px=(6000, 4000), pixel_pitch_um=5.96
         ),
+    }
+    return DngTags(**(values | change))
+
+
+def grey_tags(**change: Any) -> DngTags:
+    """Tags of a camera of 12 bits that sees every colour alike, and is known by nothing else."""
+    values: dict[str, Any] = {
+        "cfa": "RGGB",
+        "black": 256,
+        "white": 4095,
+        "color_matrix": None,
+        "as_shot_neutral": (1.0, 1.0, 1.0),
+        "camera_model": "camkit test",
     }
     return DngTags(**(values | change))
 

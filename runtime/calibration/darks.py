@@ -16,6 +16,10 @@ from camkit.runtime.merging.survey import Frame, Survey, check_alike, read_frame
 SAME_TIME: Final = 0.01
 BROKEN_LIGHT: Final = 0.5
 """Share of white that the dark alone reaches from which on a sample says nothing of the light."""
+DRIFT_DN: Final = 0.1
+"""By which black may differ from frame to frame, where too few dark frames tell it."""
+TOLD_BY: Final = 4
+"""Dark frames more than there are exposure times of them, that tell a drift smaller than this."""
 
 
 class Darks:
@@ -25,9 +29,15 @@ class Darks:
     black the dark is a current. `rows` is what `merging.merge.merge` asks for.
     """
 
-    def __init__(self, means: dict[float, FloatArray]) -> None:
-        """Take dark light by exposure time, NaN where the dark itself is clipped."""
+    def __init__(self, means: dict[float, FloatArray], drift: float = 0.0) -> None:
+        """Take dark light by exposure time, NaN where the dark itself is clipped.
+
+        Args:
+            means: By exposure time.
+            drift: Standard deviation of the level from frame to frame, 1.0 = white.
+        """
         self._means = means
+        self._drift = drift
 
     @classmethod
     def read(
@@ -50,6 +60,7 @@ class Darks:
             DecodeError: If a frame cannot be read or differs from the bracket.
         """
         sums: dict[float, tuple[FloatArray, int]] = {}
+        levels: dict[float, list[float]] = {}
         for number, path in enumerate(files):
             capture = read_frame(path, mosaic)
             check_alike(bracket.like, bracket.frames[0].path, capture, path)
@@ -63,9 +74,25 @@ class Darks:
             light = capture.linear_rows(0, capture.height)
             light[clipped_rows(capture, 0, capture.height)] = np.nan
             light = light.reshape(capture.plane_shape)
+            levels.setdefault(time_s, []).append(_level(light))
             before, count = sums.get(time_s, (np.zeros_like(light), 0))
             sums[time_s] = before + light, count + 1
-        return cls({time_s: total / np.float32(count) for time_s, (total, count) in sums.items()})
+        like = bracket.like
+        step = 1 / (like.white_level - float(like.black_level.max()))
+        means = {time_s: total / np.float32(count) for time_s, (total, count) in sums.items()}
+        return cls(means, _drift(list(levels.values()), DRIFT_DN * step))
+
+    def level_error(self, bracket: Survey) -> float:
+        """Give the standard error of black in the merged light of a bracket, at most.
+
+        Every frame and every dark has a black of its own. Where shot noise rules, frames are
+        weighted by their times, and the error of each comes through with the same strength.
+
+        Args:
+            bracket: What the darks were read for; 1.0 = white of its longest frame.
+        """
+        shares = bracket.times_s / bracket.times_s[0]
+        return self._drift * float(np.sqrt(2 * shares.size) / shares.sum())
 
     def rows(self, frame: Frame, top: int, bottom: int) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Give the dark light of rows of a frame, and where it leaves nothing to measure."""
@@ -75,3 +102,21 @@ class Darks:
             dark = dark * np.float32(frame.time_s / nearest)
         broken = ~(dark <= BROKEN_LIGHT)
         return np.where(broken, np.float32(0), dark), broken
+
+
+def _level(light: FloatArray) -> float:
+    """Give the mean of a dark frame without its hot pixels."""
+    seen = light[np.isfinite(light)]
+    if not seen.size:
+        return 0.0
+    low, high = np.quantile(seen, (0.01, 0.99))
+    return float(seen[(seen >= low) & (seen <= high)].mean(dtype=np.float64))
+
+
+def _drift(levels: Sequence[Sequence[float]], least: float) -> float:
+    """Give the spread of levels of frames of one time each, pooled; where few, `least` or more."""
+    free = sum(len(of_time) - 1 for of_time in levels)
+    if free == 0:
+        return least
+    square = sum(float(np.square(np.array(one) - np.mean(one)).sum()) for one in levels) / free
+    return float(np.sqrt(square)) if free >= TOLD_BY else max(float(np.sqrt(square)), least)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.lattice import FloatGrid
-from camkit.runtime.calibration.psf import MeasuredPoint
+from camkit.runtime.calibration.measured import MeasuredPsf
 
 FINE: Final = 8
 """Parts of a pixel, along either axis, that lie inside a circle or outside."""
@@ -119,9 +119,9 @@ def see_dots(
 
 
 def dots_psf(
-    measured: MeasuredPoint, designed: FrozenPsf, active_um: float = ACTIVE_UM
+    measured: MeasuredPsf, designed: FrozenPsf, active_um: float = ACTIVE_UM
 ) -> tuple[FrozenPsf, SeenDots]:
-    """Give the PSF of an array out of a point measured on fine pixels, see `measure_point`.
+    """Give the PSF of an array out of a point measured on fine pixels, see `measure_psf`.
 
     Args:
         measured: The point through the plate. Its red is taken as it lies on the sensor: dots
@@ -143,9 +143,11 @@ def dots_psf(
             "the PSF that a plate was made for must be one square kernel, the same everywhere; "
             f"got {shape}, {designed.symmetry}"
         )
+    if measured.red is None:
+        raise ContractError("dots are seen by the light of a point; leave --disc-px and --edge out")
     seen = see_dots(
-        measured.red,
-        measured.red_pitch_um,
+        measured.red.light,
+        measured.red.pitch_um,
         designed.kernels[0, 0, 0],
         spacing_um=designed.pixel_pitch_um,
         active_um=active_um,

@@ -17,12 +17,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import cfa_channels
+from camkit.contracts import CfaPattern, cfa_channels
 from camkit.runtime.capture import Capture
 
 FloatLine = NDArray[np.float64]
 FloatGrid = NDArray[np.float64]
 Sites = NDArray[np.bool_]
+Samples = tuple[FloatGrid, FloatGrid, FloatLine]
+"""(y, x, value) of one colour, each (n,)."""
 
 SQUARE_PX: Final = 128
 STEP_PX: Final = 64
@@ -91,8 +93,8 @@ class FoundEdges:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Line:
-    """Of a square: a point (y, x) of the edge, and the unit normal towards its bright side."""
+class Line:
+    """Of a picture: a point (y, x) of the edge, and the unit normal towards its bright side."""
 
     y: float
     x: float
@@ -100,13 +102,16 @@ class _Line:
 
     @property
     def normal(self) -> tuple[float, float]:
+        """Give (y, x) of unit length."""
         return float(np.sin(self.angle)), float(np.cos(self.angle))
 
     def distances(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
+        """Give how far pixels lie on its bright side."""
         down, right = self.normal
         return np.asarray((y - self.y) * down + (x - self.x) * right)
 
     def along(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
+        """Give how far along it pixels lie."""
         down, right = self.normal
         return np.asarray((y - self.y) * right - (x - self.x) * down)
 
@@ -135,7 +140,7 @@ def find_edges(capture: Capture) -> FoundEdges:
         square = linear[..., top : top + SQUARE_PX, left : left + SQUARE_PX]
         if min(top, left) < 0 or square.shape[-2:] != (SQUARE_PX, SQUARE_PX):
             continue
-        line = _Line(y=y_px - top, x=x_px - left, angle=angle)
+        line = Line(y=y_px - top, x=x_px - left, angle=angle)
         edge = _edge(square, capture, (top, left), line)
         if edge is not None:
             found.append(edge)
@@ -183,34 +188,45 @@ def _steps(cells: FloatGrid) -> Iterator[tuple[float, float, float]]:
 
 
 def _step_in(cells: FloatGrid, top: int, left: int) -> tuple[float, float, float] | None:
-    """Give the (y, x) in pixels and the angle of the step of a square, None where there is none.
+    """Give the (y, x) in pixels and the angle of the step of a square, None where there is none."""
+    found = step_of(cells[_square(top, left)])
+    if found is None:
+        return None
+    return found[0] + top * _CELL_PX, found[1] + left * _CELL_PX, found[2]
+
+
+def step_of(cells: FloatGrid) -> tuple[float, float, float] | None:
+    """Give (y, x) in pixels of a point of the one step of a picture, and the angle of its normal.
 
     All gradients of a straight edge point along its normal, so their sum does too.
+
+    Args:
+        cells: (h, w), one value for each cell of 2x2 pixels.
+
+    Returns:
+        None where there is no step.
     """
-    square = cells[_square(top, left)]
-    low, high = np.quantile(square[::2, ::2], EXTREMES)
+    low, high = np.quantile(cells[::2, ::2], EXTREMES)
     if high - low < LEAST_STEP or high < LEAST_RATIO * low:
         return None
-    down, right = (np.diff(square, axis=axis) for axis in (0, 1))
+    down, right = (np.diff(cells, axis=axis) for axis in (0, 1))
     gradient = np.stack([down[:, 1:] + down[:, :-1], right[1:] + right[:-1]]) / 2
     total = gradient.sum((1, 2))
     length = float(np.hypot(*total))
-    if length < (high - low) * len(square) / 4:
+    if length < (high - low) * min(cells.shape) / 4:
         return None
     along = np.tensordot(total / length, gradient, axes=1)
     y, x = np.mgrid[: along.shape[0], : along.shape[1]] + 0.5
     middle = (float((along * at).sum() / along.sum()) for at in (y, x))
-    y_px, x_px = (
-        (start + at) * _CELL_PX + 0.5 for start, at in zip((top, left), middle, strict=True)
-    )
+    y_px, x_px = (at * _CELL_PX + 0.5 for at in middle)
     return y_px, x_px, float(np.arctan2(total[0], total[1]))
 
 
 def _edge(
-    square: NDArray[np.float32], capture: Capture, origin: tuple[int, int], line: _Line
+    square: NDArray[np.float32], capture: Capture, origin: tuple[int, int], line: Line
 ) -> Edge | None:
     """Fit the line of an edge and sort the samples of each colour; None where it is no edge."""
-    samples = _samples(square, capture, origin)
+    samples = edge_samples(square, capture.cfa, origin)
     searched = samples[1] if len(samples) > 1 else samples[0]
     fitted = _fitted(line, searched)
     if fitted is None:
@@ -227,26 +243,51 @@ def _edge(
     )
 
 
-def _samples(
-    square: NDArray[np.float32], capture: Capture, origin: tuple[int, int]
-) -> list[tuple[FloatGrid, FloatGrid, FloatLine]]:
-    """Give (y, x, value) of the samples of each colour."""
+def edge_samples(
+    square: NDArray[np.floating], cfa: CfaPattern | None, origin: tuple[int, int] = (0, 0)
+) -> list[Samples]:
+    """Give (y, x, value) of the samples of each colour.
+
+    Args:
+        square: (h, w) of a mosaic, or (c, h, w).
+        cfa: Letters of the mosaic.
+        origin: (row, column) of the square in it.
+    """
     y, x = np.mgrid[: square.shape[-2], : square.shape[-1]].astype(np.float64)
-    if capture.cfa is None:
+    if cfa is None:
         return [(y.ravel(), x.ravel(), plane.ravel().astype(np.float64)) for plane in square]
-    colours = np.array(cfa_channels(capture.cfa))
+    colours = np.array(cfa_channels(cfa))
     sites = colours[(y.astype(int) + origin[0]) % 2, (x.astype(int) + origin[1]) % 2]
     return [
         (y[sites == c], x[sites == c], square[sites == c].astype(np.float64))
-        for c in range(capture.channels)
+        for c in range(colours.max() + 1)
     ]
 
 
-def _fitted(line: _Line, samples: tuple[FloatGrid, FloatGrid, FloatLine]) -> _Line | None:
-    """Turn and move a line until its profile explains the samples best; None if it never does.
+def _fitted(line: Line, samples: Samples) -> Line | None:
+    """Turn and move a line until its profile explains the samples best; None if it never does."""
+    found = fit_line(line, samples, (SQUARE_PX, SQUARE_PX))
+    if found is None or found[2] < LEAST_EXPLAINED or not _is_even(found[1]):
+        return None
+    return found[0]
+
+
+def fit_line(
+    line: Line, samples: Samples, size: tuple[int, int]
+) -> tuple[Line, Profile, float] | None:
+    """Turn and move a line until its profile explains the samples near it best.
 
     A sample off the profile by r, where this rises by p' a pixel, lies r / p' nearer to the edge
     than the line says: least squares for the place and the angle of the line.
+
+    Args:
+        line: To begin with.
+        samples: Of one colour.
+        size: (h, w) of their picture.
+
+    Returns:
+        The line, the profile, and the share of the variance that it explains; None where the line
+        leaves the picture, or a side of it is not seen.
     """
     y, x, values = samples
     explained, profile = 0.0, None
@@ -256,7 +297,7 @@ def _fitted(line: _Line, samples: tuple[FloatGrid, FloatGrid, FloatLine]) -> _Li
         if profile is None:
             return None
         near = np.abs(distance) < REACH_PX
-        lost = not 0 <= min(line.y, line.x) <= max(line.y, line.x) <= SQUARE_PX
+        lost = not (0 <= line.y <= size[0] and 0 <= line.x <= size[1])
         if lost or not values[near].var() > 0:
             return None
         slope = np.gradient(profile.value, profile.distance_px)
@@ -266,10 +307,8 @@ def _fitted(line: _Line, samples: tuple[FloatGrid, FloatGrid, FloatLine]) -> _Li
         table = np.stack([rise, rise * along[near]], axis=1)
         (move, turn), *_ = np.linalg.lstsq(table, rest, rcond=None)
         down, right = line.normal
-        line = _Line(y=line.y - move * down, x=line.x - move * right, angle=line.angle + turn)
-    if profile is None or explained < LEAST_EXPLAINED or not _is_even(profile):
-        return None
-    return line
+        line = Line(y=line.y - move * down, x=line.x - move * right, angle=line.angle + turn)
+    return None if profile is None else (line, profile, explained)
 
 
 def _is_even(profile: Profile) -> bool:

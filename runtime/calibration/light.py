@@ -6,7 +6,7 @@ one colour as they lie.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from camkit.errors import DecodeError
 from camkit.runtime.calibration.lattice import FloatGrid, Lattice
 
 CORE_PX: Final = 6.0
+REST_PX: Final = 4.0
 LEAST_SNR: Final = 20.0
 LONE_FACTOR: Final = 100.0
 """A cell this many times as bright as all around it is a defect and no light."""
@@ -27,6 +28,33 @@ _START_SPREAD_PX: Final = 1.2
 _SPREADS_PX: Final = (0.25, 8.0)
 
 
+class LightCore(Protocol):
+    """The bright part of a light as a plain function fits it."""
+
+    @property
+    def y(self) -> float:
+        """Give the row of its centre, in pixels."""
+
+    @property
+    def x(self) -> float:
+        """Give the column of its centre."""
+
+    @property
+    def height(self) -> float:
+        """Give how bright it is in the middle."""
+
+    @property
+    def radius_px(self) -> float:
+        """Give how far from the centre what it leaves tells whether it fits."""
+
+    @property
+    def spread_px(self) -> float:
+        """Give the standard deviation of its blur where it is narrowest."""
+
+    def at(self, y: FloatGrid, x: FloatGrid) -> FloatGrid:
+        """Give its values at pixels."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Core:
     """A Gaussian: its centre (y, x) in pixels, height, and the (2, 2) form in its exponent."""
@@ -35,6 +63,11 @@ class Core:
     x: float
     height: float
     form: FloatGrid
+
+    @property
+    def radius_px(self) -> float:
+        """Give how far from the centre it is looked at."""
+        return REST_PX
 
     @property
     def spread_px(self) -> float:
@@ -79,14 +112,24 @@ def background(planes: Sequence[NDArray[np.floating]]) -> tuple[float, float]:
     Raises:
         DecodeError: If there is nothing but NaN.
     """
-    found = []
-    for plane in planes:
-        sides = [max(_LEAST_BORDER_PX, round(BORDER_SHARE * n)) for n in plane.shape]
-        border = np.ones(plane.shape, dtype=bool)
-        border[sides[0] : -sides[0], sides[1] : -sides[1]] = False
-        found.append(plane[border])
-    seen = np.concatenate(found)
-    seen = seen[np.isfinite(seen)]
+    return level_of(np.concatenate([plane[border(plane)] for plane in planes]))
+
+
+def border(plane: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Tell which samples of a (h, w) plane lie along its border."""
+    sides = [max(_LEAST_BORDER_PX, round(BORDER_SHARE * n)) for n in plane.shape]
+    found = np.ones(plane.shape, dtype=bool)
+    found[sides[0] : -sides[0], sides[1] : -sides[1]] = False
+    return found
+
+
+def level_of(values: NDArray[np.floating]) -> tuple[float, float]:
+    """Give level and spread of (n,) values of the dark, robustly; NaN is left out.
+
+    Raises:
+        DecodeError: If there is nothing but NaN.
+    """
+    seen = values[np.isfinite(values)]
     if not seen.size:
         raise DecodeError("every frame is clipped along its border: darken the room")
     middle, high = np.quantile(seen, (0.5, _ONE_SIGMA))

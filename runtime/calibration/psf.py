@@ -1,7 +1,8 @@
-"""A bracket of a point light to a frozen PSF.
+"""A bracket of a small light to a frozen PSF.
 
     frames less darks -> merged light -> the light found -> each colour on its own lattice, centred
-    to a fraction of a pixel -> background off -> cropped -> noise smoothed -> sum 1
+    to a fraction of a pixel -> background off -> a disc taken out, if it was one -> cropped
+    -> noise smoothed -> sum 1
 
 The colours are written as wavelengths, blue, green and red in this order, at `WAVELENGTHS_UM`: a
 camera with such optics takes them by a `channel_response` that is one at its own and zero at the
@@ -10,248 +11,155 @@ others.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, FrozenPsf, RadialDistortion, cfa_channels
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.calibration.lattice import FloatGrid, Lattice, filled
-from camkit.runtime.calibration.light import Core, background, find_light, fit_core
+from camkit.runtime.calibration.darks import Darks
+from camkit.runtime.calibration.disc import (
+    DiscCore,
+    FloatLine,
+    fit_disc,
+    middle_of,
+    with_disc,
+    without_disc,
+)
+from camkit.runtime.calibration.lattice import FloatGrid, Lattice
+from camkit.runtime.calibration.light import LightCore, find_light, fit_core
+from camkit.runtime.calibration.measured import (
+    COLOURS,
+    WAVELENGTHS_UM,
+    ColourFacts,
+    MeasuredPsf,
+    PsfOptions,
+    Reblurred,
+    RedSamples,
+    core_share,
+    frozen,
+)
+from camkit.runtime.calibration.patch import BORDER_PX, CHANNELS, RED, Patch, cells
+from camkit.runtime.calibration.peak import Field, height_mm, peak_share
 from camkit.runtime.calibration.trim import cropped, reach_px, smooth_noise
-from camkit.runtime.merging.merge import DarkRows, Merged, merge
+from camkit.runtime.merging.merge import Merged, merge
 from camkit.runtime.merging.survey import Survey
-from camkit.units import MM_PER_M
 
-COLOURS: Final = ("blue", "green", "red")
-CHANNELS: Final = (2, 1, 0)
-RED: Final = 2
-"""Its place in both."""
-WAVELENGTHS_UM: Final = (0.46, 0.54, 0.60)
-CORE_SHARE_PX: Final = 3.0
+GREEN: Final = CHANNELS.index(1)
 MOST_HALF_PX: Final = 511
 CLIP_PX: Final = 8
-LEAST_BORDER_PX: Final = 12
 LEAST_SPREADS: Final = 0.4
 """Standard deviation of a core, in pitches of its lattice, below which samples miss it: a Gaussian
 then keeps a twentieth of its amplitude at the finest wave that the lattice holds."""
 MOST_REST: Final = 0.15
-REST_PX: Final = 4.0
+SHOWN_PX: Final = 24
+"""Beyond the rim of a disc, how far its picture is compared with the disc blurred anew."""
 _EDGE_PX: Final = 3
 _WHITE: Final = 0.98
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ColourFacts:
-    """What was measured of one colour.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Centred:
+    """All colours about the centre of green.
 
     Attributes:
-        colour: Its name.
-        wavelength_um: Under which it is written.
-        core_share: Of its light within the crop, what lies within 3 px of the centre.
-        noise_floor: Spread of the dark around, of the peak, before noise is smoothed.
-        offset_px: (x, y) of its core from that of green.
+        light: (colour, side, side), background taken off.
+        noise: Its standard deviation.
+        cores: Of each colour, in pixels of the patch.
     """
 
-    colour: str
-    wavelength_um: float
-    core_share: float
-    noise_floor: float
-    offset_px: tuple[float, float]
-
-    def to_json(self) -> dict[str, Any]:
-        """Give plain JSON values."""
-        return {
-            "colour": self.colour,
-            "wavelength_um": self.wavelength_um,
-            "core_share": round(self.core_share, 5),
-            "noise_floor": float(f"{self.noise_floor:.3g}"),
-            "offset_px": [round(part, 4) for part in self.offset_px],
-        }
+    light: FloatGrid
+    noise: FloatGrid
+    cores: list[LightCore]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MeasuredPoint:
-    """A PSF as it was measured.
-
-    Attributes:
-        psf: One field, one depth, three colours as wavelengths.
-        red: (h, w) light of red as its samples lie on the sensor, as far as the kernels reach,
-            background taken off: what is summed over many samples is not to be resampled.
-        red_pitch_um: Of these samples.
-        centre_px: (x, y) of the light in the frames.
-        colours: Facts of each colour.
-        filled_samples: Samples of the crop that no frame holds, taken from their neighbours.
-        notes: What the user should know.
-    """
-
-    psf: FrozenPsf
-    red: FloatGrid
-    red_pitch_um: float
-    centre_px: tuple[float, float]
-    colours: tuple[ColourFacts, ...]
-    filled_samples: int
-    notes: tuple[str, ...]
-
-    @property
-    def side_px(self) -> int:
-        """Give the side of the kernels."""
-        return int(self.psf.kernels.shape[-1])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PointOptions:
-    """What the caller says of a measurement.
-
-    Attributes:
-        side_px: Odd side of the kernels; None for as far as the light stands out of the noise.
-        pixel_pitch_um: None for what the frames state.
-        depth_m: Distance of the light.
-    """
-
-    side_px: int | None = None
-    pixel_pitch_um: float | None = None
-    depth_m: float = np.inf
-
-    def __post_init__(self) -> None:
-        side, pitch = self.side_px, self.pixel_pitch_um
-        if side is not None and (side < 3 or side % 2 == 0):
-            raise ContractError(f"--side-px must be odd and >= 3; got {side}")
-        if pitch is not None and not (np.isfinite(pitch) and pitch > 0):
-            raise ContractError(f"--pixel-pitch-um must be > 0; got {pitch:g}")
-        if not self.depth_m > 0:
-            raise ContractError(f"--depth-m must be > 0; got {self.depth_m:g}")
-
-
-def measure_point(survey: Survey, options: PointOptions, dark: DarkRows | None) -> MeasuredPoint:
-    """Measure the PSF of a bracket of a point light.
+def measure_psf(survey: Survey, options: PsfOptions, darks: Darks | None) -> MeasuredPsf:
+    """Measure the PSF of a bracket of a small light.
 
     Args:
         survey: The bracket; linear frames.
         options: What the caller says of it.
-        dark: Taken off every frame.
+        darks: Taken off every frame; what is left is light, haze included.
 
     Raises:
         ContractError: If frames are coded, no pitch is known, or a side does not fit.
-        DecodeError: If there is no light, it lies too near the border, or its peak is clipped in
-            the shortest frame.
+        DecodeError: If there is no light, it lies too near the border, its peak is clipped in the
+            shortest frame, haze cannot be told from the background, or a disc is too large.
+    """
+    pitch_um = checked_pitch_um(survey, options)
+    merged = merge(survey, None, None if darks is None else darks.rows)
+    row, column = _place(merged, survey, options.disc_px)
+    _refuse_clipped(merged, survey, (row, column), CLIP_PX + round((options.disc_px or 0) / 2))
+    half = _most_half(survey, row, column, options.side_px)
+    black_error = None if darks is None else darks.level_error(survey)
+    patch = Patch(merged, survey, (row, column), half, black_error)
+    seen = _centred(patch, half, options.disc_px)
+    middle = seen.cores[GREEN]
+    notes = _doubts(patch, seen.cores)
+    light, noise = _as_point(seen, [lattice.pitch_px for lattice in patch.light]), seen.noise
+    if options.side_px is None:
+        found = reach_px(light, noise)
+        if found == half:
+            notes.append(f"light is still seen {half} px from the centre, where the crop ends")
+        half = found
+        light, noise = cropped(light, half), cropped(noise, half)
+    kernels = np.stack([smooth_noise(p, n) for p, n in zip(light, noise, strict=True)])
+    kernels = np.maximum(kernels, 0)
+    kernels /= kernels.sum((-2, -1), keepdims=True)
+    colours = _facts(kernels, light, noise, seen, patch)
+    centre_px = (patch.left + middle.x, patch.top + middle.y)
+    red = RedSamples(light=patch.red(half, middle), pitch_um=pitch_um * patch.light[RED].pitch_px)
+    return MeasuredPsf(
+        psf=frozen(kernels, pitch_um, options.depth_m),
+        centre_px=centre_px,
+        colours=colours,
+        fields=(
+            Field(
+                height_mm=height_mm(survey.like, centre_px, pitch_um),
+                peak_share=colours[GREEN].peak_share,
+                peak_share_error=colours[GREEN].peak_share_error,
+            ),
+        ),
+        notes=tuple(notes),
+        filled_samples=patch.filled_samples(half, middle),
+        red=red if options.disc_px is None else None,
+    )
+
+
+def checked_pitch_um(survey: Survey, options: PsfOptions) -> float:
+    """Give the pixel pitch of frames that a PSF can be measured on.
+
+    Raises:
+        ContractError: If frames are coded, or no pitch is known.
     """
     pitch_um = options.pixel_pitch_um or survey.like.pixel_pitch_um
     if survey.codes is not None:
         raise ContractError("a PSF is measured on linear frames: RAW, EXR, 16-bit TIFF or PNG")
     if pitch_um is None:
         raise ContractError("the frames state no pixel pitch; say --pixel-pitch-um")
-    merged = merge(survey, None, dark)
-    row, column = find_light(_cells(merged, survey))
-    row, column = (n * (2 if survey.like.cfa else 1) for n in (row, column))
-    _refuse_clipped(merged, survey, row, column)
-    half = _most_half(survey, row, column, options.side_px)
-    patch = _Patch(merged, survey, (row, column), half)
-    planes, noise, facts = _centred(patch, half)
-    notes = _doubts(patch, facts)
-    if options.side_px is None:
-        found = reach_px(planes, noise)
-        if found == half:
-            notes.append(f"light is still seen {half} px from the centre, where the crop ends")
-        planes, noise = cropped(planes, found), cropped(noise, found)
-    kernels = np.stack([smooth_noise(p, n) for p, n in zip(planes, noise, strict=True)])
-    kernels = np.maximum(kernels, 0)
-    kernels /= kernels.sum((-2, -1), keepdims=True)
-    return MeasuredPoint(
-        psf=_frozen(kernels, pitch_um, options.depth_m),
-        red=patch.red(kernels.shape[-1] // 2, facts[1]),
-        red_pitch_um=pitch_um * patch.light[RED].pitch_px,
-        centre_px=(patch.left + facts[1].x, patch.top + facts[1].y),
-        colours=_facts(kernels, facts, patch.floors),
-        filled_samples=patch.filled_samples(kernels.shape[-1] // 2, facts[1]),
-        notes=tuple(notes),
-    )
+    return pitch_um
 
 
-class _Patch:
-    """The light around the point, colour by colour, with its noise."""
-
-    def __init__(self, merged: Merged, survey: Survey, place: tuple[int, int], half: int) -> None:
-        like, reach = survey.like, half + LEAST_BORDER_PX
-        # an even first row and column keep the phase of the mosaic
-        self.top, self.left = (max(0, n - reach) // 2 * 2 for n in place)
-        inside = (
-            slice(None),
-            slice(self.top, place[0] + reach + 2),
-            slice(self.left, place[1] + reach + 2),
-        )
-        precision = merged.precision[inside].astype(np.float64)
-        light = merged.light[inside].astype(np.float64)
-        self._missing = precision <= 0
-        light[self._missing] = np.nan
-        variance = np.where(self._missing, np.nan, 1 / np.maximum(precision, 1e-300))
-        self.light: list[Lattice] = []
-        self.variance: list[Lattice] = []
-        self.floors: list[float] = []
-        for channel in CHANNELS:
-            level, spread = background(_sites(merged, survey, channel))
-            lattice = _lattice(light, survey, channel)
-            self.light.append(lattice.with_values(lattice.values - level))
-            self.variance.append(_lattice(variance, survey, channel))
-            # noise finer than the steps of a converter shows no spread
-            self.floors.append(max(spread, float(np.sqrt(np.nanmedian(self.variance[-1].values)))))
-        self.place = place[0] - self.top, place[1] - self.left
-        self.cfa = like.cfa
-
-    def red(self, half: int, core: Core) -> FloatGrid:
-        """Give the light of red as its samples lie, up to so many pixels from a core."""
-        lattice = self.light[RED]
-        y, x = lattice.places()
-        inside = np.maximum(np.abs(y - core.y), np.abs(x - core.x)) <= half
-        rows, columns = (np.flatnonzero(inside.any(axis=n)) for n in (1, 0))
-        return filled(lattice.values[np.ix_(rows, columns)])
-
-    def filled_samples(self, half: int, core: Core) -> int:
-        """Count the samples of the crop that no frame holds."""
-        y, x = np.indices(self._missing.shape[-2:])
-        inside = np.maximum(np.abs(y - core.y), np.abs(x - core.x)) <= half
-        return int(np.count_nonzero(self._missing & inside))
+def _place(merged: Merged, survey: Survey, disc_px: float | None) -> tuple[int, int]:
+    """Give (row, column) of the light, in pixels."""
+    pitch, light = (2 if survey.like.cfa else 1), cells(merged, survey)
+    place = find_light(light)
+    if disc_px is not None:
+        place = middle_of(light, place, disc_px / 2 / pitch)
+    return place[0] * pitch, place[1] * pitch
 
 
-def _lattice(planes: FloatGrid, survey: Survey, channel: int) -> Lattice:
-    """Give the lattice of a channel of (1 or 3, h, w)."""
-    cfa = survey.like.cfa
-    if cfa is None:
-        return Lattice.of_plane(planes[channel])
-    return Lattice.of_mosaic(planes[0], cfa, channel)
-
-
-def _sites(merged: Merged, survey: Survey, channel: int) -> list[FloatArray]:
-    """Give the light of a channel as planes of its places in the cell, NaN where none is known."""
-    usable = np.where(merged.precision > 0, merged.light, np.float32(np.nan))
-    if survey.like.cfa is None:
-        return [usable[channel]]
-    cell = np.array(cfa_channels(survey.like.cfa))
-    return [usable[0, y::2, x::2] for y, x in np.argwhere(cell == channel)]
-
-
-def _cells(merged: Merged, survey: Survey) -> FloatArray:
-    """Give the light of whole cells: the sum of the planes, or of the 2x2 of a mosaic."""
-    light = merged.light
-    if survey.like.cfa is None:
-        return np.asarray(light.sum(axis=0))
-    height, width = (n // 2 * 2 for n in light.shape[1:])
-    even = light[0, :height, :width]
-    return np.asarray(even.reshape(height // 2, 2, width // 2, 2).sum(axis=(1, 3)))
-
-
-def _refuse_clipped(merged: Merged, survey: Survey, row: int, column: int) -> None:
+def _refuse_clipped(merged: Merged, survey: Survey, place: tuple[int, int], reach: int) -> None:
     """Refuse a light that even the shortest frame does not hold.
 
     Raises:
         DecodeError: If samples near it are clipped there.
     """
+    row, column = place
     shortest, longest = survey.frames[-1], survey.frames[0]
     near = (
         slice(None),
-        slice(max(0, row - CLIP_PX), row + CLIP_PX + 2),
-        slice(max(0, column - CLIP_PX), column + CLIP_PX + 2),
+        slice(max(0, row - reach), row + reach + 2),
+        slice(max(0, column - reach), column + reach + 2),
     )
     white = _WHITE * longest.time_s / shortest.time_s
     clipped = np.count_nonzero((merged.precision[near] == 0) & (merged.light[near] >= white))
@@ -271,7 +179,7 @@ def _most_half(survey: Survey, row: int, column: int, side_px: int | None) -> in
     """
     like = survey.like
     most = min(row, column, like.height - 1 - row, like.width - 1 - column) - _EDGE_PX
-    if most < LEAST_BORDER_PX:
+    if most < BORDER_PX:
         raise DecodeError(
             f"the light lies at ({column}, {row}), at the border of {like.width}x{like.height} "
             "pixels; move it inwards"
@@ -286,10 +194,10 @@ def _most_half(survey: Survey, row: int, column: int, side_px: int | None) -> in
     return side_px // 2
 
 
-def _centred(patch: _Patch, half: int) -> tuple[FloatGrid, FloatGrid, list[Core]]:
-    """Give (colour, side, side) light and noise about the centre of green, and the cores."""
-    cores = [fit_core(lattice, *patch.place) for lattice in patch.light]
-    middle = cores[CHANNELS.index(1)]
+def _centred(patch: Patch, half: int, disc_px: float | None) -> _Centred:
+    """Give every colour on the pixels about the centre of green."""
+    cores = [_core(lattice, patch.place, disc_px) for lattice in patch.light]
+    middle = cores[GREEN]
     offset = np.arange(-half, half + 1, dtype=np.float64)
     y, x = np.meshgrid(middle.y + offset, middle.x + offset, indexing="ij")
     planes, noise = [], []
@@ -297,14 +205,31 @@ def _centred(patch: _Patch, half: int) -> tuple[FloatGrid, FloatGrid, list[Core]
         rest = light.with_values(light.values - core.at(*light.places()))
         planes.append(rest.at(y, x) + core.at(y, x))
         noise.append(np.sqrt(np.maximum(variance.at(y, x, order=1), 1e-30)))
-    return np.stack(planes), np.stack(noise), cores
+    return _Centred(light=np.stack(planes), noise=np.stack(noise), cores=cores)
 
 
-def _doubts(patch: _Patch, cores: Sequence[Core]) -> list[str]:
+def _core(lattice: Lattice, place: tuple[int, int], disc_px: float | None) -> LightCore:
+    if disc_px is None:
+        return fit_core(lattice, *place)
+    return fit_disc(lattice, *place, disc_px)
+
+
+def _as_point(seen: _Centred, pitches_px: Sequence[float]) -> FloatGrid:
+    """Give (colour, side, side) light as of a point: discs are taken out."""
+    light, middle = seen.light.copy(), seen.cores[GREEN]
+    for n, (core, pitch_px) in enumerate(zip(seen.cores, pitches_px, strict=True)):
+        if isinstance(core, DiscCore):
+            offset = core.y - middle.y, core.x - middle.x
+            light[n] = without_disc(seen.light[n], seen.noise[n], core, offset, pitch_px)
+    return light
+
+
+def _doubts(patch: Patch, cores: Sequence[LightCore]) -> list[str]:
     """Say whether the core is too fine for the lattice of a colour, as any of them shows."""
     for lattice, core in zip(patch.light, cores, strict=True):
         y, x = lattice.places()
-        rest = np.abs(lattice.values - core.at(y, x))[np.hypot(y - core.y, x - core.x) <= REST_PX]
+        near = np.hypot(y - core.y, x - core.x) <= core.radius_px
+        rest = np.abs(lattice.values - core.at(y, x))[near]
         narrow = core.spread_px < LEAST_SPREADS * lattice.pitch_px
         if lattice.pitch_px > 1 and (narrow or np.nanmax(rest) > MOST_REST * core.height):
             return [
@@ -315,33 +240,47 @@ def _doubts(patch: _Patch, cores: Sequence[Core]) -> list[str]:
 
 
 def _facts(
-    kernels: FloatGrid, cores: Sequence[Core], floors: Sequence[float]
+    kernels: FloatGrid, light: FloatGrid, noise: FloatGrid, seen: _Centred, patch: Patch
 ) -> tuple[ColourFacts, ...]:
-    offset = np.arange(kernels.shape[-1]) - kernels.shape[-1] // 2
-    near = np.hypot(offset[:, None], offset[None]) <= CORE_SHARE_PX
-    middle = cores[CHANNELS.index(1)]
-    return tuple(
-        ColourFacts(
-            colour=colour,
-            wavelength_um=wavelength_um,
-            core_share=float(kernel[near].sum()),
-            noise_floor=floor / core.height,
-            offset_px=(core.x - middle.x, core.y - middle.y),
+    middle, told = seen.cores[GREEN], []
+    for n, (colour, wavelength_um) in enumerate(zip(COLOURS, WAVELENGTHS_UM, strict=True)):
+        core, pitch_px = seen.cores[n], patch.light[n].pitch_px
+        # what darks add to the noise is seen where there is no light
+        modelled = float(np.nanmedian(patch.variance[n].values))
+        variance = noise[n] ** 2 + max(0.0, patch.floors[n] ** 2 - modelled)
+        share, error = peak_share(light[n], variance, patch.level_errors[n], pitch_px)
+        told.append(
+            ColourFacts(
+                colour=colour,
+                wavelength_um=wavelength_um,
+                core_share=core_share(kernels[n]),
+                peak_share=share,
+                peak_share_error=error,
+                offset_px=(core.x - middle.x, core.y - middle.y),
+                noise_floor=patch.floors[n] / core.height,
+                reblurred=_reblurred(kernels[n] * light[n].sum(), seen.light[n], core),
+            )
         )
-        for colour, wavelength_um, kernel, core, floor in zip(
-            COLOURS, WAVELENGTHS_UM, kernels, cores, floors, strict=True
-        )
-    )
+    return tuple(told)
 
 
-def _frozen(kernels: NDArray[np.float64], pitch_um: float, depth_m: float) -> FrozenPsf:
-    return FrozenPsf(
-        kernels=np.ascontiguousarray(kernels[None, None], dtype=np.float32),
-        field_heights_mm=np.zeros(1),
-        depths_mm=np.array([depth_m * MM_PER_M]),
-        wavelengths_um=np.array(WAVELENGTHS_UM),
-        pixel_pitch_um=pitch_um,
-        distortion=RadialDistortion(coefficients=np.array([[1.0, 0, 0, 0]]), radius_mm=1.0),
-        relative_illumination=np.ones(1),
-        symmetry="uniform",
+def _reblurred(kernel: FloatGrid, seen: FloatGrid, core: LightCore) -> Reblurred | None:
+    """Give the means of rings of a disc, as it was seen and as a kernel makes it."""
+    if not isinstance(core, DiscCore):
+        return None
+    level = core.level
+    offset = np.arange(kernel.shape[-1]) - kernel.shape[-1] // 2
+    radius = np.hypot(offset[:, None], offset[None]).ravel()
+    most = min(int(core.diameter_px / 2) + SHOWN_PX, kernel.shape[-1] // 2)
+    ring = np.rint(radius).astype(np.intp)
+    # as much light as of a point, spread over a disc of its level
+    told = with_disc(kernel, core.diameter_px)
+    counts = np.bincount(ring)[: most + 1]
+
+    def means(of: FloatGrid) -> FloatLine:
+        return np.asarray(np.bincount(ring, of.ravel())[: most + 1] / counts / level)
+
+    at = np.bincount(ring, radius)[: most + 1] / counts
+    return Reblurred(
+        distance_px=at, seen=means(cropped(seen, kernel.shape[-1] // 2)), told=means(told)
     )

@@ -71,6 +71,7 @@ def survey(
     times_s: Sequence[float] | None,
     *,
     mosaic: MosaicOptions | None = None,
+    alike: bool = False,
 ) -> Survey:
     """Look at every frame once.
 
@@ -78,6 +79,7 @@ def survey(
         files: Two or more, in any order.
         times_s: One for each file; None for what the files say.
         mosaic: How to read headerless mosaics, or levels in place of a RAW file's.
+        alike: A single frame, or frames of one exposure, will do.
 
     Raises:
         ContractError: If there are not two different times, a file is given twice, or times are
@@ -85,7 +87,7 @@ def survey(
         DecodeError: If a frame cannot be read, is not finite, or differs from the others in kind
             or size.
     """
-    _check_files(files)
+    _check_files(files, 1 if alike else 2)
     found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]] = []
     for number, path in enumerate(files):
         capture = read_frame(path, mosaic)
@@ -102,6 +104,8 @@ def survey(
     if times_s is None:
         _check_settings([(frame.path, capture) for frame, capture, _ in found])
     found.sort(key=lambda one: (-one[0].time_s, str(one[0].path)))
+    if not alike:
+        _check_exposures([frame for frame, _, _ in found])
     return _joined(found, mosaic)
 
 
@@ -142,9 +146,9 @@ def check_alike(one: Capture, named: Path, other: Capture, path: Path) -> None:
             )
 
 
-def _check_files(files: Sequence[Path]) -> None:
-    if not 2 <= len(files) <= _MOST_FRAMES:
-        raise ContractError(f"a bracket has 2 to {_MOST_FRAMES} frames; got {len(files)}")
+def _check_files(files: Sequence[Path], least: int) -> None:
+    if not least <= len(files) <= _MOST_FRAMES:
+        raise ContractError(f"a bracket has {least} to {_MOST_FRAMES} frames; got {len(files)}")
     seen: set[Path] = set()
     for path in files:
         if path.resolve() in seen:
@@ -164,17 +168,21 @@ def _check_settings(frames: Sequence[tuple[Path, Capture]]) -> None:
             )
 
 
-def _joined(
-    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]], mosaic: MosaicOptions | None
-) -> Survey:
-    frames = tuple(frame for frame, _, _ in found)
+def _check_exposures(frames: Sequence[Frame]) -> None:
+    """Refuse frames of one exposure, longest first."""
     longest, shortest = frames[0], frames[-1]
     if math.isclose(longest.time_s, shortest.time_s, rel_tol=SAME_TIME):
         raise ContractError(
             f"a bracket needs two different exposures; all {len(frames)} frames have "
             f"{longest.time_s:g} s"
         )
-    like, is_raw = found[0][1], not is_picture(longest.path) or found[0][1].cfa is not None
+
+
+def _joined(
+    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]], mosaic: MosaicOptions | None
+) -> Survey:
+    frames = tuple(frame for frame, _, _ in found)
+    like, is_raw = found[0][1], not is_picture(frames[0].path) or found[0][1].cfa is not None
     lattices = [codes for _, _, codes in found if codes is not None]
     return Survey(
         frames=frames,

@@ -3,6 +3,7 @@
 page             sections of words, tables and pictures as one HTML file
 geometry         what those of a camera's geometry are
 geometry_charts  residuals, covered area, distortion
+psf_page         kernels, light by radius, the target blurred anew
 noise_page       photon transfer of every ISO
 flat_page        relative illumination, the display, what both leave
 tone_page        luminance over level

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from camkit.runtime.calibration.flat.pose import Pose
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.output.dng import DngTags, write_bayer_dng
+from camkit.runtime.output.dng import write_bayer_dng
+from tests.dng_factory import grey_tags
 
 BLACK, WHITE = 256, 4095
 ELECTRONS_AT_WHITE = 10_000
@@ -71,13 +72,7 @@ class Flats:
             light = self.seen(shift) * (1 + 0.1 * rng.uniform(-1, 1))
             noise = rng.standard_normal(light.shape) * np.sqrt(light / ELECTRONS_AT_WHITE)
             codes = np.rint(BLACK + (light + noise) * (WHITE - BLACK))
-            tags = DngTags(
-                cfa="RGGB",
-                black=BLACK,
-                white=WHITE,
-                color_matrix=None,
-                as_shot_neutral=(1.0, 1.0, 1.0),
-                camera_model="camkit test",
+            tags = grey_tags(
                 metadata=Metadata(),
                 description=description,
                 orientation=orientations[n] if orientations else 1,

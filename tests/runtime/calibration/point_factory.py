@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from camkit.contracts import NoiseModel, cfa_channels
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.output.dng import DngTags, write_bayer_dng
+from camkit.runtime.output.dng import write_bayer_dng
+from tests.dng_factory import grey_tags
 
 BLACK, WHITE = 256, 4095
 NOISE = NoiseModel(shot=(1e-4,) * 3, read_variance=(1e-6,) * 3)
@@ -75,16 +76,7 @@ def mosaic_of(planes: FloatGrid) -> FloatGrid:
 def write_mosaic(path: Path, seen: FloatGrid, time_s: float) -> None:
     """Write a 12-bit mosaic as DNG that states its time."""
     codes = np.clip(np.rint(BLACK + seen * (WHITE - BLACK)), 0, WHITE).astype(np.uint16)
-    tags = DngTags(
-        cfa="RGGB",
-        black=BLACK,
-        white=WHITE,
-        color_matrix=None,
-        as_shot_neutral=(1.0, 1.0, 1.0),
-        camera_model="camkit test",
-        metadata=Metadata.believable(exposure_time_s=time_s),
-        noise=NOISE,
-    )
+    tags = grey_tags(metadata=Metadata.believable(exposure_time_s=time_s), noise=NOISE)
     write_bayer_dng(path, codes, tags=tags)
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.output.dng import DngTags, write_bayer_dng
+from camkit.runtime.output.dng import write_bayer_dng
+from tests.dng_factory import grey_tags
 
 BLACK, WHITE = 256, 4095
 PRNU = 0.01
@@ -19,13 +20,9 @@ Codes = NDArray[np.uint16]
 
 def write_raw(path: Path, codes: Codes, iso: float | None, time_s: float | None = None, white: int = WHITE) -> None:  # noqa: E501 # fmt: skip
     """Write a mosaic as DNG that states ISO and time."""
-    tags = DngTags(
-        cfa="RGGB",
+    tags = grey_tags(
         black=BLACK * (white + 1) // (WHITE + 1),
         white=white,
-        color_matrix=None,
-        as_shot_neutral=(1.0, 1.0, 1.0),
-        camera_model="camkit test",
         metadata=Metadata.believable(iso=iso, exposure_time_s=time_s),
     )
     write_bayer_dng(path, codes, tags=tags)

@@ -53,3 +53,14 @@ def test_a_dark_frame_of_another_size_or_without_a_time_is_refused(
     _dark(tmp_path / "e.dng", 0.02, 0.0)
     with pytest.raises(ContractError, match=r"dark frame e\.dng states no exposure time"):
         Darks.read([tmp_path / "e.dng"], None, bracket)
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_the_error_of_black_is_the_drift_that_darks_show_else_a_tenth_of_a_step(
+    tmp_path: Path, bracket: Survey, count: int
+) -> None:
+    levels = (0.0, 0.001, -0.001, 0.002, -0.002)[:count]
+    files = [_dark(tmp_path / f"d{n}.dng", 0.02 + level, 1.0) for n, level in enumerate(levels)]
+    drift = np.std(levels, ddof=1) if count > 1 else 0.1 / (4095 - 256)
+    found = Darks.read(files, None, bracket).level_error(bracket)
+    assert found == pytest.approx(drift * np.sqrt(2 * 2) / (1 + 1 / 8), rel=0.02)

@@ -7,7 +7,7 @@ from camkit.bundle.psf_file import psf_to_bytes
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.dots import dots_psf, see_dots
-from camkit.runtime.calibration.psf import MeasuredPoint
+from camkit.runtime.calibration.measured import MeasuredPsf, RedSamples
 
 PITCH_UM, SPACING_UM = 3.45, 37.5
 RNG = np.random.default_rng(0)
@@ -120,13 +120,12 @@ def _psf(kernels: np.ndarray, pitch_um: float) -> FrozenPsf:
 
 def test_a_point_on_fine_pixels_becomes_the_psf_of_the_array_by_its_red() -> None:
     red = _photograph(side=(181, 181)) - 1e-9
-    measured = MeasuredPoint(
+    measured = MeasuredPsf(
         psf=_psf(np.ones((3, 5, 5)), PITCH_UM),
-        red=red,
-        red_pitch_um=PITCH_UM,
+        red=RedSamples(light=red, pitch_um=PITCH_UM),
         centre_px=(90.0, 90.0),
         colours=(),
-        filled_samples=0,
+        fields=(),
         notes=(),
     )
     made, seen = dots_psf(measured, _psf(KERNEL[None], SPACING_UM))

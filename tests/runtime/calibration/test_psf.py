@@ -10,8 +10,10 @@ import pytest
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.darks import Darks
-from camkit.runtime.calibration.psf import MeasuredPoint, PointOptions, measure_point
+from camkit.runtime.calibration.measured import MeasuredPsf, PsfOptions
+from camkit.runtime.calibration.psf import measure_psf
 from camkit.runtime.merging.survey import Survey, survey
+from tests.runtime.calibration.haze_factory import Hazy
 from tests.runtime.calibration.point_factory import (
     STREAK,
     TIMES_S,
@@ -26,7 +28,7 @@ from tests.runtime.calibration.point_factory import (
 CORE_TOLERANCE = 0.03
 STREAK_TOLERANCE = 0.06
 SHORT_S = (1.0, 1 / 8, 1 / 64)
-FIVE_UM = PointOptions(pixel_pitch_um=5.0)
+FIVE_UM = PsfOptions(pixel_pitch_um=5.0)
 SMALL = Point(side=96, x=47.7, y=46.2, reach=20, streak=1e-3)
 
 
@@ -34,7 +36,7 @@ def _measured(psf: FrozenPsf) -> np.ndarray:
     return psf.kernels[0, 0].astype(np.float64)
 
 
-def _check(found: MeasuredPoint, point: Point) -> None:
+def _check(found: MeasuredPsf, point: Point) -> None:
     kernels, half = _measured(found.psf), found.side_px // 2
     truth = point.kernels(half)
     dy, dx = np.mgrid[-half : half + 1, -half : half + 1]
@@ -50,7 +52,7 @@ def _check(found: MeasuredPoint, point: Point) -> None:
 
 def test_a_mosaic_gives_the_kernel_with_streaks_of_1e_5_of_its_peak(tmp_path: Path) -> None:
     point = Point()
-    found = measure_point(survey(write_bracket(tmp_path, point), None), FIVE_UM, None)
+    found = measure_psf(survey(write_bracket(tmp_path, point), None), FIVE_UM, None)
     assert found.centre_px == pytest.approx((point.x, point.y), abs=0.02)
     assert 2 * point.reach <= found.side_px <= 2 * point.reach + 25
     assert found.notes == ()
@@ -64,7 +66,7 @@ def test_a_mosaic_gives_the_kernel_with_streaks_of_1e_5_of_its_peak(tmp_path: Pa
 
 def test_linear_pictures_that_are_cut_at_black_give_it_too(tmp_path: Path) -> None:
     point = Point(x=128.5, y=130.02)
-    found = measure_point(survey(write_pictures(tmp_path, point), TIMES_S), FIVE_UM, None)
+    found = measure_psf(survey(write_pictures(tmp_path, point), TIMES_S), FIVE_UM, None)
     assert found.centre_px == pytest.approx((point.x, point.y), abs=0.02)
     _check(found, point)
 
@@ -76,10 +78,10 @@ def test_dark_current_and_hot_pixels_are_taken_off(tmp_path: Path) -> None:
     files = write_bracket(tmp_path, SMALL, dark=current, times_s=SHORT_S)
     dark = tmp_path / "dark.dng"
     write_mosaic(dark, exposed(current, SHORT_S[1], 50), SHORT_S[1])
-    bracket, asked = survey(files, None), PointOptions(pixel_pitch_um=5.0, side_px=41)
+    bracket, asked = survey(files, None), PsfOptions(pixel_pitch_um=5.0, side_px=41)
     errors = []
-    for rows in (Darks.read([dark], None, bracket).rows, None):
-        found = measure_point(bracket, asked, rows)
+    for darks in (Darks.read([dark], None, bracket), None):
+        found = measure_psf(bracket, asked, darks)
         off = np.abs(_measured(found.psf) - SMALL.kernels(20)).max(axis=0)
         off[14:27, 14:27] = 0
         errors.append(off.max() / SMALL.kernels(20).max())
@@ -94,8 +96,8 @@ def test_a_hot_pixel_that_no_frame_sees_through_is_filled_and_counted(tmp_path: 
     path = tmp_path / "dark.dng"
     write_mosaic(path, exposed(current, SHORT_S[-1], 9), SHORT_S[-1])
     bracket = survey(files, None)
-    asked = PointOptions(pixel_pitch_um=5.0, side_px=41)
-    found = measure_point(bracket, asked, Darks.read([path], None, bracket).rows)
+    asked = PsfOptions(pixel_pitch_um=5.0, side_px=41)
+    found = measure_psf(bracket, asked, Darks.read([path], None, bracket))
     assert found.filled_samples == 1
     wrong = np.abs(_measured(found.psf) - SMALL.kernels(20)) / SMALL.kernels(20).max()
     assert wrong[:, 22:27, 31:36].max() < 5e-3
@@ -107,8 +109,8 @@ def _pictures(folder: Path, point: Point, peak: float = 0.7) -> Survey:
 
 
 def test_what_is_asked_for_is_what_is_written(tmp_path: Path) -> None:
-    asked = PointOptions(pixel_pitch_um=4.5, side_px=31, depth_m=2.0)
-    found = measure_point(_pictures(tmp_path, SMALL), asked, None)
+    asked = PsfOptions(pixel_pitch_um=4.5, side_px=31, depth_m=2.0)
+    found = measure_psf(_pictures(tmp_path, SMALL), asked, None)
     assert found.psf.kernels.shape == (1, 1, 3, 31, 31)
     assert found.psf.pixel_pitch_um == 4.5
     assert found.psf.depths_mm.tolist() == [2000]
@@ -118,7 +120,7 @@ def test_what_is_asked_for_is_what_is_written(tmp_path: Path) -> None:
 
 def test_light_up_to_the_border_of_the_frame_is_said(tmp_path: Path) -> None:
     point = replace(SMALL, reach=90, streak=3e-2)
-    found = measure_point(_pictures(tmp_path, point), FIVE_UM, None)
+    found = measure_psf(_pictures(tmp_path, point), FIVE_UM, None)
     assert "light is still seen" in found.notes[0]
 
 
@@ -126,9 +128,9 @@ def test_light_up_to_the_border_of_the_frame_is_said(tmp_path: Path) -> None:
 def test_a_core_too_fine_for_a_mosaic_is_said(tmp_path: Path, spread_px: float) -> None:
     point = replace(SMALL, spreads_px=(spread_px,) * 3)
     files = write_bracket(tmp_path, point, times_s=SHORT_S)
-    found = measure_point(survey(files, None), FIVE_UM, None)
+    found = measure_psf(survey(files, None), FIVE_UM, None)
     assert any("too fine for the mosaic" in note for note in found.notes) == (spread_px < 1)
-    planes = measure_point(_pictures(tmp_path, point), FIVE_UM, None)
+    planes = measure_psf(_pictures(tmp_path, point), FIVE_UM, None)
     assert planes.notes == ()
 
 
@@ -144,21 +146,21 @@ def test_a_bracket_that_tells_no_psf_is_refused(
     tmp_path: Path, point: Point, peak: float, told: str
 ) -> None:
     with pytest.raises(DecodeError, match=told):
-        measure_point(_pictures(tmp_path, point, peak), FIVE_UM, None)
+        measure_psf(_pictures(tmp_path, point, peak), FIVE_UM, None)
 
 
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (PointOptions(), "no pixel pitch"),
-        (PointOptions(pixel_pitch_um=5.0, side_px=95), "at most"),
+        (PsfOptions(), "no pixel pitch"),
+        (PsfOptions(pixel_pitch_um=5.0, side_px=95), "at most"),
     ],
 )
 def test_what_does_not_fit_the_frames_is_refused(
-    tmp_path: Path, options: PointOptions, told: str
+    tmp_path: Path, options: PsfOptions, told: str
 ) -> None:
     with pytest.raises(ContractError, match=told):
-        measure_point(_pictures(tmp_path, SMALL), options, None)
+        measure_psf(_pictures(tmp_path, SMALL), options, None)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +168,7 @@ def test_what_does_not_fit_the_frames_is_refused(
 )
 def test_what_nobody_can_mean_is_refused(options: dict[str, float]) -> None:
     with pytest.raises(ContractError, match="must be"):
-        PointOptions(**options)  # type: ignore[arg-type]
+        PsfOptions(**options)  # type: ignore[arg-type]
 
 
 def test_coded_pictures_are_refused(tmp_path: Path) -> None:
@@ -174,4 +176,42 @@ def test_coded_pictures_are_refused(tmp_path: Path) -> None:
     for path in files:
         assert cv2.imwrite(str(path), np.full((40, 40, 3), 9, np.uint8))
     with pytest.raises(ContractError, match="linear frames"):
-        measure_point(survey(files, (1.0, 2.0)), FIVE_UM, None)
+        measure_psf(survey(files, (1.0, 2.0)), FIVE_UM, None)
+
+
+@pytest.mark.parametrize("core", [0.14, 0.6])
+def test_the_light_near_the_peak_is_right_to_a_hundredth(tmp_path: Path, core: float) -> None:
+    hazy = Hazy(core=core, seed=2)
+    bracket = survey(hazy.write(tmp_path, hazy.planes()), None)
+    darks = Darks.read(hazy.write_darks(tmp_path), None, bracket)
+    found = measure_psf(bracket, PsfOptions(pixel_pitch_um=4.0), darks)
+    (field,) = found.fields
+    assert field.peak_share == pytest.approx(hazy.peak_share, abs=0.01)
+    assert abs(field.peak_share - hazy.peak_share) < 3 * field.peak_share_error
+    assert field.peak_share_error < 0.01
+    off = np.hypot(hazy.x - 299.5, hazy.y - 299.5) * 0.004
+    assert field.height_mm == pytest.approx(off, abs=2e-4)
+    kernel, half = _measured(found.psf)[1], found.side_px // 2
+    y, x = np.mgrid[-half : half + 1, -half : half + 1]
+    assert kernel[np.hypot(y, x) <= 10].sum() == pytest.approx(hazy.peak_share, abs=0.01)
+
+
+def test_a_wrong_black_is_in_the_error(tmp_path: Path) -> None:
+    short, errors = (1 / 8, 1 / 64), []  # haze of some DN: half of one matters
+    for drift_dn in (0.0, 0.5):
+        hazy = Hazy(side=360, end=140, scale=60, x=181.3, y=178.6, drift_dn=drift_dn)
+        bracket = survey(hazy.write(tmp_path, hazy.planes(), times_s=short), None)
+        darks = Darks.read(hazy.write_darks(tmp_path, 8, short[0]), None, bracket)
+        (field,) = measure_psf(bracket, PsfOptions(pixel_pitch_um=4.0), darks).fields
+        assert abs(field.peak_share - hazy.peak_share) < 3 * field.peak_share_error
+        errors.append(field.peak_share_error)
+    # what noise alone explains is less than black moved it by
+    assert abs(field.peak_share - hazy.peak_share) > 3 * errors[0]
+    assert errors[1] > 4 * errors[0]
+
+
+def test_haze_without_darks_is_refused(tmp_path: Path) -> None:
+    hazy = Hazy(side=360, x=181.3, y=178.6)
+    bracket = survey(hazy.write(tmp_path, hazy.planes()), None)
+    with pytest.raises(DecodeError, match=r"haze fills the frame: \d+% .* by --dark"):
+        measure_psf(bracket, PsfOptions(pixel_pitch_um=4.0), None)

@@ -10,7 +10,8 @@ import pytest
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.tone import ToneFacts, levels_of, measure_tone
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.output.dng import DngTags, write_bayer_dng
+from camkit.runtime.output.dng import write_bayer_dng
+from tests.dng_factory import grey_tags
 
 TOLERANCE = 0.01
 BLACK, WHITE = 256, 4095
@@ -47,15 +48,7 @@ def _codes(light: float, seed: int) -> np.ndarray:
 
 
 def _write(path: Path, codes: np.ndarray, **stated: float) -> Path:
-    tags = DngTags(
-        cfa="RGGB",
-        black=BLACK,
-        white=WHITE,
-        color_matrix=None,
-        as_shot_neutral=(1.0, 1.0, 1.0),
-        camera_model="camkit test",
-        metadata=Metadata.believable(**stated),
-    )
+    tags = grey_tags(metadata=Metadata.believable(**stated))
     write_bayer_dng(path, codes, tags=tags)
     return path
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.runtime.metadata import Metadata
-from camkit.runtime.output.dng import DngTags, write_bayer_dng
+from camkit.runtime.output.dng import write_bayer_dng
+from tests.dng_factory import grey_tags
 
 BLACK, WHITE = 256, 4095
 NOISE = NoiseModel(shot=(1e-4,) * 3, read_variance=(1e-6,) * 3)
@@ -33,13 +34,7 @@ def write_dng(
     write_bayer_dng(
         path,
         codes,
-        tags=DngTags(
-            cfa="RGGB",
-            black=BLACK,
-            white=WHITE,
-            color_matrix=None,
-            as_shot_neutral=(1.0, 1.0, 1.0),
-            camera_model="camkit test",
+        tags=grey_tags(
             metadata=Metadata.believable(exposure_time_s=time_s, iso=iso),
             noise=noise,
         ),

@@ -22,7 +22,8 @@ from camkit.models_def.optics.dots.camera import DotCamera
 from camkit.models_def.optics.dots.pattern import dot_picture
 from camkit.models_def.optics.dots.target import FloatGrid
 from camkit.runtime.calibration.dots import SeenDots, dots_psf
-from camkit.runtime.calibration.psf import PointOptions, measure_point
+from camkit.runtime.calibration.measured import PsfOptions
+from camkit.runtime.calibration.psf import measure_psf
 from camkit.runtime.merging.survey import survey
 from camkit.runtime.output.part_file import atomic_output
 
@@ -59,8 +60,8 @@ def measured_psf(
     """
     grid = PixelGrid(side_px=SIDE_PX, pitch_um=PITCH_UM, samples=SAMPLES)
     frames = _bracket(dot_picture(height_um, camera, grid), folder)
-    options = PointOptions(pixel_pitch_um=PITCH_UM, depth_m=DEPTH_M)
-    point = measure_point(survey(frames, TIMES_S), options, None)
+    options = PsfOptions(pixel_pitch_um=PITCH_UM, depth_m=DEPTH_M)
+    point = measure_psf(survey(frames, TIMES_S), options, None)
     psf, seen = dots_psf(point, frozen_psf(designed), camera.active_um)
     out = folder / "measured.safetensors"
     with atomic_output(out) as part:

@@ -2,7 +2,7 @@
 
 app       the commands joined
 outputs   the files that a command leaves, and what it says
-psf       the point spread function, from a bracket of a point light
+psf       the point spread function, from a bracket of a point, of a disc, or from an edge
 geometry  focal length, optical centre and distortion, from photographs of a checkerboard
 flat      relative illumination, from pictures of an uneven display in several poses
 noise     gain, read noise and fixed patterns, from pairs of dark and flat frames

@@ -1,6 +1,7 @@
-"""`camkit calibrate psf`: a bracket of a point light to a frozen PSF."""
+"""`camkit calibrate psf`: a bracket of a small light, or an edge, to a frozen PSF."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,25 +9,38 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
+from camkit.cli.use.calibrate.outputs import Page, check_page
 from camkit.cli.use.merge import BlackLevel, MosaicCfa, Times, WhiteLevel
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
     from camkit.runtime.calibration.dots import SeenDots
-    from camkit.runtime.calibration.psf import MeasuredPoint
+    from camkit.runtime.calibration.measured import MeasuredPsf
     from camkit.runtime.merging.survey import Survey
 
 
 def psf(
     files: Annotated[
-        list[Path], typer.Argument(help="Exposures of a point light in the dark, linear.")
+        list[Path],
+        typer.Argument(help="Exposures of a point light, a disc or an edge in the dark, linear."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The PSF (safetensors) to write.")],
+    page: Page = None,
     times: Times = None,
     dark: Annotated[
         list[Path] | None,
         typer.Option(help="A frame without light; may be given again, at every exposure time."),
     ] = None,
+    disc_px: Annotated[
+        float | None,
+        typer.Option(
+            help="The light is an even disc: its diameter in pixels, if the lens were perfect."
+        ),
+    ] = None,
+    edge: Annotated[
+        bool,
+        typer.Option("--edge", help="The light is a straight edge, slanted; its PSF is round."),
+    ] = False,
     side_px: Annotated[
         int | None,
         typer.Option(help="Odd side of the kernels; default: as far as light is seen."),
@@ -51,31 +65,56 @@ def psf(
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Merge a bracket of a point light, centre it and normalise every colour to a PSF."""
+    """Merge a bracket of a small light or an edge to a PSF, every colour of sum 1."""
     if out.suffix.lower() != ".safetensors":
         raise ContractError(f"a PSF is safetensors; expected a name in .safetensors, got {out}")
     if out.exists() and not overwrite:
         raise ContractError(f"{out} exists; say --overwrite or another name")
+    check_page(page, overwrite=overwrite)
+    _check_target(disc_px, dots, edge=edge)
     from camkit.bundle.psf_file import psf_to_bytes, read_psf
     from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.darks import Darks
     from camkit.runtime.calibration.dots import dots_psf
-    from camkit.runtime.calibration.psf import PointOptions, measure_point
+    from camkit.runtime.calibration.edge_psf import measure_edge
+    from camkit.runtime.calibration.measured import PsfOptions
+    from camkit.runtime.calibration.psf import measure_psf
     from camkit.runtime.merging.survey import survey
-    from camkit.runtime.output.part_file import atomic_output
+    from camkit.runtime.output.part_file import atomic_outputs
 
     designed = None if dots is None else read_psf(dots)
-    options = PointOptions(side_px=side_px, pixel_pitch_um=pixel_pitch_um, depth_m=depth_m)
+    options = PsfOptions(
+        side_px=side_px, pixel_pitch_um=pixel_pitch_um, depth_m=depth_m, disc_px=disc_px
+    )
     said = mosaic_options(mosaic, black_level, white_level)
     times_s, dark_times_s = _times(times, files, dark or [])
-    bracket = survey(files, times_s, mosaic=said)
+    bracket = survey(files, times_s, mosaic=said, alike=edge)
     darks = Darks.read(dark, dark_times_s, bracket, said) if dark else None
-    found = measure_point(bracket, options, None if darks is None else darks.rows)
+    found = (measure_edge if edge else measure_psf)(bracket, options, darks)
     made, seen = (found.psf, None) if designed is None else dots_psf(found, designed)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_output(out) as part:
-        part.write_bytes(psf_to_bytes(made))
-    _tell(out, bracket, found, seen, as_json=json_)
+    contents = {out: psf_to_bytes(made)}
+    if page is not None:
+        from camkit.report.calibration.psf_page import psf_html
+
+        contents[page] = psf_html(found).encode()
+    for path in contents:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_outputs(*contents) as parts:
+        for part, content in zip(parts, contents.values(), strict=True):
+            part.write_bytes(content)
+    _tell(contents, bracket, found, seen, as_json=json_)
+
+
+def _check_target(disc_px: float | None, dots: Path | None, *, edge: bool) -> None:
+    """Refuse a light that is two things.
+
+    Raises:
+        ContractError: If it is.
+    """
+    named = {"--disc-px": disc_px is not None, "--edge": edge, "--dots": dots is not None}
+    said = [name for name, is_said in named.items() if is_said]
+    if len(said) > 1:
+        raise ContractError(f"the light is one thing; say one of {' and '.join(said)}")
 
 
 def _times(
@@ -94,14 +133,14 @@ def _times(
 
 
 def _tell(
-    out: Path,
+    files: Iterable[Path],
     bracket: "Survey",
-    found: "MeasuredPoint",
+    found: "MeasuredPsf",
     seen: "SeenDots | None",
     *,
     as_json: bool,
 ) -> None:
-    x, y = found.centre_px
+    (x, y), (out, *page) = found.centre_px, files
     if as_json:
         record: dict[str, Any] = {
             "frames": [frame.path.name for frame in bracket.frames],
@@ -110,25 +149,35 @@ def _tell(
             "side_px": found.side_px,
             "pixel_pitch_um": found.psf.pixel_pitch_um,
             "colours": [colour.to_json() for colour in found.colours],
+            "fields": [field.to_json() for field in found.fields],
             "filled_samples": found.filled_samples,
             "notes": [*bracket.notes, *found.notes],
             "out": str(out),
         }
         if seen is not None:
             record["dots"] = seen.to_json()
+        if page:
+            record["page"] = str(page[0])
         say(json.dumps(record))
         return
     for note in (*bracket.notes, *found.notes):
         say(f"note: {note}", err=True)
-    say(f"{out}: {found.side_px} px, the light at ({x:.2f}, {y:.2f})")
+    say(f"{', '.join(map(str, (out, *page)))}: {found.side_px} px, the light at ({x:.2f}, {y:.2f})")
     if seen is not None:
         say(
             f"  dots: {seen.share:.1%} of the light in active areas, like the design by "
             f"{seen.likeness:.4f}"
         )
         return
-    for colour in found.colours:
+    for field in found.fields:
         say(
-            f"  {colour.colour:<5}  {colour.core_share:.2%} within 3 px, "
-            f"noise {colour.noise_floor:.1e} of the peak"
+            f"  {field.peak_share:.2%} +- {field.peak_share_error:.2%} within 10 px, "
+            f"{field.height_mm:.2f} mm from the middle"
         )
+    for colour in found.colours:
+        noise = (
+            "" if colour.noise_floor is None else f", noise {colour.noise_floor:.1e} of the peak"
+        )
+        target = colour.reblurred
+        rest = "" if target is None else f", blurred anew {target.rest:.2%} off"
+        say(f"  {colour.colour:<5}  {colour.core_share:.2%} within 3 px{noise}{rest}")

@@ -17,6 +17,7 @@ from camkit.models_def.optics.dots.match import match_dots
 from camkit.models_def.optics.dots.pattern import dot_picture
 from camkit.models_def.optics.dots.target import likeness, to_target
 from camkit.models_def.optics.dots.unit import DotPlate
+from tests.runtime.calibration.haze_factory import Hazy
 from tests.runtime.calibration.point_factory import (
     Point,
     exposed,
@@ -180,3 +181,60 @@ def test_a_point_without_a_plate_has_no_dots(
     assert done.code == ExitCode.INPUT_FAILED
     assert "no dots every 37.5 um" in done.err
     assert not out.exists()
+
+
+def test_a_disc_becomes_a_psf_a_page_and_one_object(camkit_command, tmp_path: Path) -> None:
+    hazy = Hazy(side=300, end=110, scale=50, x=151.3, y=147.6)
+    files, darks = hazy.write(tmp_path, hazy.planes(4.0)), hazy.write_darks(tmp_path, 2)
+    out, page = tmp_path / "psf.safetensors", tmp_path / "psf.html"
+    asked = ["-o", out, "--page", page, "--pixel-pitch-um", 4, "--disc-px", 4]
+    dark = [part for path in darks for part in ("--dark", path)]
+    done = camkit_command("calibrate", "psf", *files, *dark, *asked, "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    (field,) = told["fields"]
+    assert set(field) == {"height_mm", "peak_share", "peak_share_error"}
+    assert field["height_mm"] == pytest.approx(0.004 * np.hypot(1.8, 1.9), abs=2e-4)
+    assert field["peak_share"] == pytest.approx(hazy.peak_share, abs=0.01)
+    assert told["page"] == str(page)
+    assert all(colour["residual"] < 0.01 for colour in told["colours"])
+    assert page.read_text().count("<img") == 3
+    assert read_psf(out).kernels.shape[2] == 3
+    again = camkit_command("calibrate", "psf", *files, *dark, *asked)
+    assert again.code == ExitCode.USAGE
+    out.unlink()
+    assert "psf.html exists" in camkit_command("calibrate", "psf", *files, *dark, *asked).err
+    missing = camkit_command("calibrate", "psf", *files, *asked, "--overwrite")
+    assert missing.code == ExitCode.INPUT_FAILED
+    assert "haze fills the frame" in missing.err
+    assert len(missing.err.strip().splitlines()) == 1
+    assert not out.exists()
+
+
+def test_one_frame_of_an_edge_becomes_a_psf(camkit_command, tmp_path: Path) -> None:
+    clear = Hazy(core=1.0, side=200, x=101.3, y=97.6)
+    (file,) = clear.write(tmp_path, clear.edge_planes(0.1), times_s=(1.0,))
+    out = tmp_path / "psf.safetensors"
+    done = camkit_command("calibrate", "psf", file, "--edge", "-o", out, "--pixel-pitch-um", 4)
+    assert done.code == 0, done.err
+    assert "within 10 px" in done.out
+    assert "blurred anew" in done.out
+    assert read_psf(out).kernels.shape[-1] < 30
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--edge", "--disc-px", 4], "say one of --disc-px and --edge"),
+        (["--edge", "--dots", "d.safetensors"], "say one of --edge and --dots"),
+        (["--disc-px", 0], "--disc-px must be > 0"),
+        (["--page", "psf.txt"], "a page is HTML"),
+    ],
+)
+def test_a_light_is_one_thing(
+    camkit_command, bracket: list[Path], tmp_path: Path, options: list, told: str
+) -> None:
+    asked = ("--times", "1,1/8,1/64", "-o", tmp_path / "psf.safetensors", *options)
+    done = camkit_command("calibrate", "psf", *bracket, *asked)
+    assert done.code == ExitCode.USAGE
+    assert told in done.err
