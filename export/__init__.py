@@ -3,6 +3,8 @@
     golden_cases    small captures of known scenes
     onnx_graph      a network becomes ONNX, held against torch
     network_facts   what is measured about it
+    activations     its activations on golden cases, of a bundle that is there
+    remeasured      a bundle that is there, with parts that were measured
     energy, card    the card and the preview for people
     assemble        everything packed, proved, written
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.golden import GoldenArrays
+from camkit.bundle.golden import NO_SIZE, GoldenArrays
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import MOSAIC, Extent
@@ -109,8 +109,8 @@ def add_outputs(bundle: Bundle, cases: Cases) -> dict[str, GoldenArrays]:
             arrays,
             outputs={
                 product: {
-                    size: case_work(bundle, case, arrays, size).fill(product=product)
-                    for size in bundle.manifest.sizes
+                    size or NO_SIZE: case_work(bundle, case, arrays, size).fill(product=product)
+                    for size in bundle.manifest.sizes or (None,)
                 }
                 for product in _products(bundle, arrays)
             },

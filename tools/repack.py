@@ -10,15 +10,14 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.manifest import FORMAT_VERSION, Manifest
-from camkit.bundle.reader import GOLDEN, Bundle, open_bundle
+from camkit.bundle.reader import GOLDEN, open_bundle
 from camkit.bundle.stages import Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ParityError
-from camkit.export.golden_cases import Cases, add_outputs
-from camkit.runtime.network.ranges import node_activations
+from camkit.export.activations import with_activations
+from camkit.export.golden_cases import add_outputs
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 
@@ -49,7 +48,7 @@ def repack(old: Path, new: Path, *, clip_reach_px: int | None = None) -> int:
             golden = golden_from_bytes(members[GOLDEN])
             cases = {case.name: (case, golden[case.name]) for case in manifest.golden}
             members[GOLDEN] = golden_to_bytes(add_outputs(made, cases))
-            manifest = manifest.model_copy(update={"networks": _measured(made, cases)})
+            manifest = manifest.model_copy(update={"networks": with_activations(made, cases)})
         write_bundle(trial, manifest, members)
         report = check_bundle(trial, run=case_work)
     if not report.passed:
@@ -68,26 +67,6 @@ def _reaching(manifest: Manifest, clip_reach_px: int) -> Manifest:
     )
     major, minor, *_ = manifest.version.split(".")
     return manifest.model_copy(update={"stages": stages, "version": f"{major}.{int(minor) + 1}.0"})
-
-
-def _measured(bundle: Bundle, cases: Cases) -> dict[str, dict[str, NetworkFacts]]:
-    """Give the facts with activations that hold for the golden cases too."""
-    found: dict[str, dict[str, NetworkFacts]] = {}
-    for role, sizes in bundle.manifest.networks.items():
-        found[role] = {}
-        for size, facts in sizes.items():
-            windows = [
-                case_work(bundle, case, arrays, size).network_input(role)[None]
-                for case, arrays in cases.values()
-            ]
-            seen = node_activations(bundle.network_bytes(role, size), windows)
-            known = facts.node_activation
-            largest = {name: max(value, known.get(name, 0.0)) for name, value in seen.items()}
-            top = max(facts.max_activation, *largest.values())
-            found[role][size] = facts.model_copy(
-                update={"node_activation": largest, "max_activation": top}
-            )
-    return found
 
 
 def main() -> None:

@@ -35,9 +35,11 @@ from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
 
-FORMAT_VERSION: Final = (2, 5)
+FORMAT_VERSION: Final = (2, 6)
 FOCUS_VERSION: Final = (2, 5)
 """From here on a PSF may hold kernels of a moved sensor; others state what they always did."""
+PROFILE_VERSION: Final = (2, 6)
+"""From here on optics may be a lens profile, and distortion have even powers."""
 _OLDEST: Final = 1
 _S = TypeVar("_S", bound=Entry)
 NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
@@ -168,6 +170,11 @@ class Manifest(Entry):
         return Parts(sensor=self.sensor, optics=self.optics, networks=self.networks)
 
     @property
+    def has_kernels(self) -> bool:
+        """Tell whether the optics blur by kernels that are known: only then is there a twin."""
+        return self.optics is not None and self.optics.type != "lens_profile"
+
+    @property
     def all_planes(self) -> dict[str, Plane]:
         """Give every plane by name, that of the sensor first."""
         return {CAPTURE: capture_plane(self.sensor), **self.planes}
@@ -214,7 +221,9 @@ class _Head(Entry, extra="ignore"):
 
 
 def format_of(psf: FrozenPsf) -> str:
-    """Give the format of a bundle with such a PSF: kernels of a moved sensor need a newer one."""
+    """Give the format of a bundle with such a PSF: what came later needs a newer one."""
+    if psf.distortion.even_coefficients is not None:
+        return ".".join(map(str, PROFILE_VERSION))
     if psf.focus_um is None:
         return str(Manifest.model_fields["format_version"].default)
     return ".".join(map(str, FOCUS_VERSION))

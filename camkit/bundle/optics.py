@@ -2,15 +2,18 @@
 
 Optics = FrozenPsfOptics    kernels, psf.safetensors        (psf_file.py)
        | StreakEntry        core, arms and haze, streaks.safetensors    (streak_file.py)
+       | LensProfile        distortion and illumination alone, in the manifest
 """
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Discriminator, Tag
+import numpy as np
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from camkit.bundle.entry import Entry, Positive
-from camkit.contracts import Symmetry
+from camkit.bundle.entry import Entry, NonNegative, Positive
+from camkit.contracts import RadialDistortion, RadialIllumination, Symmetry
+from camkit.errors import ContractError
 
 PSF: Final = "psf.safetensors"
 STREAKS: Final = "streaks.safetensors"
@@ -51,6 +54,86 @@ class StreakEntry(Entry):
     object_distance_mm: Positive | None = None
 
 
+Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class RadialEntry(Entry):
+    """Radial distortion, r_d = a0 r + a1 r^3 + a2 r^5 + a3 r^7 + b0 r^2 + b1 r^4 + b2 r^6.
+
+    Attributes:
+        coefficients: One row (a0, a1, a2, a3) for each channel of the sensor.
+        even_coefficients: One row (b0, b1, b2) likewise; None for none.
+        radius_mm: The unit of the ideal radius r and of r_d on the sensor.
+    """
+
+    coefficients: Annotated[
+        tuple[tuple[Factor, Factor, Factor, Factor], ...], Field(min_length=1, max_length=256)
+    ]
+    even_coefficients: tuple[tuple[Factor, Factor, Factor], ...] | None = None
+    radius_mm: Positive
+
+    @model_validator(mode="after")
+    def _check(self) -> "RadialEntry":
+        even = self.even_coefficients
+        if even is not None and len(even) != len(self.coefficients):
+            raise ValueError(
+                f"even_coefficients needs a row for each of {len(self.coefficients)}; got "
+                f"{len(even)}"
+            )
+        return self
+
+    def to_distortion(self) -> RadialDistortion:
+        """Give it as arrays."""
+        even = self.even_coefficients
+        return RadialDistortion(
+            coefficients=np.array(self.coefficients, dtype=np.float64),
+            radius_mm=self.radius_mm,
+            even_coefficients=None if even is None else np.array(even, dtype=np.float64),
+        )
+
+
+class IlluminationEntry(Entry):
+    """Relative illumination over the distance from the optical axis.
+
+    Attributes:
+        heights_mm: Increasing from 0; between them it is linear in their square.
+        relative_illumination: 1 on the axis, > 0.
+    """
+
+    heights_mm: Annotated[tuple[NonNegative, ...], Field(min_length=1, max_length=1024)]
+    relative_illumination: tuple[Annotated[float, Field(gt=1e-6, le=1e6)], ...]
+
+    @model_validator(mode="after")
+    def _check(self) -> "IlluminationEntry":
+        try:
+            self.to_illumination()
+        except ContractError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    def to_illumination(self) -> RadialIllumination:
+        """Give it as arrays."""
+        return RadialIllumination(
+            heights_mm=np.array(self.heights_mm, dtype=np.float64),
+            light=np.array(self.relative_illumination, dtype=np.float64),
+        )
+
+
+class LensProfile(Entry):
+    """A lens known by distortion and illumination alone; it has no kernels (format 2.6).
+
+    Attributes:
+        distortion: None where it is not known: no stage undistorts then.
+        illumination: None likewise.
+        object_distance_mm: Distance for which both hold; None for infinity.
+    """
+
+    type: Literal["lens_profile"] = "lens_profile"
+    distortion: RadialEntry | None = None
+    illumination: IlluminationEntry | None = None
+    object_distance_mm: Positive | None = None
+
+
 def _type_of(value: Any) -> Any:
     """Give the type of optics; those that state none are kernels, as before there were others."""
     if isinstance(value, Mapping):
@@ -59,6 +142,8 @@ def _type_of(value: Any) -> Any:
 
 
 Optics = Annotated[
-    Annotated[FrozenPsfOptics, Tag("frozen_psf")] | Annotated[StreakEntry, Tag("streaks")],
+    Annotated[FrozenPsfOptics, Tag("frozen_psf")]
+    | Annotated[StreakEntry, Tag("streaks")]
+    | Annotated[LensProfile, Tag("lens_profile")],
     Discriminator(_type_of),
 ]

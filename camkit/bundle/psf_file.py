@@ -5,7 +5,8 @@ The file holds seven tensors and no metadata, so that the same PSF always gives 
 `pixel_pitch_um` (1,), `distortion_coefficients` (channel, 4), `distortion_radius_mm` (1,) and
 `relative_illumination`. A PSF that is not radial adds `symmetry`, its name in ASCII (uint8), and a
 grid its positions, `grid_x_mm` and `grid_y_mm`. Kernels of a moved sensor (format 2.5) add
-`focus_kernels` (float32) and `focus_um`.
+`focus_kernels` (float32) and `focus_um`; even powers of the distortion (format 2.6) add
+`distortion_even_coefficients` (channel, 3).
 """
 
 from collections.abc import Mapping
@@ -30,6 +31,7 @@ _MAX_HEADER_BYTES: Final = 2**20
 _GRID: Final = ("grid_x_mm", "grid_y_mm")
 _ADDED: Final = {"radial": (), "uniform": (_SYMMETRY,), "grid": (_SYMMETRY, *_GRID)}
 """What a PSF of each symmetry holds besides."""
+_EVEN: Final = "distortion_even_coefficients"
 _FOCUS: Final = ("focus_um", "focus_kernels")
 _SIDES: Final = ("field", "depth", "wavelength", "h", "w")
 _KERNELS: Final = {"kernels": _SIDES, "focus_kernels": ("shift", *_SIDES)}
@@ -90,6 +92,8 @@ def psf_to_bytes(psf: FrozenPsf) -> bytes:
             name: np.asarray(positions, dtype=np.float64)
             for name, positions in zip(_GRID, (psf.grid_x_mm, psf.grid_y_mm), strict=True)
         }
+    if psf.distortion.even_coefficients is not None:
+        tensors[_EVEN] = np.asarray(psf.distortion.even_coefficients, dtype=np.float64)
     if psf.focus_um is not None and psf.focus_kernels is not None:
         tensors[_FOCUS[0]] = np.asarray(psf.focus_um, dtype=np.float64)
         tensors[_FOCUS[1]] = psf.focus_kernels
@@ -123,6 +127,7 @@ def psf_from_bytes(data: bytes, *, what: str = "psf.safetensors") -> FrozenPsf:
             distortion=RadialDistortion(
                 coefficients=tensors["distortion_coefficients"],
                 radius_mm=float(tensors["distortion_radius_mm"][0]),
+                even_coefficients=tensors.get(_EVEN),
             ),
             relative_illumination=tensors["relative_illumination"],
             symmetry=symmetry,
@@ -151,6 +156,8 @@ def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what
     wanted_names = _TENSORS | set(_ADDED[symmetry])
     if tensors.keys() & set(_FOCUS):
         wanted_names |= set(_FOCUS)
+    if _EVEN in tensors:
+        wanted_names |= {_EVEN}
     if tensors.keys() - {_SYMMETRY} != wanted_names - {_SYMMETRY}:
         missing = ", ".join(sorted(wanted_names - tensors.keys())) or "none"
         extra = ", ".join(sorted(tensors.keys() - wanted_names)) or "none"
@@ -168,7 +175,9 @@ def _check_tensors(tensors: Mapping[str, NDArray[Any]], symmetry: Symmetry, what
                 f"got {kernels.dtype} {kernels.shape}"
             )
     rows = tensors["distortion_coefficients"].shape[:1]
-    shapes = {"distortion_coefficients": (*rows, 4)} | dict.fromkeys(_SCALARS, (1,))
+    shapes = {"distortion_coefficients": (*rows, 4), _EVEN: (*rows, 3)} | dict.fromkeys(
+        _SCALARS, (1,)
+    )
     for name in sorted(wanted_names - {_SYMMETRY, *_KERNELS}):
         array = tensors[name]
         wanted = shapes.get(name, (array.size,))

@@ -24,10 +24,10 @@ from camkit.bundle.container import (
 )
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, optics_from_bytes
-from camkit.bundle.manifest import FOCUS_VERSION, Manifest, read_manifest
-from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, StreakEntry
+from camkit.bundle.manifest import FOCUS_VERSION, PROFILE_VERSION, Manifest, read_manifest
+from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, LensProfile, StreakEntry
 from camkit.bundle.psf_file import psf_from_bytes
-from camkit.contracts import FrozenPsf
+from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import BundleError
 from camkit.streaks.optics import StreakOptics
 
@@ -77,6 +77,34 @@ class Bundle:
         return self._optics.psf
 
     @property
+    def distortion(self) -> RadialDistortion:
+        """The distortion of the optics.
+
+        Raises:
+            BundleError: If they state none.
+        """
+        optics = self.manifest.optics
+        if not isinstance(optics, LensProfile):
+            return self.psf.distortion
+        if optics.distortion is None:
+            raise BundleError(f"{self.path.name} states no distortion")
+        return optics.distortion.to_distortion()
+
+    @property
+    def illumination(self) -> FrozenPsf | RadialIllumination:
+        """What says the relative illumination of the optics.
+
+        Raises:
+            BundleError: If they state none.
+        """
+        optics = self.manifest.optics
+        if not isinstance(optics, LensProfile):
+            return self.psf
+        if optics.illumination is None:
+            raise BundleError(f"{self.path.name} states no illumination")
+        return optics.illumination.to_illumination()
+
+    @property
     def streaks(self) -> StreakOptics:
         """What its optics write beside a light.
 
@@ -92,6 +120,8 @@ class Bundle:
         """The distance of focus; where the PSF does not reach it, the nearest that it knows."""
         optics = self.manifest.optics
         focus_mm = (optics and optics.object_distance_mm) or math.inf
+        if isinstance(optics, LensProfile):
+            return focus_mm
         depths_mm = self.psf.depths_mm
         return float(min(max(focus_mm, depths_mm[0]), depths_mm[-1]))
 
@@ -185,25 +215,42 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
     """Read the optics; those of a bundle without any are refused."""
     stated = manifest.optics
     for name in (PSF, STREAKS):
-        if name in manifest.members and (stated is None or stated.member != name):
+        if name in manifest.members and name != getattr(stated, "member", None):
             such = "no" if stated is None else "no such"
             raise BundleError(f"the bundle holds {name}, and its manifest states {such} optics")
     if stated is None:
         return None
     channels = len(manifest.sensor.channels)
+    if isinstance(stated, LensProfile):
+        _need_version(manifest, PROFILE_VERSION, "the optics are a lens profile")
+        rows = 0 if stated.distortion is None else len(stated.distortion.coefficients)
+        if rows not in (0, channels):
+            raise BundleError(
+                f"the lens profile has the distortion of {rows} channel(s), the sensor {channels}"
+            )
+        return None
     data = container.read(stated.member)
     optics = optics_from_bytes(data, what=stated.member, channels=channels)
     if optics.member_name != stated.member:
         raise BundleError(f"{stated.member} holds optics of another type than the manifest states")
     _check_psf(optics.psf, stated, channels)
-    version = tuple(int(part) for part in manifest.format_version.split("."))
-    if optics.psf.focus_um is not None and version < FOCUS_VERSION:
-        needed = ".".join(map(str, FOCUS_VERSION))
-        raise BundleError(
-            f"{stated.member} holds kernels of a moved sensor, which format {needed} brought, and "
-            f"the manifest states {manifest.format_version}; export the bundle again"
-        )
+    if optics.psf.focus_um is not None:
+        what = f"{stated.member} holds kernels of a moved sensor"
+        _need_version(manifest, FOCUS_VERSION, what)
+    if optics.psf.distortion.even_coefficients is not None:
+        what = f"{stated.member} holds even powers of distortion"
+        _need_version(manifest, PROFILE_VERSION, what)
     return optics
+
+
+def _need_version(manifest: Manifest, needed: tuple[int, int], what: str) -> None:
+    """Refuse what the stated format did not know."""
+    version = tuple(int(part) for part in manifest.format_version.split("."))
+    if version < needed:
+        raise BundleError(
+            f"{what}, which format {'.'.join(map(str, needed))} brought, and the manifest states "
+            f"{manifest.format_version}; export the bundle again"
+        )
 
 
 def read_container_manifest(container: Container) -> Manifest:
@@ -241,7 +288,7 @@ def _check_references(manifest: Manifest) -> None:
             needed[facts.member] = f"network {size} ({role})"
             if facts.fp16_member is not None:
                 needed[facts.fp16_member] = f"network {size} ({role}) in fp16"
-    if manifest.optics is not None:
+    if manifest.optics is not None and not isinstance(manifest.optics, LensProfile):
         needed[manifest.optics.member] = "the optics"
     if manifest.golden:
         needed[GOLDEN] = "the golden cases"

@@ -40,9 +40,10 @@ def check_photographs(manifest: Manifest, instead: str) -> None:
     Raises:
         ContractError: If it states no optics.
     """
-    if manifest.optics is None:
+    if not manifest.has_kernels:
+        stated = "no optics" if manifest.optics is None else "a lens profile without kernels"
         raise ContractError(
-            f"{manifest.name} states no optics, so nothing can be photographed with it; {instead}"
+            f"{manifest.name} states {stated}, so nothing can be photographed with it; {instead}"
         )
 
 

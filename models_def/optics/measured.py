@@ -117,7 +117,10 @@ class MeasuredOptics:
                 f"{self.name} has the distortion of {len(rows)} channels, the sensor {channels}"
             )
         coefficients = np.ascontiguousarray(np.broadcast_to(rows, (channels, 4)))
-        return replace(self.psf.distortion, coefficients=coefficients)
+        even = self.psf.distortion.even_coefficients
+        if even is not None:
+            even = np.ascontiguousarray(np.broadcast_to(even, (channels, 3)))
+        return replace(self.psf.distortion, coefficients=coefficients, even_coefficients=even)
 
     def illumination(self, fields: FieldLayout) -> FloatGrid:
         """Give the relative illumination, blended as kernels are."""

@@ -17,4 +17,6 @@ tone       pictures of grey steps to the tone curve of a display
 geometry/  focal length, optical centre and distortion, from a checkerboard
 display/   what a display shows, and captures of it as pairs for training
 record     what a calibration found, as TOML
+measured_files  that TOML read back
+lensfun/   lenses of lensfun's database
 """

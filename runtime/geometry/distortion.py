@@ -1,7 +1,8 @@
 """Radial distortion of points: the model, its inverse, its range.
 
 r_d = xi r (1 + k1 r^2 + k2 r^4 + k3 r^6), r ideal and r_d on the sensor, both in units of
-`RadialDistortion.radius_mm` (Sun 2021, eq. 6.10). Pictures are warped in `warp.py`.
+`RadialDistortion.radius_mm` (Sun 2021, eq. 6.10), plus even powers, b0 r^2 + b1 r^4 + b2 r^6, where
+a lens has them. Pictures are warped in `warp.py`.
 """
 
 from typing import Final
@@ -17,6 +18,7 @@ FloatGrid = NDArray[np.float64]
 TABLE_SAMPLES: Final = 1024
 NEWTON_STEPS: Final = 4
 LEAST_SCALE: Final = 1e-3
+ODD_TERMS: Final = 4
 # A fold beyond a million half diagonals is none.
 FLAT_ROOT: Final = 1e-12
 # A picture is warped a little beyond the farthest pixel, where filters reach over the border.
@@ -41,8 +43,7 @@ def distort_points(
     References: Sun 2021, eq. (6.10).
     """
     square = (points_mm**2).sum(axis=-1, keepdims=True) / distortion.radius_mm**2
-    c0, c1, c2, c3 = distortion.coefficients[channel]
-    return np.asarray(points_mm * (c0 + square * (c1 + square * (c2 + square * c3))))
+    return np.asarray(points_mm * _growth(distortion.row(channel), square))
 
 
 def undistort_points(
@@ -60,7 +61,7 @@ def undistort_points(
     Raises:
         ContractError: If a point lies where the model has no single inverse.
     """
-    coefficients = distortion.coefficients[channel]
+    coefficients = distortion.row(channel)
     radius = np.sqrt((points_mm**2).sum(axis=-1, keepdims=True)) / distortion.radius_mm
     limit = ideal_limit(coefficients, float(radius.max(initial=0.0)))
     table = np.linspace(0.0, limit, TABLE_SAMPLES)
@@ -80,7 +81,8 @@ def check_distortion(distortion: RadialDistortion, corner_radius_mm: float) -> N
         ContractError: If r_d does not grow with r out to the corner, in any colour.
     """
     corner = corner_radius_mm / distortion.radius_mm * RANGE_MARGIN
-    for coefficients in distortion.coefficients:
+    for channel in range(len(distortion.coefficients)):
+        coefficients = distortion.row(channel)
         fold = _fold_radius(coefficients)
         if fold <= corner:
             raise ContractError(
@@ -94,7 +96,7 @@ def ideal_limit(coefficients: FloatGrid, radius: float) -> float:
     """Give an ideal radius whose image is at or beyond `radius` on the sensor, before any fold.
 
     Args:
-        coefficients: (4,) of one colour.
+        coefficients: (4,) of one colour, or (7,) with even powers.
         radius: Radius on the sensor in units of radius_mm.
 
     Raises:
@@ -110,27 +112,47 @@ def ideal_limit(coefficients: FloatGrid, radius: float) -> float:
             break
         limit *= 1.25
     raise ContractError(
-        f"the distortion has no inverse at {radius:.3f} of the half diagonal (it folds at ideal "
+        f"the distortion has no inverse at {radius:.3f} of its unit (it folds at ideal "
         f"radius {fold:.3f}); fit it again over the whole sensor"
     )
 
 
+def _growth(c: FloatGrid, u: FloatGrid) -> FloatGrid:
+    """Give r_d / r at squared radii."""
+    odd = c[0] + u * (c[1] + u * (c[2] + u * c[3]))
+    if len(c) == ODD_TERMS:
+        return np.asarray(odd)
+    return np.asarray(odd + np.sqrt(u) * (c[4] + u * (c[5] + u * c[6])))
+
+
 def _distorted_radius(c: FloatGrid, r: FloatGrid) -> FloatGrid:
-    u = r * r
-    return np.asarray(r * (c[0] + u * (c[1] + u * (c[2] + u * c[3]))))
+    return np.asarray(r * _growth(c, r * r))
 
 
 def _slope(c: FloatGrid, r: FloatGrid) -> FloatGrid:
     u = r * r
-    return np.asarray(c[0] + u * (3 * c[1] + u * (5 * c[2] + u * 7 * c[3])))
+    odd = c[0] + u * (3 * c[1] + u * (5 * c[2] + u * 7 * c[3]))
+    if len(c) == ODD_TERMS:
+        return np.asarray(odd)
+    return np.asarray(odd + r * (2 * c[4] + u * (4 * c[5] + u * 6 * c[6])))
 
 
 def _fold_radius(c: FloatGrid) -> float:
     # r_d stops growing where its slope, a cubic in u = r^2, has its first positive root. Solved
-    # for v = 1 / u, whose highest coefficient is the scale xi and never vanishes.
+    # for v = 1 / u, whose highest coefficient is the scale xi and never vanishes. With even powers
+    # the slope is a polynomial in r, solved for 1 / r likewise.
     if c[0] < LEAST_SCALE:
         return 0.0
-    roots = np.roots([1.0, 3 * c[1] / c[0], 5 * c[2] / c[0], 7 * c[3] / c[0]])
-    real = roots[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))].real
-    last = float(real.max(initial=0.0))
+    if len(c) > ODD_TERMS and c[ODD_TERMS:].any():
+        slopes = [c[0], 2 * c[4], 3 * c[1], 4 * c[5], 5 * c[2], 6 * c[6], 7 * c[3]]
+        last = _last_root(np.array(slopes) / c[0])
+        return 1 / last if last > FLAT_ROOT**0.5 else float("inf")
+    last = _last_root(np.array([1.0, 3 * c[1] / c[0], 5 * c[2] / c[0], 7 * c[3] / c[0]]))
     return last**-0.5 if last > FLAT_ROOT else float("inf")
+
+
+def _last_root(polynomial: FloatGrid) -> float:
+    """Give the largest real root > 0 of a polynomial, highest power first; 0 for none."""
+    roots = np.roots(polynomial)
+    real = roots[np.abs(roots.imag) <= 1e-9 * (1 + np.abs(roots.real))].real
+    return float(real.max(initial=0.0))

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray, FrozenPsf, RadialIllumination
 from camkit.runtime.geometry.sensor_window import FloatGrid, SensorWindow
 
 TABLE_SAMPLES: Final = 4096
@@ -79,23 +79,28 @@ class IlluminationGain:
     than that, else computed for each pixel. On a grid of fields, computed band by band.
     """
 
-    def __init__(self, psf: FrozenPsf, window: SensorWindow) -> None:
+    def __init__(self, optics: FrozenPsf | RadialIllumination, window: SensorWindow) -> None:
         """Make the table.
 
         Args:
-            psf: Frozen PSF; its relative illumination is 1 on the axis.
+            optics: Frozen PSF, whose relative illumination is 1 on the axis, or that alone.
             window: Where the picture lies on the sensor.
         """
-        self._psf = psf
         self._window = window
         self._table: FloatArray | None = None
-        if psf.symmetry == "grid":
+        self._grid: FrozenPsf | None = None
+        if isinstance(optics, RadialIllumination):
+            radial = optics
+        elif optics.radial_illumination is not None:
+            radial = optics.radial_illumination
+        else:
+            self._grid = optics
             return
         width, height = window.size_px
         x_mm, y_mm = window.to_mm(np.arange(width), np.arange(height))
         end = max(window.corner_radius_mm, 1e-9) ** 2 * (1 + 1e-6)
         self._squares = np.linspace(0.0, end, TABLE_SAMPLES)
-        self._coarse = np.interp(self._squares, psf.field_heights_mm**2, psf.relative_illumination)
+        self._coarse = np.interp(self._squares, radial.heights_mm**2, radial.light)
         self._step = end / GAIN_SAMPLES
         if width * height > GAIN_SAMPLES:
             # Rounded one by one, the two indices of a pixel may sum to one more than the last.
@@ -110,8 +115,8 @@ class IlluminationGain:
         Fills `out`, which may be the band, or a new array.
         """
         bottom = top + band.shape[1]
-        if self._psf.symmetry == "grid":
-            light = illumination_band(self._psf, self._window, top, bottom)
+        if self._grid is not None:
+            light = illumination_band(self._grid, self._window, top, bottom)
             return np.asarray(np.divide(band, light, out=out))
         index = self._rows[top:bottom, None] + self._columns
         gain = self._gains(index) if self._table is None else self._table.take(index, mode="clip")

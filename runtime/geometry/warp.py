@@ -134,8 +134,8 @@ class Warp:
 
     def shares_map(self, channel: int) -> bool:
         """Tell whether a channel has the same map as the one before it."""
-        rows = self.distortion.coefficients
-        return channel > 0 and bool(np.array_equal(rows[channel], rows[channel - 1]))
+        row = self.distortion.row
+        return channel > 0 and bool(np.array_equal(row(channel), row(channel - 1)))
 
     def positions(self, channel: int, x_px: FloatGrid, y_px: FloatGrid) -> FloatGrid:
         """Give (..., 2) source pixel positions of output pixel positions.

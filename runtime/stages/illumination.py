@@ -29,7 +29,7 @@ def prepare(_entry: Illumination, job: Job) -> StageWork:
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         (light,) = taken
-        gain = IlluminationGain(job.known_bundle.psf, job.window_of(light.plane))
+        gain = IlluminationGain(job.known_bundle.illumination, job.window_of(light.plane))
 
         def even(rows: FloatArray, top: int) -> None:
             gain.divide(rows, top, out=rows)

@@ -34,7 +34,7 @@ def prepare(entry: Undistort, job: Job) -> StageWork:
         (light,) = taken
         bands = undistort_bands(
             light.pieced(),
-            job.known_bundle.psf.distortion,
+            job.known_bundle.distortion,
             job.window_of(light.plane),
             threads=job.threads,
             interpolation=entry.interpolation,

@@ -9,7 +9,7 @@ from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_rows, 
 
 
 class Illumination(StageEntry):
-    """Division by the relative illumination of the frozen PSF."""
+    """Division by the relative illumination of the optics."""
 
     type: Literal["illumination"] = "illumination"
     takes: tuple[Word, ...] = ("neutral",)
@@ -19,7 +19,9 @@ class Illumination(StageEntry):
         """Give a plane of the kind taken."""
         plane = one_linear(taken)
         need_rows(plane)
-        parts.need_optics("it divides by the illumination of optics")
+        optics = parts.need_optics("it divides by the illumination of optics")
+        if optics.type == "lens_profile" and optics.illumination is None:
+            raise JoinError("the lens_profile states no illumination")
         if not plane.grid.warped:
             raise JoinError("it works in the geometry of the sensor, before any undistortion")
         return (plane,)

@@ -57,7 +57,7 @@ class SuperResolve(StageEntry):
         sensor, optics = parts.sensor, parts.need_optics("it undoes their blur")
         if not isinstance(sensor, SpadSensor) or sensor.sub_pixels < 2:
             raise JoinError("it takes an array that counts photons and states its sub_pixels")
-        if optics.symmetry != "uniform" or optics.type != "frozen_psf":
+        if optics.type != "frozen_psf" or optics.symmetry != "uniform":
             raise JoinError("it takes one kernel for the whole array: symmetry uniform")
         pitch_um = sensor.pixel_pitch_um / sensor.sub_pixels
         if abs(optics.pixel_pitch_um - pitch_um) > 1e-6 * pitch_um:

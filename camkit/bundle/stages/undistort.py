@@ -12,7 +12,7 @@ Interpolation = Literal["lanczos", "cubic"]
 
 
 class Undistort(StageEntry):
-    """Removal of the radial distortion of the frozen PSF, per channel.
+    """Removal of the radial distortion of the optics, per channel.
 
     Attributes:
         interpolation: Between pixels: lanczos (8x8), as before, or cubic (4x4) for a third of
@@ -28,7 +28,9 @@ class Undistort(StageEntry):
         """Give the plane in ideal geometry."""
         plane = one_linear(taken)
         need_rows(plane)
-        parts.need_optics("it undoes the distortion of optics")
+        optics = parts.need_optics("it undoes the distortion of optics")
+        if optics.type == "lens_profile" and optics.distortion is None:
+            raise JoinError("the lens_profile states no distortion")
         if not plane.grid.warped:
             raise JoinError("it takes the geometry of the sensor; this plane is undistorted")
         if plane.channels == MOSAIC:

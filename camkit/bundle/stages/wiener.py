@@ -68,6 +68,8 @@ class Wiener(StageEntry):
             if mask.grid != plane.grid:
                 raise JoinError("its mask must lie on the samples that it deconvolves")
         optics = parts.need_optics("it deconvolves with the kernels of optics")
+        if optics.type == "lens_profile":
+            raise JoinError("it needs optics with kernels; a lens_profile has none")
         if plane.channels != parts.sensor.channels:
             raise JoinError(
                 f"it takes one plane for each of {', '.join(parts.sensor.channels)}, not "

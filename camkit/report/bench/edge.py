@@ -74,7 +74,7 @@ def measure_edges(bundle: Bundle, trials: Iterable[Trial], restorers: Restorers)
         restorers: Of that camera.
     """
     manifest = bundle.manifest
-    if manifest.optics is None or IMAGE not in manifest.products:
+    if not manifest.has_kernels or IMAGE not in manifest.products:
         return Edges()
     try:
         scale = picture_scale(manifest)

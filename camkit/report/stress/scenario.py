@@ -35,7 +35,7 @@ def photographs(bundle: Bundle) -> str | None:
     manifest = bundle.manifest
     if isinstance(manifest.sensor, SpadSensor):
         return f"it takes {manifest.sensor.inputs[0]}, the scenario a photograph"
-    if manifest.optics is None:
+    if not manifest.has_kernels:
         return "it states no optics to photograph through"
     return None
 
@@ -48,7 +48,7 @@ def has_networks(bundle: Bundle) -> str | None:
 def varies_over_field(bundle: Bundle) -> str | None:
     """Say why a bundle cannot take scenarios that move its kernels; None if it can."""
     optics = bundle.manifest.optics
-    if optics is not None and optics.symmetry == "uniform":
+    if optics is not None and optics.type != "lens_profile" and optics.symmetry == "uniform":
         return "its PSF is the same over the field"
     return photographs(bundle)
 

@@ -265,7 +265,7 @@ def _notes(
     if off > _OFF_MIDDLE * np.hypot(*size):
         notes.append(
             f"the optical centre lies {off:.1f} px off the middle of the picture, about which a "
-            "bundle undistorts"
+            "bundle undistorts unless it states `optical_centre_px`"
         )
     if radial.residual_px > MISSED_PX:
         notes.append(

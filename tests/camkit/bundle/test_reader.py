@@ -21,6 +21,7 @@ from safetensors.numpy import load, save
 
 from camkit.bundle import reader
 from camkit.bundle.container import MAX_MEMBERS, check_name
+from camkit.bundle.manifest import format_of
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, bundle_from_bytes, find_bundle, open_bundle
 from camkit.bundle.writer import bundle_to_bytes, write_bundle
@@ -260,7 +261,7 @@ def test_huge_manifest_is_refused() -> None:
     _refuse(_zip(_contents() | {"manifest.json": noise}), "manifest.json is larger")
 
 
-@pytest.mark.parametrize("version", ["1.1", "2.6", "3.0"])
+@pytest.mark.parametrize("version", ["1.1", "2.7", "3.0"])
 def test_newer_format_is_refused_naming_the_version_needed(version: str) -> None:
     data = _with_manifest(lambda document: document.update(format_version=version))
     _refuse(data, f"update to a camkit that reads format {version}")
@@ -506,3 +507,16 @@ def test_kernels_of_a_moved_sensor_need_the_format_that_brought_them(tmp_path: P
     older = bundle.manifest.model_copy(update={"format_version": "2.4"})
     with pytest.raises(BundleError, match=r"moved sensor, which format 2.5 brought, .* states 2.4"):
         write_bundle(tmp_path / "older.camkit", older, members)
+
+
+def test_even_powers_of_distortion_need_the_format_that_brought_them(tmp_path: Path) -> None:
+    psf = tiny_psf()
+    bent = replace(psf.distortion, even_coefficients=np.full((3, 3), 0.001))
+    changed = replace(psf, distortion=bent)
+    assert (format_of(psf), format_of(changed)) == ("2.4", "2.6")
+    members = tiny_members() | {"psf.safetensors": psf_to_bytes(changed)}
+    newer = tiny_manifest(format_version="2.6")
+    written = write_bundle(tmp_path / "newer.camkit", newer, members)
+    np.testing.assert_array_equal(written.distortion.row(2)[4:], 0.001)
+    with pytest.raises(BundleError, match=r"even powers .* format 2.6 brought, .* states 2.5"):
+        write_bundle(tmp_path / "old.camkit", tiny_manifest(format_version="2.5"), members)

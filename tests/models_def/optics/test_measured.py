@@ -1,5 +1,6 @@
 """A measured PSF goes through freezing as it is: where it was measured, and never mirrored."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -167,6 +168,15 @@ def test_between_depths_and_wavelengths_kernels_are_blended(sensor: PlanesSensor
         expected = (1 - share) * at_blue + share * at_red
         np.testing.assert_allclose(found[2:-2, 2:-2], expected, atol=1e-7)
     np.testing.assert_allclose(seen.energy_kept, 1)
+
+
+def test_even_powers_of_distortion_come_along_for_every_channel() -> None:
+    known = uniform(0.0)
+    bent = replace(known.psf.distortion, even_coefficients=np.array([[0.01, -0.002, 0.0]]))
+    optics = replace(known, psf=replace(known.psf, distortion=bent))
+    distortion = optics.distortion(1.0, 3)
+    for channel in range(3):
+        np.testing.assert_array_equal(distortion.row(channel)[4:], [0.01, -0.002, 0.0])
 
 
 def test_light_outside_the_window_is_told() -> None:

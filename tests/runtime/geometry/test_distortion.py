@@ -82,3 +82,49 @@ def test_model_that_folds_on_the_sensor_is_refused() -> None:
 def test_model_with_negative_scale_is_refused() -> None:
     with pytest.raises(ContractError, match="folds"):
         check_distortion(model((-1, 0, 0, 0)), RADIUS_MM)
+
+
+def with_even(odd: tuple[float, ...], even: tuple[float, ...]) -> RadialDistortion:
+    return RadialDistortion(
+        coefficients=np.array([odd]), radius_mm=RADIUS_MM, even_coefficients=np.array([even])
+    )
+
+
+def test_even_powers_are_added_to_the_odd_ones() -> None:
+    odd, even = (1.01, -0.06, 0.012, -0.002), (0.03, -0.02, 0.004)
+    r = RADII / RADIUS_MM
+    powers = {1: 1.01, 3: -0.06, 5: 0.012, 7: -0.002, 2: 0.03, 4: -0.02, 6: 0.004}
+    expected = sum(factor * r**power for power, factor in powers.items()) * RADIUS_MM
+    found = distort_points(on_axis_x(RADII), with_even(odd, even), channel=0)[:, 0]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    back = undistort_points(on_axis_x(found), with_even(odd, even), channel=0)[:, 0]
+    np.testing.assert_allclose(back, RADII, atol=1e-9)
+
+
+def test_even_powers_of_nothing_change_no_bit() -> None:
+    odd = (1.01, -0.06, 0.012, -0.002)
+    for way in (distort_points, undistort_points):
+        plain = way(on_axis_x(RADII), model(odd), channel=0)
+        np.testing.assert_array_equal(
+            way(on_axis_x(RADII), with_even(odd, (0, 0, 0)), channel=0), plain
+        )
+
+
+@pytest.mark.parametrize("fold", [0.6, 0.9, 1.1])
+def test_a_fold_by_even_powers_is_found_where_it_is(fold: float) -> None:
+    """r - r^4 / (4 fold^3) turns back at `fold`."""
+    bent = with_even((1.0, 0.0, 0.0, 0.0), (0.0, -1 / (4 * fold**3), 0.0))
+    inside = fold * RADIUS_MM / 1.02  # a picture is warped a little beyond its corner
+    with pytest.raises(ContractError, match=f"folds at {fold * RADIUS_MM:.2f} mm"):
+        check_distortion(bent, 1.001 * inside)
+    reached = RADIUS_MM * fold * 0.75 / 1.02  # r_d at the fold
+    check_distortion(bent, 0.99 * reached)
+
+
+def test_even_powers_for_other_channels_are_refused() -> None:
+    with pytest.raises(ContractError, match=r"finite \(1, 3\)"):
+        RadialDistortion(
+            coefficients=np.array([[1.0, 0, 0, 0]]),
+            radius_mm=1.0,
+            even_coefficients=np.ones((3, 3)),
+        )

@@ -9,5 +9,8 @@ noise     gain, read noise and fixed patterns, from pairs of dark and flat frame
 targets   what a display shows to be photographed
 pairs     captures of it as pairs for training
 folder    the folder that those two fill, all or nothing
+bundle    what was measured, into a copy of a bundle
+lensfun_in    a lens of lensfun's database, to a bundle
+lensfun_out   distortion and vignetting, to an entry that lensfun reads
 tone      the tone curve of a display, from pictures of grey steps
 """

@@ -93,6 +93,34 @@ def check_page(page: Path | None, *, overwrite: bool) -> None:
     _check_free(page, overwrite=overwrite)
 
 
+def check_out(path: Path, suffix: str, what: str, *, overwrite: bool) -> None:
+    """Refuse a file of another kind, or one that is there and may not be replaced.
+
+    Args:
+        path: Where the result goes.
+        suffix: Of its kind, with the dot.
+        what: What it is, for the message.
+        overwrite: Whether it may be replaced.
+
+    Raises:
+        ContractError: If so.
+    """
+    if path.suffix.lower() != suffix:
+        raise ContractError(f"{what} is a file in {suffix}; got {path}")
+    _check_free(path, overwrite=overwrite)
+
+
+def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> None:
+    """Say what was done: one object, or notes on stderr and lines."""
+    if as_json:
+        say(json.dumps(record, allow_nan=False))
+        return
+    for note in record.get("notes", ()):
+        say(f"note: {note}", err=True)
+    for line in (f"{record['out']}:", *lines):
+        say(line)
+
+
 def _check_free(path: Path, *, overwrite: bool) -> None:
     if path.exists() and not overwrite:
         raise ContractError(f"{path} exists; say --overwrite or another name")

@@ -56,7 +56,11 @@ def timed_capture(
         check_photographs(manifest, "give a capture to time with --capture FILE")
     width, height = _sides(manifest.sensor, width_px, height_px, bundle.path.name)
     optics = manifest.optics
-    lens = None if optics is None else manifest.members[optics.member].sha256
+    lens = (
+        None
+        if optics is None or optics.type == "lens_profile"
+        else manifest.members[optics.member].sha256
+    )
     depth_mm = None if optics is None else bundle.reference_depth_mm
     shown = hashlib.sha256(photo.read_bytes()).hexdigest() if photo else SCENE_TEXT
     camera = (manifest.kind, manifest.sensor.model_dump_json(), lens, depth_mm)

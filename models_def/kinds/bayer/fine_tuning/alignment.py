@@ -181,7 +181,11 @@ def _growth(distortion: RadialDistortion, radius: NDArray[np.float64]) -> NDArra
     """Give r_d / r of eq. (6.10) for the green colour."""
     square = radius * radius
     c0, c1, c2, c3 = distortion.coefficients[1]
-    return np.asarray(c0 + square * (c1 + square * (c2 + square * c3)))
+    growth = c0 + square * (c1 + square * (c2 + square * c3))
+    if distortion.even_coefficients is not None:
+        b0, b1, b2 = distortion.even_coefficients[1]
+        growth = growth + radius * (b0 + square * (b1 + square * b2))
+    return np.asarray(growth)
 
 
 def _encoded(grey: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ FAR_M = 1000.0
 
 
 def _applies(bundle: Bundle) -> str | None:
-    if bundle.manifest.optics is None or bundle.psf.depths_mm.size < 2:
+    if not bundle.manifest.has_kernels or bundle.psf.depths_mm.size < 2:
         return "its PSF knows no several depths"
     return photographs(bundle)
 

@@ -22,7 +22,7 @@ GRID_UM = np.linspace(0.40, 0.70, 301)
 
 
 def _applies(bundle: Bundle) -> str | None:
-    if bundle.manifest.optics is not None and bundle.psf.wavelengths_um.size < 2:
+    if bundle.manifest.has_kernels and bundle.psf.wavelengths_um.size < 2:
         return "its PSF knows one wavelength"
     return photographs(bundle)
 

@@ -1,0 +1,74 @@
+"""`camkit calibrate bundle`: what was measured of a camera, into a copy of a bundle."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.use.calibrate.outputs import check_out, tell
+from camkit.errors import BundleError, ContractError, DecodeError
+
+
+def bundle(
+    source: Annotated[
+        str, typer.Argument(metavar="FROM", help="The bundle that is copied, by name or path.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The new bundle (.camkit).")],
+    geometry: Annotated[
+        Path | None, typer.Option(help="Of `calibrate geometry`: distortion, optical centre.")
+    ] = None,
+    flat: Annotated[Path | None, typer.Option(help="Of `calibrate flat`: vignetting.")] = None,
+    noise: Annotated[
+        Path | None, typer.Option(help="Of `calibrate noise`: gain, read noise, levels.")
+    ] = None,
+    psf: Annotated[
+        Path | None, typer.Option(help="Of `calibrate psf`: kernels; networks are left out.")
+    ] = None,
+    keep_networks: Annotated[
+        bool, typer.Option("--keep-networks", help="Keep networks with other kernels.")
+    ] = False,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Put what was measured of a camera into a copy of a bundle, and prove it."""
+    check_out(out, ".camkit", "a bundle", overwrite=overwrite)
+    if keep_networks and psf is None:
+        raise ContractError("--keep-networks belongs to --psf; without it they stay")
+    if (geometry, flat, noise, psf) == (None, None, None, None):
+        raise ContractError("give what was measured: --geometry, --flat, --noise, --psf")
+    from camkit.bundle.psf_file import read_psf
+    from camkit.bundle.reader import find_bundle, open_bundle
+    from camkit.export.remeasured import Measured, remeasured
+    from camkit.runtime.calibration.measured_files import read_flat, read_geometry, read_noise
+
+    before = open_bundle(find_bundle(source))
+    try:
+        kernels = None if psf is None else read_psf(psf)
+    except BundleError as error:  # a file that was measured, and no bundle, is refused here
+        raise DecodeError(str(error)) from error
+    measured = Measured(
+        geometry=None if geometry is None else read_geometry(geometry),
+        flat=None if flat is None else read_flat(flat),
+        noise=None if noise is None else read_noise(noise),
+        psf=kernels,
+    )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    made, notes = remeasured(before, measured, out, keep_networks=keep_networks)
+    files = {"geometry": geometry, "flat": flat, "noise": noise, "psf": psf}
+    given = {name: str(path) for name, path in files.items() if path is not None}
+    found = measured.geometry
+    record = {
+        "from": before.manifest.name,
+        "measured": given,
+        "model": None if found is None else found.model,
+        "residual_px": None if found is None else found.radial.residual_px,
+        "networks": list(made.manifest.sizes),
+        "golden": [case.name for case in made.manifest.golden],
+        "left_out": sorted({*before.names} - {*made.names}),
+        "notes": list(notes),
+        "out": str(out),
+    }
+    line = f"  {before.manifest.name} with {', '.join(given)} as measured"
+    tell(record, [line], as_json=json_)

@@ -1,0 +1,104 @@
+"""`camkit calibrate lensfun-in`: a lens of lensfun's database to a bundle of an ordinary camera."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.use.calibrate.outputs import check_out, tell
+from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
+
+if TYPE_CHECKING:
+    from camkit.runtime.calibration.lensfun.profile import Found
+
+
+def lensfun_in(
+    database: Annotated[
+        Path, typer.Argument(help="Folder of a lensfun database, or one of its XML files.")
+    ],
+    lens: Annotated[str, typer.Option(help="Model of the lens, as the database writes it.")],
+    focal_mm: Annotated[float, typer.Option(help="Focal length of the captures.")],
+    capture: Annotated[
+        Path, typer.Option(help="One of the captures; the bundle is for others like it.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The bundle (.camkit).")],
+    aperture: Annotated[
+        float | None,
+        typer.Option(help="F-number, for vignetting; default: what the capture states."),
+    ] = None,
+    distance_m: Annotated[
+        float | None, typer.Option(help="Distance of the object, for vignetting; default: far.")
+    ] = None,
+    crop_factor: Annotated[
+        float | None,
+        typer.Option(help="Of the captures' sensor; default: by pixel pitch, else the camera's."),
+    ] = None,
+    mosaic: MosaicCfa = None,
+    black_level: BlackLevel = None,
+    white_level: WhiteLevel = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Make a bundle that undistorts and evens the light of a lens that lensfun knows."""
+    check_out(out, ".camkit", "a bundle", overwrite=overwrite)
+    from camkit.bundle.writer import write_bundle
+    from camkit.cli.use.mosaic import mosaic_options
+    from camkit.runtime.calibration.lensfun.camera import frame_of, manifest_of, slug
+    from camkit.runtime.calibration.lensfun.database import Database, check_positive
+    from camkit.runtime.calibration.lensfun.profile import profile_of
+    from camkit.runtime.raw import read_capture
+
+    options = {"--focal-mm": focal_mm, "--aperture": aperture}
+    options |= {"--distance-m": distance_m, "--crop-factor": crop_factor}
+    for option, value in options.items():
+        if value is not None:
+            check_positive(value, option)
+    said = mosaic_options(mosaic, black_level, white_level)
+    known = Database(database)
+    lenses = known.find(lens)
+    shot = read_capture(capture, mosaic=said)
+    frame, taken = frame_of(shot, crop_factor, known)
+    found = profile_of(
+        lenses,
+        focal_mm,
+        frame,
+        aperture=shot.metadata.f_number if aperture is None else aperture,
+        distance_m=distance_m,
+    )
+    manifest, stood_in = manifest_of(slug(out.stem), shot, frame, found.profile)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_bundle(out, manifest, {})
+    notes = [*taken, *found.notes, *stood_in]
+    record = {**_record(found), "notes": notes, "out": str(out)}
+    tell(record, [_line(found)], as_json=json_)
+
+
+def _record(found: "Found") -> dict[str, Any]:
+    from camkit.runtime.calibration.lensfun.models import TERMS
+
+    entry, light = found.distortion, found.vignetting
+    terms = dict(zip(TERMS[entry.model], entry.terms, strict=True))
+    return {
+        "lens": found.lens.name,
+        "file": found.lens.file,
+        "crop_factor": found.lens.crop_factor,
+        "model": entry.model,
+        "focal_mm": entry.focal_mm,
+        "terms": terms,
+        "residual_px": round(found.residual_px, 6),
+        "vignetting": light
+        and {
+            "focal_mm": light.focal_mm,
+            "aperture": light.aperture,
+            "distance_m": light.distance_m,
+            "terms": list(light.terms),
+        },
+    }
+
+
+def _line(found: "Found") -> str:
+    entry, light = found.distortion, found.vignetting
+    evened = "" if light is None else f", light evened as at f/{light.aperture:g}"
+    return f"  {found.lens.name}, {entry.model} at {entry.focal_mm:g} mm{evened}"

@@ -1,0 +1,317 @@
+"""A copy of a bundle with parts that were measured: geometry, illumination, noise, kernels.
+
+    FROM + what was measured -> sensor, optics, stages -> golden cases anew -> checked -> bundle
+
+What was shown of FROM holds no more: its envelope, its plan, its card and its stress kernels are
+left out; with other kernels also the design that they came from, and the networks that were trained
+behind them.
+"""
+
+import tempfile
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.chain import rewired
+from camkit.bundle.facts import Card
+from camkit.bundle.frozen_optics import FrozenOptics
+from camkit.bundle.golden import golden_to_bytes
+from camkit.bundle.manifest import Manifest, format_of, planes_of
+from camkit.bundle.optics import FrozenPsfOptics, LensProfile, RadialEntry
+from camkit.bundle.psf_file import psf_to_bytes
+from camkit.bundle.reader import (
+    CARD,
+    GOLDEN,
+    PLATE,
+    PLATE_HEIGHTS,
+    PRESCRIPTION,
+    PREVIEW,
+    STRESS_PSF,
+    Bundle,
+)
+from camkit.bundle.sensor import BayerSensor, ChannelResponse, PlanesSensor
+from camkit.bundle.stages import Illumination, Parts, Wiener
+from camkit.bundle.writer import write_bundle
+from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.errors import ContractError, DecodeError, ParityError
+from camkit.export.activations import with_activations
+from camkit.export.golden_cases import add_outputs, photograph_all
+from camkit.runtime.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
+from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
+from camkit.runtime.proof.check import check_bundle
+from camkit.runtime.proof.golden_run import case_work
+from camkit.units import to_mm
+
+FloatGrid = NDArray[np.float64]
+PITCH_TOLERANCE: Final = 0.02
+OWN_NAMES: Final = (STRESS_PSF, CARD, PREVIEW, GOLDEN)
+DESIGN: Final = (PRESCRIPTION, PLATE, PLATE_HEIGHTS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """What was measured; None for what was not.
+
+    Attributes:
+        geometry: Distortion and optical centre.
+        flat: Relative illumination; its centre counts where no geometry states one.
+        noise: Of the sensor.
+        psf: Kernels of one place.
+    """
+
+    geometry: GeometryFile | None = None
+    flat: FlatFile | None = None
+    noise: NoiseFile | None = None
+    psf: FrozenPsf | None = None
+
+
+@dataclass(slots=True)
+class _Draft:
+    """A bundle on its way."""
+
+    manifest: Manifest
+    members: dict[str, bytes]
+    psf: FrozenPsf | None
+    notes: list[str] = field(default_factory=list)
+
+    def change(self, **fields: Any) -> None:
+        """Change fields of the manifest."""
+        self.manifest = self.manifest.model_copy(update=fields)
+
+    @property
+    def sensor(self) -> BayerSensor | PlanesSensor:
+        """Give the sensor."""
+        sensor = self.manifest.sensor
+        if not isinstance(sensor, BayerSensor | PlanesSensor):
+            raise DecodeError(f"{self.manifest.name} counts photons; nothing of it is measured so")
+        return sensor
+
+
+def remeasured(
+    bundle: Bundle, measured: Measured, out: Path, *, keep_networks: bool = False
+) -> tuple[Bundle, tuple[str, ...]]:
+    """Write a copy of a bundle with what was measured; give it, and what people should know.
+
+    Args:
+        bundle: What is copied.
+        measured: What was measured, one part at least.
+        out: The new bundle; its name is the camera's.
+        keep_networks: Keep networks with other kernels.
+
+    Raises:
+        DecodeError: If a part does not fit the bundle.
+        BundleError: If a reader would refuse the result.
+        ParityError: If it fails its check; nothing is written then.
+    """
+    if measured == Measured():
+        raise ContractError("nothing was measured: give --geometry, --flat, --noise or --psf")
+    optics, name = bundle.manifest.optics, bundle.manifest.name
+    if optics is None or bundle.manifest.sensor.extent is None:
+        raise DecodeError(f"{name} states no optics or no size of its sensor, so no camera of it")
+    if optics.type == "streaks" and measured != Measured(noise=measured.noise):
+        raise DecodeError(f"the optics of {name} write streaks; only --noise can be put into it")
+    own = {name: bundle.member(name) for name in bundle.names if name not in OWN_NAMES}
+    psf = bundle.psf if optics.type == "frozen_psf" else None
+    draft = _Draft(manifest=bundle.manifest, members=own, psf=psf)
+    draft.change(golden=(), envelope=None, plan=None, card=Card())
+    if measured.noise is not None:
+        _put_noise(draft, measured.noise)
+    if measured.psf is not None:
+        _put_psf(draft, measured.psf, keep_networks=keep_networks)
+    _put_centre(draft, measured)
+    if measured.flat is not None:
+        _put_flat(draft, measured.flat)
+    if measured.geometry is not None:
+        _put_geometry(draft, measured.geometry)
+    _finish(draft)
+    return _proved(draft, out), tuple(draft.notes)
+
+
+def _put_noise(draft: _Draft, found: NoiseFile) -> None:
+    lowest = min(found.iso, key=lambda one: one.iso)
+    if any(not one.read_noise_resolved for one in found.iso):
+        draft.notes.append("read noise that was not resolved is taken as large as it may be")
+    update = {
+        "noise": found.noise(),
+        "full_well_e": lowest.full_well_e,
+        "black_level": lowest.black_level,
+        "white_level": lowest.white_level,
+    }
+    sensor = draft.sensor
+    draft.change(sensor=type(sensor).model_validate({**sensor.model_dump(), **update}))
+
+
+def _put_psf(draft: _Draft, found: FrozenPsf, *, keep_networks: bool) -> None:
+    sensor, before = draft.sensor, draft.psf
+    if before is None or draft.manifest.stage(Wiener) is None:
+        raise DecodeError(f"{draft.manifest.name} has no Wiener bank that would use kernels")
+    pitch_um = sensor.pixel_pitch_um
+    if abs(found.pixel_pitch_um / pitch_um - 1) > PITCH_TOLERANCE:
+        raise DecodeError(
+            f"the kernels have samples of {found.pixel_pitch_um:g} um, the sensor pixels of "
+            f"{pitch_um:g} um"
+        )
+    channels = len(sensor.channels)
+    if found.wavelengths_um.size != channels:
+        raise DecodeError(
+            f"the kernels have {found.wavelengths_um.size} wavelengths, one for each of {channels} "
+            "channels is expected, as `camkit calibrate psf` writes them"
+        )
+    light = _light_at(found.field_heights_mm, before)
+    if found.symmetry == "uniform":
+        draft.notes.append("kernels of one place hold no vignetting: light is not evened")
+        _leave_out(draft, {Illumination})
+    draft.psf = replace(
+        found,
+        pixel_pitch_um=pitch_um,
+        distortion=before.distortion,
+        relative_illumination=light,
+    )
+    waves = tuple(map(float, found.wavelengths_um))
+    # red sees the longest wavelength: rows of the response in the order of the channels
+    rows = tuple(tuple(float(n == channels - 1 - row) for n in range(channels)) for row in range(channels))  # noqa: E501 # fmt: skip
+    response = ChannelResponse(
+        wavelengths_um=waves, response=rows, source="one measured kernel for each colour"
+    )
+    draft.change(sensor=sensor.model_copy(update={"channel_response": response}), freeze={})
+    draft.members = {name: data for name, data in draft.members.items() if name not in DESIGN}
+    stages = tuple(
+        stage.model_copy(update={"together": None}) if isinstance(stage, Wiener) else stage
+        for stage in draft.manifest.stages
+    )
+    draft.change(stages=stages)
+    if draft.manifest.networks and not keep_networks:
+        draft.notes.append("the networks were trained behind other kernels and are left out")
+        _leave_out_networks(draft)
+
+
+def _light_at(heights_mm: FloatGrid, psf: FrozenPsf) -> FloatGrid:
+    known = psf.radial_illumination
+    if known is None:
+        return np.ones(heights_mm.size)
+    return np.asarray(np.interp(heights_mm**2, known.heights_mm**2, known.light))
+
+
+def _leave_out(draft: _Draft, kinds: set[type]) -> None:
+    stages = draft.manifest.stages
+    kept = [stage for stage in stages if type(stage) not in kinds]
+    draft.change(stages=rewired(kept, stages))
+
+
+def _leave_out_networks(draft: _Draft) -> None:
+    names = {
+        name
+        for sizes in draft.manifest.networks.values()
+        for facts in sizes.values()
+        for name in (facts.member, facts.fp16_member)
+    }
+    draft.members = {name: data for name, data in draft.members.items() if name not in names}
+    stages = draft.manifest.stages
+    kept = [stage for stage in stages if stage.type != "network"]
+    draft.change(stages=rewired(kept, stages), networks={})
+
+
+def _put_centre(draft: _Draft, measured: Measured) -> None:
+    flat, geometry = measured.flat, measured.geometry
+    if geometry is not None:
+        centre = geometry.centre_px
+    elif flat is not None and flat.centre_found:
+        centre = flat.centre_px
+    else:
+        return
+    extent = draft.sensor.known_extent.model_copy(update={"optical_centre_px": centre})
+    draft.change(sensor=draft.sensor.model_copy(update={"extent": extent}))
+
+
+def _put_flat(draft: _Draft, found: FlatFile) -> None:
+    pitch_um, entry = draft.sensor.pixel_pitch_um, found.to_entry()
+    if abs(found.pixel_pitch_um / pitch_um - 1) > PITCH_TOLERANCE:
+        raise DecodeError(
+            f"the flat was measured with pixels of {found.pixel_pitch_um:g} um, the sensor has "
+            f"{pitch_um:g} um"
+        )
+    if not found.separated:
+        draft.notes.append("the flat was not told from the display; what it has of it comes along")
+    optics = draft.manifest.optics
+    if isinstance(optics, LensProfile):
+        draft.change(optics=optics.model_copy(update={"illumination": entry}))
+        return
+    assert draft.psf is not None
+    if draft.psf.symmetry == "uniform":
+        raise DecodeError("kernels of one place hold no vignetting; leave --flat out")
+    light = entry.to_illumination()
+    values = np.interp(draft.psf.field_heights_mm**2, light.heights_mm**2, light.light)
+    draft.psf = replace(draft.psf, relative_illumination=values)
+
+
+def _put_geometry(draft: _Draft, found: GeometryFile) -> None:
+    extent = draft.sensor.known_extent
+    if (found.width_px, found.height_px) != (extent.width_px, extent.height_px):
+        raise DecodeError(
+            f"the geometry is of {found.width_px}x{found.height_px} px, the sensor has "
+            f"{extent.width_px}x{extent.height_px}"
+        )
+    rows = (found.radial.coefficients,) * len(draft.sensor.channels)
+    radius_mm = found.radial.radius_px * to_mm(extent.pixel_pitch_um)
+    entry = RadialEntry(coefficients=rows, radius_mm=radius_mm)
+    x, y = found.centre_px
+    farthest = np.hypot(max(x, extent.width_px - 1 - x), max(y, extent.height_px - 1 - y))
+    try:
+        check_distortion(entry.to_distortion(), float(farthest) * to_mm(extent.pixel_pitch_um))
+    except ContractError as error:
+        raise DecodeError(f"the geometry cannot be undone: {error}") from error
+    if found.covered_radius_px * RANGE_MARGIN < farthest:
+        known = f"{found.covered_radius_px:.0f} px of {farthest:.0f}"
+        draft.notes.append(f"the geometry is known to {known} from the centre; the rest is guessed")
+    optics = draft.manifest.optics
+    if isinstance(optics, LensProfile):
+        draft.change(optics=optics.model_copy(update={"distortion": entry}))
+        return
+    assert draft.psf is not None
+    distortion = RadialDistortion(coefficients=np.array(rows), radius_mm=radius_mm)
+    draft.psf = replace(draft.psf, distortion=distortion)
+
+
+def _finish(draft: _Draft) -> None:
+    """Bring planes, products, optics and version up to the parts."""
+    manifest, optics = draft.manifest, draft.manifest.optics
+    if draft.psf is not None and isinstance(optics, FrozenPsfOptics):
+        draft.members[optics.member] = psf_to_bytes(draft.psf)
+        focus_mm = optics.object_distance_mm
+        made = FrozenOptics(psf=draft.psf).entry(np.inf if focus_mm is None else focus_mm)
+        stated = tuple(map(int, manifest.format_version.split(".")))
+        needed = tuple(map(int, format_of(draft.psf).split(".")))
+        newest = ".".join(map(str, max(stated, needed)))
+        draft.change(optics=made, format_version=newest)
+    parts = Parts(
+        sensor=draft.manifest.sensor,
+        optics=draft.manifest.optics,
+        networks=draft.manifest.networks,
+    )
+    stages = draft.manifest.stages
+    draft.change(planes=planes_of(stages, parts))
+    given = draft.manifest.all_planes
+    products = {name: plane for name, plane in manifest.products.items() if plane in given}
+    draft.change(products={**products, "image": stages[-1].gives[0]})
+
+
+def _proved(draft: _Draft, out: Path) -> Bundle:
+    """Make golden cases, check the bundle, and write it."""
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / out.name
+        made = write_bundle(trial, draft.manifest, draft.members)
+        if made.manifest.has_kernels:
+            cases = photograph_all(made)
+            draft.members[GOLDEN] = golden_to_bytes(add_outputs(made, cases))
+            draft.change(
+                golden=tuple(case for case, _ in cases.values()),
+                networks=with_activations(made, cases),
+            )
+            write_bundle(trial, draft.manifest, draft.members)
+        report = check_bundle(trial, run=case_work)
+        if not report.passed:
+            raise ParityError("the new bundle fails its check: " + "; ".join(report.lines()))
+    return write_bundle(out, draft.manifest, draft.members)

@@ -1,0 +1,11 @@
+"""Lens profiles of lensfun's database, to bundles and back.
+
+xml        one file of the database, read safely
+database   lenses by name, and their entries
+models     lensfun's formulas of distortion, as odd and even powers
+between    entries between measured focal lengths
+profile    the lens profile of a lens for captures like one
+camera     a bundle of that lens
+source     the distortion of a bundle or of a measured geometry
+entry      the entry that lensfun reads
+"""

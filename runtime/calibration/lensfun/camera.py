@@ -1,0 +1,154 @@
+"""A bundle of an ordinary lens, for captures like one: no kernels, no network.
+
+linearise -> repair -> white_balance -> [demosaic] -> raise_clipped -> illumination -> undistort
+-> color
+"""
+
+import math
+import re
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.chain import rewired
+from camkit.bundle.manifest import PROFILE_VERSION, Manifest, planes_of
+from camkit.bundle.optics import LensProfile
+from camkit.bundle.sensor import BayerSensor, Extent, IsoNoise, PlanesSensor, Row
+from camkit.bundle.stages import (
+    Color,
+    Demosaic,
+    Illumination,
+    Linearise,
+    Parts,
+    RaiseClipped,
+    Repair,
+    Stage,
+    Undistort,
+    WhiteBalance,
+)
+from camkit.colorimetry import D65, REC709_PRIMARIES, rgb_to_xyz
+from camkit.errors import DecodeError
+from camkit.runtime.calibration.lensfun.database import Database
+from camkit.runtime.calibration.lensfun.models import FULL_FRAME_MM
+from camkit.runtime.calibration.lensfun.profile import Frame
+from camkit.runtime.capture import COLOURS, Capture
+from camkit.units import to_mm
+
+LICENCE: Final = "CC-BY-SA-3.0"
+"""Of the numbers of lensfun's database, which a profile is made of."""
+
+
+def frame_of(
+    capture: Capture, crop_factor: float | None, database: Database
+) -> tuple[Frame, tuple[str, ...]]:
+    """Give size and scale of the captures, and what had to be taken from elsewhere.
+
+    Args:
+        capture: One of them.
+        crop_factor: What a person states; None for what file or database say.
+        database: Knows cameras by name.
+
+    Raises:
+        DecodeError: If nothing tells how large the sensor is, or it is no colour picture.
+    """
+    if capture.channels != COLOURS:
+        raise DecodeError(f"expected a mosaic or three colours; got {capture.channels} channel(s)")
+    size = (capture.width, capture.height)
+    known = capture.metadata
+    notes = []
+    crop, pitch_um = crop_factor, capture.pixel_pitch_um
+    if crop is None and pitch_um is not None:
+        crop = FULL_FRAME_MM / (math.hypot(*size) * to_mm(pitch_um))
+    if crop is None and (crop := database.crop_factor(known.make, known.model)) is not None:
+        notes.append(f"the sensor's size is that of the {known.model} in the database")
+    if crop is None:
+        raise DecodeError(
+            "the capture states no pixel pitch and the database does not know its camera: say "
+            "--crop-factor"
+        )
+    if pitch_um is None:
+        pitch_um = 1000 * FULL_FRAME_MM / crop / math.hypot(*size)
+    return Frame(size_px=size, pitch_um=pitch_um, crop_factor=crop, channels=COLOURS), tuple(notes)
+
+
+def manifest_of(
+    name: str, capture: Capture, frame: Frame, profile: LensProfile
+) -> tuple[Manifest, tuple[str, ...]]:
+    """Give the manifest of a bundle for captures like one, and notes."""
+    sensor, notes = _sensor(capture, frame)
+    stages = _stages(profile, mosaic=capture.cfa is not None)
+    parts = Parts(sensor=sensor, optics=profile, networks={})
+    return Manifest(
+        format_version=".".join(map(str, PROFILE_VERSION)),
+        name=name,
+        version="1.0.0",
+        licence=LICENCE,
+        training_data="no network; distortion and vignetting of lensfun's database",
+        sensor=sensor,
+        optics=profile,
+        stages=stages,
+        planes=planes_of(stages, parts),
+        products={"image": stages[-1].gives[0]},
+    ), notes
+
+
+def slug(text: str) -> str:
+    """Give a name of a bundle out of that of a file."""
+    plain = re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")
+    return plain[:64] or "lens"
+
+
+def _sensor(capture: Capture, frame: Frame) -> tuple[BayerSensor | PlanesSensor, tuple[str, ...]]:
+    notes = []
+    black, white = float(np.mean(capture.black_level)), float(capture.white_level)
+    width, height = frame.size_px
+    if capture.noise is not None and min(capture.noise.shot) > 0:
+        full_well_e = 1 / float(np.mean(capture.noise.shot))
+        read_noise_e = math.sqrt(float(np.mean(capture.noise.read_variance))) * full_well_e
+    else:
+        full_well_e, read_noise_e = white - black, 0.0
+        notes.append("the capture states no noise: 1 electron per DN stands for it")
+    fields: dict[str, Any] = {
+        "extent": Extent(width_px=width, height_px=height, pixel_pitch_um=frame.pitch_um),
+        "black_level": max(black, 0.0),
+        "white_level": white,
+        "full_well_e": full_well_e,
+        "noise": (
+            IsoNoise(
+                iso=capture.iso or 100.0,
+                gain_e_per_dn=full_well_e / (white - black),
+                read_noise_e=read_noise_e,
+            ),
+        ),
+    }
+    stated = capture.color_matrix
+    if capture.cfa is None:
+        matrix = None if stated is None else _rows(stated)
+        return PlanesSensor(**fields, color_matrix=matrix), tuple(notes)
+    if stated is None:
+        stated = np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)), dtype=np.float64)
+        notes.append("the capture states no colour matrix: camera RGB is taken as Rec.709")
+    return BayerSensor(**fields, cfa=capture.cfa, color_matrix=_rows(stated)), tuple(notes)
+
+
+def _rows(matrix: NDArray[np.float64]) -> tuple[Row, Row, Row]:
+    red, green, blue = ((float(x), float(y), float(z)) for x, y, z in matrix)
+    return red, green, blue
+
+
+def _stages(profile: LensProfile, *, mosaic: bool) -> tuple[Stage, ...]:
+    usual: tuple[Stage, ...] = (
+        Linearise(),
+        Repair(),
+        WhiteBalance(),
+        Demosaic(),
+        RaiseClipped(takes=("rgb",)),
+        Illumination(),
+        Undistort(),
+        Color(),
+    )
+    left_out = set() if mosaic else {"demosaic", "raise_clipped"}
+    left_out |= {"illumination"} if profile.illumination is None else set()
+    left_out |= {"undistort"} if profile.distortion is None else set()
+    return rewired([stage for stage in usual if stage.type not in left_out], usual)

@@ -1,0 +1,123 @@
+"""What the commands of `camkit calibrate` wrote, read back: geometry, flat, noise."""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field, ValidationError, model_validator
+
+from camkit.bundle.entry import Entry, NonNegative, Positive
+from camkit.bundle.optics import IlluminationEntry
+from camkit.bundle.sensor import IsoNoise
+from camkit.errors import DecodeError
+
+Side = Annotated[int, Field(ge=2, le=100_000)]
+Place = Annotated[float, Field(ge=-1e6, le=1e6)]
+Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
+_T = TypeVar("_T", bound=Entry)
+
+
+class RadialRecord(Entry, extra="ignore"):
+    """The polynomial by which bundles are distorted; see `RadialFit`."""
+
+    coefficients: tuple[Factor, Factor, Factor, Factor]
+    radius_px: Positive
+    residual_px: NonNegative
+
+
+class GeometryFile(Entry, extra="ignore"):
+    """What `camkit calibrate geometry` found, as far as bundles take it."""
+
+    width_px: Side
+    height_px: Side
+    model: str
+    centre_px: tuple[Place, Place]
+    covered_radius_px: Positive
+    radial: RadialRecord
+
+
+class FlatFile(Entry, extra="ignore"):
+    """What `camkit calibrate flat` found, as far as bundles take it."""
+
+    heights_mm: tuple[NonNegative, ...]
+    relative_illumination: tuple[Positive, ...]
+    pixel_pitch_um: Positive
+    centre_px: tuple[Place, Place]
+    centre_found: bool
+    separated: bool
+
+    @model_validator(mode="after")
+    def _check(self) -> "FlatFile":
+        self.to_entry()
+        return self
+
+    def to_entry(self) -> IlluminationEntry:
+        """Give it as a lens profile holds it."""
+        return IlluminationEntry(
+            heights_mm=self.heights_mm, relative_illumination=self.relative_illumination
+        )
+
+
+class IsoRecord(Entry, extra="ignore"):
+    """What was found at one ISO."""
+
+    iso: Positive
+    gain_e_per_dn: Positive
+    read_noise_e: NonNegative
+    read_noise_resolved: bool
+    full_well_e: Positive
+    black_level: NonNegative
+    white_level: Positive
+
+
+class NoiseFile(Entry, extra="ignore"):
+    """What `camkit calibrate noise` found, as far as bundles take it."""
+
+    iso: Annotated[tuple[IsoRecord, ...], Field(min_length=1, max_length=256)]
+
+    def noise(self) -> tuple[IsoNoise, ...]:
+        """Give gain and read noise by increasing ISO."""
+        return tuple(
+            IsoNoise(iso=one.iso, gain_e_per_dn=one.gain_e_per_dn, read_noise_e=one.read_noise_e)
+            for one in sorted(self.iso, key=lambda one: one.iso)
+        )
+
+
+def read_geometry(path: Path) -> GeometryFile:
+    """Read what `camkit calibrate geometry` wrote.
+
+    Raises:
+        DecodeError: If it cannot be read or is something else.
+    """
+    return _read(path, GeometryFile, "geometry")
+
+
+def read_flat(path: Path) -> FlatFile:
+    """Read what `camkit calibrate flat` wrote; see `read_geometry`."""
+    return _read(path, FlatFile, "flat")
+
+
+def read_noise(path: Path) -> NoiseFile:
+    """Read what `camkit calibrate noise` wrote; see `read_geometry`."""
+    return _read(path, NoiseFile, "noise")
+
+
+def _read(path: Path, model: type[_T], command: str) -> _T:
+    record = _toml(path)
+    try:
+        return model.model_validate(record)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise DecodeError(
+            f"{path} is not what `camkit calibrate {command}` writes: {where}: {first['msg']}"
+        ) from error
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DecodeError(f"cannot read {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise DecodeError(f"{path} is no TOML: {error}") from error
