@@ -172,7 +172,7 @@ def _put_psf(draft: _Draft, found: FrozenPsf, *, keep_networks: bool) -> None:
     )
     waves = tuple(map(float, found.wavelengths_um))
     # red sees the longest wavelength: rows of the response in the order of the channels
-    rows = tuple(tuple(float(n == channels - 1 - row) for n in range(channels)) for row in range(channels))  # noqa: E501 # fmt: skip
+    rows = tuple(tuple(map(float, row)) for row in np.eye(channels)[::-1])
     response = ChannelResponse(
         wavelengths_um=waves, response=rows, source="one measured kernel for each colour"
     )

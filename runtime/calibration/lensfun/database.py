@@ -66,7 +66,8 @@ class Database:
         """Give a lens as it was measured with every camera.
 
         Args:
-            name: Its model, with or without its maker; case and spaces do not count.
+            name: Its model, with or without its maker; case, spaces and the
+                slash of f/ do not count.
 
         Raises:
             DecodeError: If there is none of that name (near ones are named), or it is malformed.
@@ -110,7 +111,8 @@ def _files_of(place: Path) -> list[Path]:
 
 
 def _plain(name: str) -> str:
-    return " ".join(name.casefold().split())
+    # cameras state f-numbers as F4.5 where the database writes f/4.5
+    return " ".join(name.casefold().replace("f/", "f").split())
 
 
 def _names(lens: Element) -> list[str]:

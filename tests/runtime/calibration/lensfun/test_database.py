@@ -21,6 +21,12 @@ def test_a_lens_is_found_with_and_without_its_maker(tmp_path: Path) -> None:
     assert (small.distortion[0].model, small.distortion[0].terms) == ("poly5", (-0.02, 0.004))
 
 
+def test_a_lens_is_found_by_the_name_that_cameras_state(tmp_path: Path) -> None:
+    stated = ZOOM.replace("f/", "F")
+    assert stated != ZOOM
+    assert Database(write_database(tmp_path)).find(stated)[0].name == ZOOM
+
+
 def test_a_single_file_is_a_database(tmp_path: Path) -> None:
     assert Database(write_database(tmp_path) / "example.xml").find(ZOOM)
 
