@@ -15,6 +15,7 @@
     lens/            one lens on one page
     plate/           one plate on one page
     calibration/     what a calibration found, on one page
+    figure           a chart as SVG and PNG, the same from run to run
     style            how the pages of lenses, plates and calibrations look
 
 Test pictures are only ever measured on.

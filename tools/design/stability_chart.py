@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from camkit.report.lens.figure import GRID_COLOR, MARKS, field_color, new_figure, to_png, to_svg
+from camkit.report.figure import GRID_COLOR, MARKS, field_color, new_figure, to_png, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Panel

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from camkit.report.lens.figure import field_color, new_figure, to_png
+from camkit.report.figure import field_color, new_figure, to_png
 from tools.design.edge import ACROSS, EdgeContrast
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.bundle.reader import Bundle
-from camkit.report.lens.figure import GRID_COLOR, MARKS, field_color, new_figure, to_png
+from camkit.report.figure import GRID_COLOR, MARKS, field_color, new_figure, to_png
 from camkit.runtime.plan.decision import DEVELOP
 from tools.hdr.record import in_one_line, new_parser, open_camera, origin_of, table, write_record
 from tools.hdr.speed_captures import SUBJECTS, Subject, write_subject

@@ -39,7 +39,7 @@ from camkit.models_def.training.checkpoint import load_network, read_checkpoint,
 from camkit.models_def.training.kind import Restorer
 from camkit.models_def.training.pictures import open_source
 from camkit.report.edge_mtf import edge_mtf
-from camkit.report.lens.figure import field_color, new_figure, to_png
+from camkit.report.figure import field_color, new_figure, to_png
 from camkit.scenes.slanted_edge import LEVELS, slanted_edge
 
 Curve = NDArray[np.float64]

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from camkit.report.lens.figure import GRID_COLOR, new_figure, to_png
+from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.geometry.adjustment import rms
 from camkit.runtime.calibration.geometry.camera import FloatGrid
 from camkit.runtime.calibration.geometry.coverage import seen_cells

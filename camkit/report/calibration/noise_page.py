@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camkit.report.calibration.page import Section, Table, to_html
-from camkit.report.lens.figure import GRID_COLOR, field_color, new_figure, to_png
+from camkit.report.figure import GRID_COLOR, field_color, new_figure, to_png
 from camkit.runtime.calibration.noise.measure import IsoFacts, NoiseFacts
 
 if TYPE_CHECKING:

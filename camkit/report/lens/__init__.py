@@ -7,7 +7,6 @@ mtf_chart      contrast with its diffraction limit
 field_chart    field curvature, distortion, relative illumination
 colour_chart   longitudinal aberration, axial and lateral colour
 seidel_chart   third-order sums by surface
-figure         a chart as SVG and PNG
 design_picture a moment of a joint design
 yield_chart    fabricated copies: yield, classes of errors, table and JSON
 page           the HTML page, complete in itself

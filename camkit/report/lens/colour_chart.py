@@ -10,8 +10,8 @@ from camkit.models_def.optics.analysis.curves import (
     lateral_colour_mm,
     longitudinal_mm,
 )
+from camkit.report.figure import GRID_COLOR, new_figure, wave_color
 from camkit.report.lens.facts import LensFacts
-from camkit.report.lens.figure import GRID_COLOR, new_figure, wave_color
 from camkit.units import UM_PER_MM
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from torch import Tensor
 
 from camkit.models_def.design.run import DesignView
 from camkit.models_def.optics.analysis.sampling import Pupil
+from camkit.report.figure import new_figure, to_png
 from camkit.report.lens.facts import analyse
-from camkit.report.lens.figure import new_figure, to_png
 from camkit.report.lens.layout import draw_layout_on
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import torch
 from camkit.errors import ContractError
 from camkit.models_def.optics.analysis.curves import distortion, field_curvature
 from camkit.models_def.optics.analysis.illumination import relative_illumination_of
+from camkit.report.figure import GRID_COLOR, new_figure, wave_color
 from camkit.report.lens.facts import LensFacts
-from camkit.report.lens.figure import GRID_COLOR, new_figure, wave_color
 from camkit.units import to_degrees
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from camkit.models_def.optics.analysis.spots import launch_beams
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilSamples
 from camkit.models_def.optics.trace import Rays, sag, surface_tensors, trace
+from camkit.report.figure import field_color, new_figure
 from camkit.report.lens.facts import LensFacts
-from camkit.report.lens.figure import field_color, new_figure
 from camkit.units import to_degrees
 
 if TYPE_CHECKING:

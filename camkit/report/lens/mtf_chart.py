@@ -21,8 +21,8 @@ from camkit.models_def.optics.analysis.wave_psf import (
     widest_aperture,
 )
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront
+from camkit.report.figure import GRID_COLOR, field_color, new_figure
 from camkit.report.lens.facts import LensFacts
-from camkit.report.lens.figure import GRID_COLOR, field_color, new_figure
 from camkit.units import UM_PER_MM, to_degrees
 
 if TYPE_CHECKING:

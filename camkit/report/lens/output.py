@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from camkit.errors import UnsupportedError
+from camkit.report.figure import to_png, to_svg
 from camkit.report.lens.colour_chart import draw_colour
 from camkit.report.lens.facts import LensFacts
 from camkit.report.lens.field_chart import draw_field
-from camkit.report.lens.figure import to_png, to_svg
 from camkit.report.lens.layout import draw_layout
 from camkit.report.lens.mtf_chart import draw_mtf
 from camkit.report.lens.page import to_html

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Final
 
 from camkit.models_def.optics.analysis.seidel import Seidel
-from camkit.report.lens.figure import GRID_COLOR, new_figure
+from camkit.report.figure import GRID_COLOR, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import torch
 
+from camkit.report.figure import GRID_COLOR, MARKS, new_figure, wave_color
 from camkit.report.lens.facts import LensFacts
-from camkit.report.lens.figure import GRID_COLOR, MARKS, new_figure, wave_color
 from camkit.units import UM_PER_MM, to_degrees
 
 if TYPE_CHECKING:

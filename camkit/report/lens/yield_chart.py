@@ -8,7 +8,7 @@ import numpy as np
 
 from camkit.models_def.design.tolerance import Measured, Offender, ToleranceResult
 from camkit.models_def.optics.tolerance.error_table import in_file_units
-from camkit.report.lens.figure import GRID_COLOR, field_color, new_figure, to_png, to_svg
+from camkit.report.figure import GRID_COLOR, field_color, new_figure, to_png, to_svg
 from camkit.units import UM_PER_MM, to_degrees
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.diffraction.shares import CORE_PX, HALF_WIDTH_PX
-from camkit.report.lens.figure import GRID_COLOR, field_color, new_figure
+from camkit.report.figure import GRID_COLOR, field_color, new_figure
 from camkit.report.plate.facts import PlateFacts
 from camkit.report.plate.psf_chart import shown_reach_px
 

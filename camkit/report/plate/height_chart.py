@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Final
 
-from camkit.report.lens.figure import GRID_COLOR, new_figure
+from camkit.report.figure import GRID_COLOR, new_figure
 from camkit.report.plate.facts import PlateFacts
 from camkit.units import UM_PER_MM
 

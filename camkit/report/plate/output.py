@@ -4,7 +4,7 @@ from importlib import util
 from pathlib import Path
 
 from camkit.errors import UnsupportedError
-from camkit.report.lens.figure import to_png, to_svg
+from camkit.report.figure import to_png, to_svg
 from camkit.report.plate.cut_chart import draw_cuts
 from camkit.report.plate.facts import PlateFacts
 from camkit.report.plate.height_chart import draw_heights

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 import torch
 from torch import Tensor
 
-from camkit.report.lens.figure import new_figure
+from camkit.report.figure import new_figure
 from camkit.report.plate.facts import PlateFacts
 
 if TYPE_CHECKING:
