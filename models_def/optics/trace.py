@@ -18,7 +18,8 @@ from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.tracing import kernel
 from camkit.models_def.optics.tracing.compilation import compiled_engine
 from camkit.models_def.optics.tracing.gradient import Eager, trace_tensors
-from camkit.models_def.optics.tracing.kernel import LensTensors, State, TraceSettings
+from camkit.models_def.optics.tracing.kernel import LensTensors, TraceSettings
+from camkit.models_def.optics.tracing.meeting import State
 from camkit.models_def.optics.tracing.profile import TINY, profile
 
 

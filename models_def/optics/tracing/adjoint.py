@@ -17,7 +17,8 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
-from camkit.models_def.optics.tracing.kernel import Kept, Numbers, State, TraceSettings, rest
+from camkit.models_def.optics.tracing.kernel import Kept, TraceSettings, rest
+from camkit.models_def.optics.tracing.meeting import Numbers, State
 from camkit.models_def.optics.tracing.profile import TINY, polynomial
 
 

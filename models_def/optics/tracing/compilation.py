@@ -24,12 +24,12 @@ from camkit.models_def.optics.tracing.kernel import (
     Kept,
     LensTensors,
     Result,
-    State,
     TraceSettings,
     numbers,
     rest,
     run,
 )
+from camkit.models_def.optics.tracing.meeting import State
 
 _LOG = logging.getLogger(__name__)
 _COMPILERS: Final = ("g++", "clang++", "c++", "cl")

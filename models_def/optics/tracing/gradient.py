@@ -17,12 +17,12 @@ from camkit.models_def.optics.tracing.kernel import (
     Kept,
     LensTensors,
     Result,
-    State,
     TraceSettings,
     numbers,
     rest,
     run,
 )
+from camkit.models_def.optics.tracing.meeting import State
 
 BLOCK_RAYS: Final = 16_384
 KEEP_BYTES: Final = 2**28
