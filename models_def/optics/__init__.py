@@ -3,6 +3,7 @@
 In the order in which data flows:
 
 - `glass`: catalogues, refractive indices by strict name
+- `grooves`: what a surface may be cut into
 - `prescription`: lenses as dataclasses, TOML files, fabrication errors
 - `lens_file`: lenses from and to files, TOML or .zmx
 - `tracing/`, `trace`: rays through surfaces, differentiable, with a fate for each ray

@@ -16,7 +16,8 @@ import torch
 from torch import Tensor
 
 from camkit.errors import ContractError
-from camkit.models_def.optics.trace import Rays, SurfaceTensors, sag, sag_slope
+from camkit.models_def.optics.trace import Rays, SurfaceTensors
+from camkit.models_def.optics.tracing.profile import sag, sag_slope
 
 BARRIER: Final = 0.05
 _TINY: Final = 1e-6

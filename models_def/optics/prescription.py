@@ -18,6 +18,7 @@ from camkit.models_def.optics.glass.agf import read_agf
 from camkit.models_def.optics.glass.catalogue import GlassCatalogue, find_glass, own_glass
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
+from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves
 from camkit.models_def.toml_table import key_line
 from camkit.units import to_degrees, to_radians
 
@@ -33,6 +34,9 @@ _SURFACE_KEYS: Final = {
     "semi_diameter_mm",
     "conic",
     "even_asphere",
+    "groove_depth_um",
+    "groove_walls",
+    "tool_radius_um",
     "vary",
 }
 _LENS_KEYS: Final = {
@@ -65,6 +69,7 @@ class Surface:
         even_asphere: Coefficients of r^2, r^4, r^6, ... (mm^-1, mm^-3, ...).
         index_offset: Added to the index after the surface (fabrication error).
         material: The glass itself where it comes from a user's catalogue; its name is `glass`.
+        grooves: That it is cut into; None for none. They need a finite semi-diameter.
         vary: What an optimisation may change.
     References: Sun 2021, eq. (2.2).
     """
@@ -77,6 +82,7 @@ class Surface:
     even_asphere: tuple[float, ...] = ()
     index_offset: float = 0.0
     material: Glass | None = None
+    grooves: Grooves | None = None
     vary: tuple[Vary, ...] = ()
 
     def __post_init__(self) -> None:
@@ -93,11 +99,23 @@ class Surface:
             raise ContractError(f"a surface needs finite numbers; got {self}")
         if not self.semi_diameter_mm > 0:
             raise ContractError(f"semi_diameter_mm must be > 0; got {self.semi_diameter_mm}")
+        if self.grooves is not None:
+            check_grooves(self.profile, self.grooves)
 
     @property
     def medium(self) -> Glass:
         """The glass after the surface."""
         return self.material or find_glass(self.glass)
+
+    @property
+    def profile(self) -> Profile:
+        """The continuous profile, up to the rim."""
+        return Profile(
+            curvature_per_mm=self.curvature_per_mm,
+            conic=self.conic,
+            even_asphere=self.even_asphere,
+            rim_mm=self.semi_diameter_mm,
+        )
 
     @property
     def radius_mm(self) -> float:
@@ -315,9 +333,20 @@ def _surface_lines(surface: Surface) -> list[str]:
         lines.append(f"conic = {surface.conic!r}")
     if surface.even_asphere:
         lines.append(key_line("even_asphere", surface.even_asphere))
+    if surface.grooves is not None:
+        lines += [key_line(key, value) for key, value in _groove_table(surface.grooves).items()]
     if surface.vary:
         lines.append(key_line("vary", surface.vary))
     return lines
+
+
+def _groove_table(grooves: Grooves) -> dict[str, float | bool]:
+    table: dict[str, float | bool] = {"groove_depth_um": grooves.depth_um}
+    if not grooves.walls:
+        table["groove_walls"] = False
+    if grooves.tool_radius_um:
+        table["tool_radius_um"] = grooves.tool_radius_um
+    return table
 
 
 def degrees_text(angle_rad: float) -> str:
@@ -370,7 +399,7 @@ def _parse_surface(
         glass = find_glass(_text(table.get("glass", "air"), "glass"), catalogues)
     except ContractError as error:
         raise ContractError(f"{where}: {error}") from error
-    return Surface(
+    made = Surface(
         curvature_per_mm=1 / radius_mm,
         thickness_mm=_number(table["thickness_mm"], f"{where}: thickness_mm"),
         glass=glass.name,
@@ -381,6 +410,26 @@ def _parse_surface(
         conic=_number(table.get("conic", 0.0), f"{where}: conic"),
         even_asphere=_numbers(table.get("even_asphere", []), f"{where}: even_asphere"),
         vary=_names(table.get("vary", []), f"{where}: vary"),
+    )
+    try:
+        return replace(made, grooves=_parse_grooves(table))
+    except ContractError as error:
+        raise ContractError(f"{where}: {error}") from error
+
+
+def _parse_grooves(table: Mapping[str, Any]) -> Grooves | None:
+    if "groove_depth_um" not in table:
+        astray = sorted({"groove_walls", "tool_radius_um"} & set(table))
+        if astray:
+            raise ContractError(f"{', '.join(astray)} without groove_depth_um")
+        return None
+    walls = table.get("groove_walls", True)
+    if not isinstance(walls, bool):
+        raise ContractError(f"groove_walls must be true or false; got {walls!r}")
+    return Grooves(
+        depth_um=_number(table["groove_depth_um"], "groove_depth_um"),
+        walls=walls,
+        tool_radius_um=_number(table.get("tool_radius_um", 0.0), "tool_radius_um"),
     )
 
 

@@ -30,6 +30,7 @@ from camkit.models_def.optics.trace import (
     refract,
     surface_tensors,
     trace,
+    without_walls,
 )
 
 PupilDefinition = Literal["paraxial", "chief", "stop"]
@@ -222,7 +223,8 @@ def real_stop_radius_mm(lens: Lens) -> float:
 
 
 def with_open_apertures(tensors: SurfaceTensors) -> SurfaceTensors:
-    """Give the lens without the limits of its surfaces."""
+    """Give the lens without the limits of its surfaces: no rim and no wall of a groove."""
+    tensors = without_walls(tensors)
     return replace(tensors, semi_diameter_mm=torch.full_like(tensors.semi_diameter_mm, math.inf))
 
 

@@ -29,6 +29,10 @@ def reverse(tensors: SurfaceTensors) -> SurfaceTensors:
         semi_diameter_mm=tensors.semi_diameter_mm.flip(0),
         index=tensors.index.flip(0),
         aspheric=tensors.aspheric[::-1],
+        grooves=tuple(
+            None if g is None else replace(g, solid_after=not g.solid_after)
+            for g in tensors.grooves[::-1]
+        ),
     )
 
 

@@ -13,7 +13,7 @@ from camkit.models_def.optics.pupil import (
     PupilSamples,
     pupil_rays,
 )
-from camkit.models_def.optics.trace import surface_tensors, trace
+from camkit.models_def.optics.trace import surface_tensors, trace, without_walls
 
 _SLOPE_STEPS: Final = 12
 _SLOPE_TOLERANCE_MM: Final = 1e-9
@@ -42,7 +42,7 @@ class Spots:
 def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None) -> Tensor:
     """Give the heights (field,) in mm at which chief rays of field slopes meet the sensor.
 
-    The chief ray passes the centre of the stop.
+    The chief ray passes the centre of the stop; no wall of a groove takes it.
 
     Args:
         lens: The prescription.
@@ -53,7 +53,7 @@ def chief_heights(lens: Lens, slopes: Tensor, wavelength_um: float | None = None
         ContractError: If a chief ray is lost.
     """
     wave = lens.reference_wavelength_um if wavelength_um is None else wavelength_um
-    tensors = surface_tensors(lens, torch.tensor(wave, dtype=torch.float64))
+    tensors = without_walls(surface_tensors(lens, torch.tensor(wave, dtype=torch.float64)))
     centre = PupilSamples(
         x=torch.zeros(1, dtype=torch.float64), y=torch.zeros(1, dtype=torch.float64)
     )

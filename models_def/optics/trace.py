@@ -13,14 +13,16 @@ from typing import Self
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.glass.catalogue import AIR
 from camkit.models_def.optics.glass.dispersion import refractive_index
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, Surface
 from camkit.models_def.optics.tracing import kernel
 from camkit.models_def.optics.tracing.compilation import compiled_engine
 from camkit.models_def.optics.tracing.gradient import Eager, trace_tensors
+from camkit.models_def.optics.tracing.groove import Groove
 from camkit.models_def.optics.tracing.kernel import LensTensors, TraceSettings
 from camkit.models_def.optics.tracing.meeting import State
-from camkit.models_def.optics.tracing.profile import TINY, profile
+from camkit.units import to_mm
 
 
 class Fate(IntEnum):
@@ -31,6 +33,8 @@ class Fate(IntEnum):
     TOTAL_REFLECTION = kernel.TOTAL_REFLECTION
     VIGNETTED = kernel.VIGNETTED
     NOT_CONVERGED = kernel.NOT_CONVERGED
+    GROOVE_WALL = kernel.GROOVE_WALL
+    SECOND_HIT = kernel.SECOND_HIT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +48,8 @@ class SurfaceTensors:
         thickness_mm: (surface, ...), after each surface; the last leads to the sensor.
         semi_diameter_mm: (surface, ...).
         index: (surface + 1, ...), before the first and after each surface.
-        aspheric: Which surfaces have a polynomial part.
+        aspheric: Which surfaces have a polynomial part or grooves.
+        grooves: Of each surface, None for none; empty where none has any.
     """
 
     curvature_per_mm: Tensor
@@ -54,6 +59,7 @@ class SurfaceTensors:
     semi_diameter_mm: Tensor
     index: Tensor
     aspheric: tuple[bool, ...]
+    grooves: tuple[Groove | None, ...] = ()
 
     def to(self, target: torch.dtype | torch.device) -> Self:
         """Give the same lens in another type or on another device."""
@@ -118,37 +124,33 @@ def surface_tensors(lens: Lens, wavelengths_um: Tensor) -> SurfaceTensors:
         thickness_mm=column([s.thickness_mm for s in surfaces]),
         semi_diameter_mm=column([s.semi_diameter_mm for s in surfaces]),
         index=torch.stack([torch.ones_like(waves), *glass]),
-        aspheric=tuple(any(s.even_asphere) for s in surfaces),
+        aspheric=tuple(any(s.even_asphere) or s.grooves is not None for s in surfaces),
+        grooves=tuple(_groove(s) for s in surfaces),
     )
+
+
+def _groove(surface: Surface) -> Groove | None:
+    own = surface.grooves
+    if own is None:
+        return None
+    return Groove(
+        depth_mm=to_mm(own.depth_um),
+        walls=own.walls,
+        tool_radius_mm=to_mm(own.tool_radius_um),
+        solid_after=surface.glass != AIR.name,
+    )
+
+
+def without_walls(tensors: SurfaceTensors) -> SurfaceTensors:
+    """Give the lens with ideal grooves, for rays that are a reference and must not be lost."""
+    ideal = (None if g is None else replace(g, walls=False) for g in tensors.grooves)
+    return replace(tensors, grooves=tuple(ideal))
 
 
 def count_fates(fate: Tensor) -> dict[Fate, int]:
     """Count the rays of each fate; every fate has an entry."""
     counts = torch.bincount(fate.flatten().to(torch.int64), minlength=len(Fate)).tolist()
     return {kind: int(counts[kind]) for kind in Fate}
-
-
-def sag(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
-    """Give the height h(rho) of a surface, rho = r^2 in mm^2 (eq. 2.2, plus an r^2 term).
-
-    Where (1 + conic) c^2 rho > 1 there is no surface: the value is finite but meaningless.
-    """
-    return _profile(curvature, conic, even_asphere, rho)[0]
-
-
-def sag_slope(curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor) -> Tensor:
-    """Give dh/d rho (eq. 2.3, in the form c / (2 s), s the root, plus the polynomial)."""
-    return _profile(curvature, conic, even_asphere, rho)[1] / 2
-
-
-def _profile(
-    curvature: Tensor, conic: Tensor, even_asphere: Tensor, rho: Tensor
-) -> tuple[Tensor, Tensor]:
-    square = 1 - (1 + conic) * curvature**2 * rho
-    root = torch.sqrt(torch.where(square > TINY, square, 1.0))
-    terms = even_asphere.unbind(0)
-    slopes = [a * (2 * j) for j, a in enumerate(terms, start=1)]
-    return profile(curvature, root, terms, slopes, rho)
 
 
 def trace(
@@ -203,7 +205,11 @@ def _trace(
     compiled: bool = False,
 ) -> Rays:
     first, end = surfaces.start, surfaces.stop
-    settings = TraceSettings(aspheric=tensors.aspheric[first:end], path=path)
+    settings = TraceSettings(
+        aspheric=tensors.aspheric[first:end],
+        grooves=tensors.grooves[first:end] or (None,) * len(surfaces),
+        path=path,
+    )
     lens = LensTensors(
         tensors.curvature_per_mm[first:end],
         tensors.conic[first:end],

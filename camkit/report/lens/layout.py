@@ -7,9 +7,10 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.analysis.spots import launch_beams
+from camkit.models_def.optics.grooves import grooved_mm
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import PupilSamples
-from camkit.models_def.optics.trace import Rays, sag, surface_tensors, trace
+from camkit.models_def.optics.trace import Rays, trace
 from camkit.report.figure import field_color, new_figure
 from camkit.report.lens.facts import LensFacts
 from camkit.units import to_degrees
@@ -22,6 +23,8 @@ RAYS_PER_FIELD: Final = 5
 _GLASS_COLOR: Final = "#cfe3f5"
 _LEAD: Final = 0.12
 _OVERSIZE: Final = 1.06
+_POINTS: Final = 81
+_GROOVED_POINTS: Final = 1601
 
 
 def draw_layout(facts: LensFacts) -> "Figure":
@@ -109,13 +112,14 @@ def _semi_diameters(facts: LensFacts, paths: list[tuple[Tensor, Tensor]]) -> lis
 
 def _profile(lens: Lens, number: int, height_mm: float) -> tuple[Tensor, Tensor]:
     """Give z and y of a surface, cut off where it ends."""
-    tensors = surface_tensors(lens, torch.tensor(lens.reference_wavelength_um, dtype=torch.float64))
-    c, k = tensors.curvature_per_mm[number], tensors.conic[number]
-    square = float((1 + k) * c**2)
+    surface = lens.surfaces[number]
+    square = (1 + surface.conic) * surface.curvature_per_mm**2
     if square > 0:
         height_mm = min(height_mm, 0.999 / math.sqrt(square))
-    y = torch.linspace(-height_mm, height_mm, 81, dtype=torch.float64)
-    return sag(c, k, tensors.even_asphere[number], y**2), y
+    points = _POINTS if surface.grooves is None else _GROOVED_POINTS
+    y = torch.linspace(-height_mm, height_mm, points, dtype=torch.float64)
+    z = surface.profile.height_mm(y)
+    return z if surface.grooves is None else grooved_mm(z, surface.grooves), y
 
 
 def _draw_glass(panel: "Panel", lens: Lens, heights: list[float], vertices: list[float]) -> None:

@@ -26,7 +26,7 @@ def write_zmx(lens: Lens, path: Path) -> None:
     """Write a lens as UTF-16 with byte order mark and Windows line ends, as its program does.
 
     Raises:
-        UnsupportedError: If a surface has more aspheric terms than the format.
+        UnsupportedError: If a surface has grooves, or more aspheric terms than the format.
         ContractError: If the lens is a fabricated copy (index offsets are not written).
     """
     path.write_bytes(format_zmx(lens).replace("\n", "\r\n").encode("utf-16"))
@@ -126,6 +126,10 @@ def _object_lines(lens: Lens) -> list[str]:
 
 
 def _surface_lines(lens: Lens, surface: Surface, position: int, order: GlassOrder) -> list[str]:
+    if surface.grooves is not None:
+        raise UnsupportedError(
+            f"surface {position} has grooves, which a .zmx file does not carry; write .toml"
+        )
     if len(surface.even_asphere) > EVEN_TERMS:
         raise UnsupportedError(
             f"surface {position} has {len(surface.even_asphere)} aspheric terms; "

@@ -46,9 +46,11 @@ from camkit.models_def.optics.render.texture import Texture, look_up
 from camkit.models_def.optics.render.window import Window
 from camkit.models_def.optics.reverse import trace_to_scene
 from camkit.models_def.optics.trace import SurfaceTensors
+from camkit.models_def.optics.tracing.groove import Groove
 
 Illumination = Literal["kept", "divided"]
 ILLUMINATIONS: Final[tuple[Illumination, ...]] = get_args(Illumination)
+Shapes = tuple[tuple[bool, ...], tuple[Groove | None, ...]]
 _LEAST_LIGHT: Final = 1e-12
 
 
@@ -99,7 +101,7 @@ class _Job:
     window: Window
     sampling: Sampling
     beams: BeamTable
-    aspheric: tuple[bool, ...]
+    shapes: Shapes
 
     def chunks(self) -> Iterator[range]:
         """Give the rows of each chunk."""
@@ -134,7 +136,7 @@ def render(
     beams = find_beams(optics, labels, window.radius_mm, waves)
     light = light_at(optics, labels, beams, torch.zeros(1))[0]
     tensors = optics.stopped(_wavelengths(response, chosen)).to(chosen.dtype)
-    job = _Job(texture, optics, window, chosen, beams, tensors.aspheric)
+    job = _Job(texture, optics, window, chosen, beams, (tensors.aspheric, tensors.grooves))
     numbers = (texture.values, labels.a, labels.b, light, *_fields(tensors))
     made = _MeanOfPasses.apply(job, *numbers)  # type: ignore[no-untyped-call]
     return cast("Tensor", made)
@@ -166,7 +168,7 @@ def _fields(tensors: SurfaceTensors) -> tuple[Tensor, ...]:
     )
 
 
-def _lens(fields: list[Tensor], number: int, aspheric: tuple[bool, ...]) -> SurfaceTensors:
+def _lens(fields: list[Tensor], number: int, shapes: Shapes) -> SurfaceTensors:
     """Give the lens at the wavelengths of a pass: the inverse of `_fields`."""
     curvature, conic, even_asphere, thickness_mm, semi_diameter_mm, index = fields
     return SurfaceTensors(
@@ -176,7 +178,8 @@ def _lens(fields: list[Tensor], number: int, aspheric: tuple[bool, ...]) -> Surf
         thickness_mm=thickness_mm,
         semi_diameter_mm=semi_diameter_mm,
         index=index[:, number],
-        aspheric=aspheric,
+        aspheric=shapes[0],
+        grooves=shapes[1],
     )
 
 
@@ -230,7 +233,7 @@ def _rows(job: _Job, number: int, rows: range, numbers: tuple[Tensor, ...]) -> T
     values, a, b, light, *fields = numbers
     sampling, window = job.sampling, job.window
     labels = Labels(a=a, b=b, radius_mm=job.optics.stop_radius_mm)
-    lens = _lens(fields, number, job.aspheric)
+    lens = _lens(fields, number, job.shapes)
     place, label, radius = _draw(job, number, rows)
     start = rays_from(labels_of_type(labels, sampling.dtype), *place, *label)
     end = trace_to_scene(lens, start, job.optics.object_distance_mm)

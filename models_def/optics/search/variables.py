@@ -132,6 +132,7 @@ class FreeLens:
             semi_diameter_mm=torch.full((count, 1), torch.inf, dtype=torch.float64),
             index=self._reference_index(),
             aspheric=self._aspheric(),
+            grooves=base.grooves,
         )
         made = self._solve(made, rest[-1])
 
@@ -206,7 +207,7 @@ class FreeLens:
 
     def _aspheric(self) -> tuple[bool, ...]:
         free = {v.surface for v in self.variables if v.kind == "even_asphere"}
-        own = {i for i, s in enumerate(self.lens.surfaces) if any(s.even_asphere)}
+        own = {i for i, s in enumerate(self.lens.surfaces) if any(s.even_asphere) or s.grooves}
         return tuple(i in free | own for i in range(len(self.lens.surfaces)))
 
     def _reference_index(self) -> Tensor:

@@ -109,6 +109,7 @@ def fabricated_tensors(
         semi_diameter_mm=wide(nominal.semi_diameter_mm),
         index=torch.cat([torch.ones_like(index[:1]), index]),
         aspheric=nominal.aspheric,
+        grooves=nominal.grooves,
     )
 
 

@@ -3,7 +3,7 @@
 In the order in which data flows:
 
 - `profile`: height and slope of a surface
-- `meeting`: where rays meet a surface
+- `meeting`: where rays meet a surface, `groove`: one that is cut into grooves
 - `kernel`: rays through the surfaces of a lens, each with its fate
 - `adjoint`: the gradients, from where rays met the surfaces
 - `gradient`: both as one node of the autograd graph, in blocks, with bounded memory

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import torch
 from torch import Tensor
 
+from camkit.models_def.optics.tracing.groove import Groove, meet_grooves, meets_again
 from camkit.models_def.optics.tracing.meeting import (
     MIN_COSINE,
     Bound,
@@ -28,6 +29,8 @@ MISSED: Final = 1
 TOTAL_REFLECTION: Final = 2
 VIGNETTED: Final = 3
 NOT_CONVERGED: Final = 4
+GROOVE_WALL: Final = 5
+SECOND_HIT: Final = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,12 +38,14 @@ class TraceSettings:
     """What is static about a trace.
 
     Attributes:
-        aspheric: Which surfaces have a polynomial part.
+        aspheric: Which surfaces have a polynomial part or grooves.
+        grooves: Of each surface; None for none.
         path: Whether the optical path is summed.
         adaptive: Whether Newton steps end when every ray has converged.
     """
 
     aspheric: tuple[bool, ...]
+    grooves: tuple[Groove | None, ...]
     path: bool
     adaptive: bool = True
 
@@ -108,8 +113,9 @@ def run(settings: TraceSettings, lens: Sequence[Numbers], rays: State, fate: Ten
     path: Tensor | None = torch.zeros_like(state.x) if settings.path else None
     seen: list[State] = []
     fates: list[Tensor] = []
-    for p, aspheric in zip(lens, settings.aspheric, strict=True):
-        state, way, now = cross(p, state, fate, aspheric=aspheric, adaptive=settings.adaptive)
+    shapes = zip(settings.aspheric, settings.grooves, strict=True)
+    for p, shape in zip(lens, shapes, strict=True):
+        state, way, now = cross(p, state, fate, shape, adaptive=settings.adaptive)
         code, fate = code if now is fate else now.to(torch.int8), now
         path = None if path is None else path + p.before * way
         seen.append(state)
@@ -130,11 +136,27 @@ def rest(state: State, fate: Tensor, *, adaptive: bool, n: float = 1.0) -> State
 
 
 def cross(
-    p: Numbers, rays: State, fate: Tensor, *, aspheric: bool, adaptive: bool
+    p: Numbers, rays: State, fate: Tensor, shape: tuple[bool, Groove | None], *, adaptive: bool
 ) -> tuple[State, Tensor, Tensor]:
-    """Carry rays onto a surface and refract them; give rays, way and fate (as floats)."""
+    """Carry rays onto a surface and refract them.
+
+    Args:
+        p: The surface.
+        rays: At any z.
+        fate: 0 where a ray lives, as floats.
+        shape: Whether the surface is aspheric, and its grooves.
+        adaptive: See `TraceSettings`.
+
+    Returns:
+        Rays, way and fate (as floats).
+    """
     at, lead = to_plane(rays)
-    hit = meet_asphere(p, at, adaptive=adaptive) if aspheric else meet_conic(p, at)
+    aspheric, groove = shape
+    met = None if groove is None else meet_grooves(p, at, groove, adaptive=adaptive)
+    if met is not None:
+        hit = met.hit
+    else:
+        hit = meet_asphere(p, at, adaptive=adaptive) if aspheric else meet_conic(p, at)
     # N.d and the length of N give the refracted direction ratio d + bend N (Snell)
     square = torch.addcmul(hit.length2 * p.rest2, hit.facing2, p.ratio2)
     root = torch.sqrt(square.clamp_min(TINY))
@@ -153,17 +175,44 @@ def cross(
     way = lead + hit.way
     transmits, onward = Bound(square, TINY), Bound(n, MIN_COSINE)
     bounds = [*hit.exists, transmits, onward, *([hit.found] if hit.found else [])]
-    inside = adaptive and bool(hit.rho.amax() <= p.reach.amin())
+    lost = _Lost()
+    if groove is not None and met is not None and met.wall is not None:
+        lost = _Lost(met.wall, meets_again(p, met, bent, groove, adaptive=adaptive))
+    inside = adaptive and bool(hit.rho.amax() <= p.reach.amin()) and not lost.any()
     if inside and all(bound.all() for bound in bounds):
         return rest(bent, fate, adaptive=True), way, fate
-    fate = torch.where(fate == 0, _judge(p, hit, transmits, onward), fate)
+    fate = torch.where(fate == 0, _judge(p, hit, (transmits, onward), lost), fate)
     return rest(bent, fate, adaptive=adaptive), way, fate
 
 
-def _judge(p: Numbers, hit: Meeting, transmits: Bound, onward: Bound) -> Tensor:
-    """Give the first thing that is wrong with each ray, in the order of the light, as floats."""
-    new = (~(onward.value > onward.least)).to(hit.x.dtype) * MISSED
+class _Lost(NamedTuple):
+    """Which rays a groove took: at its wall, or by being met again; None for none."""
+
+    wall: Tensor | None = None
+    again: Tensor | None = None
+
+    def any(self) -> bool:
+        """Tell whether it took one."""
+        return any(mask is not None and bool(mask.any()) for mask in self)
+
+
+def _judge(p: Numbers, hit: Meeting, bends: tuple[Bound, Bound], lost: _Lost) -> Tensor:
+    """Give the first thing that is wrong with each ray, in the order of the light, as floats.
+
+    Args:
+        p: The surface.
+        hit: Where they met it.
+        bends: That a ray is refracted, and that it goes on.
+        lost: To grooves.
+    """
+    transmits, onward = bends
+    new = torch.zeros_like(hit.x)
+    if lost.again is not None:
+        new = torch.where(lost.again, SECOND_HIT, new)
+    new = torch.where(onward.value > onward.least, new, MISSED)
     new = torch.where(transmits.value > transmits.least, new, TOTAL_REFLECTION)
+    if lost.wall is not None:
+        new = torch.where(lost.wall, GROOVE_WALL, new)
     new = torch.where(hit.rho <= p.reach, new, VIGNETTED)
     if hit.found is not None:
         new = torch.where(hit.found.value > hit.found.least, new, NOT_CONVERGED)

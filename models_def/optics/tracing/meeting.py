@@ -133,22 +133,42 @@ def _conic_way(p: Numbers, at: State) -> tuple[Tensor, list[Bound], Tensor, Tens
     return g / sum_, [Bound(square, TINY), Bound(sum_, MIN_SLOPE)], root, square
 
 
-def meet_asphere(p: Numbers, at: State, *, adaptive: bool) -> Meeting:
-    """Newton's method from the conic (Sun 2021, eq. (6.6)); from the plane where it is missed."""
-    way, usable, _, _ = _conic_way(p, at)
-    if not (adaptive and all(bound.all() for bound in usable)):
-        for bound in usable:
-            way = torch.where(bound.value > bound.least, way, 0.0)
+class Heights(NamedTuple):
+    """A profile at rho = r^2: height h, q = 2 dh/d rho, S^2 of the conic (it ends at 0)."""
+
+    height: Tensor
+    lean: Tensor
+    square: Tensor
+
+
+def heights(p: Numbers, rho: Tensor) -> Heights:
+    """Give the profile of a surface; finite everywhere."""
+    near = rho.clamp_max(MAX_RHO_MM2)
+    square = 1 - near * p.opening
+    height, lean = profile(p.c, square.clamp_min(TINY).sqrt(), p.terms, p.slopes, near)
+    return Heights(height, lean, square)
+
+
+def meet_asphere(p: Numbers, at: State, *, adaptive: bool, drop: Tensor | None = None) -> Meeting:
+    """Give where rays from the vertex plane meet a surface, by Newton's method.
+
+    It starts from the conic (Sun 2021, eq. (6.6)), from the plane where that is missed.
+
+    Args:
+        p: The surface.
+        at: The rays.
+        adaptive: Whether steps end when every ray has converged.
+        drop: The surface is z = h - drop, and Newton starts from the plane; None for z = h.
+    """
+    way = torch.zeros_like(at.x) if drop is not None else _conic_start(p, at, adaptive=adaptive)
     stop_mm = NEWTON_STOP_MM[way.dtype]
     steps = MAX_NEWTON_STEPS if adaptive else FIXED_NEWTON_STEPS
     for step in range(steps + 1):
         x, y = torch.addcmul(at.x, way, at.l), torch.addcmul(at.y, way, at.m)
         z = way * at.n
         rho = torch.addcmul(x * x, y, y)
-        near = rho.clamp_max(MAX_RHO_MM2)
-        square = 1 - near * p.opening
-        height, lean = profile(p.c, square.clamp_min(TINY).sqrt(), p.terms, p.slopes, near)
-        gap = height - z
+        height, lean, square = heights(p, rho)
+        gap = height - z if drop is None else height - drop - z
         facing = at.n - torch.addcmul(x * at.l, y, at.m) * lean
         if step == steps or (adaptive and bool(gap.abs().amax() <= stop_mm)):
             break
@@ -174,3 +194,11 @@ def meet_asphere(p: Numbers, at: State, *, adaptive: bool) -> Meeting:
         exists=exists,
         found=Bound(-gap.abs(), -NEWTON_TOLERANCE_MM[way.dtype]),
     )
+
+
+def _conic_start(p: Numbers, at: State, *, adaptive: bool) -> Tensor:
+    way, usable, _, _ = _conic_way(p, at)
+    if not (adaptive and all(bound.all() for bound in usable)):
+        for bound in usable:
+            way = torch.where(bound.value > bound.least, way, 0.0)
+    return way

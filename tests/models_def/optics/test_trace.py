@@ -11,11 +11,10 @@ from camkit.models_def.optics.pupil import launch
 from camkit.models_def.optics.trace import (
     Fate,
     SurfaceTensors,
-    sag,
-    sag_slope,
     surface_tensors,
     trace,
 )
+from camkit.models_def.optics.tracing.profile import sag, sag_slope
 
 ONE_SURFACE_TOLERANCE_MM = 1e-10
 

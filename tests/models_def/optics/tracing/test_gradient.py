@@ -10,8 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, sag, sag_slope, trace
+from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, trace
 from camkit.models_def.optics.tracing import gradient
+from camkit.models_def.optics.tracing.profile import sag, sag_slope
 from tests.physics.printed_lenses import cooke_tensors, rays_at
 
 EQUAL = 1e-9
