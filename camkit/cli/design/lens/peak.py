@@ -1,0 +1,78 @@
+"""`camkit lens peak`: how much light lies near the peak of a point, and how far haze reaches."""
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from camkit.cli.choices import Debug, GlassFiles, Json
+from camkit.cli.say import say, say_over
+
+if TYPE_CHECKING:
+    from camkit.models_def.optics.prescription import Lens
+
+PitchUm = Annotated[float, typer.Option(min=0.1, help="Of the pixels.")]
+WithWaves = Annotated[
+    bool,
+    typer.Option(
+        "--waves", help="Also sum the peaks of three fields from waves, in every colour (minutes)."
+    ),
+]
+
+
+def peak(
+    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    pitch_um: PitchUm = 5.96,
+    waves: WithWaves = False,
+    glass: GlassFiles = None,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Say how much light of a point lies near its peak, and how far haze reaches (needs torch).
+
+    The fields are those of the file and the middles between them.
+    """
+    from camkit.cli.design.design_time import require_torch
+
+    require_torch("camkit lens peak")
+    import torch
+
+    torch.set_num_threads(1)
+    from camkit.models_def.optics.glass.agf import read_agf
+    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
+    from camkit.models_def.optics.thin.report import to_text
+
+    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    told = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)
+    if json_:
+        say(json.dumps(told | {"notes": list(notes)}))
+        return
+    for note in notes:
+        say(f"{file.name}: {note}", err=True)
+    say(to_text(told))
+
+
+def measured(
+    lens: "Lens", field_angles_rad: Sequence[float], pitch_um: float, *, waves: bool
+) -> dict[str, Any]:
+    """Give the report on a lens as JSON values; waves at the first, middle and last field."""
+    from camkit.models_def.optics.thin.report import between, report_peaks, to_json
+
+    fields = between(field_angles_rad)
+    chosen = sorted({0, len(fields) // 2, len(fields) - 1}) if waves else []
+    found = report_peaks(
+        lens,
+        fields,
+        pitch_um,
+        wave_fields_rad=[fields[i] for i in chosen],
+        progress=_progress,
+    )
+    return to_json(found)
+
+
+def _progress(done: int, total: int) -> None:
+    if sys.stderr.isatty():
+        say_over(f"{done} of {total} peaks", last=done == total)

@@ -1,0 +1,61 @@
+"""`camkit lens sag`: the profile of a surface as a table for the workshop."""
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from camkit.cli.choices import Debug, GlassFiles, Json, Overwrite
+from camkit.cli.say import say
+
+
+def sag(
+    file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The table (.csv).")],
+    surface: Annotated[int, typer.Option(min=0, help="Which, from 0.")] = 0,
+    step_um: Annotated[float, typer.Option(min=0.1, help="Of the radius.")] = 10.0,
+    glass: GlassFiles = None,
+    overwrite: Overwrite = False,
+    json_: Json = False,
+    _debug: Debug = False,
+) -> None:
+    """Write radius, height and slope of a surface from the axis to its rim (needs torch).
+
+    At a wall of a groove there are two rows of one radius: the foot and the top.
+    """
+    from camkit.cli.design.design_time import refuse_existing, require_torch
+
+    require_torch("camkit lens sag")
+    refuse_existing([out], overwrite=overwrite)
+    from camkit.errors import ContractError
+    from camkit.models_def.optics.glass.agf import read_agf
+    from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
+    from camkit.models_def.optics.thin.sag_table import sag_table, write_sag_table
+
+    lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    if surface >= len(lens.surfaces):
+        raise ContractError(f"--surface must be 0..{len(lens.surfaces) - 1}; got {surface}")
+    table = sag_table(lens.surfaces[surface], step_um)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_sag_table(table, out)
+    for note in notes:
+        say(f"{file.name}: {note}", err=True)
+    told = {
+        "lens": lens.name,
+        "surface": surface,
+        "out": str(out),
+        "rows": len(table.radius_mm),
+        "walls": table.walls,
+        "height_um": [float(table.height_um.min()), float(table.height_um.max())],
+        "steepest_deg": math.degrees(math.atan(float(abs(table.slope).max()))),
+    }
+    if json_:
+        say(json.dumps(told))
+        return
+    low, high = told["height_um"]  # type: ignore[misc]
+    say(
+        f"{out}: {told['rows']} radii, {table.walls} walls, heights {low:.3f} to {high:.3f} um, "
+        f"slopes to {told['steepest_deg']:.2f} degrees"
+    )

@@ -1,0 +1,15 @@
+"""A thin plate for a large field: Fresnel profiles that keep a sharp peak everywhere (ch. 3).
+
+In the order in which data flows:
+
+- `recipe`: what is wanted, from a TOML file
+- `ideal`: the phase that one direction would want of the whole aperture (eq. 3.1-3.3)
+- `partition`: one profile for all directions, each in its virtual aperture (eq. 3.4), meridional
+- `skew`: the same as spots of skew rays through both faces of the plate
+- `solver`: profiles, distance of the sensor and virtual apertures that make these spots small
+- `plate_lens`: the plate as a lens file
+- `peak`: how much light lies near the peak of a field, and how far the haze reaches
+- `waves`: the same peak as a sum of waves
+- `report`: both of a lens, for people and programs
+- `sag_table`: a profile for the workshop
+"""
