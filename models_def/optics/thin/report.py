@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from scipy.special import ndtri
 
 from camkit.models_def.optics.grooves import narrowest_mm, wall_radii_mm
-from camkit.models_def.optics.kernel_bank import GAUSS_FWHM
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.peak import (
     RAYS,
@@ -21,7 +19,7 @@ from camkit.models_def.optics.thin.peak import (
 from camkit.models_def.optics.thin.waves import wave_shares
 from camkit.units import to_degrees, to_mm
 
-# centres in um and full width of the colours of camkit's model camera (`gaussian_response`)
+# centres in um and full width at half maximum of the colours of camkit's model camera (`gaussian_response`)
 BANDS: Final = {"blue": 0.46, "green": 0.54, "red": 0.60}
 BAND_FWHM_UM: Final = 0.09
 BAND_WAVES: Final = 6
@@ -83,9 +81,9 @@ def between(angles_rad: Sequence[float]) -> tuple[float, ...]:
 
 
 def band_wavelengths_um(band: str) -> tuple[float, ...]:
-    """Give wavelengths that stand for equal shares of a colour's light."""
-    places = ndtri((np.arange(BAND_WAVES) + 0.5) / BAND_WAVES)
-    return tuple((BANDS[band] + BAND_FWHM_UM / GAUSS_FWHM * places).tolist())
+    """Give wavelengths spread evenly over the width of a colour."""
+    places = (np.arange(BAND_WAVES) + 0.5) / BAND_WAVES - 0.5
+    return tuple((BANDS[band] + BAND_FWHM_UM * places).tolist())
 
 
 def report_peaks(
@@ -113,7 +111,9 @@ def report_peaks(
     wave_um = lens.reference_wavelength_um
     ideal_lens = with_ideal_grooves(lens)
     total = len(field_angles_rad) + len(wave_fields_rad) * len(BANDS)
-    real, ideal, waves = [], [], []
+    real: list[Peak] = []
+    ideal: list[Peak] = []
+    waves: list[WavePeak] = []
 
     def done() -> None:
         if progress is not None:
@@ -223,8 +223,8 @@ def to_text(told: dict[str, Any]) -> str:
     lines.append(("{:>9}" * 7 + "{:>13}  lost").format(*head))
     for f in told["fields"]:
         lost = ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in f["lost"].items())
-        row = (f["within_5_px"]["real"], f["within_10_px"]["real"], f["within_50_px"])
-        row = (*row, f["beyond_450_px"], f["beyond_900_px"])
+        near = [f["within_5_px"]["real"], f["within_10_px"]["real"], f["within_50_px"]]
+        row = [*near, f["beyond_450_px"], f["beyond_900_px"]]
         shares = "".join(f"{v:9.3f}" for v in row) + f"{f['within_10_px']['ideal']:13.3f}"
         lines.append(f"{f['field_angle_deg']:9.2f}{f['peak_px']:9.1f}{shares}  {lost}".rstrip())
     least, ratio = told["within_10_px_least"], told["within_10_px_ratio"]

@@ -42,20 +42,14 @@ def sag(
     write_sag_table(table, out)
     for note in notes:
         say(f"{file.name}: {note}", err=True)
-    told = {
-        "lens": lens.name,
-        "surface": surface,
-        "out": str(out),
-        "rows": len(table.radius_mm),
-        "walls": table.walls,
-        "height_um": [float(table.height_um.min()), float(table.height_um.max())],
-        "steepest_deg": math.degrees(math.atan(float(abs(table.slope).max()))),
-    }
+    low, high = float(table.height_um.min()), float(table.height_um.max())
+    steepest_deg = math.degrees(math.atan(float(abs(table.slope).max())))
     if json_:
-        say(json.dumps(told))
+        told = {"lens": lens.name, "surface": surface, "out": str(out)}
+        told |= {"rows": len(table.radius_mm), "walls": table.walls}
+        say(json.dumps(told | {"height_um": [low, high], "steepest_deg": steepest_deg}))
         return
-    low, high = told["height_um"]  # type: ignore[misc]
     say(
-        f"{out}: {told['rows']} radii, {table.walls} walls, heights {low:.3f} to {high:.3f} um, "
-        f"slopes to {told['steepest_deg']:.2f} degrees"
+        f"{out}: {len(table.radius_mm)} radii, {table.walls} walls, heights {low:.3f} to "
+        f"{high:.3f} um, slopes to {steepest_deg:.2f} degrees"
     )
