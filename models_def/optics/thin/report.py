@@ -19,7 +19,7 @@ from camkit.models_def.optics.thin.peak import (
 from camkit.models_def.optics.thin.waves import wave_shares
 from camkit.units import to_degrees, to_mm
 
-# centres in um and full width at half maximum of the colours of camkit's model camera (`gaussian_response`)
+# centres and full width at half maximum of camkit's model camera (`gaussian_response`), in um
 BANDS: Final = {"blue": 0.46, "green": 0.54, "red": 0.60}
 BAND_FWHM_UM: Final = 0.09
 BAND_WAVES: Final = 6

@@ -24,7 +24,13 @@ from camkit.models_def.optics.tolerance.elements import glass_elements
 from camkit.models_def.optics.tolerance.errors import Array, Compensator
 from camkit.models_def.optics.tolerance.misaligned_trace import meet, trace_misaligned
 from camkit.models_def.optics.tolerance.pose import Pose, poses
-from camkit.models_def.optics.trace import Fate, Rays, SurfaceTensors, surface_tensors
+from camkit.models_def.optics.trace import (
+    Fate,
+    Rays,
+    SurfaceTensors,
+    surface_tensors,
+    without_walls,
+)
 
 # beams of copies start from those of the nominal lens, which are close: slopes are measured once
 _AIM_STEPS: Final = 4
@@ -136,7 +142,8 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
             x=torch.zeros(1, dtype=torch.float64), y=torch.zeros(1, dtype=torch.float64)
         )
         wave = torch.tensor([lens.reference_wavelength_um], dtype=torch.float64)
-        chief, alive = _trace(fixed, deviations, replace(view, wavelengths_um=wave, samples=centre))
+        middle = replace(view, wavelengths_um=wave, samples=centre)
+        chief, alive = _trace(fixed, deviations, middle, walls=False)
         if not bool((alive > 0).all()) or not bool((weight > 0).any(-1).all()):
             raise ContractError("the light of a copy is lost; use smaller errors or fields")
         rays, chief = _moved(rays, shift), _moved(chief, shift)
@@ -149,9 +156,15 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
     )
 
 
-def _trace(lens: Lens, deviations: Deviations, view: View) -> tuple[Rays, Tensor]:
-    """Give rays (copy, field, wave, ray) on the sensor before refocus, and their weights."""
+def _trace(
+    lens: Lens, deviations: Deviations, view: View, *, walls: bool = True
+) -> tuple[Rays, Tensor]:
+    """Give rays (copy, field, wave, ray) on the sensor before refocus, and their weights.
+
+    Without walls those of grooves take none: a chief ray is a reference.
+    """
     tensors = fabricated_tensors(lens, deviations, view.wavelengths_um)
+    tensors = tensors if walls else without_walls(tensors)
     thickness = tensors.thickness_mm[:, :, 0, 0, 0]
     stands = poses(deviations, glass_elements(lens), thickness, view.azimuths_rad)
     nominal = surface_tensors(lens, view.wavelengths_um[:, None])
