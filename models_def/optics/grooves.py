@@ -110,6 +110,18 @@ def narrowest_mm(profile: Profile, grooves: Grooves) -> float:
     return float(widths.min()) if len(widths) else math.inf
 
 
+def groove_facts(profile: Profile, grooves: Grooves) -> dict[str, float | bool | None]:
+    """Give what is known of the grooves of a surface, as plain values; None for no number."""
+    narrowest = narrowest_mm(profile, grooves)
+    return {
+        "groove_depth_um": grooves.depth_um,
+        "walls": len(wall_radii_mm(profile, grooves)),
+        "narrowest_mm": narrowest if math.isfinite(narrowest) else None,
+        "tool_radius_um": grooves.tool_radius_um,
+        "ideal": not grooves.walls,
+    }
+
+
 def check_grooves(profile: Profile, grooves: Grooves) -> None:
     """Refuse grooves that cannot be cut.
 

@@ -18,7 +18,7 @@ from camkit.models_def.optics.glass.agf import read_agf
 from camkit.models_def.optics.glass.catalogue import GlassCatalogue, find_glass, own_glass
 from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
-from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves
+from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves, groove_facts
 from camkit.models_def.toml_table import key_line
 from camkit.units import to_degrees, to_radians
 
@@ -169,6 +169,15 @@ class Lens:
         waves = (*self.wavelengths_um, self.reference_wavelength_um)
         if not all(0.2 < w < 20 for w in waves):
             raise ContractError(f"wavelengths must lie in 0.2..20 um; got {waves}")
+
+
+def grooves_of(lens: Lens) -> list[dict[str, Any]]:
+    """Give what is known of the grooves of a lens, one entry for each grooved surface."""
+    return [
+        {"surface": number, **groove_facts(surface.profile, surface.grooves)}
+        for number, surface in enumerate(lens.surfaces)
+        if surface.grooves is not None
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,7 @@ from camkit.models_def.optics.analysis.spots import (
 )
 from camkit.models_def.optics.analysis.wavefront import trace_wavefront, wavefront_rms_um
 from camkit.models_def.optics.paraxial import Paraxial, paraxial_data
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, grooves_of
 from camkit.models_def.optics.pupil import real_stop_radius_mm
 from camkit.models_def.optics.spot import Spots
 from camkit.models_def.optics.trace import Fate, count_fates
@@ -228,6 +228,7 @@ def to_json(facts: LensFacts) -> dict[str, Any]:
         "pupil_sampling": facts.pupil.sampling,
         "psf_model": facts.model.regime,
         "psf_model_reason": facts.model.reason,
+        "grooves": grooves_of(facts.lens),
         "fields": [
             _field(facts, i, j)
             for i in range(len(facts.lens.field_angles_rad))

@@ -7,6 +7,7 @@ from html import escape
 from typing import Final
 
 from camkit.models_def.optics.analysis.seidel import SEIDEL_NAMES
+from camkit.models_def.optics.prescription import grooves_of
 from camkit.report.lens.facts import LensFacts
 from camkit.report.style import STYLE
 from camkit.units import UM_PER_MM, to_degrees
@@ -135,6 +136,25 @@ def _prescription(facts: LensFacts) -> str:
                 ", ".join(_number(a, 6) for a in surface.even_asphere),
             )
         )
+    return _table(head, rows) + _grooves(facts)
+
+
+def _grooves(facts: LensFacts) -> str:
+    found = grooves_of(facts.lens)
+    if not found:
+        return ""
+    head = ("surface", "groove, µm", "walls", "narrowest, mm", "tool radius, µm", "grooves")
+    rows = [
+        (
+            str(g["surface"]),
+            _number(g["groove_depth_um"], 6),
+            str(g["walls"]),
+            _number(math.nan if g["narrowest_mm"] is None else g["narrowest_mm"], 4),
+            _number(g["tool_radius_um"], 4),
+            "ideal" if g["ideal"] else "with walls",
+        )
+        for g in found
+    ]
     return _table(head, rows)
 
 

@@ -1,14 +1,12 @@
 """What the image of a point is over the field: peak, haze, grooves, rays against waves."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from camkit.models_def.optics.grooves import narrowest_mm, wall_radii_mm
-from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.prescription import Lens, grooves_of
 from camkit.models_def.optics.thin.peak import (
     RAYS,
     Peak,
@@ -152,26 +150,6 @@ def _wave_peak(
     )
 
 
-def grooves_json(lens: Lens) -> list[dict[str, Any]]:
-    """Give what is known of the grooves of a lens, by surface."""
-    found = []
-    for number, surface in enumerate(lens.surfaces):
-        own = surface.grooves
-        if own is not None:
-            narrowest = narrowest_mm(surface.profile, own)
-            found.append(
-                {
-                    "surface": number,
-                    "groove_depth_um": own.depth_um,
-                    "walls": len(wall_radii_mm(surface.profile, own)),
-                    "narrowest_mm": narrowest if math.isfinite(narrowest) else None,
-                    "tool_radius_um": own.tool_radius_um,
-                    "ideal": not own.walls,
-                }
-            )
-    return found
-
-
 def to_json(report: PeakReport) -> dict[str, Any]:
     """Give the report as plain JSON values."""
     ideal, real = ([p.within_px(10.0) for p in peaks] for peaks in (report.ideal, report.real))
@@ -179,7 +157,7 @@ def to_json(report: PeakReport) -> dict[str, Any]:
         "lens": report.lens.name,
         "wavelength_um": report.lens.reference_wavelength_um,
         "pitch_um": report.pitch_um,
-        "grooves": grooves_json(report.lens),
+        "grooves": grooves_of(report.lens),
         "within_10_px_least": {"ideal": min(ideal), "real": min(real)},
         "within_10_px_ratio": {"ideal": max(ideal) / min(ideal), "real": max(real) / min(real)},
         "fields": [_field(a, b) for a, b in zip(report.ideal, report.real, strict=True)],
