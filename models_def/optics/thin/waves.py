@@ -25,7 +25,9 @@ from camkit.units import to_mm
 
 LATTICE_MM: Final = 0.03
 REACH_MM: Final = 0.25
+# step of the points on the sensor, at most, and least points in a radius
 _GRID_MM: Final = 0.0008
+_POINTS: Final = 10
 _PROBE_MM: Final = 1e-4
 _MAX_SIDE: Final = 4000
 _CHUNK_RAYS: Final = 16_384
@@ -74,7 +76,7 @@ def wave_shares(
     with torch.no_grad():
         reach_mm = max(radii_mm)
         waves = _waves(lens, field_angle_rad, wavelength_um, height_mm, reach_mm, lattice_mm)
-        count = math.ceil(reach_mm / _GRID_MM)
+        count = math.ceil(reach_mm / min(_GRID_MM, min(radii_mm) / _POINTS))
         step = reach_mm / count
         x = (torch.arange(count, dtype=torch.float64) + 0.5) * step
         y = torch.cat([-x.flip(0), x])
@@ -82,7 +84,9 @@ def wave_shares(
         away = torch.hypot(x, y[:, None])
         # both halves; Parseval: the integral of |U|^2 is wavelength^2 times the energy of all rays
         scale = 2 * step**2 / (to_mm(wavelength_um) ** 2 * waves.energy)
-        return tuple(float(light[away < radius].sum()) * scale for radius in radii_mm)
+        # points at the edge of a disc count by how much of their cell lies within
+        parts = (((radius - away) / step + 0.5).clamp(0, 1) for radius in radii_mm)
+        return tuple(float((light * part).sum()) * scale for part in parts)
 
 
 def _light(waves: _Waves, number: float, x: Tensor, y: Tensor) -> Tensor:

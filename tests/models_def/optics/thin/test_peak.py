@@ -1,0 +1,58 @@
+"""Peaks against blurs whose shares are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from camkit.errors import ContractError
+from camkit.models_def.optics.thin.peak import (
+    LandedLight,
+    land_light,
+    measure_peak,
+    peak_height_px,
+    within,
+)
+from tests.thin_factory import perfect_lens
+
+PITCH_UM = 5.0
+
+
+def test_a_point_has_all_its_light_in_the_peak() -> None:
+    peak = measure_peak(perfect_lens(50.0, 5.0), 0.0, 0.55, PITCH_UM, rays=2000)
+    assert peak.within == pytest.approx((1.0,) * 5)
+    assert abs(peak.height_px) < 5
+    assert peak.lost == {}
+
+
+def test_a_defocused_disc_has_the_share_of_its_area() -> None:
+    """A beam of F/5 (edge slope 0.1) 1 mm behind focus: a disc of 20 px, evenly lit enough."""
+    lens = perfect_lens(500.0, 5.0, defocus_mm=10.0)
+    light = land_light(lens, 0.0, 0.55, PITCH_UM, rays=100_000)
+    assert within(light, 0.0, 10.0) == pytest.approx((10 / 20) ** 2, rel=0.01)
+    assert within(light, 0.0, 5.0) == pytest.approx((5 / 20) ** 2, rel=0.03)
+
+
+def test_the_peak_is_found_in_haze() -> None:
+    rng = np.random.default_rng(0)
+    haze = rng.uniform(-800, 800, (2, 30_000))
+    core = rng.normal(0, 2, (2, 3_000)) + np.array([[0.0], [317.3]])
+    x, y = np.concatenate([haze, core], axis=1)
+    light = LandedLight(x_px=np.abs(x), y_px=y, share=np.full(x.size, 1 / x.size), lost={})
+    assert peak_height_px(light) == pytest.approx(317.3, abs=1.0)
+    assert within(light, peak_height_px(light), 10.0) == pytest.approx(3 / 33, rel=0.02)
+
+
+def test_rays_that_rims_take_count_as_missing() -> None:
+    lens = perfect_lens(50.0, 5.0)
+    narrow = replace(lens.surfaces[2], semi_diameter_mm=2.5)
+    lens = replace(lens, surfaces=(*lens.surfaces[:2], narrow))
+    peak = measure_peak(lens, 0.0, 0.55, PITCH_UM, rays=40_000)
+    assert peak.within_px(10.0) == pytest.approx(0.25, rel=0.01)
+    assert peak.lost == {"vignetted": pytest.approx(0.75, rel=0.01)}
+
+
+def test_a_field_without_light_on_the_meridian_is_an_error() -> None:
+    none = LandedLight(x_px=np.full(3, 50.0), y_px=np.zeros(3), share=np.ones(3) / 3, lost={})
+    with pytest.raises(ContractError, match="no light reaches the meridian"):
+        peak_height_px(none)
