@@ -6,6 +6,7 @@ import torch
 
 from camkit.models_def.optics.trace import SurfaceTensors, trace
 from camkit.models_def.optics.tracing import compilation
+from camkit.models_def.optics.tracing.groove import Groove
 from tests.physics.printed_lenses import cooke_tensors, rays_at
 
 FLOAT64_EQUAL = 1e-11
@@ -46,6 +47,24 @@ def test_fused_engine_equals_the_plain_one(r4: float, monkeypatch: pytest.Monkey
     compilation._forward.cache_clear()
     compilation._backward.cache_clear()
     assert torch.equal(found[2], wanted[2])
+    for a, b in zip(found, wanted, strict=True):
+        if a.numel() and a.dtype != torch.int8:
+            assert float((a - b).abs().max()) < FLOAT64_EQUAL * max(1.0, float(b.abs().max()))
+
+
+def test_fused_engine_meets_grooves_as_the_plain_one_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch, "compile", lambda function, **_: function)
+    monkeypatch.setattr(compilation, "compiler_fault", lambda: None)
+    compilation._forward.cache_clear()
+    compilation._backward.cache_clear()
+    lens = cooke_tensors(conic=-0.3, r4=1e-7)
+    groove = Groove(depth_mm=0.1, walls=True, tool_radius_mm=0.01, solid_after=True)
+    lens = replace(lens, aspheric=(True,) * 6, grooves=(groove, *(None,) * 5))
+    found, wanted = (_both(lens, compiled=c) for c in (True, False))
+    compilation._forward.cache_clear()
+    compilation._backward.cache_clear()
+    assert torch.equal(found[2], wanted[2])
+    assert len(set(wanted[2].tolist())) > 1
     for a, b in zip(found, wanted, strict=True):
         if a.numel() and a.dtype != torch.int8:
             assert float((a - b).abs().max()) < FLOAT64_EQUAL * max(1.0, float(b.abs().max()))
