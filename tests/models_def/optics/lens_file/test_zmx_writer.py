@@ -66,6 +66,10 @@ def test_written_lens_reads_back_to_the_last_bit(lens: Lens) -> None:
 @pytest.mark.parametrize("path", sorted(PRESCRIPTIONS.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_prescription_of_camkit_goes_through_the_format(path: Path, tmp_path: Path) -> None:
     lens = read_prescription(path)
+    if any(surface.grooves for surface in lens.surfaces):
+        with pytest.raises(UnsupportedError, match="grooves"):
+            write_zmx(lens, tmp_path / "lens.zmx")
+        return
     write_zmx(lens, tmp_path / "lens.zmx")
     assert read_zmx(tmp_path / "lens.zmx").lens == lens
 
