@@ -71,6 +71,19 @@ def with_ideal_grooves(lens: Lens) -> Lens:
     return replace(lens, surfaces=tuple(surfaces))
 
 
+def with_tool(lens: Lens, radius_um: float) -> Lens:
+    """Give the lens whose grooves are cut by a tool with a nose of this radius.
+
+    Raises:
+        ContractError: If a groove is narrower than the tool.
+    """
+    surfaces = (
+        s if s.grooves is None else replace(s, grooves=replace(s.grooves, tool_radius_um=radius_um))
+        for s in lens.surfaces
+    )
+    return replace(lens, surfaces=tuple(surfaces))
+
+
 def between(angles_rad: Sequence[float]) -> tuple[float, ...]:
     """Give angles and the middles between them."""
     angles = np.array(sorted(angles_rad))

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from camkit.models_def.optics.prescription import Lens
 
 PitchUm = Annotated[float, typer.Option(min=0.1, help="Of the pixels.")]
+ToolRadiusUm = Annotated[
+    float | None,
+    typer.Option(min=0, help="Nose of the tool that cuts grooves, instead of what the file says."),
+]
 WithWaves = Annotated[
     bool,
     typer.Option(
@@ -27,6 +31,7 @@ def peak(
     file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
     pitch_um: PitchUm = 5.96,
     waves: WithWaves = False,
+    tool_radius_um: ToolRadiusUm = None,
     glass: GlassFiles = None,
     json_: Json = False,
     _debug: Debug = False,
@@ -43,9 +48,11 @@ def peak(
     torch.set_num_threads(1)
     from camkit.models_def.optics.glass.agf import read_agf
     from camkit.models_def.optics.lens_file.lens_file import read_noted_lens
-    from camkit.models_def.optics.thin.report import to_text
+    from camkit.models_def.optics.thin.report import to_text, with_tool
 
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    if tool_radius_um is not None:
+        lens = with_tool(lens, tool_radius_um)
     told = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)
     if json_:
         say(json.dumps(told | {"notes": list(notes)}))

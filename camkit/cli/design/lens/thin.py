@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.design.lens.peak import PitchUm, WithWaves, measured
+from camkit.cli.design.lens.peak import PitchUm, ToolRadiusUm, WithWaves, measured
 from camkit.cli.say import say
 
 
@@ -19,6 +19,7 @@ def thin(
     out: Annotated[Path, typer.Option("-o", "--out", help="The plate as a lens (.toml).")],
     pitch_um: PitchUm = 5.96,
     waves: WithWaves = False,
+    tool_radius_um: ToolRadiusUm = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
@@ -35,7 +36,7 @@ def thin(
     from camkit.models_def.optics.lens_file.lens_file import ready_for_lens, write_lens
     from camkit.models_def.optics.thin.plate_lens import plate_lens
     from camkit.models_def.optics.thin.recipe import find_thin_recipe
-    from camkit.models_def.optics.thin.report import to_text
+    from camkit.models_def.optics.thin.report import to_text, with_tool
     from camkit.models_def.optics.thin.solver import solve_plate
     from camkit.units import to_degrees
 
@@ -47,6 +48,8 @@ def thin(
     began = time.process_time()
     solved = solve_plate(wanted)
     lens = plate_lens(wanted, solved)
+    if tool_radius_um is not None:
+        lens = with_tool(lens, tool_radius_um)
     seconds = time.process_time() - began
     write_lens(lens, out)
     told = measured(lens, lens.field_angles_rad, pitch_um, waves=waves)

@@ -162,6 +162,17 @@ def test_living_rays_lie_on_the_ring_that_is_there(sign: int) -> None:
     assert np.allclose(met.z[met.valid].numpy(), cut, atol=1e-10)
 
 
+def test_single_precision_gives_the_same_fates_but_at_edges() -> None:
+    tensors, rays = _tensors(-1, entering=False), _rays(4000, steep=0.4, seed=8)
+    single = Rays(
+        **{n: getattr(rays, n).float() for n in ("x", "y", "z", "l", "m", "n")}, fate=rays.fate
+    )
+    found, wanted = refract(tensors.to(torch.float32), single, 0), refract(tensors, rays, 0)
+    assert (found.fate == wanted.fate).float().mean() > 0.998
+    both = found.valid & wanted.valid & ((found.z - wanted.z).abs() < 1e-2)
+    assert torch.allclose(found.z[both].double(), wanted.z[both], atol=1e-5)
+
+
 def test_ideal_grooves_lose_no_ray_and_bend_by_the_slope_of_the_profile() -> None:
     tensors = without_walls(_tensors(1, entering=True))
     rays = _rays(2000, steep=0.4, seed=2)

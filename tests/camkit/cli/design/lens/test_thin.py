@@ -37,6 +37,12 @@ def test_a_plate_is_solved_written_and_reported(camkit_command, tmp_path: Path, 
     assert again.code == ExitCode.USAGE
     assert "--overwrite" in again.err
     assert camkit_command("lens", "thin", quick, "-o", out, "--overwrite").code == 0
+    tool = ("--tool-radius-um", 16)
+    assert camkit_command("lens", "thin", quick, "-o", out, "--overwrite", *tool).code == 0
+    assert "tool_radius_um = 16.0" in out.read_text()
+    blunt = camkit_command("lens", "peak", out, "--tool-radius-um", 900)
+    assert blunt.code == ExitCode.USAGE
+    assert "narrower than the tool" in blunt.err
     peaks = camkit_command("lens", "peak", out)
     assert peaks.code == 0, peaks.err
     assert "within 10 px, least of all fields" in peaks.out
