@@ -86,6 +86,13 @@ class NoiseModel:
             read_variance=tuple(v * g * g for v, g in zip(self.read_variance, gains, strict=True)),
         )
 
+    def raised(self, factors: tuple[float, ...]) -> "NoiseModel":
+        """Give the noise whose variance is multiplied by one factor per channel."""
+        return NoiseModel(
+            shot=tuple(s * f for s, f in zip(self.shot, factors, strict=True)),
+            read_variance=tuple(v * f for v, f in zip(self.read_variance, factors, strict=True)),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RadialDistortion:

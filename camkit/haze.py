@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 
-LEAST_CELL_PX: Final = 2
+LEAST_CELL_PX: Final = 4
 MOST_CELL_PX: Final = 64
-MOST_CELLS: Final = 401
+MOST_CELLS: Final = 257
 """Along a side of a kernel."""
+MOST_FIELDS: Final = 33
 MOST_LIGHT: Final = 1 + 1e-4
 LEAST_SHARE: Final = 0.01
 """Of the light in a core: the capture is divided by it."""
@@ -68,6 +69,8 @@ class Haze:
             )
         if side % 2 == 0 or not 0 < side <= MOST_CELLS:
             raise ContractError(f"haze needs an odd side of at most {MOST_CELLS} cells; got {side}")
+        if lead[0] > MOST_FIELDS:
+            raise ContractError(f"haze is known at {MOST_FIELDS} fields at most; got {lead[0]}")
         if self.cell_px % 2 or not LEAST_CELL_PX <= self.cell_px <= MOST_CELL_PX:
             raise ContractError(
                 f"cells of haze have an even side of {LEAST_CELL_PX} to {MOST_CELL_PX} px; got "

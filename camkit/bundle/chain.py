@@ -11,9 +11,10 @@ names both ends.
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Axes, Plane
 from camkit.bundle.sensor import Sensor, SpadSensor
-from camkit.bundle.stages import JoinError, Parts, Stage
+from camkit.bundle.stages import Dehaze, JoinError, Parts, Stage, Wiener
 
 CAPTURE: Final = "capture"
 """The plane that the sensor gives."""
@@ -87,6 +88,24 @@ def check_use(
             raise JoinError(
                 f"stage {number} ({stage.type}) gives {', '.join(stage.gives)}, which no stage "
                 "takes and no product names"
+            )
+
+
+def check_haze(stages: Sequence[Stage], optics: Optics | None) -> None:
+    """Refuse a bank behind which the haze of the optics would stay.
+
+    Raises:
+        JoinError: If optics have a haze and a stage wiener comes before any stage haze.
+    """
+    if optics is None or optics.type != "hazy_psf":
+        return
+    for number, stage in enumerate(stages, start=1):
+        if isinstance(stage, Dehaze):
+            return
+        if isinstance(stage, Wiener):
+            raise JoinError(
+                f"stage {number} (wiener) deconvolves with core kernels, and no stage haze before "
+                "it takes away what lies beside them"
             )
 
 

@@ -1,6 +1,7 @@
-"""Optics as their file holds them, kernels or streaks, and the kernels that both give.
+"""Optics as their files hold them, kernels or streaks, and the kernels that both give.
 
-psf.safetensors | streaks.safetensors -> FrozenOptics -> entry of the manifest, member, kernels
+psf.safetensors [+ haze.safetensors] | streaks.safetensors
+    -> FrozenOptics -> entry of the manifest, members, kernels
 """
 
 from dataclasses import dataclass
@@ -9,11 +10,13 @@ from typing import Final
 
 import numpy as np
 
-from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, StreakEntry
+from camkit.bundle.haze_file import haze_to_bytes
+from camkit.bundle.optics import HAZE, PSF, STREAKS, FrozenPsfOptics, HazyPsfOptics, StreakEntry
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_tensors
 from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
 from camkit.contracts import FrozenPsf, RadialDistortion
-from camkit.errors import BundleError
+from camkit.errors import BundleError, ContractError
+from camkit.haze import Haze
 from camkit.streaks.optics import StreakOptics
 
 PROFILES: Final = "profiles"
@@ -27,10 +30,23 @@ class FrozenOptics:
     Attributes:
         psf: Their kernels, each of sum 1.
         streaks: Core, arms and haze; None for optics that are known by kernels alone.
+        haze: What lies beside the kernels, which are a core then; None where they are all.
     """
 
     psf: FrozenPsf
     streaks: StreakOptics | None = None
+    haze: Haze | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse parts that do not belong together.
+
+        Raises:
+            ContractError: If the haze is not of the samples of the kernels, or lies beside streaks.
+        """
+        if self.haze is not None:
+            if self.streaks is not None:
+                raise ContractError("streaks have a haze of their own; leave the other out")
+            self.haze.check_beside(self.psf)
 
     @property
     def member_name(self) -> str:
@@ -44,12 +60,25 @@ class FrozenOptics:
             return self.member_name, streaks_to_bytes(self.streaks)
         return self.member_name, psf_to_bytes(self.psf)
 
-    def entry(self, object_distance_mm: float) -> FrozenPsfOptics | StreakEntry:
+    @property
+    def members(self) -> dict[str, bytes]:
+        """Give the bytes of every member by name: that of the kernels, and the haze."""
+        added = {} if self.haze is None else {HAZE: haze_to_bytes(self.haze)}
+        return dict([self.member]) | added
+
+    def entry(self, object_distance_mm: float) -> FrozenPsfOptics | HazyPsfOptics | StreakEntry:
         """Give what the manifest says of them; the distance may be inf."""
         pitch_um = self.psf.pixel_pitch_um
         focus_mm = None if np.isinf(object_distance_mm) else object_distance_mm
         if self.streaks is not None:
             return StreakEntry(pixel_pitch_um=pitch_um, object_distance_mm=focus_mm)
+        if self.haze is not None:
+            return HazyPsfOptics(
+                pixel_pitch_um=pitch_um,
+                cell_px=self.haze.cell_px,
+                symmetry=self.psf.symmetry,
+                object_distance_mm=focus_mm,
+            )
         return FrozenPsfOptics(
             pixel_pitch_um=pitch_um, symmetry=self.psf.symmetry, object_distance_mm=focus_mm
         )

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 
-from camkit.bundle.chain import CAPTURE, capture_plane, check_use, join_stages
+from camkit.bundle.chain import CAPTURE, capture_plane, check_haze, check_use, join_stages
 from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Sorted, Word
 from camkit.bundle.facts import Card, NetworkFacts
 from camkit.bundle.optics import Optics
@@ -35,11 +35,13 @@ from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
 
-FORMAT_VERSION: Final = (2, 6)
+FORMAT_VERSION: Final = (2, 7)
 FOCUS_VERSION: Final = (2, 5)
 """From here on a PSF may hold kernels of a moved sensor; others state what they always did."""
 PROFILE_VERSION: Final = (2, 6)
 """From here on optics may be a lens profile, and distortion have even powers."""
+HAZE_VERSION: Final = (2, 7)
+"""From here on optics may have a haze beside core kernels."""
 _OLDEST: Final = 1
 _S = TypeVar("_S", bound=Entry)
 NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
@@ -157,6 +159,7 @@ class Manifest(Entry):
                     f"gives {found[name].describe()}"
                 )
         check_use(self.stages, self.products, self.planes)
+        check_haze(self.stages, self.optics)
         if idle := self.networks.keys() - {getattr(stage, "role", None) for stage in self.stages}:
             raise ValueError(f"no stage uses the networks of the role {', '.join(sorted(idle))}")
         names = [case.name for case in self.golden]
@@ -220,8 +223,15 @@ class _Head(Entry, extra="ignore"):
     exported_with: dict[str, Any] = Field(default_factory=dict)
 
 
-def format_of(psf: FrozenPsf) -> str:
-    """Give the format of a bundle with such a PSF: what came later needs a newer one."""
+def format_of(psf: FrozenPsf, *, hazy: bool = False) -> str:
+    """Give the format of a bundle with such a PSF: what came later needs a newer one.
+
+    Args:
+        psf: Of its optics.
+        hazy: Whether a haze lies beside it.
+    """
+    if hazy:
+        return ".".join(map(str, HAZE_VERSION))
     if psf.distortion.even_coefficients is not None:
         return ".".join(map(str, PROFILE_VERSION))
     if psf.focus_um is None:

@@ -1,6 +1,7 @@
 """What the light goes through, as a bundle states it: a tagged union.
 
 Optics = FrozenPsfOptics    kernels, psf.safetensors        (psf_file.py)
+       | HazyPsfOptics      core kernels, psf.safetensors, and haze, haze.safetensors (haze_file.py)
        | StreakEntry        core, arms and haze, streaks.safetensors    (streak_file.py)
        | LensProfile        distortion and illumination alone, in the manifest
 """
@@ -14,9 +15,11 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from camkit.bundle.entry import Entry, NonNegative, Positive
 from camkit.contracts import RadialDistortion, RadialIllumination, Symmetry
 from camkit.errors import ContractError
+from camkit.haze import LEAST_CELL_PX, MOST_CELL_PX
 
 PSF: Final = "psf.safetensors"
 STREAKS: Final = "streaks.safetensors"
+HAZE: Final = "haze.safetensors"
 
 
 class FrozenPsfOptics(Entry):
@@ -33,6 +36,27 @@ class FrozenPsfOptics(Entry):
     type: Literal["frozen_psf"] = "frozen_psf"
     member: Literal["psf.safetensors"] = PSF
     pixel_pitch_um: Positive
+    symmetry: Symmetry = "radial"
+    object_distance_mm: Positive | None = None
+
+
+class HazyPsfOptics(Entry):
+    """Optics whose light falls into a narrow core and a wide haze (format 2.7).
+
+    Attributes:
+        member: The file of the core kernels.
+        haze_member: The file of the haze; see camkit/bundle/haze_file.py.
+        pixel_pitch_um: Pitch of the core kernels' samples.
+        cell_px: Side of the cells of the haze, in these samples.
+        symmetry: Of both; see `FrozenPsfOptics`.
+        object_distance_mm: Distance of focus; None for infinity.
+    """
+
+    type: Literal["hazy_psf"] = "hazy_psf"
+    member: Literal["psf.safetensors"] = PSF
+    haze_member: Literal["haze.safetensors"] = HAZE
+    pixel_pitch_um: Positive
+    cell_px: Annotated[int, Field(ge=LEAST_CELL_PX, le=MOST_CELL_PX, multiple_of=2)]
     symmetry: Symmetry = "radial"
     object_distance_mm: Positive | None = None
 
@@ -143,6 +167,7 @@ def _type_of(value: Any) -> Any:
 
 Optics = Annotated[
     Annotated[FrozenPsfOptics, Tag("frozen_psf")]
+    | Annotated[HazyPsfOptics, Tag("hazy_psf")]
     | Annotated[StreakEntry, Tag("streaks")]
     | Annotated[LensProfile, Tag("lens_profile")],
     Discriminator(_type_of),

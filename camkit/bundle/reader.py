@@ -12,7 +12,7 @@ import importlib.resources
 import math
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -24,11 +24,27 @@ from camkit.bundle.container import (
 )
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, optics_from_bytes
-from camkit.bundle.manifest import FOCUS_VERSION, PROFILE_VERSION, Manifest, read_manifest
-from camkit.bundle.optics import PSF, STREAKS, FrozenPsfOptics, LensProfile, StreakEntry
+from camkit.bundle.haze_file import haze_from_bytes
+from camkit.bundle.manifest import (
+    FOCUS_VERSION,
+    HAZE_VERSION,
+    PROFILE_VERSION,
+    Manifest,
+    read_manifest,
+)
+from camkit.bundle.optics import (
+    HAZE,
+    PSF,
+    STREAKS,
+    FrozenPsfOptics,
+    HazyPsfOptics,
+    LensProfile,
+    StreakEntry,
+)
 from camkit.bundle.psf_file import psf_from_bytes
 from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
-from camkit.errors import BundleError
+from camkit.errors import BundleError, ContractError
+from camkit.haze import Haze
 from camkit.streaks.optics import StreakOptics
 
 SUFFIX: Final = ".camkit"
@@ -114,6 +130,17 @@ class Bundle:
         if self._optics is None or self._optics.streaks is None:
             raise BundleError(f"{self.path.name} has no {STREAKS}")
         return self._optics.streaks
+
+    @property
+    def haze(self) -> Haze:
+        """What its optics write far from a light.
+
+        Raises:
+            BundleError: If their kernels hold all.
+        """
+        if self._optics is None or self._optics.haze is None:
+            raise BundleError(f"{self.path.name} has no {HAZE}")
+        return self._optics.haze
 
     @property
     def reference_depth_mm(self) -> float:
@@ -214,8 +241,9 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
 def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
     """Read the optics; those of a bundle without any are refused."""
     stated = manifest.optics
-    for name in (PSF, STREAKS):
-        if name in manifest.members and name != getattr(stated, "member", None):
+    own = {getattr(stated, "member", None), getattr(stated, "haze_member", None)}
+    for name in (PSF, STREAKS, HAZE):
+        if name in manifest.members and name not in own:
             such = "no" if stated is None else "no such"
             raise BundleError(f"the bundle holds {name}, and its manifest states {such} optics")
     if stated is None:
@@ -240,7 +268,23 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
     if optics.psf.distortion.even_coefficients is not None:
         what = f"{stated.member} holds even powers of distortion"
         _need_version(manifest, PROFILE_VERSION, what)
-    return optics
+    return optics if not isinstance(stated, HazyPsfOptics) else _hazy(container, manifest, optics)
+
+
+def _hazy(container: Container, manifest: Manifest, optics: FrozenOptics) -> FrozenOptics:
+    """Add the haze to optics whose manifest states one."""
+    stated = manifest.optics
+    assert isinstance(stated, HazyPsfOptics)
+    _need_version(manifest, HAZE_VERSION, "the optics have a haze")
+    haze = haze_from_bytes(container.read(HAZE), what=HAZE)
+    if haze.cell_px != stated.cell_px:
+        raise BundleError(
+            f"{HAZE} has cells of {haze.cell_px} px, the manifest says {stated.cell_px}"
+        )
+    try:
+        return replace(optics, haze=haze)
+    except ContractError as error:
+        raise BundleError(f"{HAZE} is refused: {error}") from error
 
 
 def _need_version(manifest: Manifest, needed: tuple[int, int], what: str) -> None:
@@ -290,6 +334,8 @@ def _check_references(manifest: Manifest) -> None:
                 needed[facts.fp16_member] = f"network {size} ({role}) in fp16"
     if manifest.optics is not None and not isinstance(manifest.optics, LensProfile):
         needed[manifest.optics.member] = "the optics"
+    if isinstance(manifest.optics, HazyPsfOptics):
+        needed[manifest.optics.haze_member] = "the haze of the optics"
     if manifest.golden:
         needed[GOLDEN] = "the golden cases"
     if PLATE_HEIGHTS in manifest.members:
@@ -313,7 +359,9 @@ def _check_member(container: Container, name: str, size: int, sha256: str) -> No
         )
 
 
-def _check_psf(psf: FrozenPsf, stated: FrozenPsfOptics | StreakEntry, channels: int) -> None:
+def _check_psf(
+    psf: FrozenPsf, stated: FrozenPsfOptics | HazyPsfOptics | StreakEntry, channels: int
+) -> None:
     """Hold the PSF against what the manifest says of it."""
     if abs(psf.pixel_pitch_um - stated.pixel_pitch_um) > _PITCH_RTOL * stated.pixel_pitch_um:
         raise BundleError(

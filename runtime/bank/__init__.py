@@ -1,6 +1,9 @@
 """The bank: pictures restored block by block, each with the PSF of its own place.
 
 psf               frozen PSF -> one kernel per colour, field height and azimuth
+cell_means        a capture in coarse cells
+place_blur        blur that varies from cell to cell, as few convolutions
+haze              the coarse band: the scene in cells, and the capture cleared by it
 blocks            the grid of overlapping windowed blocks, and the sum of them
 spectrum          Fourier transforms of blocks
 wiener            the Wiener filter of one block

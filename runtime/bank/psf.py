@@ -143,6 +143,7 @@ def color_kernels(
     *,
     depth_mm: float | None = None,
     focus_um: float = 0.0,
+    share: FloatGrid | None = None,
 ) -> FieldKernels:
     """Weight the wavelength kernels into one kernel per field and channel.
 
@@ -155,12 +156,15 @@ def color_kernels(
         response: (channel, n) response of the channels.
         depth_mm: Object distance, see `depth_weights`; None for the mean kernel over the depths.
         focus_um: How far the sensor lies from its nominal place, see `focus_weights`.
+        share: (field, depth, wavelength): of the light that is in every kernel; None for all.
 
     Raises:
         ContractError: If the PSF does not reach depth or focus, or the response does not fit.
     """
     weights = wavelength_weights(psf.wavelengths_um, wavelengths_um, response)
-    at_depth = _at_depth(_in_focus(psf, focus_um), depth_weights(psf.depths_mm, depth_mm))
+    lit = _in_focus(psf, focus_um)
+    lit = lit if share is None else lit * share[..., None, None]
+    at_depth = _at_depth(lit, depth_weights(psf.depths_mm, depth_mm))
     mixed = np.tensordot(at_depth, weights, axes=([1], [1]))
     mixed = np.moveaxis(mixed, -1, 1)
     if psf.symmetry == "radial":

@@ -3,7 +3,7 @@
 a source (rows of any place, made when asked for)    or    bands (from top to bottom, once)
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from camkit.bundle.plane import Plane
@@ -26,6 +26,8 @@ class Stream:
         source: Rows that may be read from any row on; None for bands.
         made: Bands from top to bottom, each an array that nobody else reads; None for a source.
         owned: Whether what the source reads is the reader's own to change.
+        noise_rise: Gives what the variance of the noise of every channel was multiplied by besides,
+            on average; to be asked when the first row is, as `Job.probe`. None for nothing.
     """
 
     plane: Plane
@@ -34,6 +36,7 @@ class Stream:
     source: RowSource | None = None
     made: Iterator[Rows] | None = None
     owned: bool = True
+    noise_rise: Callable[[], tuple[float, ...]] | None = None
 
     def __post_init__(self) -> None:
         if (self.source is None) == (self.made is None):

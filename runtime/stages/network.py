@@ -212,9 +212,8 @@ class _NetworkStage:
         """Share the channels of the bands among the planes that the stage gives."""
         entry, planes = self._entry, self._job.known_bundle.manifest.planes
         height, width = (side * self._scale() for side in last.shape[1:])
-        made = replace(
-            last, shape=(sum(channels), height, width), made=bands, source=None, owned=True
-        )
+        shape = sum(channels), height, width
+        made = replace(last.with_bands(bands), shape=shape, noise_rise=None)
         if len(channels) == 1:
             return (replace(made, plane=planes[entry.gives[0]]),)
         starts = np.cumsum([0, *channels])

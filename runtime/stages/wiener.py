@@ -1,6 +1,7 @@
 """The Wiener bank, or a classical method on its blocks."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -31,6 +32,7 @@ from camkit.runtime.plan.blocks import plain_blocks
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tuning import Tuning, stated_numbers
+from camkit.runtime.rows import Rows
 from camkit.runtime.unit import FOCUS
 
 METHODS: Final = ("wiener", "rl", "admm-tv")
@@ -92,11 +94,7 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         job.record[FOCUS] = job.options.focus_um
 
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        planes, mask = taken[0], taken[1] if len(taken) > 1 else None
-        bank = make_bank(entry, job, planes)
-        unknown = None if mask is None else mask.rows().read
-        bands = bank.restore_bands(planes.rows(), unknown, _plain(job), job.cancel)
-        return (planes.with_bands(bands),)
+        return (replace(taken[0].with_bands(_restored(entry, job, taken)), noise_rise=None),)
 
     size_px = job.capture.width, job.capture.height
     block_px = cut_block_px(entry.block_px, entry.overlap_px, size_px)
@@ -107,6 +105,14 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         block_bytes(block_px, len(bundle.manifest.sensor.channels), threads=threads),
     )
     return StageWork(run=run, held_bytes=held)
+
+
+def _restored(entry: Wiener, job: Job, taken: Sequence[Stream]) -> Iterator[Rows]:
+    """Yield the restored bands; makes the bank when the first is asked for."""
+    planes, mask = taken[0], taken[1] if len(taken) > 1 else None
+    bank = make_bank(entry, job, planes)
+    unknown = None if mask is None else mask.rows().read
+    yield from bank.restore_bands(planes.rows(), unknown, _plain(job), job.cancel)
 
 
 def tuning(entry: Wiener, method: str) -> Tuning:
@@ -138,17 +144,21 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
+    hazy = bundle.manifest.optics is not None and bundle.manifest.optics.type == "hazy_psf"
     kernels = color_kernels(
         bundle.psf,
         *sensor.response_arrays(),
         depth_mm=job.options.depth_mm,
         focus_um=job.options.focus_um,
+        share=bundle.haze.core_share if hazy else None,
     )
     local = LocalPsf(
         kernels=kernels.scaled(job.placement.kernel_scale), window=job.window_of(planes.plane)
     )
     method = job.work.method if job.work.method in METHODS else METHODS[0]
     noise = job.noise.with_gains(planes.gains)
+    if planes.noise_rise is not None:
+        noise = noise.raised(planes.noise_rise())
     side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)
     cut = entry.model_copy(update={"block_px": max(side, *local.kernels.kernels.shape[-2:])})
     return restoration_bank(local, cut, noise, method=method, threads=job.threads)

@@ -33,8 +33,8 @@ REFUSED: dict[str, tuple[Callable[[Haze], Haze], str]] = {
     "no square": (lambda h: replace(h, kernels=h.kernels[..., 1:].copy()), "must be float32"),
     "an even side": (lambda h: replace(h, kernels=h.kernels[..., 1:, 1:].copy()), "odd side"),
     "too wide": (
-        lambda h: replace(h, kernels=np.zeros((2, 1, 3, 403, 403), np.float32)),
-        "at most 401",
+        lambda h: replace(h, kernels=np.zeros((2, 1, 3, 259, 259), np.float32)),
+        "at most 257",
     ),
     "fields": (lambda h: replace(h, field_heights_mm=np.zeros(3)), "must be float32"),
     "odd cells": (lambda h: replace(h, cell_px=7), "even side"),

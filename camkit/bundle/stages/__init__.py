@@ -4,7 +4,7 @@ A stage names the planes that it takes and gives, and says by `join` what it mak
 does stands in the module of the same name in `camkit.runtime.stages`.
 
 linearise, repair, white_balance, demosaic    the front
-wiener, highlights, deglare, network          the restoration
+haze, wiener, highlights, deglare, network    the restoration
 raise_clipped, illumination, undistort, color what every picture needs behind it
 correct, super_resolve, sharpen               single photons
 """
@@ -18,6 +18,7 @@ from camkit.bundle.stages.correct import Correct
 from camkit.bundle.stages.deglare import Deglare
 from camkit.bundle.stages.demosaic import Demosaic
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry
+from camkit.bundle.stages.haze import Dehaze
 from camkit.bundle.stages.highlights import Highlights
 from camkit.bundle.stages.illumination import Illumination
 from camkit.bundle.stages.linearise import Linearise
@@ -35,6 +36,7 @@ __all__ = [
     "Color",
     "Correct",
     "Deglare",
+    "Dehaze",
     "Demosaic",
     "Highlights",
     "Illumination",
@@ -61,6 +63,7 @@ Stage = Annotated[
     | Demosaic
     | Highlights
     | Deglare
+    | Dehaze
     | Wiener
     | Network
     | RaiseClipped

@@ -19,6 +19,7 @@ from camkit.bundle.sensor import RGB
 from camkit.bundle.stages import (
     Color,
     Deglare,
+    Dehaze,
     Demosaic,
     Highlights,
     Illumination,
@@ -38,11 +39,14 @@ from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
+from camkit.runtime.bank.cell_means import cell_means
+from camkit.runtime.bank.haze import CoarseBand, hazy_kernels, solve_coarse
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.capture import Capture
 from camkit.runtime.color import color_stage, recover_highlights, to_output
 from camkit.runtime.geometry.illumination import divide_illumination
 from camkit.runtime.geometry.placement import place
+from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import undistort_bands
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
@@ -57,7 +61,9 @@ from camkit.streaks.glare.removal import GlareSettings, find_glare
 from camkit.streaks.kernels import streak_kernels
 from camkit.streaks.painting import Painter
 from camkit.streaks.recovery import recover
-from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, tiny_stages
+from tests.haze_bundle import hazy_optics, hazy_stages
+from tests.haze_factory import CELL_PX
 from tests.streak_factory import small_streaks
 
 GAINS = (1.7, 1.0, 1.4)
@@ -68,6 +74,7 @@ POOL: tuple[Callable[..., Stage], ...] = (
     WhiteBalance,
     Demosaic,
     lambda **wiring: Wiener(**BANK, **wiring),
+    lambda **wiring: Dehaze(shrink=CELL_PX, terms=8, rounds=2, **wiring),
     Highlights,
     Deglare,
     Network,
@@ -77,11 +84,17 @@ POOL: tuple[Callable[..., Stage], ...] = (
 )
 
 
+def _tiny(optics: FrozenOptics) -> Manifest:
+    """Give a manifest of all stages before some optics."""
+    stages = hazy_stages(network=True) if optics.haze is not None else tiny_stages()
+    return tiny_manifest(optics=optics.entry(np.inf), stages=stages)
+
+
 class _Drawn:
     """A list of stages that joins, grown stage by stage."""
 
     def __init__(self, optics: FrozenOptics) -> None:
-        manifest = tiny_manifest(optics=optics.entry(np.inf))
+        manifest = _tiny(optics)
         self.parts: Parts = manifest.parts
         self.stages: list[Stage] = []
         self.planes: dict[str, Plane] = {CAPTURE: capture_plane(manifest.sensor)}
@@ -91,8 +104,16 @@ class _Drawn:
     def tried(self, make: Callable[..., Stage]) -> Stage | None:
         """Give the stage wired to what there is, None if it does not join."""
         kind = make(takes=("x",), gives=("y",))
-        if isinstance(kind, Deglare) and any(isinstance(s, Deglare) for s in self.stages):
-            return None  # a runtime takes one: each reads twice what lies before it
+        for once in (Deglare, Dehaze):
+            if isinstance(kind, once) and any(isinstance(s, once) for s in self.stages):
+                return None  # a runtime takes one: each reads twice what lies before it
+        hazy = self.parts.optics is not None and self.parts.optics.type == "hazy_psf"
+        if (
+            isinstance(kind, Wiener)
+            and hazy
+            and not any(isinstance(s, Dehaze) for s in self.stages)
+        ):
+            return None  # a bundle is refused whose bank leaves the haze
         number = len(self.stages)
         takes = [self.main]
         gives = [f"p{number}"]
@@ -100,7 +121,7 @@ class _Drawn:
             takes = [self.before or self.main, self.main]
         elif isinstance(kind, Linearise):
             gives.append(f"m{number}")
-        elif isinstance(kind, Repair | Wiener) and self.mask:
+        elif isinstance(kind, Repair | Wiener | Dehaze) and self.mask:
             takes.append(self.mask)
             if isinstance(kind, Repair):
                 gives.append(f"m{number}")
@@ -145,9 +166,9 @@ def lists(draw: st.DrawFn, optics: FrozenOptics) -> tuple[Stage, ...]:
 
 
 def _bundle(stages: tuple[Stage, ...], optics: FrozenOptics, folder: Path) -> Bundle:
-    tiny, members = tiny_manifest(optics=optics.entry(np.inf)), tiny_members()
+    tiny, members = _tiny(optics), tiny_members()
     del members[PSF]
-    members |= [optics.member]
+    members |= optics.members
     has_network = any(isinstance(stage, Network) for stage in stages)
     networks = tiny.networks if has_network else {}
     if not has_network:
@@ -157,6 +178,7 @@ def _bundle(stages: tuple[Stage, ...], optics: FrozenOptics, folder: Path) -> Bu
     manifest = Manifest.model_validate(
         {
             **dict(tiny),
+            "format_version": "2.7",
             "stages": stages,
             "planes": planes_of(stages, parts),
             "products": {"image": stages[-1].gives[0]},
@@ -180,6 +202,7 @@ def _slowly(  # noqa: C901, PLR0912 - one arm for each stage
     noise = sensor.noise_at(ISO)
     held: dict[str, np.ndarray] = {}
     gains: dict[str, tuple[float, float, float]] = {CAPTURE: (1.0, 1.0, 1.0)}
+    rises: dict[str, tuple[float, ...]] = {}
     looked_at: list[np.ndarray] = []  # the samples before any gain, mended where they are
     for stage in stages:
         taken = [held[name] for name in stage.takes if name != CAPTURE]
@@ -202,10 +225,16 @@ def _slowly(  # noqa: C901, PLR0912 - one arm for each stage
             case Demosaic():
                 made = [demosaic(taken[0], sensor.cfa, stage.method)]
             case Wiener():
+                hazy = any(isinstance(before, Dehaze) for before in stages)
+                cores = bundle.haze.core_share if hazy else None
                 local = LocalPsf(
-                    kernels=color_kernels(psf, *sensor.response_arrays()), window=window
+                    kernels=color_kernels(psf, *sensor.response_arrays(), share=cores),
+                    window=window,
                 )
-                bank = restoration_bank(local, stage, noise.with_gains(gain))
+                raised = noise.with_gains(gain)
+                if stage.takes[0] in rises:
+                    raised = raised.raised(rises[stage.takes[0]])
+                bank = restoration_bank(local, stage, raised)
                 made = [bank.restore_array(taken[0], *taken[1:])]
             case Network():
                 both = [
@@ -215,6 +244,13 @@ def _slowly(  # noqa: C901, PLR0912 - one arm for each stage
                 engine = NetworkEngine(bundle.network_bytes("restore", "M"), threads=1)
                 stable = engine.run(np.concatenate(both)[None])[0]
                 made = [unstabilise(stable, noise.with_gains(gain), scale=stage.scale)]
+            case Dehaze():
+                summed = _summed(stage, stages)
+                mask = held[stage.takes[1]] if len(stage.takes) > 1 else None
+                band = _coarse(held[summed], mask, bundle, window, stage)
+                made = [taken[0].copy()]
+                band.clear(made[0], 0)
+                rises |= dict.fromkeys(stage.gives, band.noise_rise)
             case Highlights():
                 made = [_lit(taken[0], gain, looked_at, bundle)]
             case Deglare():
@@ -230,9 +266,39 @@ def _slowly(  # noqa: C901, PLR0912 - one arm for each stage
                 made = [to_output(taken[0], color_stage(matrix))]
         if len(made) == 2 and gain == gains[CAPTURE]:
             looked_at = made
+        if stage.takes[0] in rises and not isinstance(stage, Wiener | Network):
+            rises |= dict.fromkeys(stage.gives, rises[stage.takes[0]])
         held |= dict(zip(stage.gives, made, strict=True))
         gains |= dict.fromkeys(stage.gives, gain)
     return held[stages[-1].gives[0]]
+
+
+def _summed(stage: Dehaze, stages: tuple[Stage, ...]) -> str:
+    """Name the plane that cells are summed of: the mosaic, where it was demosaicked alone."""
+    (giver,) = [before for before in stages if stage.takes[0] in before.gives]
+    return giver.takes[0] if isinstance(giver, Demosaic) else stage.takes[0]
+
+
+def _coarse(
+    seen: np.ndarray,
+    mask: np.ndarray | None,
+    bundle: Bundle,
+    window: SensorWindow,
+    stage: Dehaze,
+) -> CoarseBand:
+    """Find the scene in cells of a whole picture."""
+    sensor = bundle.manifest.sensor
+    assert sensor.type == "bayer"
+    rows, over = (
+        None if planes is None else ArrayRows(planes if planes.ndim == 3 else planes[None])
+        for planes in (seen, mask)
+    )
+    assert rows is not None
+    cfa = sensor.cfa if seen.ndim == 2 else None
+    cells, clipped = cell_means(rows, over, cfa, stage.shrink)
+    kernels = hazy_kernels(bundle.psf, bundle.haze, *sensor.response_arrays())
+    chosen = {"terms": stage.terms, "rounds": stage.rounds}
+    return solve_coarse(cells, clipped, kernels, window, **chosen)
 
 
 def _lit(
@@ -267,6 +333,7 @@ def _cleared(planes: FloatArray, gain: tuple[float, float, float], stage: Deglar
 
 OPTICS = {
     "kernels": FrozenOptics(psf=tiny_psf()),
+    "haze": hazy_optics(),
     "streaks": FrozenOptics(psf=psf_of_streaks(small_streaks(), 3), streaks=small_streaks()),
 }
 
@@ -301,10 +368,10 @@ def test_the_listed_stages_run_in_their_order_and_nothing_else_does(
     idle = Undistort if optics.streaks is not None else ()
     wanted = [stage.type for stage in stages if not isinstance(stage, idle)]
     assert ran[: len(wanted)] == wanted
-    # highlights and deglare look at what lies before them
+    # haze, highlights and deglare look at what lies before them
     looked_at: set[str] = set()
     for number, stage in enumerate(stages):
-        if isinstance(stage, Highlights | Deglare):
+        if isinstance(stage, Highlights | Deglare | Dehaze):
             looked_at |= {before.type for before in stages[:number]}
     assert set(ran[len(wanted) :]) <= looked_at
     expected = _slowly(stages, bundle, work.capture)

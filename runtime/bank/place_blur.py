@@ -1,0 +1,244 @@
+"""Blur whose kernel differs from cell to cell of a coarse picture, as few plain convolutions.
+
+    kernels of nodes (rings and azimuths, or a grid) -> few kernels b_k and weights of the nodes
+    H x = sum over k of b_k * (a_k x),  a_k interpolated between the nodes, in every cell
+
+The few kernels are the leading directions of the nodes' kernels. Errors are weighed in cells and in
+squares of 2, 4, 8, ... cells, since pictures are mostly smooth: what a kernel must keep is where
+its light goes, not the value of every cell.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.runtime.bank.psf import FieldKernels
+from camkit.runtime.geometry.sensor_window import SensorWindow
+
+AZIMUTHS: Final = 32
+"""Nodes on a ring; more changed nothing (docs/decisions: the haze is undone in cells)."""
+DOUBLINGS: Final = 5
+"""Of single cells to squares of 32."""
+
+FloatGrid = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nodes:
+    """Places at which kernels are known, and how every cell lies between them.
+
+    Attributes:
+        places_mm: (node, 2): x, y from the axis.
+        near: (h, w, m): the nodes that a cell lies between.
+        share: (h, w, m) float32: of each; they sum to 1.
+    """
+
+    places_mm: FloatGrid
+    near: NDArray[np.intp]
+    share: FloatArray
+
+
+def lay_nodes(kernels: FieldKernels, window: SensorWindow) -> Nodes:
+    """Lay nodes where the kernels of optics are stored, on every azimuth where they turn.
+
+    Args:
+        kernels: Their places and symmetry.
+        window: Of the cells on the sensor.
+    """
+    width, height = window.size_px
+    x_mm, y_mm = window.to_mm(np.arange(width)[None, :], np.arange(height)[:, None])
+    if kernels.grid_x_mm is not None and kernels.grid_y_mm is not None:
+        columns, rows = kernels.grid_x_mm, kernels.grid_y_mm
+        low, up = _between(rows, np.broadcast_to(y_mm, (height, width)))
+        left, right = _between(columns, np.broadcast_to(x_mm, (height, width)))
+        places = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        return _crossed(places, (low, up), (left, right), lambda r, c: r * columns.size + c)
+    if not kernels.turns:
+        single = np.zeros((height, width, 1))
+        return Nodes(
+            places_mm=np.zeros((1, 2)),
+            near=single.astype(np.intp),
+            share=np.ones_like(single, np.float32),
+        )
+    heights = kernels.field_heights_mm
+    turn = np.arctan2(x_mm, y_mm) / (2 * np.pi) % 1 * AZIMUTHS
+    first = np.floor(turn).astype(np.intp)
+    azimuth = (first, turn - first)
+    angle = 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+    outward = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    rings = [outward * height_mm for height_mm in heights[1:]]
+    return _crossed(
+        np.concatenate([np.zeros((1, 2)), *rings]),
+        _between(heights, np.hypot(x_mm, y_mm)),
+        azimuth,
+        lambda ring, at: np.where(ring == 0, 0, 1 + (ring - 1) * AZIMUTHS + at % AZIMUTHS),
+    )
+
+
+def _between(knots_mm: FloatGrid, at_mm: FloatGrid) -> tuple[NDArray[np.intp], FloatGrid]:
+    """Give the knot below places, and the share of the one above; the ends hold beyond them."""
+    if knots_mm.size == 1:
+        return np.zeros(at_mm.shape, np.intp), np.zeros(at_mm.shape)
+    low = np.clip(np.searchsorted(knots_mm, at_mm, "right") - 1, 0, knots_mm.size - 2)
+    share = (at_mm - knots_mm[low]) / (knots_mm[low + 1] - knots_mm[low])
+    return low, np.clip(share, 0.0, 1.0)
+
+
+_Axis = tuple[NDArray[np.intp], FloatGrid]
+
+
+def _crossed(
+    places_mm: FloatGrid,
+    down: _Axis,
+    across: _Axis,
+    number: Callable[[NDArray[np.intp], NDArray[np.intp]], NDArray[np.intp]],
+) -> Nodes:
+    """Give the four nodes about every cell, of which `number` tells which they are."""
+    (row, lower), (column, right) = down, across
+    near, share = [], []
+    for step, of_row in ((0, 1 - lower), (1, lower)):
+        for stride, of_column in ((0, 1 - right), (1, right)):
+            weight = of_row * of_column
+            node = np.where(weight > 0, number(row + step, column + stride), 0)
+            near.append(node)
+            share.append(weight)
+    return Nodes(
+        places_mm=places_mm,
+        near=np.stack(near, axis=-1),
+        share=np.stack(share, axis=-1).astype(np.float32),
+    )
+
+
+class NodeKernels:
+    """The kernels of nodes, with the light that each holds; immutable."""
+
+    def __init__(self, kernels: FieldKernels, light: FloatGrid, nodes: Nodes) -> None:
+        """Turn the kernels of one quadrant; the others mirror them.
+
+        Args:
+            kernels: Of sum 1, (field, c, n, n).
+            light: (field, c): what they hold.
+            nodes: Of these kernels, by `lay_nodes`.
+        """
+        fields = np.arange(len(nodes.places_mm))
+        if kernels.turns:
+            fields = (fields + AZIMUTHS - 1) // AZIMUTHS
+        self._light = light[fields]
+        self._turns = kernels.turns
+        self._places_mm = nodes.places_mm
+        self._made: dict[tuple[float, float], FloatArray] = {}
+        for place in nodes.places_mm:
+            key = self._key(place)
+            if key not in self._made:
+                self._made[key] = kernels.at(*key)
+
+    def of(self, channel: int) -> FloatArray:
+        """Give the kernels (node, n, n) of a channel."""
+        found = []
+        for place, light in zip(self._places_mm, self._light, strict=True):
+            kernel = self._made[self._key(place)][channel]
+            if self._turns:
+                kernel = kernel[:: -1 if place[1] < 0 else 1, :: -1 if place[0] < 0 else 1]
+            found.append(kernel * np.float32(light[channel]))
+        return np.stack(found)
+
+    def _key(self, place_mm: FloatGrid) -> tuple[float, float]:
+        """Give the place, or of turned kernels that which mirrors it."""
+        x, y = (round(float(along), 9) for along in place_mm)
+        return (abs(x), abs(y)) if self._turns else (x, y)
+
+
+class PlaceBlur:
+    """The blur of one colour of a coarse picture; immutable."""
+
+    def __init__(self, kernels: FloatArray, nodes: Nodes, *, terms: int) -> None:
+        """Find the few kernels.
+
+        Args:
+            kernels: (node, n, n), n odd.
+            nodes: Whose kernels they are.
+            terms: How many kernels stand for them; with fewer nodes each stands for itself.
+
+        Raises:
+            ContractError: If there is not one kernel for each node.
+        """
+        if kernels.ndim != 3 or len(kernels) != len(nodes.places_mm):
+            raise ContractError(
+                f"{len(nodes.places_mm)} nodes need a kernel each; got {kernels.shape}"
+            )
+        few, weights = _few(kernels, terms)
+        height, width = nodes.near.shape[:2]
+        self._size = height, width
+        between = np.zeros((height, width, len(few)), np.float32)
+        for near, share in zip(
+            np.moveaxis(nodes.near, -1, 0), np.moveaxis(nodes.share, -1, 0), strict=True
+        ):
+            between += share[..., None] * weights.take(near, axis=0)
+        self._weights = np.ascontiguousarray(np.moveaxis(between, -1, 0))
+        half = kernels.shape[-1] // 2
+        # what comes round from the other side falls beside the picture
+        self._full = tuple(scipy.fft.next_fast_len(side + half, real=True) for side in self._size)
+        self._spectra = np.stack([self._spectrum(kernel) for kernel in few])
+
+    def __call__(self, light: FloatArray) -> FloatArray:
+        """Give the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
+        total = np.zeros(self._spectra.shape[1:], np.complex64)
+        for weight, spectrum in zip(self._weights, self._spectra, strict=True):
+            lit = scipy.fft.rfft2(weight * light, self._full)
+            lit *= spectrum
+            total += lit
+        return self._inverse(total)
+
+    def solver(self, damping: float) -> Callable[[FloatArray], FloatArray]:
+        """Give what nearly undoes the blur: the Wiener filter of its mean kernel.
+
+        Args:
+            damping: Added to the kernel's power.
+        """
+        share = self._weights.mean(axis=(1, 2), dtype=np.float64).astype(np.float32)
+        mean = np.tensordot(share, self._spectra, axes=1)
+        gain = np.conj(mean) / (np.square(np.abs(mean)) + np.float32(damping))
+        return lambda picture: self._inverse(scipy.fft.rfft2(picture, self._full) * gain)
+
+    def _inverse(self, spectrum: NDArray[np.complex64]) -> FloatArray:
+        height, width = self._size
+        made = scipy.fft.irfft2(spectrum, self._full)[:height, :width]
+        return np.ascontiguousarray(made, np.float32)
+
+    def _spectrum(self, kernel: FloatArray) -> NDArray[np.complex64]:
+        rows, columns = self._full
+        place = np.arange(kernel.shape[-1]) - kernel.shape[-1] // 2
+        laid = np.zeros(self._full, np.float32)
+        np.add.at(laid, (place[:, None] % rows, place % columns), kernel)
+        return np.asarray(scipy.fft.rfft2(laid), np.complex64)
+
+
+def _few(kernels: FloatArray, terms: int) -> tuple[FloatArray, FloatArray]:
+    """Give kernels (term, n, n) and weights (node, term) whose products are nearly the kernels."""
+    count = len(kernels)
+    if count <= terms:
+        return kernels, np.eye(count, dtype=np.float32)
+    products = _products(kernels)
+    squares = kernels
+    for _ in range(DOUBLINGS):
+        if squares.shape[-1] < 2:
+            break
+        inside = squares[:, : squares.shape[1] // 2 * 2, : squares.shape[2] // 2 * 2]
+        rows = inside[:, ::2] + inside[:, 1::2]
+        squares = rows[..., ::2] + rows[..., 1::2]
+        products += _products(squares)
+    _, directions = np.linalg.eigh(products)
+    weights = np.ascontiguousarray(directions[:, : -terms - 1 : -1], np.float32)
+    few = np.tensordot(weights.T, kernels, axes=1)
+    return np.asarray(few, np.float32), weights
+
+
+def _products(kernels: FloatArray) -> FloatGrid:
+    flat = kernels.reshape(len(kernels), -1)
+    return np.asarray(flat @ flat.T, np.float64)

@@ -1,0 +1,120 @@
+"""The scene in coarse cells found before the first row; the haze taken out of rows as they pass."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Final
+
+from camkit.bundle.manifest import Manifest
+from camkit.bundle.stages import Dehaze, Demosaic
+from camkit.errors import BundleError
+from camkit.runtime.bank.cell_means import cell_means
+from camkit.runtime.bank.haze import (
+    CoarseBand,
+    coarse_work,
+    hazy_kernels,
+    solve_coarse,
+    solving_bytes,
+)
+from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.job.job import Job
+from camkit.runtime.job.stage_work import StageWork
+from camkit.runtime.job.stream import Stream
+from camkit.runtime.machine.limits import BANK_WORK
+from camkit.runtime.plan.decision import Subject, Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import Rows
+
+METHODS: Final = ("haze",)
+OPTIONS: Final = ("depth_m",)
+BYTES_PER_COLUMN: Final = 6_000
+"""Of rows on their way."""
+REST_SHARE: Final = 0.4
+"""What lies before it is read once more, and a gain and a veil are put on every pixel."""
+SOLVED_MP: Final = 3.0
+"""The kernels of all places and the rounds take as long as the rest of so many megapixels."""
+
+
+def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:
+    """Refuse several, and cells that take more work than is admitted.
+
+    Raises:
+        BundleError: If the bundle lists two, or every pixel would be transformed too often.
+    """
+    count = len(manifest.stages_of(Dehaze))
+    if count > 1:
+        raise BundleError(f"a bundle has one stage haze at most; {manifest.name} has {count}")
+    work = coarse_work(entry, len(manifest.sensor.channels))
+    BANK_WORK.check(work, f"the haze of {manifest.name}")
+
+
+def prepare(entry: Dehaze, job: Job) -> StageWork:
+    """Say what the coarse picture takes."""
+
+    def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
+        picture = taken[0]
+
+        @cache
+        def band() -> CoarseBand:
+            return coarse_band(entry, picture, job)
+
+        cleared = picture.with_bands(_cleared(picture, band))
+        return (replace(cleared, noise_rise=lambda: band().noise_rise),)
+
+    capture = job.capture
+    size_px = capture.width, capture.height
+    return StageWork(
+        run=run,
+        held_bytes=BYTES_PER_COLUMN * capture.width,
+        first_bytes=solving_bytes(entry, job.known_bundle.haze, capture.channels, size_px),
+    )
+
+
+def seconds(_entry: Dehaze, subject: Subject, _work: Work, speed: Speed) -> float:
+    """Give the seconds that it will take."""
+    return (REST_SHARE * subject.megapixels + SOLVED_MP) * speed.rest_s_per_mp
+
+
+def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
+    """Find the scene in cells.
+
+    Args:
+        entry: The manifest's stage.
+        picture: What it clears.
+        job: The capture; what lies before the stage is read once.
+    """
+    bundle = job.known_bundle
+    sensor = bundle.manifest.sensor
+    assert sensor.type != "spad"  # its counts never join
+    light, *mask = job.probe(_summed(entry, job), *entry.takes[1:])
+    cfa = job.capture.cfa if light.shape[0] == 1 else None
+    cells, clipped = cell_means(light, mask[0] if mask else None, cfa, entry.shrink)
+    kernels = hazy_kernels(
+        bundle.psf, bundle.haze, *sensor.response_arrays(), depth_mm=job.options.depth_mm
+    )
+    return solve_coarse(
+        cells,
+        clipped,
+        kernels.scaled(job.placement.kernel_scale),
+        job.window_of(picture.plane),
+        terms=entry.terms,
+        rounds=entry.rounds,
+        between=lambda: check_cancelled(job.cancel),
+    )
+
+
+def _summed(entry: Dehaze, job: Job) -> str:
+    """Name the plane whose samples are summed: the mosaic, where nothing else was made of it."""
+    stages = job.setup.stages
+    giver = next((stage for stage in stages if entry.takes[0] in stage.gives), None)
+    mosaic = isinstance(giver, Demosaic) and job.capture.cfa is not None
+    return giver.takes[0] if giver is not None and mosaic else entry.takes[0]
+
+
+def _cleared(picture: Stream, band: Callable[[], CoarseBand]) -> Iterator[Rows]:
+    """Yield the bands of a picture without its haze; finds it when the first is asked for."""
+    found, top = band(), 0
+    for rows in picture.bands():
+        found.clear(rows, top)
+        top += rows.shape[1]
+        yield rows

@@ -1,0 +1,200 @@
+"""The haze found before the first row: the same bits by any bands; left out, or refused."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from camkit.bundle.manifest import Manifest, planes_of
+from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Dehaze
+from camkit.contracts import FloatArray
+from camkit.errors import BundleError, ContractError
+from camkit.runtime.bank.cell_means import cell_means
+from camkit.runtime.cancel import Cancelled
+from camkit.runtime.capture import Capture
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.decision import Subject, Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.rows import ArrayRows
+from camkit.runtime.stages import haze
+from tests.haze_bundle import hazy_manifest, hazy_stages, write_hazy_bundle
+from tests.job_factory import made_mosaic, made_planes, start
+
+FLOAT32 = 1e-5
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    return write_hazy_bundle(tmp_path_factory.mktemp("haze"))
+
+
+def _capture(height: int = 64, width: int = 96, seed: int = 3) -> Capture:
+    rng = np.random.default_rng(seed)
+    samples = rng.integers(100, 1024, (height, width), dtype=np.uint16)
+    samples[20:24, 30:34] = 1023
+    return made_mosaic(samples=samples)
+
+
+def _filled(bundle: Bundle, capture: Capture, **choices: Any) -> FloatArray:
+    return start(bundle, capture, **choices).fill()
+
+
+@pytest.mark.parametrize("choices", [{"threads": 2}, {"max_mem_bytes": 700_000_000}])
+def test_threads_and_memory_do_not_change_a_bit(bundle: Bundle, choices: dict[str, Any]) -> None:
+    usual = _filled(bundle, _capture(), threads=1)
+    np.testing.assert_array_equal(_filled(bundle, _capture(), **choices), usual)
+    assert np.isfinite(usual).all()
+
+
+def test_the_mosaic_is_summed_not_what_was_made_of_it(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shapes = []
+
+    def watched(samples: Any, *rest: Any) -> Any:
+        shapes.append(samples.shape)
+        return cell_means(samples, *rest)
+
+    monkeypatch.setattr(haze, "cell_means", watched)
+    _filled(bundle, _capture())
+    _filled(bundle, made_planes())
+    assert shapes == [(1, 64, 96), (3, 64, 96)]
+
+
+def test_it_is_found_once_though_bank_and_rows_ask(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+    found = haze.coarse_band
+
+    def watched(*args: Any) -> Any:
+        calls.append(args)
+        return found(*args)
+
+    monkeypatch.setattr(haze, "coarse_band", watched)
+    _filled(bundle, _capture())
+    assert len(calls) == 1
+
+
+def test_a_crop_knows_its_place(bundle: Bundle) -> None:
+    samples = _capture().samples[:32, :48]
+    pipeline = Pipeline(bundle, Options(threads=1))
+    made = [
+        pipeline.start(
+            pipeline.capture_of(samples, iso=100, white_balance=None, origin_px=origin)
+        ).fill()
+        for origin in ((0, 0), (48, 32))
+    ]
+    assert np.abs(made[0] - made[1]).max() > FLOAT32
+
+
+def test_methods_end_before_the_haze_behind_it_or_behind_the_bank(bundle: Bundle) -> None:
+    ways = {}
+    for method in ("develop", "haze", "wiener", "rl"):
+        work = start(bundle, _capture(), method=method)
+        picture = work.fill()
+        assert np.isfinite(picture).all()
+        ways[method] = picture
+    assert np.abs(ways["develop"] - ways["haze"]).max() > FLOAT32
+    assert np.abs(ways["haze"] - ways["wiener"]).max() > FLOAT32
+
+
+def test_an_even_capture_stays_even(bundle: Bundle) -> None:
+    flat = made_planes(samples=np.full((3, 64, 96), 0.3, np.float32))
+    hazed = _filled(bundle, flat, method="haze")
+    np.testing.assert_allclose(hazed, _filled(bundle, flat, method="develop"), atol=5e-3)
+
+
+def test_the_noise_of_the_bank_is_raised(bundle: Bundle, monkeypatch: pytest.MonkeyPatch) -> None:
+    from camkit.runtime.stages import wiener
+
+    told = []
+    bank = wiener.restoration_bank
+
+    def watched(psf: Any, settings: Any, noise: Any, **rest: Any) -> Any:
+        told.append(noise)
+        return bank(psf, settings, noise, **rest)
+
+    monkeypatch.setattr(wiener, "restoration_bank", watched)
+    work = start(bundle, _capture())
+    work.fill()
+    (noise,) = told
+    plain = bundle.manifest.sensor.noise_at(100.0)  # type: ignore[union-attr]
+    gains = (2.0, 1.0, 1.5)
+    rises = [got / (known * g) for got, known, g in zip(noise.shot, plain.shot, gains, strict=True)]
+    assert all(2 < rise < 9 for rise in rises)
+
+
+def test_no_number_stays_where_it_is(bundle: Bundle) -> None:
+    samples = np.full((3, 64, 96), 0.3, np.float32)
+    samples[:, 40, 50] = np.nan
+    pipeline = Pipeline(bundle, Options(threads=1, method="haze"))
+    capture = pipeline.capture_of(samples, iso=100, white_balance=None, origin_px=None)
+    picture = pipeline.start(capture).fill()
+    assert np.isfinite(picture[:, :24, :24]).all()
+
+
+def test_it_may_be_cancelled(bundle: Bundle) -> None:
+    pipeline = Pipeline(bundle, Options(threads=1))
+    work = pipeline.start(_capture(), cancel=lambda: True)
+    with pytest.raises(Cancelled):
+        work.fill()
+
+
+def test_too_little_memory_is_said_before_any_row(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(haze, "solving_bytes", lambda *_: 10**9)
+    with pytest.raises(ContractError, match="raise --max-mem"):
+        start(bundle, _capture(), max_mem_bytes=700_000_000).fill()
+
+
+def _manifest(**changes: Any) -> Manifest:
+    return hazy_manifest(stages=hazy_stages(**changes))
+
+
+def test_what_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    fine = Dehaze(shrink=4, terms=128, rounds=16)
+    haze.check(fine, _manifest(), 0)
+    monkeypatch.setenv("CAMKIT_MAX_BANK_WORK", "400")
+    haze.check(Dehaze(shrink=8), _manifest(), 0)
+    with pytest.raises(BundleError, match="the haze of tiny"):
+        haze.check(fine, _manifest(), 0)
+
+
+def test_a_second_one_is_refused() -> None:
+    stages = list(hazy_stages())
+    at = next(n for n, stage in enumerate(stages) if isinstance(stage, Dehaze))
+    again = stages[at].model_copy(update={"takes": ("clear", "unknown"), "gives": ("clearer",)})
+    stages.insert(at + 1, again)
+    stages[at + 2] = stages[at + 2].model_copy(update={"takes": ("clearer", "unknown")})
+    parts = hazy_manifest().parts
+    twice = hazy_manifest(stages=tuple(stages), planes=planes_of(tuple(stages), parts))
+    with pytest.raises(BundleError, match="one stage haze at most; tiny has 2"):
+        haze.check(Dehaze(), twice, 0)
+
+
+def test_larger_captures_take_longer(bundle: Bundle) -> None:
+    speed = Speed(block_s=1e-3, clipped_block_s=1e-2, rest_s_per_mp=0.1, threads=1)
+    placement = start(bundle, _capture()).job.placement
+    small, large = (
+        Subject(
+            bundle=bundle, options=Options(), height_px=side, width_px=side, placement=placement
+        )
+        for side in (64, 4000)
+    )
+    taken = [haze.seconds(Dehaze(), subject, Work(), speed) for subject in (small, large)]
+    assert 0 < taken[0] < taken[1]
+
+
+def test_cells_of_rows_are_those_of_the_whole() -> None:
+    planes = np.random.default_rng(0).random((1, 40, 40), dtype=np.float32)
+    wanted, _ = cell_means(ArrayRows(planes), None, "GRBG", 8)
+    assert wanted.shape == (3, 5, 5)
+
+
+def test_a_bundle_opens_from_disk(tmp_path: Path) -> None:
+    assert write_hazy_bundle(tmp_path).manifest.stage(Dehaze) is not None
