@@ -178,6 +178,11 @@ class Manifest(Entry):
         return self.optics is not None and self.optics.type != "lens_profile"
 
     @property
+    def has_haze(self) -> bool:
+        """Tell whether a haze lies beside these kernels."""
+        return self.optics is not None and self.optics.type == "hazy_psf"
+
+    @property
     def all_planes(self) -> dict[str, Plane]:
         """Give every plane by name, that of the sensor first."""
         return {CAPTURE: capture_plane(self.sensor), **self.planes}

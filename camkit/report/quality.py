@@ -168,7 +168,8 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Ex
         scale=scale,
         depth_mm=bundle.reference_depth_mm,
     )
-    simulation = simulate(scene, sensor, lens, options)
+    haze = bundle.haze if bundle.manifest.has_haze else None
+    simulation = simulate(scene, sensor, lens, options, haze=haze)
     sharp = encode_srgb(true_picture(simulation.clean, sensor))
     return Exposed(simulation=simulation, truths={IMAGE: sharp})
 

@@ -46,12 +46,14 @@ class HazyKernels:
     Attributes:
         core: Core kernels in pixels, of sum 1.
         coarse_core: The same in cells, with its light.
+        haze: What lies beside it in cells, with its light.
         coarse: Core and haze in cells, with their light.
         cell_px: Side of a cell.
     """
 
     core: FieldKernels
     coarse_core: "Lit"
+    haze: "Lit"
     coarse: "Lit"
     cell_px: int
 
@@ -60,6 +62,7 @@ class HazyKernels:
         return HazyKernels(
             core=self.core.scaled(ratio),
             coarse_core=self.coarse_core.scaled(ratio),
+            haze=self.haze.scaled(ratio),
             coarse=self.coarse.scaled(ratio),
             cell_px=self.cell_px,
         )
@@ -76,6 +79,19 @@ class Lit:
 
     kernels: FieldKernels
     light: FloatGrid
+
+    def at(self, x_mm: float, y_mm: float) -> FloatArray:
+        """Give the kernels (c, n, n) of an image point, with their light."""
+        return self.kernels.at(x_mm, y_mm) * self.light_at(x_mm, y_mm)[:, None, None]
+
+    def light_at(self, x_mm: float, y_mm: float) -> FloatArray:
+        """Give the light (c,) of an image point, interpolated as the kernels are."""
+        fields = self.kernels
+        if fields.grid_x_mm is not None and fields.grid_y_mm is not None:
+            return _on_grid(self.light, (fields.grid_y_mm, fields.grid_x_mm), (y_mm, x_mm))
+        height_mm = float(np.hypot(x_mm, y_mm))
+        found = [np.interp(height_mm, fields.field_heights_mm, light) for light in self.light.T]
+        return np.array(found, np.float32)
 
     def scaled(self, ratio: float) -> "Lit":
         """Give the kernels scaled about their centres; see `FieldKernels.scaled`."""
@@ -186,6 +202,7 @@ def hazy_kernels(
     return HazyKernels(
         core=core,
         coarse_core=_lit(narrow, core),
+        haze=_lit(wide, core),
         coarse=_lit(_added(wide, narrow), core),
         cell_px=haze.cell_px,
     )
@@ -222,11 +239,25 @@ def _added(wide: FloatGrid, narrow: FloatGrid) -> FloatGrid:
     return total
 
 
+def _on_grid(
+    light: FloatGrid, axes_mm: tuple[FloatGrid, FloatGrid], at_mm: tuple[float, float]
+) -> FloatArray:
+    """Interpolate (field, c) linearly between the places of a grid; its rim holds beyond it."""
+    rows, columns = axes_mm
+    laid = light.reshape(rows.size, columns.size, -1)
+    along = [[np.interp(at_mm[1], columns, line) for line in row.T] for row in laid]
+    return np.array([np.interp(at_mm[0], rows, line) for line in np.array(along).T], np.float32)
+
+
 def _lit(kernels: FloatGrid, like: FieldKernels) -> Lit:
     light = kernels.sum(axis=(-2, -1))
+    # a kernel without light is even
+    even = 1 / kernels[0, 0].size
+    unit = np.full(kernels.shape, even)
+    np.divide(kernels, light[..., None, None], out=unit, where=light[..., None, None] > 0)
     return Lit(
         kernels=FieldKernels(
-            kernels=(kernels / light[..., None, None]).astype(np.float32),
+            kernels=unit.astype(np.float32),
             field_heights_mm=like.field_heights_mm,
             symmetry=like.symmetry,
             grid_x_mm=like.grid_x_mm,

@@ -55,6 +55,30 @@ def scatter(
     Raises:
         ContractError: If the planes do not have the size of the window with its margin.
     """
+    out, light = scatter_light(
+        planes, kernels_at, window, margin_px=margin_px, step_px=step_px, workers=workers
+    )
+    out /= light
+    return out
+
+
+def scatter_light(
+    planes: FloatArray,
+    kernels_at: KernelLookup,
+    window: SensorWindow,
+    *,
+    margin_px: int,
+    step_px: int = BLOCK_STEP_PX,
+    workers: int = 1,
+) -> tuple[FloatArray, FloatArray]:
+    """Do as `scatter` does, for kernels of any sums.
+
+    Returns:
+        (c, h, w) float32: the light that arrives inside the window; the same of planes of ones.
+
+    Raises:
+        ContractError: If the planes do not have the size of the window with its margin.
+    """
     width, height = window.size_px
     if planes.shape[1:] != (height + 2 * margin_px, width + 2 * margin_px):
         raise ContractError(
@@ -76,8 +100,7 @@ def scatter(
             ):
                 spread = convolve_full(block, kernels, workers=workers)
                 _add_inside(total, spread, top - down, left - across)
-    out /= light
-    return out
+    return out, light
 
 
 def scatter_uniform(

@@ -144,13 +144,12 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
-    hazy = bundle.manifest.optics is not None and bundle.manifest.optics.type == "hazy_psf"
     kernels = color_kernels(
         bundle.psf,
         *sensor.response_arrays(),
         depth_mm=job.options.depth_mm,
         focus_um=job.options.focus_um,
-        share=bundle.haze.core_share if hazy else None,
+        share=bundle.haze.core_share if bundle.manifest.has_haze else None,
     )
     local = LocalPsf(
         kernels=kernels.scaled(job.placement.kernel_scale), window=job.window_of(planes.plane)

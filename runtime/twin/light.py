@@ -15,10 +15,18 @@ from camkit.bundle.sensor import MOSAIC, BayerSensor, ColorSensor
 from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import FloatArray, FrozenPsf, depth_name
 from camkit.errors import ContractError
+from camkit.haze import Haze
+from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.geometry.scatter import KernelLookup, scatter, scatter_uniform
+from camkit.runtime.geometry.scatter import (
+    KernelLookup,
+    scatter,
+    scatter_light,
+    scatter_uniform,
+)
 from camkit.runtime.geometry.sensor_window import SensorWindow, centred_origin
 from camkit.runtime.geometry.warp import distort_array
+from camkit.runtime.twin.haze import HazeLens, hazed, margin_px
 
 Gains = tuple[float, ...]
 KernelChange = Callable[[FloatArray], FloatArray]
@@ -39,6 +47,7 @@ class Lens:
         margin_px: Half of the largest kernel.
         gains: White balance of the light; None for that of the sensor's illuminant.
         uniform: Whether all places have the same kernels.
+        haze: What falls beside these kernels, which are a core then; None where they are all.
     """
 
     psf: FrozenPsf
@@ -46,6 +55,7 @@ class Lens:
     margin_px: int
     gains: Gains | None = None
     uniform: bool = False
+    haze: HazeLens | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +107,7 @@ def lens_of(
     *,
     depth_mm: float | None = None,
     focus_um: float = 0.0,
+    haze: Haze | None = None,
 ) -> Lens:
     """Give what the light goes through for one object distance.
 
@@ -105,6 +116,7 @@ def lens_of(
         sensor: Response of its channels.
         depth_mm: Object distance; may only be left out where there is one depth.
         focus_um: How far the sensor lies from its nominal place, away from the lens.
+        haze: What lies beside the kernels of the PSF.
 
     Raises:
         ContractError: If there are several depths and none is given, or the PSF does not reach
@@ -113,12 +125,29 @@ def lens_of(
     if depth_mm is None and psf.depths_mm.size > 1:
         known = ", ".join(map(depth_name, psf.depths_mm))
         raise ContractError(f"light comes from one depth: give one of those the PSF knows, {known}")
+    if haze is not None:
+        return _hazy_lens(psf, haze, sensor, depth_mm)
     kernels = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm, focus_um=focus_um)
     return Lens(
         psf=psf,
         kernels_at=kernels.at,
         margin_px=max(psf.kernels.shape[-2:]) // 2,
         uniform=psf.symmetry == "uniform",
+    )
+
+
+def _hazy_lens(psf: FrozenPsf, haze: Haze, sensor: ColorSensor, depth_mm: float | None) -> Lens:
+    kernels = hazy_kernels(psf, haze, *sensor.response_arrays(), depth_mm=depth_mm)
+    return Lens(
+        psf=psf,
+        kernels_at=kernels.core.at,
+        margin_px=max(psf.kernels.shape[-2:]) // 2,
+        haze=HazeLens(
+            haze_at=kernels.haze.at,
+            share_at=kernels.coarse_core.light_at,
+            cell_px=kernels.cell_px,
+            reach_cells=kernels.haze.kernels.kernels.shape[-1] // 2,
+        ),
     )
 
 
@@ -135,7 +164,14 @@ def with_kernels(lens: Lens, change: KernelChange) -> Lens:
 
 def with_axis_moved(lens: Lens, x_mm: float, y_mm: float) -> Lens:
     """Give a lens whose axis meets the sensor beside its middle."""
-    return replace(lens, kernels_at=lambda x, y: lens.kernels_at(x - x_mm, y - y_mm))
+
+    def moved(lookup: KernelLookup) -> KernelLookup:
+        return lambda x, y: lookup(x - x_mm, y - y_mm)
+
+    haze = lens.haze
+    if haze is not None:
+        haze = replace(haze, haze_at=moved(haze.haze_at), share_at=moved(haze.share_at))
+    return replace(lens, kernels_at=moved(lens.kernels_at), haze=haze)
 
 
 def camera_space(sensor: ColorSensor) -> tuple[NDArray[np.float64], Gains]:
@@ -171,8 +207,15 @@ def light_of(
     matrix, gains = camera_space(sensor)
     matrix, margin = matrix * chosen.exposure, lens.margin_px
     seen = cell_means(scene, chosen.scale)
-    extended = _on_sensor(seen, matrix, lens.psf, window, chosen, margin)
-    planes = _spread(extended, lens, window, chosen.workers)
+    if lens.haze is None:
+        extended = _on_sensor(seen, matrix, lens.psf, window, chosen, margin)
+        planes = _spread(extended, lens, window, chosen.workers)
+    else:
+        around = margin_px(lens.haze, max(margin, chosen.surround_px))
+        wide = _on_sensor(seen, matrix, lens.psf, window, chosen, around)
+        cut = slice(around - margin, margin - around or None)
+        extended = np.ascontiguousarray(wide[:, cut, cut])
+        planes = _spread_hazy(wide, extended, lens, window, chosen.workers)
     # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
     np.maximum(planes, 0, out=planes)
     width, height = window.size_px
@@ -196,6 +239,24 @@ def _spread(planes: FloatArray, lens: Lens, window: SensorWindow, workers: int) 
         kernels = lens.kernels_at(0.0, 0.0)
         return scatter_uniform(planes, kernels, margin_px=lens.margin_px, workers=workers)
     return scatter(planes, lens.kernels_at, window, margin_px=lens.margin_px, workers=workers)
+
+
+def _spread_hazy(
+    wide: FloatArray, extended: FloatArray, lens: Lens, window: SensorWindow, workers: int
+) -> FloatArray:
+    """Spread core and haze, and divide by what they make of a scene of ones."""
+    haze = lens.haze
+    assert haze is not None
+
+    def lit(x_mm: float, y_mm: float) -> FloatArray:
+        return lens.kernels_at(x_mm, y_mm) * haze.share_at(x_mm, y_mm)[:, None, None]
+
+    core, ones = scatter_light(extended, lit, window, margin_px=lens.margin_px, workers=workers)
+    around = (wide.shape[1] - window.size_px[1]) // 2
+    veil, even = hazed(wide, haze, window, around_px=around, workers=workers)
+    core += veil
+    core /= ones + even
+    return core
 
 
 def cell_means(planes: FloatArray, scale: int) -> FloatArray:

@@ -15,6 +15,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
+from camkit.haze import Haze
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.output.dng import DngTags, camkit_description, write_bayer_dng
@@ -93,7 +94,12 @@ class Simulation:
 
 
 def simulate(
-    scene: FloatArray, sensor: Sensor, psf: FrozenPsf, options: SimulationOptions
+    scene: FloatArray,
+    sensor: Sensor,
+    psf: FrozenPsf,
+    options: SimulationOptions,
+    *,
+    haze: Haze | None = None,
 ) -> Simulation:
     """Photograph a scene with a camera that exists as data only.
 
@@ -104,6 +110,7 @@ def simulate(
         sensor: Of the bundle: a mosaic, or planes.
         psf: Frozen PSF of the optics.
         options: Sensitivity, seed, placement and which effects to apply.
+        haze: What lies beside the kernels of the PSF.
 
     Raises:
         ContractError: If the scene is not as stated or does not lie on the sensor, or the PSF
@@ -118,7 +125,7 @@ def simulate(
     light = light_of(
         scene,
         sensor,
-        lens_of(psf, sensor, depth_mm=options.depth_mm, focus_um=options.focus_um),
+        lens_of(psf, sensor, depth_mm=options.depth_mm, focus_um=options.focus_um, haze=haze),
         window,
         LightOptions(
             exposure=options.exposure,
@@ -152,7 +159,8 @@ def _setting(options: SimulationOptions) -> Setting:
 def photograph(scene: FloatArray, bundle: Bundle, options: SimulationOptions) -> Simulation:
     """Photograph a scene with sensor and optics of a bundle; see `simulate` and `bare_psf`."""
     psf = bundle.psf if options.plate else bare_psf(bundle)
-    return simulate(scene, bundle.manifest.sensor, psf, options)
+    haze = bundle.haze if bundle.manifest.has_haze else None
+    return simulate(scene, bundle.manifest.sensor, psf, options, haze=haze)
 
 
 def bare_psf(bundle: Bundle) -> FrozenPsf:

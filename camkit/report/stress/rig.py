@@ -136,7 +136,9 @@ class Rig:
         self.rivals = tuple(m.name for m in self.methods if m not in judged)
         self.lens = self.lens_at(bundle.reference_depth_mm)
         depth_mm = Options(**self._chosen).depth_mm
-        kernels = color_kernels(bundle.psf, *self.sensor.response_arrays(), depth_mm=depth_mm)
+        share = bundle.haze.core_share if bundle.manifest.has_haze else None
+        response = self.sensor.response_arrays()
+        kernels = color_kernels(bundle.psf, *response, depth_mm=depth_mm, share=share)
         self.assumed_lens = replace(self.lens, kernels_at=kernels.at)
         self._from_array = part_of(bundle.manifest).from_array
         self._lights: dict[str, Light] = {}
@@ -164,7 +166,8 @@ class Rig:
 
     def lens_at(self, depth_mm: float) -> Lens:
         """Give the lens as the bundle knows it, for one object distance."""
-        return lens_of(self.bundle.psf, self.sensor, depth_mm=depth_mm)
+        haze = self.bundle.haze if self.bundle.manifest.has_haze else None
+        return lens_of(self.bundle.psf, self.sensor, depth_mm=depth_mm, haze=haze)
 
     def light(self, scene: Scene, lens: Lens | None = None) -> Light:
         """Let a scene fall on the sensor; that through the nominal lens is kept by its name."""

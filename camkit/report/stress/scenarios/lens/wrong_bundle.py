@@ -21,7 +21,7 @@ def other_lens(lens: Lens, share: float) -> Lens:
         other = lens.kernels_at(-away[0] * other_mm, -away[1] * other_mm)
         return np.asarray((1 - share) * lens.kernels_at(x_mm, y_mm) + share * other, np.float32)
 
-    return Lens(psf=lens.psf, kernels_at=kernels_at, margin_px=lens.margin_px)
+    return Lens(psf=lens.psf, kernels_at=kernels_at, margin_px=lens.margin_px, haze=lens.haze)
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
