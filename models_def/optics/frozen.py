@@ -135,7 +135,7 @@ def freeze_at(optics: Optics, sensor: ColorSensor, grid: FreezeGrid, fields: Fie
             for kernels, t in zip(averaged, traced, strict=True)
         ]
     psf = FrozenPsf(
-        kernels=_rounded(torch.stack(averaged, dim=1).to(torch.float32).numpy()),
+        kernels=rounded(torch.stack(averaged, dim=1).to(torch.float32).numpy()),
         field_heights_mm=fields.heights_mm,
         depths_mm=np.array(depths_mm, dtype=np.float64),
         wavelengths_um=waves_um,
@@ -196,10 +196,10 @@ def _wavelengths(
     waves_um = np.linspace(response_um[0], response_um[-1], grid.wavelengths)
     if grid.wavelengths == 1:
         waves_um = np.array([optics.reference_wavelength_um])
-    return waves_um, *_bands(waves_um)
+    return waves_um, *wavelength_bands(waves_um)
 
 
-def _rounded(kernels: NDArray[np.float32]) -> NDArray[np.float32]:
+def rounded(kernels: NDArray[np.float32]) -> NDArray[np.float32]:
     """Round to `KERNEL_BITS` of mantissa: what is cut is noise of the rays, and does not compress.
 
     No kernel value changes by more than 1 in 8192; sums stay 1 to a few 1e-6.
@@ -254,7 +254,7 @@ def freeze_stress(optics: Optics, sensor: ColorSensor, grid: FreezeGrid | None =
     return freeze_at(optics, sensor, stress, layout)
 
 
-def _bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
+def wavelength_bands(waves_um: FloatGrid) -> tuple[FloatGrid, Tensor]:
     """Give fine wavelengths and (sample, fine) weights: triangles around the samples."""
     steps = max(waves_um.size - 1, 1)
     # a whole number of fine steps per sample

@@ -75,6 +75,13 @@ def freeze(
             "'auto': what nearly all fabricated copies need."
         ),
     ] = None,
+    haze: Annotated[
+        Path | None,
+        typer.Option(
+            help="Freeze the peaks of a lens as core kernels, and write the light beside them "
+            "there (.safetensors)."
+        ),
+    ] = None,
     stress_out: Annotated[
         Path | None, typer.Option(help="Also write kernels off the design point there.")
     ] = None,
@@ -88,12 +95,13 @@ def freeze(
     """Keep as few PSF samples of a lens or a plate as the stated loss allows (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
-    refuse_existing([out, stress_out, report], overwrite=overwrite)
+    refuse_existing([out, haze, stress_out, report], overwrite=overwrite)
     depths = _depths(depths_mm)
     if unit or captures:
         from camkit.bundle.reader import SUFFIX
 
         beside = {
+            "--haze": haze,
             "--stress-out": stress_out,
             "--report": report,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
@@ -118,6 +126,19 @@ def freeze(
 
     sensor, bank = _camera_of(recipe)
     found = read_optics(optics)
+    if haze is not None:
+        chosen = {
+            "--depths-mm": depths_mm is not None,
+            "--limit-db": limit_db != LIMIT_DB,
+            "--energy": energy is not None,
+            "--max-side-px": max_side_px is not None,
+            "--focus-um": focus_um is not None,
+            "--stress-out": stress_out is not None,
+        }
+        if named := [name for name, said in chosen.items() if said]:
+            raise ContractError(f"with --haze nothing is chosen; leave {', '.join(named)} out")
+        _report(_freeze_hazy(found, out, haze, sensor), report, json_)
+        return
     moved_um = focus_range_um(found, focus_um)
     base = WINDOW if isinstance(found, PlateOptics) else FreezeGrid()
     grid = replace(
@@ -133,10 +154,37 @@ def freeze(
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
         write_psf(stress_out, freeze_stress(found, sensor, grid).psf)
+    _report(told.to_json(), report, json_)
+
+
+def _report(told: dict[str, int | float | str], report: Path | None, json_: bool) -> None:
+    """Write the report where it is wanted, and say it."""
+    from camkit.cli.design.design_time import print_report
+
     if report is not None:
         report.parent.mkdir(parents=True, exist_ok=True)
-        report.write_text(json.dumps(told.to_json(), indent=2) + "\n", encoding="utf-8")
-    print_report(told.to_json(), json_)
+        report.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    print_report(told, json_)
+
+
+def _freeze_hazy(
+    optics: "Optics", out: Path, haze_out: Path, sensor: "ColorSensor"
+) -> dict[str, int | float | str]:
+    """Freeze the peaks of a lens and the haze beside them."""
+    from camkit.bundle.haze_file import write_haze
+    from camkit.bundle.psf_file import write_psf
+    from camkit.models_def.optics.lens_optics import LensOptics
+    from camkit.models_def.optics.thin.freezing import freeze_hazy
+
+    if not isinstance(optics, LensOptics):
+        raise UnsupportedError("only a lens is frozen as core and haze; leave --haze out")
+    frozen, told = freeze_hazy(optics.lens, sensor, tell=_tell)
+    assert frozen.haze is not None
+    for path in (out, haze_out):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    write_psf(out, frozen.psf)
+    write_haze(haze_out, frozen.haze)
+    return told.to_json()
 
 
 class _Wanted(NamedTuple):

@@ -11,5 +11,6 @@ In the order in which data flows:
 - `peak`: how much light lies near the peak of a field, and how far the haze reaches
 - `waves`: the same peak as a sum of waves
 - `report`: both of a lens, for people and programs
+- `freezing`: both of a lens over the field, as core kernels and a haze in cells
 - `sag_table`: a profile for the workshop
 """

@@ -11,12 +11,12 @@ from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, IsoNoise
 from camkit.errors import ContractError
 from camkit.models_def.optics.frozen import (
     FreezeGrid,
-    _rounded,
     corner_height_mm,
     dense_grid,
     freeze,
     freeze_at,
     freeze_stress,
+    rounded,
     stress_depths_mm,
     with_focus,
 )
@@ -117,11 +117,11 @@ def test_frozen_colours_equal_a_dense_trace(sensor: BayerSensor) -> None:
 
 def test_kernels_are_rounded_to_what_a_picture_shows() -> None:
     kernels = np.random.default_rng(0).random((2, 3, 9, 9), dtype=np.float32) ** 8
-    found = _rounded(kernels)
+    found = rounded(kernels)
     assert float((np.abs(found - kernels) / kernels).max()) <= 2.0**-13
     assert not (found.view(np.uint32) & 0x7FF).any()
-    assert np.array_equal(_rounded(found), found)
-    assert not _rounded(np.zeros((1, 1), np.float32)).any()
+    assert np.array_equal(rounded(found), found)
+    assert not rounded(np.zeros((1, 1), np.float32)).any()
 
 
 def test_one_wavelength_can_be_frozen(sensor: BayerSensor) -> None:

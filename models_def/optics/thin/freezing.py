@@ -1,0 +1,313 @@
+"""A thin plate frozen into core kernels about its peaks, and a haze in cells.
+
+    angles -> peaks -> rays of every wavelength about them -> core (pixels) + haze (cells)
+
+The core is what falls near the peak, faded out by a raised cosine, so that the haze is smooth and
+lies in cells without loss. Light is counted as it arrives on the sensor: what enters from a solid
+angle, through walls and off the frame, over the area that its peaks cover.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.frozen_optics import FrozenOptics
+from camkit.bundle.sensor import ColorSensor
+from camkit.contracts import FrozenPsf, RadialDistortion
+from camkit.errors import ContractError
+from camkit.haze import MOST_CELLS, Haze
+from camkit.models_def.optics.frozen import corner_height_mm, rounded, wavelength_bands
+from camkit.models_def.optics.paraxial import paraxial_data
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.thin.peak import LandedLight, land_light, peak_height_px
+from camkit.units import to_mm
+
+Array = NDArray[np.float64]
+Tell = Callable[[str], None]
+
+FIELDS: Final = 13
+WAVELENGTHS: Final = 5
+CORE_PX: Final = 64
+FADE_PX: Final = 40
+"""From here on the core fades out, to nothing at its rim."""
+CELL_PX: Final = 16
+RAYS: Final = 20_000
+"""In half the stop, for each of some thirty wavelengths."""
+ENERGY: Final = 0.995
+_ANGLES: Final = 120
+_RINGS: Final = 24
+_CORNER_STEPS: Final = 12
+_TERMS: Final = 4
+_MOST_RAD: Final = math.radians(80.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HazyReport:
+    """What was frozen.
+
+    Attributes:
+        fields: Peaks from the axis to the corner.
+        wavelengths: Samples of the response.
+        core_px: Reach of the core.
+        cell_px: Side of a cell.
+        cells: Side of a kernel of the haze in cells.
+        core_share: Least share in the core of the light that arrives of a field and wavelength.
+        haze_kept: Least share in the cells of the haze that lands within the corner's radius.
+        corner_illumination: Relative illumination at the corner.
+    """
+
+    fields: int
+    wavelengths: int
+    core_px: int
+    cell_px: int
+    cells: int
+    core_share: float
+    haze_kept: float
+    corner_illumination: float
+
+    def to_json(self) -> dict[str, int | float | str]:
+        """Give the report as a flat mapping."""
+        return {
+            name: round(value, 5) if isinstance(value, float) else value
+            for name in self.__slots__
+            for value in [getattr(self, name)]
+        }
+
+
+def freeze_hazy(
+    lens: Lens,
+    sensor: ColorSensor,
+    *,
+    fields: int = FIELDS,
+    wavelengths: int = WAVELENGTHS,
+    core_px: int = CORE_PX,
+    cell_px: int = CELL_PX,
+    rays: int = RAYS,
+    tell: Tell = lambda _: None,
+) -> tuple[FrozenOptics, HazyReport]:
+    """Freeze a lens that makes peaks and haze.
+
+    Args:
+        lens: With its grooves as they are.
+        sensor: Size, pitch and response.
+        fields: Peaks from the axis to the corner.
+        wavelengths: Evenly spaced over the response of the sensor.
+        core_px: Reach of the core kernels.
+        cell_px: Side of a cell of the haze.
+        rays: In half the stop, for every wavelength that is traced.
+        tell: Takes a line for every field.
+
+    Raises:
+        ContractError: If no peak reaches the corner, or the haze is wider than a file holds.
+    """
+    pitch_um = sensor.pixel_pitch_um
+    corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
+    wave_um = lens.reference_wavelength_um
+    last = corner_angle_rad(lens, corner_px, pitch_um, rays)
+    angles = np.linspace(0.0, last, fields)
+    heights = np.array([_height_px(lens, a, wave_um, pitch_um, rays) for a in angles])
+    heights[0] = 0.0
+    response_um, _ = sensor.response_arrays()
+    waves_um = np.linspace(response_um[0], response_um[-1], wavelengths)
+    fine_um, bands = wavelength_bands(waves_um)
+    light = arriving(angles, heights)
+    reach = MOST_CELLS // 2
+    core = np.zeros((fields, wavelengths, 2 * core_px + 1, 2 * core_px + 1))
+    haze = np.zeros((fields, wavelengths, MOST_CELLS, MOST_CELLS))
+    wanted = np.zeros((fields, wavelengths))
+    for field, (angle, height) in enumerate(zip(angles, heights, strict=True)):
+        for fine, of_sample in zip(fine_um, bands.numpy().T, strict=True):
+            landed = land_light(lens, float(angle), float(fine), pitch_um, rays)
+            parts = _split(landed, float(height), corner_px, core_px, cell_px)
+            for sample in np.flatnonzero(of_sample):
+                core[field, sample] += of_sample[sample] * parts.core
+                haze[field, sample] += of_sample[sample] * parts.haze
+                wanted[field, sample] += of_sample[sample] * parts.within
+        tell(f"field {field + 1} of {fields}: peak at {height:.0f} px")
+    cells = _side_holding(haze, wanted, ENERGY)
+    cut = slice(reach - cells // 2, reach + cells // 2 + 1)
+    haze = haze[..., cut, cut]
+    core *= light[:, None, None, None]
+    haze *= light[:, None, None, None]
+    share = core.sum(axis=(-2, -1))
+    most = float((share + haze.sum(axis=(-2, -1))).max())
+    field_mm = heights * to_mm(pitch_um)
+    illumination = flat_light(lens, heights, pitch_um, rays=rays)
+    psf = FrozenPsf(
+        kernels=rounded((core / share[..., None, None])[:, None].astype(np.float32)),
+        field_heights_mm=field_mm,
+        depths_mm=np.array([lens.object_distance_mm]),
+        wavelengths_um=waves_um,
+        pixel_pitch_um=pitch_um,
+        distortion=_distortion(lens, angles, field_mm, len(sensor.channels)),
+        relative_illumination=illumination,
+    )
+    found = Haze(
+        kernels=rounded((haze / most)[:, None].astype(np.float32)),
+        core_share=(share / most)[:, None],
+        field_heights_mm=field_mm,
+        depths_mm=psf.depths_mm,
+        wavelengths_um=waves_um,
+        cell_px=cell_px,
+        pixel_pitch_um=pitch_um,
+    )
+    near = share / (share + haze.sum(axis=(-2, -1)))
+    report = HazyReport(
+        fields=fields,
+        wavelengths=wavelengths,
+        core_px=core_px,
+        cell_px=cell_px,
+        cells=cells,
+        core_share=float(near.min()),
+        haze_kept=float(_kept(haze / light[:, None, None, None], wanted).min()),
+        corner_illumination=float(illumination[-1]),
+    )
+    return FrozenOptics(psf=psf, haze=found), report
+
+
+def corner_angle_rad(lens: Lens, corner_px: float, pitch_um: float, rays: int) -> float:
+    """Give the field angle whose peak lies at the corner, by bisection.
+
+    Raises:
+        ContractError: If none does.
+    """
+    low, high = 0.0, _MOST_RAD
+    wave_um = lens.reference_wavelength_um
+    for _ in range(_CORNER_STEPS):
+        middle = (low + high) / 2
+        try:
+            beyond = _height_px(lens, middle, wave_um, pitch_um, rays) > corner_px
+        except ContractError:
+            beyond = True  # no light arrives from so far
+        low, high = (low, middle) if beyond else (middle, high)
+    if abs(_height_px(lens, low, wave_um, pitch_um, rays) / corner_px - 1) > 0.01:
+        raise ContractError(
+            f"no peak of {lens.name} reaches the corner, {corner_px:.0f} px from the axis: its "
+            f"largest field is {math.degrees(low):.1f} degrees; use a smaller sensor"
+        )
+    return high
+
+
+def _height_px(lens: Lens, angle_rad: float, wave_um: float, pitch_um: float, rays: int) -> float:
+    return peak_height_px(land_light(lens, float(angle_rad), wave_um, pitch_um, rays))
+
+
+def arriving(angles_rad: Array, heights_px: Array) -> Array:
+    """Give the light that enters for the area that its peaks cover, 1 on the axis.
+
+    A scene of even radiance sends cos(a) sin(a) da through a flat stop, and its peaks cover h dh.
+
+    Args:
+        angles_rad: (field,), increasing from 0.
+        heights_px: (field,), increasing from 0.
+    """
+    slope = np.gradient(heights_px, angles_rad, edge_order=2)
+    sides = np.ones_like(heights_px)
+    sides[1:] = np.sin(angles_rad[1:]) * np.cos(angles_rad[1:]) / (heights_px[1:] * slope[1:])
+    sides[0] = 1 / slope[0] ** 2
+    return np.asarray(sides / sides[0])
+
+
+def flat_light(lens: Lens, heights_px: Array, pitch_um: float, *, rays: int) -> Array:
+    """Give how an even scene lights the sensor, haze and walls counted, 1 on the axis.
+
+    Args:
+        lens: The lens.
+        heights_px: (field,), from the axis to the corner.
+        pitch_um: Of the pixels.
+        rays: In half the stop, of all angles together.
+    """
+    corner = float(heights_px[-1])
+    last = min(1.1 * corner_angle_rad(lens, corner, pitch_um, rays), _MOST_RAD)
+    step = last / _ANGLES
+    edges = np.linspace(0.0, corner, _RINGS + 1)
+    light = np.zeros(_RINGS)
+    for angle in (np.arange(_ANGLES) + 0.5) * step:
+        found = land_light(
+            lens, float(angle), lens.reference_wavelength_um, pitch_um, max(rays // 20, 500)
+        )
+        radius = np.hypot(found.x_px, found.y_px)
+        weight = found.share * math.sin(angle) * math.cos(angle)
+        light += np.histogram(radius, bins=edges, weights=weight)[0]
+    middles = (edges[1:] + edges[:-1]) / 2
+    dense = light / (edges[1:] ** 2 - edges[:-1] ** 2)
+    # even powers: the light is smooth and even about the axis
+    powers = np.stack([(middles / corner) ** (2 * k) for k in range(_TERMS)], axis=1)
+    weights = np.sqrt(middles)
+    found_terms, *_ = np.linalg.lstsq(powers * weights[:, None], dense * weights, rcond=None)
+    at = np.stack([(heights_px / corner) ** (2 * k) for k in range(_TERMS)], axis=1) @ found_terms
+    return np.asarray(np.maximum(at / at[0], 1e-3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Parts:
+    """A field in one wavelength: core, haze, and the haze that lands within the corner."""
+
+    core: Array
+    haze: Array
+    within: float
+
+
+def _split(
+    light: LandedLight, height_px: float, corner_px: float, core_px: int, cell_px: int
+) -> _Parts:
+    x, y = light.x_px, light.y_px - height_px
+    distance = np.hypot(x, y)
+    faded = (distance - FADE_PX * core_px / CORE_PX) / (core_px * (1 - FADE_PX / CORE_PX))
+    near = light.share * (0.5 + 0.5 * np.cos(np.pi * np.clip(faded, 0, 1)))
+    far = light.share - near
+    core = _laid(np.rint(x), np.rint(y), near, 2 * core_px + 1)
+    haze = np.zeros((MOST_CELLS, MOST_CELLS))
+    # the mean over points of a cell: a triangle two cells wide
+    left, top = np.floor(x / cell_px), np.floor(y / cell_px)
+    for right, across in ((0, 1 - (x / cell_px - left)), (1, x / cell_px - left)):
+        for below, down in ((0, 1 - (y / cell_px - top)), (1, y / cell_px - top)):
+            haze += _laid(left + right, top + below, far * across * down, MOST_CELLS)
+    inside = np.hypot(light.x_px, light.y_px) <= corner_px
+    return _Parts(
+        core=(core + core[:, ::-1]) / 2,
+        haze=(haze + haze[:, ::-1]) / 2,
+        within=float(far[inside].sum()),
+    )
+
+
+def _laid(x: Array, y: Array, share: Array, side: int) -> Array:
+    """Sum shares on a grid whose middle is 0; what falls beside it is left out."""
+    half = side // 2
+    inside = (np.abs(x) <= half) & (np.abs(y) <= half) & (share > 0)
+    place = (y[inside] + half) * side + x[inside] + half
+    made = np.bincount(place.astype(np.intp), share[inside], minlength=side * side)
+    return np.asarray(made.reshape(side, side))
+
+
+def _side_holding(haze: Array, wanted: Array, energy: float) -> int:
+    """Give the least odd side in cells that holds the haze which can reach the frame."""
+    most = int(haze.shape[-1])
+    for side in range(1, most, 2):
+        cut = slice(most // 2 - side // 2, most // 2 + side // 2 + 1)
+        if (_kept(haze[..., cut, cut], wanted) >= energy).all():
+            return side
+    if (_kept(haze, wanted) < energy).any():
+        raise ContractError(
+            f"cells of {most} x {most} hold {_kept(haze, wanted).min():.4f} of the haze, wanted "
+            f"{energy}; use larger cells"
+        )
+    return most
+
+
+def _kept(haze: Array, wanted: Array) -> Array:
+    held = haze.sum(axis=(-2, -1))
+    return np.asarray(np.minimum(held / np.maximum(wanted, 1e-12), 1.0))
+
+
+def _distortion(lens: Lens, angles_rad: Array, field_mm: Array, channels: int) -> RadialDistortion:
+    """Fit where peaks lie to odd powers of the ideal height."""
+    radius_mm = float(field_mm[-1])
+    ideal = paraxial_data(lens).efl_mm * np.tan(angles_rad) / radius_mm
+    powers = np.stack([ideal ** (2 * k + 1) for k in range(_TERMS)], axis=1)
+    found, *_ = np.linalg.lstsq(powers[1:], field_mm[1:] / radius_mm, rcond=None)
+    return RadialDistortion(coefficients=np.tile(found, (channels, 1)), radius_mm=radius_mm)

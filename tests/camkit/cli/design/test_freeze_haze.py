@@ -1,0 +1,46 @@
+"""`camkit freeze --haze`: a lens to core kernels and haze, or a line that says why not."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from camkit.bundle.haze_file import read_haze
+from camkit.bundle.psf_file import read_psf
+from camkit.cli.exit_code import ExitCode
+from camkit.models_def.optics.thin import freezing
+
+LENS = "thin-plate"
+
+
+def test_a_lens_is_frozen_as_core_and_haze(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = {"fields": 3, "wavelengths": 2, "rays": 1000}
+    usual = dict(freezing.freeze_hazy.__kwdefaults__)
+    monkeypatch.setattr(freezing.freeze_hazy, "__kwdefaults__", usual | few)
+    out, haze, report = (tmp_path / "frozen" / name for name in ("p.st", "h.st", "r.json"))
+    words = ("freeze", LENS, "-o", out, "--haze", haze, "--report", report, "--json")
+    outcome = camkit_command(*words)
+    assert outcome.code == 0, outcome.err
+    told = json.loads(outcome.out)
+    assert told == json.loads(report.read_text())
+    assert told["fields"] == 3
+    assert told["haze_kept"] >= 0.995
+    assert 0.1 < told["core_share"] < 0.4
+    read_haze(haze).check_beside(read_psf(out))
+    again = camkit_command(*words)
+    assert again.code == ExitCode.USAGE
+    assert "--overwrite" in again.err
+
+
+def test_what_haze_does_not_choose_is_refused(camkit_command, tmp_path: Path) -> None:
+    out, haze = tmp_path / "p.st", tmp_path / "h.st"
+    words = ("freeze", LENS, "-o", out, "--haze", haze)
+    outcome = camkit_command(*words, "--energy", "0.9", "--focus-um", "3")
+    assert outcome.code == ExitCode.USAGE
+    assert "leave --energy, --focus-um out" in outcome.err
+    outcome = camkit_command("freeze", "streak-hdr", "-o", out, "--haze", haze)
+    assert outcome.code != 0
+    assert "only a lens is frozen as core and haze" in outcome.err
+    assert not out.exists()

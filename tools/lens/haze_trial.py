@@ -1,0 +1,169 @@
+"""What undoing the haze gains: a thin plate's capture of a whole frame, and what is made of it.
+
+    camkit freeze thin-plate -o psf.safetensors --haze haze.safetensors
+    python -m tools.lens.haze_trial psf.safetensors haze.safetensors PICTURE
+
+The camera has the sensor of `duet` and no network. The picture is repeated, every second one
+mirrored, until it fills the frame, so that its detail is as fine as it comes. Printed are dB of
+sRGB against the sharp frame, over all and by zones of the half diagonal, and seconds of the
+processor; `-o` keeps the bundle, `--keep` the capture.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.bundle.chain import rewired
+from camkit.bundle.frozen_optics import FrozenOptics
+from camkit.bundle.haze_file import read_haze
+from camkit.bundle.manifest import Manifest, format_of, planes_of
+from camkit.bundle.psf_file import read_psf
+from camkit.bundle.reader import Bundle, find_bundle, open_bundle
+from camkit.bundle.stages import (
+    Color,
+    Dehaze,
+    Demosaic,
+    Illumination,
+    Linearise,
+    Parts,
+    RaiseClipped,
+    Repair,
+    Stage,
+    Undistort,
+    WhiteBalance,
+    Wiener,
+)
+from camkit.bundle.writer import write_bundle
+from camkit.colorimetry import encode_srgb
+from camkit.contracts import FloatArray
+from camkit.report.quality import read_picture
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph, write_capture
+from camkit.runtime.twin.truth import light_sensor, true_picture
+
+NAME: Final = "haze-trial"
+METHODS: Final = ("develop", "haze", "wiener")
+ZONES: Final = 5
+
+
+def main() -> None:
+    """Build, photograph, restore, print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("psf", type=Path)
+    parser.add_argument("haze", type=Path)
+    parser.add_argument("picture", type=Path)
+    parser.add_argument("--iso", type=float, default=100.0)
+    parser.add_argument("--size", type=int, nargs=2, metavar=("W", "H"), help="of the frame")
+    parser.add_argument("-o", "--output", type=Path, help="keep the bundle")
+    parser.add_argument("--keep", type=Path, help="keep the capture (DNG)")
+    for name, default in (("terms", 32), ("rounds", 3)):
+        parser.add_argument(f"--{name}", type=int, default=default)
+    chosen = parser.parse_args()
+    with TemporaryDirectory() as folder:
+        out = chosen.output or Path(folder) / f"{NAME}.camkit"
+        optics = FrozenOptics(psf=read_psf(chosen.psf), haze=read_haze(chosen.haze))
+        bundle = build(optics, out, terms=chosen.terms, rounds=chosen.rounds)
+        whole = bundle.manifest.sensor.known_extent
+        size = tuple(chosen.size or (whole.width_px, whole.height_px))
+        made, seconds = timed(
+            lambda: photograph(
+                filled(read_picture(chosen.picture), *size),
+                bundle,
+                SimulationOptions(iso=chosen.iso, distort=False, vignette=False),
+            )
+        )
+        print(f"photographed in {seconds:.1f} s of the processor")
+        if chosen.keep:
+            write_capture(chosen.keep, made, bundle.manifest.sensor, NAME)
+        print("| method | dB | by zones of the half diagonal | s |")
+        print("|---|---|---|---|")
+        for method in METHODS:
+            print(measured(bundle, made, method, chosen.iso), flush=True)
+
+
+def build(optics: FrozenOptics, out: Path, *, terms: int, rounds: int) -> Bundle:
+    """Write a camera of physics alone behind optics with a haze, and open it."""
+    assert optics.haze is not None
+    like = open_bundle(find_bundle("duet")).manifest
+    usual: tuple[Stage, ...] = (
+        Linearise(),
+        Repair(),
+        WhiteBalance(),
+        Demosaic(),
+        Dehaze(shrink=optics.haze.cell_px, terms=terms, rounds=rounds),
+        Wiener(takes=("clear", "unknown"), prior_scale=1e-3, prior_exponent=2.0),
+        RaiseClipped(takes=("restored",)),
+        Illumination(takes=("neutral",)),
+        Undistort(),
+        Color(),
+    )
+    stages = rewired(usual, usual)
+    stated = optics.entry(np.inf)
+    manifest = Manifest(
+        format_version=format_of(optics.psf, hazy=True),
+        name=NAME,
+        version="0.1.0",
+        licence="Apache-2.0",
+        training_data="none: no network",
+        sensor=like.sensor,
+        optics=stated,
+        stages=stages,
+        planes=planes_of(stages, Parts(sensor=like.sensor, optics=stated, networks={})),
+        products={"image": stages[-1].gives[0]},
+    )
+    write_bundle(out, manifest, optics.members)
+    return open_bundle(out)
+
+
+def filled(picture: FloatArray, width: int, height: int) -> FloatArray:
+    """Repeat a picture (3, h, w), every second one mirrored, until it fills a frame."""
+    pad = [(0, 0), (0, max(height - picture.shape[1], 0)), (0, max(width - picture.shape[2], 0))]
+    return np.ascontiguousarray(np.pad(picture, pad, mode="symmetric")[:, :height, :width])
+
+
+def measured(bundle: Bundle, made: Simulation, method: str, iso: float) -> str:
+    """Restore a capture by a method; give the line of a table."""
+    pipeline = Pipeline(
+        bundle, Options(method=method, undistort=False, vignetting=False, threads=1)
+    )
+    capture = pipeline.capture_of(
+        made.samples,
+        iso=iso,
+        white_balance=made.white_balance,  # type: ignore[arg-type]
+        origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
+    )
+    picture, seconds = timed(lambda: pipeline.start(capture).fill())
+    truth = true_picture(made.clean, light_sensor(bundle.manifest))
+    square = np.square(encode_srgb(picture) - encode_srgb(truth)).mean(axis=0)
+    y, x = np.indices(square.shape)
+    height, width = square.shape
+    radius = np.hypot(y - (height - 1) / 2, x - (width - 1) / 2) / np.hypot(height, width) * 2
+    zones = [
+        decibels(square[(radius >= k / ZONES) & (radius < (k + 1) / ZONES)]) for k in range(ZONES)
+    ]
+    line = " ".join(f"{zone:.1f}" for zone in zones)
+    return f"| {method} | {decibels(square):.2f} | {line} | {seconds:.1f} |"
+
+
+def decibels(square: FloatArray) -> float:
+    """Give -10 log10 of the mean."""
+    return float(-10 * np.log10(square.mean(dtype=np.float64)))
+
+
+def timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    """Do some work; give what it made and its seconds of the processor."""
+    start = time.process_time()
+    made = work()
+    return made, time.process_time() - start
+
+
+if __name__ == "__main__":
+    main()
