@@ -26,6 +26,7 @@ from camkit.runtime.network.graph_walk import GraphFacts
 from camkit.runtime.network.probe import perturbation_reach, probe_runs
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
 from camkit.runtime.network.tiling import TileLayout, TileLimits, infer_bands, lay_windows
+from camkit.runtime.proof.haze import prove_haze
 from camkit.runtime.rows import ArrayRows
 
 _SEED: Final = 7
@@ -49,9 +50,19 @@ def prove_golden(bundle: Bundle, *, run: GoldenRun | None) -> Result:
         run: The whole pipeline, or None to prove nothing.
 
     Raises:
-        BundleError: If manifest and golden.safetensors hold other cases.
+        BundleError: If manifest and golden.safetensors hold other cases, or the case of the haze
+            is not of this bundle.
         ParityError: If a result is further from the stored one than its case allows.
     """
+    coarse = prove_haze(bundle) if bundle.manifest.has_haze else None
+    shown, what = _prove_cases(bundle, run)
+    if coarse is None:
+        return shown, what
+    return True, f"{coarse}; {what}"
+
+
+def _prove_cases(bundle: Bundle, run: GoldenRun | None) -> Result:
+    """Compute the captures of the cases again; see `prove_golden`."""
     cases = {case.name: case for case in bundle.manifest.golden}
     if not cases:
         return False, "no golden case"
