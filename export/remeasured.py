@@ -113,6 +113,8 @@ def remeasured(
         raise DecodeError(f"{name} states no optics or no size of its sensor, so no camera of it")
     if optics.type == "streaks" and measured != Measured(noise=measured.noise):
         raise DecodeError(f"the optics of {name} write streaks; only --noise can be put into it")
+    if optics.type == "hazy_psf" and measured != Measured(noise=measured.noise):
+        raise DecodeError(f"the optics of {name} have a haze; only --noise can be put into it")
     own = {name: bundle.member(name) for name in bundle.names if name not in OWN_NAMES}
     psf = bundle.psf if optics.type == "frozen_psf" else None
     draft = _Draft(manifest=bundle.manifest, members=own, psf=psf)

@@ -332,7 +332,9 @@ def coarse_work(entry: Dehaze, channels: int) -> float:
     return channels * (entry.terms + CORE_TERMS) * (entry.rounds + 2) / entry.shrink**2
 
 
-def solving_bytes(entry: Dehaze, haze: Haze, channels: int, size_px: tuple[int, int]) -> int:
+def solving_bytes(
+    entry: Dehaze, haze: Haze, channels: int, size_px: tuple[int, int], kernel_scale: float = 1.0
+) -> int:
     """Give the memory in which the scene of a capture is found.
 
     Args:
@@ -340,8 +342,9 @@ def solving_bytes(entry: Dehaze, haze: Haze, channels: int, size_px: tuple[int, 
         haze: Of the optics.
         channels: Colours.
         size_px: (width, height) of the capture.
+        kernel_scale: What the kernels are scaled by.
     """
-    side = haze.kernels.shape[-1]
+    side = int(haze.kernels.shape[-1] * kernel_scale) + 3
     sides = [cell_count(length, entry.shrink) + 2 * MARGIN_CELLS for length in size_px]
     cells = sides[0] * sides[1]
     spectrum = (sides[0] + side) * (sides[1] + side)

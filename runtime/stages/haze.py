@@ -56,17 +56,20 @@ def prepare(entry: Dehaze, job: Job) -> StageWork:
 
         @cache
         def band() -> CoarseBand:
-            return coarse_band(entry, picture, job)
+            # whoever asks first, the time is this stage's
+            with job.clock.stage(entry.type):
+                return coarse_band(entry, picture, job)
 
         cleared = picture.with_bands(_cleared(picture, band))
         return (replace(cleared, noise_rise=lambda: band().noise_rise),)
 
     capture = job.capture
     size_px = capture.width, capture.height
+    haze, scale = job.known_bundle.haze, job.placement.kernel_scale
     return StageWork(
         run=run,
         held_bytes=BYTES_PER_COLUMN * capture.width,
-        first_bytes=solving_bytes(entry, job.known_bundle.haze, capture.channels, size_px),
+        first_bytes=solving_bytes(entry, haze, capture.channels, size_px, scale),
     )
 
 

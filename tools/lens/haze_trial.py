@@ -99,7 +99,7 @@ def build(optics: FrozenOptics, out: Path, *, terms: int, rounds: int) -> Bundle
         WhiteBalance(),
         Demosaic(),
         Dehaze(shrink=optics.haze.cell_px, terms=terms, rounds=rounds),
-        Wiener(takes=("clear", "unknown"), prior_scale=1e-3, prior_exponent=2.0),
+        Wiener(takes=("clear", "unknown"), prior_scale=3e-4, prior_exponent=2.0),
         RaiseClipped(takes=("restored",)),
         Illumination(takes=("neutral",)),
         Undistort(),

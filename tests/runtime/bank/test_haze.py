@@ -187,3 +187,4 @@ def test_more_terms_and_larger_captures_cost_more() -> None:
     assert coarse_work(many, 3) > 2 * coarse_work(few, 3)
     sizes = [solving_bytes(few, tiny_haze(), 3, size) for size in ((96, 64), (6000, 4000))]
     assert sizes[0] < sizes[1] < solving_bytes(many, tiny_haze(), 3, (6000, 4000))
+    assert sizes[0] < solving_bytes(few, tiny_haze(), 3, (96, 64), 4.0)

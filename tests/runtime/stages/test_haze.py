@@ -91,6 +91,27 @@ def test_a_crop_knows_its_place(bundle: Bundle) -> None:
     assert np.abs(made[0] - made[1]).max() > FLOAT32
 
 
+def test_a_larger_picture_of_the_same_frame_has_wider_kernels(bundle: Bundle) -> None:
+    samples = np.random.default_rng(5).uniform(0, 1, (3, 96, 144)).astype(np.float32)
+    picture = _filled(bundle, made_planes(samples=samples), assume="scale")
+    assert picture.shape == (3, 96, 144)
+    assert np.isfinite(picture).all()
+
+
+def test_its_seconds_are_its_own(bundle: Bundle, monkeypatch: pytest.MonkeyPatch) -> None:
+    inside = []
+    found = haze.solve_coarse
+
+    def watched(*args: Any, **options: Any) -> Any:
+        inside.append(work.job.clock.running)
+        return found(*args, **options)
+
+    monkeypatch.setattr(haze, "solve_coarse", watched)
+    work = start(bundle, _capture())
+    work.fill()
+    assert inside == ["haze"]
+
+
 def test_methods_end_before_the_haze_behind_it_or_behind_the_bank(bundle: Bundle) -> None:
     ways = {}
     for method in ("develop", "haze", "wiener", "rl"):

@@ -61,6 +61,8 @@ def timed_capture(
         if optics is None or optics.type == "lens_profile"
         else manifest.members[optics.member].sha256
     )
+    if optics is not None and optics.type == "hazy_psf":
+        lens = f"{lens} {manifest.members[optics.haze_member].sha256}"
     depth_mm = None if optics is None else bundle.reference_depth_mm
     shown = hashlib.sha256(photo.read_bytes()).hexdigest() if photo else SCENE_TEXT
     camera = (manifest.kind, manifest.sensor.model_dump_json(), lens, depth_mm)
