@@ -26,6 +26,9 @@ AZIMUTHS: Final = 32
 DOUBLINGS: Final = 5
 """Of single cells to squares of 32."""
 
+EQUAL: Final = 1e-4
+"""Directions whose lengths differ less, relatively, are equally long."""
+
 FloatGrid = NDArray[np.float64]
 
 
@@ -233,10 +236,23 @@ def _few(kernels: FloatArray, terms: int) -> tuple[FloatArray, FloatArray]:
         rows = inside[:, ::2] + inside[:, 1::2]
         squares = rows[..., ::2] + rows[..., 1::2]
         products += _products(squares)
-    _, directions = np.linalg.eigh(products)
-    weights = np.ascontiguousarray(directions[:, : -terms - 1 : -1], np.float32)
+    lengths, directions = np.linalg.eigh(products)
+    kept = _whole_pairs(lengths[::-1], terms)
+    weights = np.ascontiguousarray(directions[:, : -kept - 1 : -1], np.float32)
     few = np.tensordot(weights.T, kernels, axes=1)
     return np.asarray(few, np.float32), weights
+
+
+def _whole_pairs(lengths: FloatGrid, most: int) -> int:
+    """Give how many directions to keep, of the longest: equal ones are kept or left together.
+
+    Two equally long directions, as sine and cosine of the azimuth are, may be any two of their
+    plane: which of them the last bits of the kernels would decide.
+    """
+    kept = most
+    while kept > 1 and lengths[kept - 1] - lengths[kept] < EQUAL * lengths[kept - 1]:
+        kept -= 1
+    return kept
 
 
 def _products(kernels: FloatArray) -> FloatGrid:

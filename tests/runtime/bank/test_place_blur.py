@@ -10,6 +10,7 @@ from camkit.runtime.bank.place_blur import (
     NodeKernels,
     Nodes,
     PlaceBlur,
+    _whole_pairs,
     lay_nodes,
 )
 from camkit.runtime.bank.psf import FieldKernels
@@ -120,6 +121,11 @@ def test_few_kernels_stand_for_many_and_more_of_them_are_nearer() -> None:
     ]
     assert off[0] > 2 * off[1] > 4 * off[2]
     assert off[2] < 0.01 * exact.max()
+
+
+def test_equal_directions_are_kept_or_left_together() -> None:
+    lengths = np.array([5.0, 4.0, 4.0 - 1e-9, 3.0, 3.0, 1.0])
+    assert [_whole_pairs(lengths, most) for most in (1, 2, 3, 4, 5)] == [1, 1, 3, 3, 5]
 
 
 def test_the_solver_undoes_a_blur_that_is_the_same_everywhere() -> None:
