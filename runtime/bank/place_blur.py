@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
@@ -175,6 +174,8 @@ class PlaceBlur:
             raise ContractError(
                 f"{len(nodes.places_mm)} nodes need a kernel each; got {kernels.shape}"
             )
+        import scipy.fft
+
         few, weights = _few(kernels, terms)
         height, width = nodes.near.shape[:2]
         self._size = height, width
@@ -193,7 +194,7 @@ class PlaceBlur:
         """Give the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
         total = np.zeros(self._spectra.shape[1:], np.complex64)
         for weight, spectrum in zip(self._weights, self._spectra, strict=True):
-            lit = scipy.fft.rfft2(weight * light, self._full)
+            lit = self._transform(weight * light)
             lit *= spectrum
             total += lit
         return self._inverse(total)
@@ -207,9 +208,16 @@ class PlaceBlur:
         share = self._weights.mean(axis=(1, 2), dtype=np.float64).astype(np.float32)
         mean = np.tensordot(share, self._spectra, axes=1)
         gain = np.conj(mean) / (np.square(np.abs(mean)) + np.float32(damping))
-        return lambda picture: self._inverse(scipy.fft.rfft2(picture, self._full) * gain)
+        return lambda picture: self._inverse(self._transform(picture) * gain)
+
+    def _transform(self, picture: FloatArray) -> NDArray[np.complex64]:
+        import scipy.fft
+
+        return np.asarray(scipy.fft.rfft2(picture, self._full))
 
     def _inverse(self, spectrum: NDArray[np.complex64]) -> FloatArray:
+        import scipy.fft
+
         height, width = self._size
         made = scipy.fft.irfft2(spectrum, self._full)[:height, :width]
         return np.ascontiguousarray(made, np.float32)
@@ -219,7 +227,7 @@ class PlaceBlur:
         place = np.arange(kernel.shape[-1]) - kernel.shape[-1] // 2
         laid = np.zeros(self._full, np.float32)
         np.add.at(laid, (place[:, None] % rows, place % columns), kernel)
-        return np.asarray(scipy.fft.rfft2(laid), np.complex64)
+        return self._transform(laid)
 
 
 def _few(kernels: FloatArray, terms: int) -> tuple[FloatArray, FloatArray]:
