@@ -86,12 +86,7 @@ class Lit:
 
     def light_at(self, x_mm: float, y_mm: float) -> FloatArray:
         """Give the light (c,) of an image point, interpolated as the kernels are."""
-        fields = self.kernels
-        if fields.grid_x_mm is not None and fields.grid_y_mm is not None:
-            return _on_grid(self.light, (fields.grid_y_mm, fields.grid_x_mm), (y_mm, x_mm))
-        height_mm = float(np.hypot(x_mm, y_mm))
-        found = [np.interp(height_mm, fields.field_heights_mm, light) for light in self.light.T]
-        return np.array(found, np.float32)
+        return self.kernels.between(self.light, x_mm, y_mm)
 
     def scaled(self, ratio: float) -> "Lit":
         """Give the kernels scaled about their centres; see `FieldKernels.scaled`."""
@@ -237,16 +232,6 @@ def _added(wide: FloatGrid, narrow: FloatGrid) -> FloatGrid:
     total = np.array(large)
     total[..., at : at + small.shape[-1], at : at + small.shape[-1]] += small
     return total
-
-
-def _on_grid(
-    light: FloatGrid, axes_mm: tuple[FloatGrid, FloatGrid], at_mm: tuple[float, float]
-) -> FloatArray:
-    """Interpolate (field, c) linearly between the places of a grid; its rim holds beyond it."""
-    rows, columns = axes_mm
-    laid = light.reshape(rows.size, columns.size, -1)
-    along = [[np.interp(at_mm[1], columns, line) for line in row.T] for row in laid]
-    return np.array([np.interp(at_mm[0], rows, line) for line in np.array(along).T], np.float32)
 
 
 def _lit(kernels: FloatGrid, like: FieldKernels) -> Lit:

@@ -119,8 +119,24 @@ class FieldKernels:
             (c, h, w) float32, each kernel sums to 1.
         """
         if self.grid_x_mm is not None and self.grid_y_mm is not None:
-            return _blend_grid(self.kernels, (self.grid_y_mm, self.grid_x_mm), (y_mm, x_mm))
+            return _normalised(self.between(self.kernels, x_mm, y_mm))
         return _kernel_at(self.kernels, self.field_heights_mm, x_mm, y_mm, turns=self.turns)
+
+    def between(self, values: FloatArray | FloatGrid, x_mm: float, y_mm: float) -> FloatArray:
+        """Give what else is known at the fields at an image point: linear, as the kernels are.
+
+        Args:
+            values: (field, ...); nothing of them is turned.
+            x_mm: See `at`.
+            y_mm: See `at`.
+
+        Returns:
+            (...) float32.
+        """
+        if self.grid_x_mm is not None and self.grid_y_mm is not None:
+            return _blend_grid(values, (self.grid_y_mm, self.grid_x_mm), (y_mm, x_mm))
+        height_mm = float(np.hypot(x_mm, y_mm))
+        return np.asarray(_blend(values, self.field_heights_mm, height_mm), np.float32)
 
     def scaled(self, ratio: float) -> "FieldKernels":
         """Give the kernels scaled about their centres, odd sides and sums of 1 kept.
@@ -233,14 +249,14 @@ def _normalised(kernel: FloatArray) -> FloatArray:
 
 
 def _blend_grid(
-    kernels: FloatArray, axes_mm: tuple[FloatGrid, FloatGrid], at_mm: tuple[float, float]
+    values: FloatArray | FloatGrid, axes_mm: tuple[FloatGrid, FloatGrid], at_mm: tuple[float, float]
 ) -> FloatArray:
     """Interpolate linearly between the four neighbours on a grid; its rim holds beyond it."""
     (row, down), (column, across) = (
         _neighbours(axis, at) for axis, at in zip(axes_mm, at_mm, strict=True)
     )
     columns = axes_mm[1].size
-    total = np.zeros(kernels.shape[1:], dtype=np.float32)
+    total = np.zeros(values.shape[1:], dtype=np.float32)
     for y, x, share in (
         (row, column, (1 - down) * (1 - across)),
         (row, column + 1, (1 - down) * across),
@@ -248,8 +264,8 @@ def _blend_grid(
         (row + 1, column + 1, down * across),
     ):
         if share > 0:
-            total += np.float32(share) * kernels[y * columns + x]
-    return _normalised(total)
+            total += np.float32(share) * values[y * columns + x]
+    return total
 
 
 def _neighbours(positions_mm: FloatGrid, at_mm: float) -> tuple[int, float]:
@@ -263,7 +279,7 @@ def _neighbours(positions_mm: FloatGrid, at_mm: float) -> tuple[int, float]:
     return low, float(share)
 
 
-def _blend(kernels: FloatArray, heights_mm: FloatGrid, height_mm: float) -> FloatArray:
+def _blend(kernels: FloatArray | FloatGrid, heights_mm: FloatGrid, height_mm: float) -> FloatArray:
     """Interpolate linearly in height; a new (3, h, w) array."""
     if heights_mm.size == 1:
         return np.array(kernels[0])

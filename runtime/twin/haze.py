@@ -1,6 +1,7 @@
 """The haze of a scene: light that falls far from its peaks, spread block by block in cells.
 
-It shares nothing with how haze is undone (`camkit.runtime.bank.place_blur`) but the kernels.
+It shares nothing with how haze is undone (`camkit.runtime.bank.place_blur`) but the kernels
+and how cells are enlarged.
 """
 
 from dataclasses import dataclass

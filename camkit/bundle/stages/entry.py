@@ -103,3 +103,28 @@ def one_linear(taken: Sequence[Plane]) -> Plane:
     need_count(taken, 1)
     need_domain(taken[0], "linear")
     return taken[0]
+
+
+def need_masks(masks: Sequence[Plane], plane: Plane, use: str) -> None:
+    """Refuse masks that are none, or lie elsewhere than a plane; `use` ends the sentence.
+
+    Raises:
+        JoinError: If one is not on the samples of the plane.
+    """
+    for mask in masks:
+        need_domain(mask, "mask")
+        if mask.grid != plane.grid:
+            raise JoinError(f"its mask must lie on the samples that it {use}")
+
+
+def need_colours(plane: Plane, parts: Parts) -> None:
+    """Refuse a plane that has not one channel for each of the sensor.
+
+    Raises:
+        JoinError: If it has others.
+    """
+    if plane.channels != parts.sensor.channels:
+        raise JoinError(
+            f"it takes one plane for each of {', '.join(parts.sensor.channels)}, not "
+            f"{', '.join(plane.channels)}"
+        )

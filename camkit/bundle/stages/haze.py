@@ -11,8 +11,10 @@ from camkit.bundle.stages.entry import (
     JoinError,
     Parts,
     StageEntry,
+    need_colours,
     need_count,
     need_domain,
+    need_masks,
     need_rows,
 )
 from camkit.haze import LEAST_CELL_PX, MOST_CELL_PX
@@ -41,10 +43,7 @@ class Dehaze(StageEntry):
         plane = taken[0]
         need_domain(plane, "linear")
         need_rows(plane)
-        for mask in taken[1:]:
-            need_domain(mask, "mask")
-            if mask.grid != plane.grid:
-                raise JoinError("its mask must lie on the samples that it clears")
+        need_masks(taken[1:], plane, "clears")
         optics = parts.need_optics("it undoes the haze of optics")
         if optics.type != "hazy_psf":
             raise JoinError(f"it needs optics with a haze (hazy_psf), not {optics.type}")
@@ -52,11 +51,7 @@ class Dehaze(StageEntry):
             raise JoinError(
                 f"its cells have {self.shrink} px, those of the haze of the optics {optics.cell_px}"
             )
-        if plane.channels != parts.sensor.channels:
-            raise JoinError(
-                f"it takes one plane for each of {', '.join(parts.sensor.channels)}, not "
-                f"{', '.join(plane.channels)}"
-            )
+        need_colours(plane, parts)
         if not plane.grid.warped or plane.grid.pitch_ratio != 1:
             raise JoinError("it works on the pixels of the sensor, before any undistortion")
         return (plane,)

@@ -11,8 +11,10 @@ from camkit.bundle.stages.entry import (
     JoinError,
     Parts,
     StageEntry,
+    need_colours,
     need_count,
     need_domain,
+    need_masks,
     need_rows,
 )
 from camkit.bundle.stages.together import Together
@@ -63,18 +65,11 @@ class Wiener(StageEntry):
         plane = taken[0]
         need_domain(plane, "linear")
         need_rows(plane)
-        for mask in taken[1:]:
-            need_domain(mask, "mask")
-            if mask.grid != plane.grid:
-                raise JoinError("its mask must lie on the samples that it deconvolves")
+        need_masks(taken[1:], plane, "deconvolves")
         optics = parts.need_optics("it deconvolves with the kernels of optics")
         if optics.type == "lens_profile":
             raise JoinError("it needs optics with kernels; a lens_profile has none")
-        if plane.channels != parts.sensor.channels:
-            raise JoinError(
-                f"it takes one plane for each of {', '.join(parts.sensor.channels)}, not "
-                f"{', '.join(plane.channels)}"
-            )
+        need_colours(plane, parts)
         if self.together is not None and len(self.together.noise) != len(plane.channels):
             raise JoinError(
                 f"it restores {len(self.together.noise)} colours together and takes "
