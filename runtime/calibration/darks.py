@@ -52,7 +52,8 @@ class Darks:
         Args:
             files: The frames, one or more.
             times_s: One for each; None for what the files state.
-            bracket: The frames that they belong to.
+            bracket: The frames that they belong to; the darks of a single frame without a time
+                were exposed as long as it.
             mosaic: As for the bracket.
 
         Raises:
@@ -66,6 +67,8 @@ class Darks:
             check_alike(bracket.like, bracket.frames[0].path, capture, path)
             told = capture.metadata.exposure_time_s or capture.exposure_time_s
             time_s = told if times_s is None else times_s[number]
+            if not bracket.is_timed:
+                time_s = bracket.frames[0].time_s
             if time_s is None:
                 raise ContractError(
                     f"the dark frame {path.name} states no exposure time; say --times with one "

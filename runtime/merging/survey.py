@@ -21,6 +21,7 @@ from camkit.runtime.raw import is_picture, read_capture
 SAMPLED_PIXELS: Final = 20_000
 SAME_TIME: Final = 1e-3
 _MOST_FRAMES: Final = 256
+_UNSTATED_S: Final = 1.0  # a single frame is in proportion to itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +52,7 @@ class Survey:
         codes: (frame, 3, pixel) uint8 on a lattice; None where pictures are not of 8 bits.
         mosaic: What the caller said of a headerless mosaic or of levels.
         notes: What decoders found worth a word.
+        is_timed: Exposure times are known; a single frame may do without, as 1 s.
     """
 
     frames: tuple[Frame, ...]
@@ -59,6 +61,7 @@ class Survey:
     codes: NDArray[np.uint8] | None
     mosaic: MosaicOptions | None
     notes: tuple[str, ...]
+    is_timed: bool = True
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -79,24 +82,27 @@ def survey(
         files: Two or more, in any order.
         times_s: One for each file; None for what the files say.
         mosaic: How to read headerless mosaics, or levels in place of a RAW file's.
-        alike: A single frame, or frames of one exposure, will do.
+        alike: A single frame, or frames of one exposure, will do; a single one needs no time.
 
     Raises:
         ContractError: If there are not two different times, a file is given twice, or times are
-            neither stated nor in the files.
+            neither stated nor in the files where they are needed.
         DecodeError: If a frame cannot be read, is not finite, or differs from the others in kind
             or size.
     """
     _check_files(files, 1 if alike else 2)
+    may_lack_time, is_timed = alike and len(files) == 1, True
     found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]] = []
     for number, path in enumerate(files):
         capture = read_frame(path, mosaic)
         told = capture.metadata.exposure_time_s or capture.exposure_time_s
         time_s = told if times_s is None else times_s[number]
-        if time_s is None:
+        if time_s is None and not may_lack_time:
             raise ContractError(
                 f"{path.name} states no exposure time; say --times with one for each file"
             )
+        if time_s is None:
+            time_s, is_timed = _UNSTATED_S, False
         frame = Frame(path=path, time_s=time_s, sha256=capture.sha256, noise=capture.noise)
         if found:
             check_alike(found[0][1], found[0][0].path, capture, path)
@@ -106,7 +112,7 @@ def survey(
     found.sort(key=lambda one: (-one[0].time_s, str(one[0].path)))
     if not alike:
         _check_exposures([frame for frame, _, _ in found])
-    return _joined(found, mosaic)
+    return _joined(found, mosaic, is_timed=is_timed)
 
 
 def read_frame(path: Path, mosaic: MosaicOptions | None) -> Capture:
@@ -179,7 +185,10 @@ def _check_exposures(frames: Sequence[Frame]) -> None:
 
 
 def _joined(
-    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]], mosaic: MosaicOptions | None
+    found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]],
+    mosaic: MosaicOptions | None,
+    *,
+    is_timed: bool,
 ) -> Survey:
     frames = tuple(frame for frame, _, _ in found)
     like, is_raw = found[0][1], not is_picture(frames[0].path) or found[0][1].cfa is not None
@@ -191,6 +200,7 @@ def _joined(
         codes=np.stack(lattices) if lattices else None,
         mosaic=mosaic,
         notes=_notes([(frame.path, capture.notes) for frame, capture, _ in found]),
+        is_timed=is_timed,
     )
 
 

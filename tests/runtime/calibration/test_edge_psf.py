@@ -14,7 +14,7 @@ from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.merging.survey import Survey, survey
 from tests.data_folder import data_path
 from tests.runtime.calibration.haze_factory import Hazy
-from tests.runtime.calibration.point_factory import exposed, write_mosaic
+from tests.runtime.calibration.point_factory import exposed, mosaic_of, write_mosaic
 
 FOUR_UM = PsfOptions(pixel_pitch_um=4.0)
 CLEAR = Hazy(core=1.0, side=300, x=152.3, y=149.1)
@@ -106,6 +106,19 @@ def test_the_light_near_the_peak_is_right_to_a_hundredth(tmp_path: Path, core: f
 def test_haze_without_darks_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DecodeError, match=r"haze fills the frame: \d+% .* by --dark"):
         measure_edge(_edge(tmp_path, Hazy()), FOUR_UM, None)
+
+
+def test_one_frame_and_its_darks_need_no_times(tmp_path: Path) -> None:
+    hazy, path = Hazy(core=0.6, seed=4), tmp_path / "edge.dng"
+    write_mosaic(path, exposed(mosaic_of(hazy.edge_planes(0.1)), 0.8, 1), 0.0)
+    darks, timed = hazy.write_darks(tmp_path), survey([path], [1.0], alike=True)
+    found = measure_edge(timed, FOUR_UM, Darks.read(darks, None, timed))
+    mute = survey([path], None, alike=True)
+    assert (mute.is_timed, mute.frames[0].time_s) == (False, 1.0)
+    # what the darks say of their time counts for nothing where the frame says nothing
+    for times_s in (None, [30.0] * len(darks)):
+        again = measure_edge(mute, FOUR_UM, Darks.read(darks, times_s, mute))
+        assert again.fields == found.fields
 
 
 def test_what_shows_no_edge_is_refused(tmp_path: Path) -> None:
