@@ -51,12 +51,13 @@ class Distortion:
         """Give the radius in the picture of ideal radii, by lensfun's own formula."""
         return _FORMULAS[self.model](r, *self.terms)
 
-    def to_radial(self, radius_mm: float, channels: int) -> RadialEntry:
+    def to_radial(self, radius_mm: float, channels: int, scale: float = 1.0) -> RadialEntry:
         """Give the same as powers, for every channel.
 
         Args:
             radius_mm: What lensfun's unit is on the sensor; see `unit_mm`.
             channels: Of the sensor.
+            scale: By which ideal radii are multiplied first; below 1 the straight picture grows.
         """
         if self.model == "ptlens":
             a, b, c = self.terms
@@ -67,9 +68,12 @@ class Distortion:
         else:
             k1, k2 = self.terms
             odd, even = (1.0, k1, k2, 0.0), None
+        a0, a1, a2, a3 = (a * scale**power for a, power in zip(odd, (1, 3, 5, 7), strict=True))
+        if even is not None:
+            b0, b1, b2 = (b * scale**power for b, power in zip(even, (2, 4, 6), strict=True))
         return RadialEntry(
-            coefficients=(odd,) * channels,
-            even_coefficients=None if even is None else (even,) * channels,
+            coefficients=((a0, a1, a2, a3),) * channels,
+            even_coefficients=None if even is None else ((b0, b1, b2),) * channels,
             radius_mm=radius_mm,
         )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.bundle.optics import IlluminationEntry, LensProfile, RadialEntry
 from camkit.errors import ContractError, DecodeError
@@ -18,13 +19,20 @@ from camkit.runtime.calibration.lensfun.models import (
     corner_mm,
     unit_mm,
 )
-from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion, distort_points
+from camkit.runtime.geometry.distortion import (
+    RANGE_MARGIN,
+    check_distortion,
+    distort_points,
+    undistort_points,
+)
 from camkit.units import to_mm
 
 SMALLER: Final = 0.96
 """A lens measured on a sensor smaller than this share of the capture's does not serve."""
 HEIGHTS: Final = 129
 CHECKED: Final = 1001
+_SEEN_PX: Final = 0.5
+"""Less of a border's repetition is not worth a scale of one's own."""
 RADIAL_KIND: Final = "rectilinear"
 
 
@@ -51,6 +59,12 @@ class Frame:
         return math.hypot(width - 1, height - 1) / 2 * to_mm(self.pitch_um)
 
     @property
+    def border_radii_mm(self) -> NDArray[np.float64]:
+        """Give distances of the outermost rows and columns from the middle."""
+        nearest_mm = (min(self.size_px) - 1) / 2 * to_mm(self.pitch_um)
+        return np.linspace(nearest_mm, self.corner_radius_mm, CHECKED)
+
+    @property
     def stretch(self) -> float:
         """Give the diagonal by pixels over that by the crop factor: 1 where both are exact."""
         return math.hypot(*self.size_px) * to_mm(self.pitch_um) * self.crop_factor / FULL_FRAME_MM
@@ -65,6 +79,7 @@ class Found:
         lens: As it was measured.
         distortion: The entry, interpolated where none was measured.
         vignetting: The entry; None for none.
+        scale: Of ideal radii: the straight picture is larger than lensfun's by 1 / scale.
         residual_px: The most by which the profile misses lensfun's formula over the picture.
         notes: What people should know.
     """
@@ -73,6 +88,7 @@ class Found:
     lens: Lens
     distortion: Distortion
     vignetting: Vignetting | None
+    scale: float
     residual_px: float
     notes: tuple[str, ...]
 
@@ -84,6 +100,7 @@ def profile_of(
     *,
     aperture: float | None = None,
     distance_m: float | None = None,
+    scale: float | None = None,
 ) -> Found:
     """Make a profile.
 
@@ -93,6 +110,7 @@ def profile_of(
         frame: Of the captures.
         aperture: F-number of the captures; None where they state none.
         distance_m: Of the object.
+        scale: Of ideal radii; None for `filling_scale`.
 
     Raises:
         DecodeError: If the lens was not measured on a sensor so large or at that focal length, has
@@ -101,8 +119,11 @@ def profile_of(
     lens = _measured_on(lenses, frame)
     entry = distortion_at(lens, focal_mm)
     radius_mm = unit_mm(lens.crop_factor, lens.aspect) * frame.stretch
-    distortion = entry.to_radial(radius_mm, frame.channels)
+    as_measured = entry.to_radial(radius_mm, frame.channels)
     try:
+        check_distortion(as_measured.to_distortion(), frame.corner_radius_mm)
+        chosen = filling_scale(as_measured, frame) if scale is None else scale
+        distortion = entry.to_radial(radius_mm, frame.channels, chosen)
         check_distortion(distortion.to_distortion(), frame.corner_radius_mm)
     except ContractError as error:
         raise DecodeError(
@@ -110,6 +131,8 @@ def profile_of(
             f"so it cannot be undone: {str(error).split(';')[0]}"
         ) from error
     notes = []
+    if scale is None and chosen < 1:
+        notes.append(f"the picture is enlarged by {1 / chosen:.4f}, so that nothing beyond the capture shows")  # noqa: E501 # fmt: skip
     if len({one.model for one in lens.distortion}) > 1:
         notes.append(f"entries of other models than {entry.model} are left out, as lensfun does")
     if lens.kind != RADIAL_KIND:
@@ -128,15 +151,40 @@ def profile_of(
         lens=lens,
         distortion=entry,
         vignetting=None if light is None else nearest,
-        residual_px=missed_px(entry, distortion, frame),
+        scale=chosen,
+        residual_px=missed_px(entry, distortion, frame, chosen),
         notes=tuple(notes),
     )
 
 
-def missed_px(entry: Distortion, distortion: RadialEntry, frame: Frame) -> float:
+def filling_scale(distortion: RadialEntry, frame: Frame) -> float:
+    """Give the largest scale <= 1 of ideal radii at which no border shows what lies beyond it.
+
+    Where the border of the straight picture lies at a distance r, and d(r) > r is where the capture
+    is asked for, the scale is at most d^-1(r) / r.
+
+    Args:
+        distortion: As measured, without folds over the picture.
+        frame: Of the captures.
+    """
+    radii_mm, rows = frame.border_radii_mm, distortion.to_distortion()
+    scale = 1.0
+    for channel in range(frame.channels):
+        points = np.stack([radii_mm, np.zeros(radii_mm.size)], axis=-1)
+        placed = distort_points(points, rows, channel=channel)[:, 0]
+        beyond = points[placed > radii_mm + _SEEN_PX * to_mm(frame.pitch_um)]
+        if beyond.size:
+            ideal = undistort_points(beyond, rows, channel=channel)
+            scale = min(scale, float((ideal[:, 0] / beyond[:, 0]).min()))
+    return scale
+
+
+def missed_px(
+    entry: Distortion, distortion: RadialEntry, frame: Frame, scale: float = 1.0
+) -> float:
     """Give by how many pixels a profile misses lensfun's formula at most, over the picture."""
     ideal_mm = np.linspace(0, frame.corner_radius_mm, CHECKED)
-    placed = entry.placed(ideal_mm / distortion.radius_mm) * distortion.radius_mm
+    placed = entry.placed(scale * ideal_mm / distortion.radius_mm) * distortion.radius_mm
     points = np.stack([ideal_mm, np.zeros(CHECKED)], axis=-1)
     rows = distortion.to_distortion()
     missed = [

@@ -34,6 +34,13 @@ def lensfun_in(
         float | None,
         typer.Option(help="Of the captures' sensor; default: by pixel pitch, else the camera's."),
     ] = None,
+    scale: Annotated[
+        float | None,
+        typer.Option(
+            help="Of the straight picture's radii, 1 as lensfun has them; default: the most up to "
+            "1 at which no border is repeated."
+        ),
+    ] = None,
     mosaic: MosaicCfa = None,
     black_level: BlackLevel = None,
     white_level: WhiteLevel = None,
@@ -52,6 +59,7 @@ def lensfun_in(
 
     options = {"--focal-mm": focal_mm, "--aperture": aperture}
     options |= {"--distance-m": distance_m, "--crop-factor": crop_factor}
+    options |= {"--scale": scale}
     for option, value in options.items():
         if value is not None:
             check_positive(value, option)
@@ -66,6 +74,7 @@ def lensfun_in(
         frame,
         aperture=shot.metadata.f_number if aperture is None else aperture,
         distance_m=distance_m,
+        scale=scale,
     )
     manifest, stood_in = manifest_of(slug(out.stem), shot, frame, found.profile)
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -87,6 +96,7 @@ def _record(found: "Found") -> dict[str, Any]:
         "model": entry.model,
         "focal_mm": entry.focal_mm,
         "terms": terms,
+        "scale": found.scale,
         "residual_px": round(found.residual_px, 6),
         "vignetting": light
         and {

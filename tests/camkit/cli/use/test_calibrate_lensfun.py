@@ -64,7 +64,7 @@ def test_processing_evens_and_straightens_as_lensfun_says(
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]]
     spot = 256 + 2500 * np.exp(-((x - x0) ** 2 + (y - y0) ** 2) / 18)
     shot = write_shot(tmp_path / "spot.dng", spot)
-    assert camkit_command(*asked, "--lens", ZOOM, "--focal-mm", 24).code == 0
+    assert camkit_command(*asked, "--lens", ZOOM, "--focal-mm", 24, "--scale", 1).code == 0
     straight: dict[str, Any] = {}
     for name, more in {"on": (), "off": ("--no-undistort", "--no-vignetting")}.items():
         folder = tmp_path / name
@@ -189,7 +189,7 @@ def test_out_and_in_again_agree(
     scaled: bool,
 ) -> None:
     """On another sensor than measured, ptlens has another scale: its 1 lies elsewhere."""
-    crop = ("--crop-factor", crop_factor)
+    crop = ("--crop-factor", crop_factor, "--scale", 1)
     assert camkit_command(*asked, "--lens", lens, "--focal-mm", focal_mm, *crop).code == 0
     made = tmp_path / "zoom.camkit"
     words = ("calibrate", "lensfun-out", made, "-o", tmp_path / "own.xml")

@@ -10,7 +10,7 @@ import pytest
 from camkit.errors import DecodeError
 from camkit.runtime.calibration.lensfun.database import Database, Lens
 from camkit.runtime.calibration.lensfun.models import Distortion
-from camkit.runtime.calibration.lensfun.profile import Frame, profile_of
+from camkit.runtime.calibration.lensfun.profile import Frame, filling_scale, profile_of
 from camkit.runtime.geometry.distortion import distort_points
 from tests.lensfun_factory import ZOOM, write_database
 
@@ -71,6 +71,32 @@ def test_a_picture_of_another_aspect_keeps_the_scale_of_the_diagonal(lens: Lens)
     assert half_px == pytest.approx(math.hypot(6000, 4000) / 2 * 3 / 5)
 
 
+@pytest.mark.parametrize("terms", [(0.0, 0.03, 0.0), (0.01, 0.01, -0.01), (0.0, -0.02, 0.0)])
+def test_the_picture_grows_until_no_border_is_repeated_and_no_more(
+    lens: Lens, terms: tuple[float, float, float]
+) -> None:
+    entry = Distortion(model="ptlens", focal_mm=24.0, terms=terms)
+    found = profile_of([replace(lens, distortion=(entry,))], 24.0, FULL)
+    assert found.profile.distortion is not None
+    pitch_mm = FULL.pitch_um / 1000
+    x, y = np.meshgrid(np.arange(6000) - 2999.5, np.arange(4000) - 1999.5, sparse=True)
+    edges = [(x[0], np.full(6000, -1999.5)), (np.full(4000, 2999.5), y[:, 0])]
+    border = np.concatenate([np.stack(one, axis=-1) for one in edges])
+    seen = distort_points(border * pitch_mm, found.profile.distortion.to_distortion()) / pitch_mm
+    beyond = np.maximum(np.abs(seen[:, 0]) - 2999.5, np.abs(seen[:, 1]) - 1999.5).max()
+    assert beyond < 0.5
+    if found.scale < 1:
+        assert abs(beyond) < 0.01
+        assert any("enlarged by" in note for note in found.notes)
+    assert (found.scale < 1) == (terms[1] > 0)
+    assert found.residual_px < 1e-9
+    as_lensfun = profile_of([replace(lens, distortion=(entry,))], 24.0, FULL, scale=1.0)
+    assert as_lensfun.profile.distortion == entry.to_radial(12.0, 3).model_copy(
+        update={"radius_mm": as_lensfun.profile.distortion.radius_mm}
+    )
+    assert filling_scale(found.profile.distortion, FULL) == 1
+
+
 def test_illumination_is_the_formula_of_pa_with_the_corner_as_unit(lens: Lens) -> None:
     found = profile_of([lens], 24.0, FULL, aperture=2.8)
     assert found.profile.illumination is not None
@@ -80,7 +106,7 @@ def test_illumination_is_the_formula_of_pa_with_the_corner_as_unit(lens: Lens) -
     known = np.interp(heights_mm**2, light.heights_mm**2, light.light)
     wanted = 1 - 0.9 * r**2 + 0.3 * r**4 - 0.1 * r**6
     np.testing.assert_allclose(known, wanted, atol=1e-4)
-    assert "24 mm, f/2.8, 10 m" in found.notes[0]
+    assert any("24 mm, f/2.8, 10 m" in note for note in found.notes)
 
 
 def test_the_smallest_sensor_that_holds_the_captures_counts(lens: Lens) -> None:
