@@ -15,6 +15,7 @@ from camkit.bundle.stages import (
     Network,
     RaiseClipped,
     Repair,
+    Stage,
     Undistort,
     WhiteBalance,
 )
@@ -46,6 +47,8 @@ FAILS_ON: Final = (
     "and lenses off by more than the fabrication errors it was trained with (radius 0.2 %, "
     "thickness 0.03 mm, index 0.0005, focus 0.02 mm)",
 )
+
+FAILS_BEHIND_HAZE: Final = "lamps that clip: they throw more haze than the sensor tells"
 
 
 class BayerMaker:
@@ -93,21 +96,28 @@ class BayerTraining:
 
     def design(self, recipe: BayerRecipe) -> Design:
         """Give the stages of every camera of this kind, with the recipe's bank."""
+        restoring: tuple[Stage, ...] = (recipe.wiener, Network(scale=recipe.scale))
+        if recipe.haze is not None:
+            (clear,) = recipe.haze.gives
+            restoring = (
+                recipe.haze,
+                recipe.wiener.model_copy(update={"takes": (clear, *recipe.wiener.takes[1:])}),
+                Network(takes=(clear, *recipe.wiener.gives), scale=recipe.scale),
+            )
         return Design(
             stages=(
                 Linearise(),
                 Repair(),
                 WhiteBalance(),
                 Demosaic(method="fast"),
-                recipe.wiener,
-                Network(scale=recipe.scale),
+                *restoring,
                 RaiseClipped(),
                 Illumination(),
                 Undistort(interpolation="cubic"),
                 Color(),
             ),
             object_distance_mm=recipe.object_distance_mm,
-            fails_on=FAILS_ON,
+            fails_on=FAILS_ON if recipe.haze is None else (*FAILS_ON, FAILS_BEHIND_HAZE),
         )
 
     def build_network(self, name: str, **config: Any) -> nn.Module:

@@ -34,7 +34,7 @@ OPTIONS = {
     "fit-bank": "-o --data --samples --steps --seed --cache-dir --overwrite --json --debug",
     "design": "--data --out-dir --steps --lens-rate --prescription --seed --pictures --threads "
     "--resume --overwrite --json --debug",
-    "export": "-o --psf --stress-psf --prescription --debug",
+    "export": "-o --psf --haze --stress-psf --prescription --debug",
     "doctor": "--json --debug",
 }
 
