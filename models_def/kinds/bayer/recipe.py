@@ -151,6 +151,7 @@ class FramesRecipe:
         crop_px: Side of the crops.
         shots: Of every frame.
         tiles: Cut from every shot.
+        validation_tiles: Likewise, to choose by.
     """
 
     count: int = 16
@@ -158,6 +159,7 @@ class FramesRecipe:
     crop_px: int = 1000
     shots: int = 2
     tiles: int = 80
+    validation_tiles: int = 30
 
     def __post_init__(self) -> None:
         if min(astuple(self)) < 1:

@@ -19,6 +19,7 @@ from camkit.bundle.stages import (
     Undistort,
     WhiteBalance,
 )
+from camkit.models_def.kinds.bayer.frames.samples import TileMaker, validation_captures
 from camkit.models_def.kinds.bayer.material import BayerMaterial, read_material, trace_material
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import (
@@ -37,7 +38,7 @@ from camkit.models_def.kinds.bayer.samples import (
 )
 from camkit.models_def.kinds.bayer.validation import BayerJudge, make_validation_captures
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.training.kind import Design
+from camkit.models_def.training.kind import Design, SampleMaker
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.models_def.training.sample import Sample, SampleLayout
 
@@ -151,9 +152,12 @@ class BayerTraining:
         material: BayerMaterial,
         pictures: Path | None,
         seed: int,
-    ) -> BayerMaker:
+    ) -> SampleMaker:
         """Open the scenes."""
         del role
+        if material.frames is not None:
+            tiles = material.frames.tiles("train", pictures)
+            return TileMaker(recipe, material.bank, tiles, seed)
         return BayerMaker(recipe, material.bank, pictures, seed)
 
     def judge(
@@ -161,9 +165,12 @@ class BayerTraining:
     ) -> BayerJudge:
         """Photograph pictures that are never trained on."""
         del role
-        return BayerJudge(
-            captures=make_validation_captures(recipe, material.bank, pictures), recipe=recipe
-        )
+        if material.frames is not None:
+            tiles = material.frames.tiles("valid", pictures)
+            captures = validation_captures(recipe, material.bank, tiles)
+        else:
+            captures = make_validation_captures(recipe, material.bank, pictures)
+        return BayerJudge(captures=captures, recipe=recipe)
 
 
 PART: Final = BayerTraining()
