@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError
@@ -16,12 +17,21 @@ from camkit.export.frames import (
     physics_bundle,
     prepare_frames,
 )
-from camkit.models_def.kinds.bayer.frames.tiles import Tiles, read_frames
+from camkit.models_def.kinds.bayer.bank_fit import BANK_FITTING
+from camkit.models_def.kinds.bayer.frames.samples import developed
+from camkit.models_def.kinds.bayer.frames.tiles import Tile, Tiles, read_frames
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import finish_shot
+from camkit.models_def.sensors.stabilise import stabilise
+from camkit.models_def.training.bank_fitting import BankFitOptions
 from camkit.models_def.training.checkpoint import read_checkpoint
 from camkit.models_def.training.kind import read_recipe, training_kind
 from camkit.models_def.training.pictures import open_source
 from camkit.models_def.training.trainer import TrainOptions, train
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.twin.light import stated_balance
+from camkit.runtime.twin.simulate import SimulationOptions, photograph
 from tests.hazy_recipe import HEIGHT_PX, RECIPE, WIDTH_PX, hazy_optics
 
 LENS = {"prescription.toml": b"made up for tests"}
@@ -118,6 +128,53 @@ def test_the_camera_without_networks_ends_behind_the_bank(
     assert "network" not in types
 
 
+def test_a_tile_through_the_bank_is_what_the_runtime_restores(
+    recipe: BayerRecipe, runs: Path, tmp_path: Path
+) -> None:
+    """One block of its own and not those of a bank: nearly the same far from its border."""
+    bundle = physics_bundle(recipe, hazy_optics(), tmp_path / "x.camkit")
+    source = open_source(None, picture_share=0.0, scenes=2, scene_px=160)
+    scene = draw_scene(np.random.default_rng(2), source, recipe, even=True)
+    made = photograph(scene, bundle, SimulationOptions(iso=100.0, distort=False))
+    pipeline = Pipeline(bundle, Options(threads=1))
+    capture = pipeline.capture_of(
+        made.samples,
+        iso=100.0,
+        white_balance=stated_balance(made.white_balance),
+        origin_px=(0, 0),
+    )
+    clear = pipeline.start(capture).keep("clear")
+    assert clear.noise_rise is not None
+    planes = np.asarray(clear.rows().read(0, HEIGHT_PX), np.float32)
+    restored = pipeline.start(capture).keep("restored").rows().read(0, HEIGHT_PX)
+    top, left = 88, 128  # about the middle of the sensor
+    red, green, blue = clear.noise_rise()
+    tile = Tile(
+        planes=_with_surroundings(planes, top, left, 64, 16),
+        clipped=np.zeros((96, 96), np.bool_),
+        sharp=made.clean[:, top : top + 64, left : left + 64],
+        x_mm=0.0,
+        y_mm=0.0,
+        iso=100.0,
+        noise_rise=(red, green, blue),
+        copy=0,
+    )
+    shot = finish_shot(developed(tile, recipe, read_frames(runs / "tiny_frames").bank), recipe)
+    shot_noise, read_noise = (
+        torch.tensor(getattr(shot.noise, name)) for name in ("shot", "read_variance")
+    )
+    inner = np.s_[:, top : top + 64, left : left + 64]
+    wanted = [
+        stabilise(torch.from_numpy(np.array(x[inner]))[None], shot_noise, read_noise, scale=64.0)[0]
+        for x in (planes, restored)
+    ]
+    given = shot.sample.inputs
+    torch.testing.assert_close(given["capture"], wanted[0])
+    off = float((given["wiener"] - wanted[1]).abs()[:, 8:-8, 8:-8].mean())
+    done = float((wanted[1] - wanted[0]).abs().mean())
+    assert off < 0.1 * done
+
+
 def test_a_network_trains_on_tiles(recipe_path: Path, runs: Path, tmp_path: Path) -> None:
     (tmp_path / "tiny_frames").symlink_to(runs / "tiny_frames")
     options = TrainOptions(out_dir=tmp_path, size="S", steps=4, workers=0)
@@ -125,6 +182,17 @@ def test_a_network_trains_on_tiles(recipe_path: Path, runs: Path, tmp_path: Path
     assert result.steps == 4
     assert result.baselines["wiener"] > result.baselines["capture"]
     assert read_checkpoint(result.checkpoint).designed == LENS
+
+
+def test_a_bank_is_fitted_to_tiles(recipe: BayerRecipe, runs: Path) -> None:
+    told: list[str] = []
+    options = BankFitOptions(
+        pictures=None, recipe_folder=Path(), cache_folder=runs, samples=24, steps=2
+    )
+    found = BANK_FITTING.fit(recipe, options, told.append)
+    assert found.samples >= 8
+    assert f"{found.samples} samples, {24 - found.samples} left out" in told[0]
+    assert len(found.together.spread.heights_mm) == 3
 
 
 def test_samples_repeat_and_tiles_come_once_before_all_again(
