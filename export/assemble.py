@@ -13,7 +13,7 @@ What a camera is made of, its kind says (`camkit.models_def.training.kind.Design
 import json
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -23,11 +23,13 @@ import numpy as np
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
+from camkit.bundle.haze_file import read_haze
+from camkit.bundle.haze_golden import haze_golden_to_bytes
 from camkit.bundle.manifest import Manifest, Threshold, format_of, planes_of
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
-from camkit.bundle.reader import CARD, GOLDEN, PREVIEW, STRESS_PSF, Bundle
+from camkit.bundle.reader import CARD, GOLDEN, HAZE_GOLDEN, PREVIEW, STRESS_PSF, Bundle
+from camkit.bundle.stages import Dehaze, Stage, Wiener
 from camkit.bundle.stages import Parts as KnownParts
-from camkit.bundle.stages import Stage, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError
@@ -54,6 +56,7 @@ from camkit.runtime.kind import part_of
 from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
+from camkit.runtime.proof.haze import make_haze_golden
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -61,6 +64,8 @@ WHITE: Final = "white"
 """In the recipe of a case whose pictures have another white than 1."""
 PROBE: Final = "probe"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
+HAZE_SCENE: Final = "procedural:23"
+"""Taken for a capture of the whole sensor in cells."""
 SIZES: Final = ("S", "M", "L")
 DEFAULT_SIZE: Final = "M"
 
@@ -112,6 +117,8 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         second = write_bundle(Path(folder) / "second.camkit", manifest, members)
         golden = add_outputs(second, cases)
         members[GOLDEN] = golden_to_bytes(golden)
+        if manifest.has_haze:
+            members[HAZE_GOLDEN] = haze_golden_to_bytes(make_haze_golden(second, HAZE_SCENE))
         whites = {name: float(case.recipe.get(WHITE, 1.0)) for name, (case, _) in cases.items()}
         members[CARD] = card_text(second, golden, camera.design.fails_on, whites).encode()
         members[PREVIEW] = preview_png(second, golden)
@@ -158,15 +165,34 @@ def _camera(parts: Parts) -> _Camera:
                 f"the checkpoints are of different cameras: the recipe of {path} has another "
                 f"{what} than that of {parts.checkpoints[0]}; train them for one"
             )
+    design = kind.design(recipe)
     return _Camera(
         kind=kind,
         recipe=recipe,
-        design=kind.design(recipe),
+        design=design,
         checkpoints=_by_role(kind.roles, parts.checkpoints, checkpoints),
-        optics=read_optics_file(parts.psf, channels=len(recipe.sensor.channels)),
+        optics=_optics(parts, recipe, design),
         freeze=_freeze_facts(parts),
         plan=_plan_entries(parts),
     )
+
+
+def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
+    """Read the optics, with their haze where a stage undoes one.
+
+    Raises:
+        ContractError: If there is a haze and no such stage, or the other way round.
+    """
+    optics = read_optics_file(parts.psf, channels=len(recipe.sensor.channels))
+    undone = any(isinstance(stage, Dehaze) for stage in design.stages)
+    if undone == (parts.haze is None):
+        raise ContractError(
+            f"the recipe {recipe.name} undoes a haze: make it with `camkit freeze --haze`, say "
+            "--haze"
+            if undone
+            else f"the recipe {recipe.name} undoes no haze; leave {parts.haze} out"
+        )
+    return optics if parts.haze is None else replace(optics, haze=read_haze(parts.haze))
 
 
 def _by_role(roles: tuple[str, ...], paths: tuple[Path, ...], given: list[Checkpoint]) -> Found:
@@ -228,7 +254,7 @@ def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatAr
 
 
 def _members(parts: Parts, camera: _Camera) -> dict[str, bytes]:
-    members = dict([camera.optics.member])
+    members = camera.optics.members
     if parts.stress_psf is not None:
         members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
     checkpoints = [c for sizes in camera.checkpoints.values() for c in sizes.values()]
@@ -246,7 +272,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
     known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
     data = dict.fromkeys(c.training_data for s in camera.checkpoints.values() for c in s.values())
     return Manifest(
-        format_version=format_of(camera.optics.psf),
+        format_version=format_of(camera.optics.psf, hazy=camera.optics.haze is not None),
         kind=recipe.kind,
         name=recipe.name,
         version=parts.version,

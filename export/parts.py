@@ -11,6 +11,7 @@ class Parts:
     Attributes:
         checkpoints: One per role and size, of one camera.
         psf: Frozen PSF of `camkit freeze`.
+        haze: What `camkit freeze --haze` wrote beside it; None for optics without.
         stress_psf: Kernels off the design point.
         prescription: The lens as designed; None for that of the checkpoints.
         plate: The plate as designed, a file or a name; None for that of the checkpoints.
@@ -23,6 +24,7 @@ class Parts:
 
     checkpoints: tuple[Path, ...]
     psf: Path
+    haze: Path | None = None
     stress_psf: Path | None = None
     prescription: Path | None = None
     plate: Path | None = None

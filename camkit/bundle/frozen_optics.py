@@ -12,10 +12,15 @@ import numpy as np
 
 from camkit.bundle.haze_file import haze_to_bytes
 from camkit.bundle.optics import HAZE, PSF, STREAKS, FrozenPsfOptics, HazyPsfOptics, StreakEntry
-from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes, read_tensors
+from camkit.bundle.psf_file import (
+    psf_from_bytes,
+    psf_to_bytes,
+    read_optics_bytes,
+    read_tensors,
+)
 from camkit.bundle.streak_file import streaks_from_tensors, streaks_to_bytes
 from camkit.contracts import FrozenPsf, RadialDistortion
-from camkit.errors import BundleError, ContractError
+from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.streaks.optics import StreakOptics
 
@@ -108,10 +113,7 @@ def read_optics_file(path: Path, *, channels: int) -> FrozenOptics:
     Raises:
         BundleError: If it is missing, damaged, or neither.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise BundleError(f"cannot read the PSF {path}: {error.strerror}") from error
+    data = read_optics_bytes(path, what="PSF")
     return optics_from_bytes(data, what=str(path), channels=channels)
 
 

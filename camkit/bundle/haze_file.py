@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save
 
-from camkit.bundle.psf_file import read_tensors
+from camkit.bundle.psf_file import read_optics_bytes, read_tensors
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
 
@@ -87,8 +87,5 @@ def read_haze(path: Path) -> Haze:
     Raises:
         BundleError: If the file is missing, damaged or holds no haze.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise BundleError(f"cannot read the haze {path}: {error.strerror}") from error
+    data = read_optics_bytes(path, what="haze")
     return haze_from_bytes(data, what=str(path))

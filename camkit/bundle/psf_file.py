@@ -198,8 +198,20 @@ def read_psf(path: Path) -> FrozenPsf:
     Raises:
         BundleError: If the file is missing, damaged or not a PSF.
     """
+    return psf_from_bytes(read_optics_bytes(path, what="PSF"), what=str(path))
+
+
+def read_optics_bytes(path: Path, *, what: str) -> bytes:
+    """Read a file of optics whole.
+
+    Args:
+        path: The file.
+        what: What it should hold, for the error message.
+
+    Raises:
+        BundleError: If it cannot be read.
+    """
     try:
-        data = Path(path).read_bytes()
+        return Path(path).read_bytes()
     except OSError as error:
-        raise BundleError(f"cannot read the PSF {path}: {error.strerror}") from error
-    return psf_from_bytes(data, what=str(path))
+        raise BundleError(f"cannot read the {what} {path}: {error.strerror}") from error

@@ -63,7 +63,7 @@ _MAX_MANIFEST_BYTES: Final = 2**20
 _PITCH_RTOL: Final = 1e-6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bundle:
     """A bundle that passed every check of its container. Immutable; threads may share it.
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save
 
-from camkit.bundle.psf_file import read_tensors
+from camkit.bundle.psf_file import read_optics_bytes, read_tensors
 from camkit.errors import BundleError, ContractError
 from camkit.streaks.optics import StreakOptics
 
@@ -79,8 +79,5 @@ def read_streaks(path: Path) -> StreakOptics:
     Raises:
         BundleError: If the file is missing, damaged or holds no streak optics.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise BundleError(f"cannot read the streaks {path}: {error.strerror}") from error
+    data = read_optics_bytes(path, what="streaks")
     return streaks_from_bytes(data, what=str(path))

@@ -15,6 +15,7 @@ from camkit.cli.design.fit_bank import fit_bank
 from camkit.cli.design.freeze import freeze
 from camkit.cli.design.lens.app import lens_app
 from camkit.cli.design.plate.app import plate_app
+from camkit.cli.design.prepare import prepare
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.interrupts import none_is_lost
@@ -52,6 +53,7 @@ for command in (
     bench,
     design,
     freeze,
+    prepare,
     train,
     fit_bank,
     export,

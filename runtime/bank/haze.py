@@ -14,6 +14,7 @@ undone in cells).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -23,7 +24,14 @@ from camkit.bundle.stages import Dehaze
 from camkit.contracts import FloatArray, FrozenPsf, depth_weights
 from camkit.haze import Haze
 from camkit.runtime.bank.cell_means import cell_count
-from camkit.runtime.bank.place_blur import AZIMUTHS, NodeKernels, PlaceBlur, lay_nodes
+from camkit.runtime.bank.place_blur import (
+    AZIMUTHS,
+    FewKernels,
+    NodeKernels,
+    PlaceBlur,
+    few_kernels,
+    lay_nodes,
+)
 from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
@@ -35,6 +43,10 @@ BYTES_PER_CELL: Final = 400
 """Of how the cells lie between the nodes, and pictures in cells."""
 LEAST_RESPONSE: Final = 1e-3
 """Of a picture of ones, in a cell that hardly any light reaches."""
+
+KEPT_CAMERAS: Final = 2
+KEPT_TERMS: Final = 2 * KEPT_CAMERAS
+"""What is computed of optics once and kept by a process: with and without the haze."""
 
 FloatGrid = NDArray[np.float64]
 
@@ -68,7 +80,7 @@ class HazyKernels:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lit:
     """Kernels of sum 1, and the light that they hold.
 
@@ -282,12 +294,11 @@ def solve_coarse(
     laid = cell_window(window, kernels.cell_px, MARGIN_CELLS)
     inner = np.s_[MARGIN_CELLS:-MARGIN_CELLS, MARGIN_CELLS:-MARGIN_CELLS]
     nodes = lay_nodes(kernels.core, laid)
-    wide, narrow = (
-        NodeKernels(lit.kernels, lit.light, nodes) for lit in (kernels.coarse, kernels.coarse_core)
-    )
+    wide = few_of(kernels.coarse, terms)
+    narrow = few_of(kernels.coarse_core, CORE_TERMS)
     gain, veil, picture = (np.empty(cells.shape, np.float32) for _ in range(3))
     for channel, (seen, over) in enumerate(zip(cells, clipped, strict=True)):
-        blur = PlaceBlur(wide.of(channel), nodes, terms=terms)
+        blur = PlaceBlur(wide[channel], nodes)
         ones = np.ones(laid.size_px[::-1], np.float32)
         even = np.maximum(blur(ones)[inner], np.float32(LEAST_RESPONSE))
         undo = blur.solver(DAMPING)
@@ -297,12 +308,19 @@ def solve_coarse(
             left = seen - blur(scene)[inner] / even
             np.maximum(left, 0, out=left, where=over)
             scene += undo(_mirrored(left))
-        core = PlaceBlur(narrow.of(channel), nodes, terms=CORE_TERMS)
+        core = PlaceBlur(narrow[channel], nodes)
         own = np.maximum(core(ones)[inner], np.float32(LEAST_RESPONSE))
         gain[channel] = even / own
         veil[channel] = core(scene)[inner] / own - gain[channel] * seen
         picture[channel] = scene[inner]
     return CoarseBand(gain=gain, veil=veil, picture=picture, cell_px=kernels.cell_px)
+
+
+@lru_cache(maxsize=KEPT_TERMS)
+def few_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
+    """Give the few kernels of every channel; kept, since all captures of a camera need them."""
+    nodes = NodeKernels(lit.kernels, lit.light)
+    return tuple(few_kernels(nodes.of(c), terms) for c in range(lit.light.shape[1]))
 
 
 def _mirrored(cells: FloatArray) -> FloatArray:
@@ -315,6 +333,13 @@ def _mirrored(cells: FloatArray) -> FloatArray:
 def coarse_work(entry: Dehaze, channels: int) -> float:
     """Give how often a pixel is transformed, the margins of the cells left aside."""
     return channels * (entry.terms + CORE_TERMS) * (entry.rounds + 2) / entry.shrink**2
+
+
+def kept_bytes(entry: Dehaze, haze: Haze, channels: int, kernel_scale: float = 1.0) -> int:
+    """Give the memory of what is kept of optics, see `few_of`; arguments as of `solving_bytes`."""
+    side = int(haze.kernels.shape[-1] * kernel_scale) + 3
+    fields = 2 * haze.kernels.shape[0]
+    return int(4 * side**2 * channels * (entry.terms + fields))
 
 
 def solving_bytes(
@@ -335,4 +360,5 @@ def solving_bytes(
     spectrum = (sides[0] + side) * (sides[1] + side)
     nodes = AZIMUTHS * haze.kernels.shape[0]
     places = 4 * nodes * side**2 * (3 + channels / 4)
+    places += kept_bytes(entry, haze, channels, kernel_scale)
     return int(entry.terms * (4 * spectrum + 16 * cells) + places + BYTES_PER_CELL * cells)

@@ -46,25 +46,37 @@ class Nodes:
     share: FloatArray
 
 
+def node_places(kernels: FieldKernels) -> FloatGrid:
+    """Give where the kernels of optics are stored, on every azimuth where they turn: (node, 2)."""
+    if kernels.grid_x_mm is not None and kernels.grid_y_mm is not None:
+        return np.stack(np.meshgrid(kernels.grid_x_mm, kernels.grid_y_mm), axis=-1).reshape(-1, 2)
+    if not kernels.turns:
+        return np.zeros((1, 2))
+    angle = 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+    outward = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    rings = [outward * height_mm for height_mm in kernels.field_heights_mm[1:]]
+    return np.concatenate([np.zeros((1, 2)), *rings])
+
+
 def lay_nodes(kernels: FieldKernels, window: SensorWindow) -> Nodes:
-    """Lay nodes where the kernels of optics are stored, on every azimuth where they turn.
+    """Lay the nodes of kernels, see `node_places`.
 
     Args:
         kernels: Their places and symmetry.
         window: Of the cells on the sensor.
     """
     width, height = window.size_px
+    places = node_places(kernels)
     x_mm, y_mm = window.to_mm(np.arange(width)[None, :], np.arange(height)[:, None])
     if kernels.grid_x_mm is not None and kernels.grid_y_mm is not None:
         columns, rows = kernels.grid_x_mm, kernels.grid_y_mm
         low, up = _between(rows, np.broadcast_to(y_mm, (height, width)))
         left, right = _between(columns, np.broadcast_to(x_mm, (height, width)))
-        places = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
         return _crossed(places, (low, up), (left, right), lambda r, c: r * columns.size + c)
     if not kernels.turns:
         single = np.zeros((height, width, 1))
         return Nodes(
-            places_mm=np.zeros((1, 2)),
+            places_mm=places,
             near=single.astype(np.intp),
             share=np.ones_like(single, np.float32),
         )
@@ -72,11 +84,8 @@ def lay_nodes(kernels: FieldKernels, window: SensorWindow) -> Nodes:
     turn = np.arctan2(x_mm, y_mm) / (2 * np.pi) % 1 * AZIMUTHS
     first = np.floor(turn).astype(np.intp)
     azimuth = (first, turn - first)
-    angle = 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
-    outward = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
-    rings = [outward * height_mm for height_mm in heights[1:]]
     return _crossed(
-        np.concatenate([np.zeros((1, 2)), *rings]),
+        places,
         _between(heights, np.hypot(x_mm, y_mm)),
         azimuth,
         lambda ring, at: np.where(ring == 0, 0, 1 + (ring - 1) * AZIMUTHS + at % AZIMUTHS),
@@ -120,22 +129,21 @@ def _crossed(
 class NodeKernels:
     """The kernels of nodes, with the light that each holds; immutable."""
 
-    def __init__(self, kernels: FieldKernels, light: FloatGrid, nodes: Nodes) -> None:
+    def __init__(self, kernels: FieldKernels, light: FloatGrid) -> None:
         """Turn the kernels of one quadrant; the others mirror them.
 
         Args:
             kernels: Of sum 1, (field, c, n, n).
             light: (field, c): what they hold.
-            nodes: Of these kernels, by `lay_nodes`.
         """
-        fields = np.arange(len(nodes.places_mm))
+        self._places_mm = node_places(kernels)
+        fields = np.arange(len(self._places_mm))
         if kernels.turns:
             fields = (fields + AZIMUTHS - 1) // AZIMUTHS
         self._light = light[fields]
         self._turns = kernels.turns
-        self._places_mm = nodes.places_mm
         self._made: dict[tuple[float, float], FloatArray] = {}
-        for place in nodes.places_mm:
+        for place in self._places_mm:
             key = self._key(place)
             if key not in self._made:
                 self._made[key] = kernels.at(*key)
@@ -156,30 +164,42 @@ class NodeKernels:
         return (abs(x), abs(y)) if self._turns else (x, y)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FewKernels:
+    """Kernels whose weighed sums are nearly those of the nodes.
+
+    Attributes:
+        kernels: (term, n, n) float32, n odd.
+        weights: (node, term) float32.
+    """
+
+    kernels: FloatArray
+    weights: FloatArray
+
+
 class PlaceBlur:
     """The blur of one colour of a coarse picture; immutable."""
 
-    def __init__(self, kernels: FloatArray, nodes: Nodes, *, terms: int) -> None:
-        """Find the few kernels.
+    def __init__(self, few: FewKernels, nodes: Nodes) -> None:
+        """Lay the weights of the few kernels over the picture.
 
         Args:
-            kernels: (node, n, n), n odd.
-            nodes: Whose kernels they are.
-            terms: How many kernels stand for them; with fewer nodes each stands for itself.
+            few: By `few_kernels`.
+            nodes: For whose kernels they stand.
 
         Raises:
-            ContractError: If there is not one kernel for each node.
+            ContractError: If they do not stand for one kernel of each node.
         """
-        if kernels.ndim != 3 or len(kernels) != len(nodes.places_mm):
+        kernels, weights = few.kernels, few.weights
+        if len(weights) != len(nodes.places_mm):
             raise ContractError(
-                f"{len(nodes.places_mm)} nodes need a kernel each; got {kernels.shape}"
+                f"{len(nodes.places_mm)} nodes need a kernel each; got {len(weights)}"
             )
         import scipy.fft
 
-        few, weights = _few(kernels, terms)
         height, width = nodes.near.shape[:2]
         self._size = height, width
-        between = np.zeros((height, width, len(few)), np.float32)
+        between = np.zeros((height, width, len(kernels)), np.float32)
         for near, share in zip(
             np.moveaxis(nodes.near, -1, 0), np.moveaxis(nodes.share, -1, 0), strict=True
         ):
@@ -188,7 +208,7 @@ class PlaceBlur:
         half = kernels.shape[-1] // 2
         # what comes round from the other side falls beside the picture
         self._full = tuple(scipy.fft.next_fast_len(side + half, real=True) for side in self._size)
-        self._spectra = np.stack([self._spectrum(kernel) for kernel in few])
+        self._spectra = np.stack([self._spectrum(kernel) for kernel in kernels])
 
     def __call__(self, light: FloatArray) -> FloatArray:
         """Give the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
@@ -230,11 +250,16 @@ class PlaceBlur:
         return self._transform(laid)
 
 
-def _few(kernels: FloatArray, terms: int) -> tuple[FloatArray, FloatArray]:
-    """Give kernels (term, n, n) and weights (node, term) whose products are nearly the kernels."""
+def few_kernels(kernels: FloatArray, terms: int) -> FewKernels:
+    """Give few kernels that stand for many.
+
+    Args:
+        kernels: (node, n, n), n odd.
+        terms: How many; with fewer nodes each kernel stands for itself.
+    """
     count = len(kernels)
     if count <= terms:
-        return kernels, np.eye(count, dtype=np.float32)
+        return FewKernels(kernels=kernels, weights=np.eye(count, dtype=np.float32))
     products = _products(kernels)
     squares = kernels
     for _ in range(DOUBLINGS):
@@ -248,7 +273,7 @@ def _few(kernels: FloatArray, terms: int) -> tuple[FloatArray, FloatArray]:
     kept = _whole_pairs(lengths[::-1], terms)
     weights = np.ascontiguousarray(directions[:, : -kept - 1 : -1], np.float32)
     few = np.tensordot(weights.T, kernels, axes=1)
-    return np.asarray(few, np.float32), weights
+    return FewKernels(kernels=np.asarray(few, np.float32), weights=weights)
 
 
 def _whole_pairs(lengths: FloatGrid, most: int) -> int:

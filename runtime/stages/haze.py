@@ -2,17 +2,21 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Final
 
 from camkit.bundle.manifest import Manifest
+from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Dehaze, Demosaic
 from camkit.errors import BundleError
 from camkit.runtime.bank.cell_means import cell_means
 from camkit.runtime.bank.haze import (
+    KEPT_CAMERAS,
     CoarseBand,
+    HazyKernels,
     coarse_work,
     hazy_kernels,
+    kept_bytes,
     solve_coarse,
     solving_bytes,
 )
@@ -68,7 +72,8 @@ def prepare(entry: Dehaze, job: Job) -> StageWork:
     haze, scale = job.known_bundle.haze, job.placement.kernel_scale
     return StageWork(
         run=run,
-        held_bytes=BYTES_PER_COLUMN * capture.width,
+        held_bytes=BYTES_PER_COLUMN * capture.width
+        + kept_bytes(entry, haze, capture.channels, scale),
         first_bytes=solving_bytes(entry, haze, capture.channels, size_px, scale),
     )
 
@@ -87,23 +92,27 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
         job: The capture; what lies before the stage is read once.
     """
     bundle = job.known_bundle
-    sensor = bundle.manifest.sensor
-    assert sensor.type != "spad"  # its counts never join
     light, *mask = job.probe(_summed(entry, job), *entry.takes[1:])
     cfa = job.capture.cfa if light.shape[0] == 1 else None
     cells, clipped = cell_means(light, mask[0] if mask else None, cfa, entry.shrink)
-    kernels = hazy_kernels(
-        bundle.psf, bundle.haze, *sensor.response_arrays(), depth_mm=job.options.depth_mm
-    )
     return solve_coarse(
         cells,
         clipped,
-        kernels.scaled(job.placement.kernel_scale),
+        _kernels(bundle, job.options.depth_mm, job.placement.kernel_scale),
         job.window_of(picture.plane),
         terms=entry.terms,
         rounds=entry.rounds,
         between=lambda: check_cancelled(job.cancel),
     )
+
+
+@lru_cache(maxsize=KEPT_CAMERAS)
+def _kernels(bundle: Bundle, depth_mm: float | None, scale: float) -> HazyKernels:
+    """Give the kernels of a camera; the same ones to all its captures."""
+    sensor = bundle.manifest.sensor
+    assert sensor.type != "spad"  # its counts never join
+    response = sensor.response_arrays()
+    return hazy_kernels(bundle.psf, bundle.haze, *response, depth_mm=depth_mm).scaled(scale)
 
 
 def _summed(entry: Dehaze, job: Job) -> str:

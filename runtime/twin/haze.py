@@ -13,6 +13,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.bank.haze import enlarged
 from camkit.runtime.geometry.scatter import KernelLookup, scatter_light
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.geometry.shrink import shrunk
 
 BLOCK_PX: Final = 256
 """Distance of block centres, each of which has a kernel of its own."""
@@ -57,7 +58,7 @@ def hazed(
         Two of (c, h, w) float32.
     """
     cell, reach = lens.cell_px, lens.reach_cells
-    cells = _in_whole_cells(planes, cell)
+    cells = shrunk(planes, cell)
     rows, columns = cells.shape[1:]
     pad = ((0, 0), (reach, reach), (reach, reach))
     wide = np.pad(cells, pad, mode="reflect" if min(rows, columns) > 1 else "edge")
@@ -85,12 +86,3 @@ def hazed(
         np.stack([enlarged(plane, cell, down, across) for plane in part]) for part in spread
     )
     return light, ones
-
-
-def _in_whole_cells(planes: FloatArray, cell_px: int) -> FloatArray:
-    """Give the means of whole cells; what is left over at the right and below is left out."""
-    channels, height, width = planes.shape
-    rows, columns = height // cell_px, width // cell_px
-    inside = planes[:, : rows * cell_px, : columns * cell_px]
-    cells = inside.reshape(channels, rows, cell_px, columns, cell_px)
-    return np.asarray(cells.mean(axis=(2, 4)), np.float32)

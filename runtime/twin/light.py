@@ -25,6 +25,7 @@ from camkit.runtime.geometry.scatter import (
     scatter_uniform,
 )
 from camkit.runtime.geometry.sensor_window import SensorWindow, centred_origin
+from camkit.runtime.geometry.shrink import shrunk
 from camkit.runtime.geometry.warp import distort_array
 from camkit.runtime.twin.haze import HazeLens, hazed, margin_px
 
@@ -206,7 +207,7 @@ def light_of(
     chosen = options or LightOptions()
     matrix, gains = camera_space(sensor)
     matrix, margin = matrix * chosen.exposure, lens.margin_px
-    seen = cell_means(scene, chosen.scale)
+    seen = shrunk(scene, chosen.scale)
     if lens.haze is None:
         extended = _on_sensor(seen, matrix, lens.psf, window, chosen, margin)
         planes = _spread(extended, lens, window, chosen.workers)
@@ -257,15 +258,6 @@ def _spread_hazy(
     core += veil
     core /= ones + even
     return core
-
-
-def cell_means(planes: FloatArray, scale: int) -> FloatArray:
-    """Give (c, h, w) means over cells of (c, s h, s w) planes, `scale` samples a side."""
-    if scale == 1:
-        return planes
-    channels, height, width = planes.shape
-    cells = planes.reshape(channels, height // scale, scale, width // scale, scale)
-    return np.asarray(cells.mean(axis=(2, 4)), dtype=np.float32)
 
 
 def crop_light(light: Light, size_px: tuple[int, int]) -> Light:

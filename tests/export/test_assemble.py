@@ -11,8 +11,9 @@ import pytest
 import torch
 
 from camkit.bundle.golden import IMAGE, golden_from_bytes
+from camkit.bundle.haze_file import write_haze
 from camkit.bundle.psf_file import write_psf
-from camkit.bundle.reader import GOLDEN, Bundle, open_bundle
+from camkit.bundle.reader import GOLDEN, HAZE_GOLDEN, Bundle, open_bundle
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, ParityError
 from camkit.export import assemble
@@ -23,6 +24,7 @@ from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
 from camkit.runtime.plan.loss import plan_entries
 from camkit.runtime.proof.golden_run import case_work
+from tests.haze_factory import CELL_PX, tiny_haze
 from tests.plan_factory import MODEL
 
 _MEASURED: dict[str, ExportedNetwork] = {}
@@ -224,3 +226,41 @@ def test_what_is_no_calibration_is_refused(parts: Parts, tmp_path: Path, text: s
     (tmp_path / "plan.json").write_text(text, encoding="utf-8")
     with pytest.raises(ContractError, match=r"plan\.json is no calibration"):
         export_bundle(replace(parts, plan=tmp_path / "plan.json"), tmp_path / "x.camkit")
+
+
+HAZY_RECIPE = RECIPE.replace("[wiener]", f"[haze]\nshrink = {CELL_PX}\nterms = 8\n\n[wiener]")
+
+
+@pytest.fixture(scope="module")
+def hazy_parts(tmp_path_factory: pytest.TempPathFactory) -> Parts:
+    folder = tmp_path_factory.mktemp("hazy")
+    write_psf(folder / "psf.safetensors", _psf())
+    write_haze(folder / "haze.safetensors", tiny_haze(_psf()))
+    # of a size of its own: its network is measured behind the haze
+    write_checkpoint(folder / "m.pt", replace(_checkpoint("M"), recipe_toml=HAZY_RECIPE))
+    return Parts(
+        checkpoints=(folder / "m.pt",),
+        psf=folder / "psf.safetensors",
+        haze=folder / "haze.safetensors",
+    )
+
+
+def test_a_camera_with_a_haze_is_exported_with_its_case_of_cells(
+    hazy_parts: Parts, tmp_path: Path
+) -> None:
+    report = export_bundle(hazy_parts, tmp_path / "hazy.camkit")
+    bundle = open_bundle(tmp_path / "hazy.camkit")
+    assert bundle.manifest.format_version == "2.7"
+    types = [stage.type for stage in bundle.manifest.stages]
+    assert types[types.index("demosaic") + 1 :][:3] == ["haze", "wiener", "network"]
+    assert HAZE_GOLDEN in bundle.names
+    assert any("the haze of 80 x 70 cells" in str(line) for line in report.values())
+
+
+def test_a_haze_and_the_stage_that_undoes_it_come_together(
+    parts: Parts, hazy_parts: Parts, tmp_path: Path
+) -> None:
+    with pytest.raises(ContractError, match=r"the recipe small undoes a haze: .* say --haze"):
+        export_bundle(replace(hazy_parts, haze=None), tmp_path / "x.camkit")
+    with pytest.raises(ContractError, match=r"undoes no haze; leave .*haze.safetensors out"):
+        export_bundle(replace(parts, haze=hazy_parts.haze), tmp_path / "x.camkit")

@@ -3,51 +3,39 @@
     camkit freeze thin-plate -o psf.safetensors --haze haze.safetensors
     python -m tools.lens.haze_trial psf.safetensors haze.safetensors PICTURE
 
-The camera has the sensor of `duet` and no network. The picture is repeated, every second one
-mirrored, until it fills the frame, so that its detail is as fine as it comes. Printed are dB of
-sRGB against the sharp frame, over all and by zones of the half diagonal, and seconds of the
-processor; `-o` keeps the bundle, `--keep` the capture.
+The camera is that of a recipe, `thin_plate` unless said, and has no network. The picture is
+repeated, every second one mirrored, until it fills the frame, so that its detail is as fine as it
+comes. Printed are dB of sRGB against the sharp frame, over all and by zones of the half diagonal,
+and seconds of the processor; `-o` keeps the bundle, `--keep` the capture.
 """
 
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
 
-from camkit.bundle.chain import rewired
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.haze_file import read_haze
-from camkit.bundle.manifest import Manifest, format_of, planes_of
 from camkit.bundle.psf_file import read_psf
-from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.bundle.stages import (
-    Color,
-    Dehaze,
-    Demosaic,
-    Illumination,
-    Linearise,
-    Parts,
-    RaiseClipped,
-    Repair,
-    Stage,
-    Undistort,
-    WhiteBalance,
-    Wiener,
-)
-from camkit.bundle.writer import write_bundle
+from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Dehaze
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
+from camkit.export.frames import physics_bundle
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.training.kind import read_recipe
 from camkit.report.quality import read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph, write_capture
 from camkit.runtime.twin.truth import light_sensor, true_picture
 
-NAME: Final = "haze-trial"
+RECIPE: Final = Path(__file__).parents[2] / "models_def" / "recipes" / "thin_plate.toml"
 METHODS: Final = ("develop", "haze", "wiener")
 ZONES: Final = 5
 
@@ -60,6 +48,7 @@ def main() -> None:
     parser.add_argument("psf", type=Path)
     parser.add_argument("haze", type=Path)
     parser.add_argument("picture", type=Path)
+    parser.add_argument("--recipe", type=Path, default=RECIPE, help="of the camera")
     parser.add_argument("--iso", type=float, default=100.0)
     parser.add_argument("--size", type=int, nargs=2, metavar=("W", "H"), help="of the frame")
     parser.add_argument("-o", "--output", type=Path, help="keep the bundle")
@@ -68,9 +57,12 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, default=default)
     chosen = parser.parse_args()
     with TemporaryDirectory() as folder:
-        out = chosen.output or Path(folder) / f"{NAME}.camkit"
+        out = chosen.output or Path(folder) / "trial.camkit"
         optics = FrozenOptics(psf=read_psf(chosen.psf), haze=read_haze(chosen.haze))
-        bundle = build(optics, out, terms=chosen.terms, rounds=chosen.rounds)
+        recipe = read_recipe(chosen.recipe)
+        if not isinstance(recipe, BayerRecipe):
+            parser.error(f"{chosen.recipe} is of another kind of camera")
+        bundle = build(recipe, optics, out, terms=chosen.terms, rounds=chosen.rounds)
         whole = bundle.manifest.sensor.known_extent
         size = tuple(chosen.size or (whole.width_px, whole.height_px))
         made, seconds = timed(
@@ -82,45 +74,20 @@ def main() -> None:
         )
         print(f"photographed in {seconds:.1f} s of the processor")
         if chosen.keep:
-            write_capture(chosen.keep, made, bundle.manifest.sensor, NAME)
+            write_capture(chosen.keep, made, bundle.manifest.sensor, recipe.name)
         print("| method | dB | by zones of the half diagonal | s |")
         print("|---|---|---|---|")
         for method in METHODS:
             print(measured(bundle, made, method, chosen.iso), flush=True)
 
 
-def build(optics: FrozenOptics, out: Path, *, terms: int, rounds: int) -> Bundle:
-    """Write a camera of physics alone behind optics with a haze, and open it."""
+def build(
+    recipe: BayerRecipe, optics: FrozenOptics, out: Path, *, terms: int, rounds: int
+) -> Bundle:
+    """Write the camera of a recipe without its networks, before optics with a haze."""
     assert optics.haze is not None
-    like = open_bundle(find_bundle("duet")).manifest
-    usual: tuple[Stage, ...] = (
-        Linearise(),
-        Repair(),
-        WhiteBalance(),
-        Demosaic(),
-        Dehaze(shrink=optics.haze.cell_px, terms=terms, rounds=rounds),
-        Wiener(takes=("clear", "unknown"), prior_scale=3e-4, prior_exponent=2.0),
-        RaiseClipped(takes=("restored",)),
-        Illumination(takes=("neutral",)),
-        Undistort(),
-        Color(),
-    )
-    stages = rewired(usual, usual)
-    stated = optics.entry(np.inf)
-    manifest = Manifest(
-        format_version=format_of(optics.psf, hazy=True),
-        name=NAME,
-        version="0.1.0",
-        licence="Apache-2.0",
-        training_data="none: no network",
-        sensor=like.sensor,
-        optics=stated,
-        stages=stages,
-        planes=planes_of(stages, Parts(sensor=like.sensor, optics=stated, networks={})),
-        products={"image": stages[-1].gives[0]},
-    )
-    write_bundle(out, manifest, optics.members)
-    return open_bundle(out)
+    stage = Dehaze(shrink=optics.haze.cell_px, terms=terms, rounds=rounds)
+    return physics_bundle(replace(recipe, haze=stage), optics, out)
 
 
 def filled(picture: FloatArray, width: int, height: int) -> FloatArray:

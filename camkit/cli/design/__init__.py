@@ -4,6 +4,7 @@
     plate     one plate: look at it, design it, etch it
     design    a lens and its network designed together
     freeze    a lens to a frozen PSF
+    prepare   whole frames of a camera with a haze, for train and fit-bank
     train     a recipe to a checkpoint
     export    checkpoints and PSF to one proved bundle
 

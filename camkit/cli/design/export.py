@@ -8,6 +8,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 
 PSF_NAME = "psf.safetensors"
+HAZE_NAME = "haze.safetensors"
 STRESS_NAME = "stress_psf.safetensors"
 REPORT_NAME = "freeze.json"
 PLAN_NAME = "plan.json"
@@ -22,6 +23,10 @@ def export(
     psf: Annotated[
         Path | None,
         typer.Option(help=f"The frozen PSF; default: {PSF_NAME} beside the first checkpoint."),
+    ] = None,
+    haze: Annotated[
+        Path | None,
+        typer.Option(help=f"The haze beside it; default: {HAZE_NAME} there, if any."),
     ] = None,
     stress_psf: Annotated[
         Path | None,
@@ -69,6 +74,7 @@ def export(
         Parts(
             checkpoints=tuple(checkpoints),
             psf=frozen,
+            haze=haze or _beside(folder, HAZE_NAME),
             stress_psf=stress_psf or _beside(folder, STRESS_NAME),
             prescription=prescription,
             plate=None if plate in (None, NO_PLATE) else Path(plate),

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.report.stress.shot import Shot
 from camkit.runtime.geometry.scatter import scatter
+from camkit.runtime.geometry.shrink import shrunk
 from camkit.runtime.twin.exposure import sample_planes
-from camkit.runtime.twin.light import Lens, cell_means
+from camkit.runtime.twin.light import Lens
 
 LIMIT: Final = 1.3
 """chi^2 per pixel above which a restoration no longer fits its capture."""
@@ -77,7 +78,7 @@ def residual(planes: FloatArray, shot: Shot, lens: Lens) -> Residual | None:
     capture, gains = shot.capture, shot.light.gains
     if planes.shape[0] != len(shot.sensor.channels):
         return None
-    planes = cell_means(planes, planes.shape[2] // capture.width)
+    planes = shrunk(planes, planes.shape[2] // capture.width)
     rows, columns = (_middle(side) for side in planes.shape[1:])
     judged = judged_pixels(shot)[..., rows, columns]
     if judged.size == 0 or judged.mean() < 0.1:

@@ -4,6 +4,7 @@ recipe                 what a person edits beside the common tables
 psf_bank, lens_bank    kernels of the frozen PSF and of fabricated copies
 material               both, as samples need them
 samples                scenes photographed, filtered and stabilised
+frames/                the same of a lens with a haze, cut from whole frames
 validation             what a run is chosen by
 training               all of it as the trainer asks for it: PART
 bank_fit               the numbers of a bank that restores colours together: BANK_FITTING

@@ -22,7 +22,9 @@ from torch import Tensor
 from camkit.bundle.stages import Together
 from camkit.bundle.stages.together import Spread
 from camkit.errors import ContractError
-from camkit.models_def.kinds.bayer.material import trace_material
+from camkit.models_def.kinds.bayer.frames.samples import draw_developed
+from camkit.models_def.kinds.bayer.frames.tiles import Frames
+from camkit.models_def.kinds.bayer.material import BayerMaterial, trace_material
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import (
@@ -133,12 +135,14 @@ def _line(values: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[flo
     return tuple(round(mean, SPREAD_DIGITS) for mean in (0.0, *means[1:]))
 
 
-def fit_bank(recipe: BayerRecipe, bank: PsfBank, options: BankFitOptions, tell: Tell) -> BankFit:
+def fit_bank(
+    recipe: BayerRecipe, material: BayerMaterial, options: BankFitOptions, tell: Tell
+) -> BankFit:
     """Fit the numbers of a camera.
 
     Args:
         recipe: The camera and its samples; what its bank says of colours together is not used.
-        bank: Its kernels.
+        material: Its kernels, and the frames of a lens with a haze.
         options: How it is fitted; folders of kernels are not used.
         tell: Takes a line now and then.
 
@@ -146,8 +150,11 @@ def fit_bank(recipe: BayerRecipe, bank: PsfBank, options: BankFitOptions, tell: 
         ContractError: If there are too few samples, or the descent leaves the numbers' ranges.
     """
     samples, steps, seed = options.samples, options.steps, options.seed
-    alone = recipe.with_together(None)
-    shots = _photographed(alone, bank, options.pictures, samples, seed)
+    alone, bank = recipe.with_together(None), material.bank
+    if material.frames is None:
+        shots = _photographed(alone, bank, options.pictures, samples, seed)
+    else:
+        shots = _cut(alone, material.frames, options.pictures, samples, seed)
     cases = [_case(shot, alone) for shot in shots if not bool(shot.unknown.any())]
     if len(cases) < 2 * HELD_OUT:
         raise ContractError(
@@ -208,12 +215,21 @@ def _photographed(
     return shots
 
 
+def _cut(
+    recipe: BayerRecipe, frames: Frames, pictures: Path | None, count: int, seed: int
+) -> Sequence[Developed]:
+    tiles = frames.tiles("train", pictures)
+    rng = np.random.default_rng(seed)
+    chosen = rng.permutation(len(tiles))[:count]
+    return [draw_developed(rng, tiles.read(int(i)), recipe, frames.bank) for i in chosen]
+
+
 def _case(developed: Developed, recipe: BayerRecipe) -> _Case:
     given = developed.given
     shot, read = torch.tensor(given.noise.shot), torch.tensor(given.noise.read_variance)
-    facts = block_facts(developed.planes, given.frozen, shot, read, recipe.wiener)
+    facts = block_facts(developed.planes, given.frozen, *given.met, recipe.wiener)
     target = target_of(developed, recipe)
-    plain = wiener_restore(developed.planes, given.frozen, shot, read, recipe.wiener)
+    plain = wiener_restore(developed.planes, given.frozen, *given.met, recipe.wiener)
     return _Case(
         planes=facts.planes,
         otf=facts.otf,
@@ -324,7 +340,7 @@ class BayerBankFitting:
         """Trace the lens, or read what was traced before, and fit."""
         _check_folder(recipe.lens.prescription, options)
         material = trace_material(recipe, options.recipe_folder, options.cache_folder)
-        return fit_bank(recipe, material.bank, options, tell)
+        return fit_bank(recipe, material, options, tell)
 
 
 BANK_FITTING: Final = BayerBankFitting()

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from camkit.bundle.reader import PRESCRIPTION
+from camkit.models_def.kinds.bayer.frames.tiles import Frames, frames_folder, read_frames
 from camkit.models_def.kinds.bayer.lens_bank import build_lens_bank
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank, read_bank, write_bank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
@@ -13,6 +14,7 @@ from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import format_prescription
 
 BANK: Final = "bank.npz"
+PLACE: Final = "frames.txt"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,31 +24,50 @@ class BayerMaterial:
     Attributes:
         bank: Of fabricated copies, the frozen PSF beside them.
         designed: The lens as a bundle holds it; empty for kernels that are of none.
+        frames: What samples are cut from, of a lens with a haze; None for one without.
     """
 
     bank: PsfBank
     designed: Mapping[str, bytes] = field(default_factory=dict)
+    frames: Frames | None = None
 
     def digest(self) -> str:
-        """Give the sha256 of the kernels."""
-        return self.bank.digest()
+        """Give the sha256 of the kernels, and of the frames."""
+        return self.bank.digest() if self.frames is None else self.frames.digest()
 
     def write(self, folder: Path) -> None:
-        """Write the kernels for another process."""
-        write_bank(folder / BANK, self.bank)
+        """Write for another process the kernels, or where the frames lie."""
+        if self.frames is None:
+            write_bank(folder / BANK, self.bank)
+        else:
+            place = str(self.frames.folder.resolve())
+            (folder / PLACE).write_text(place, encoding="utf-8")
 
 
 def read_material(folder: Path) -> BayerMaterial:
-    """Read what `BayerMaterial.write` wrote: samples need no more than the kernels."""
-    return BayerMaterial(bank=read_bank(folder / BANK))
+    """Read what `BayerMaterial.write` wrote."""
+    place = folder / PLACE
+    if not place.is_file():
+        return BayerMaterial(bank=read_bank(folder / BANK))
+    return _of_frames(Path(place.read_text(encoding="utf-8")))
+
+
+def _of_frames(folder: Path, recipe: BayerRecipe | None = None) -> BayerMaterial:
+    frames = read_frames(folder, recipe)
+    return BayerMaterial(bank=frames.bank, designed=frames.designed, frames=frames)
 
 
 def trace_material(recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path) -> BayerMaterial:
     """Trace the lens that a recipe names (about a minute), or read what was traced before.
 
+    Of a lens with a haze the frames are read, which `camkit prepare` photographed.
+
     Raises:
-        ContractError: If there is no such lens, or its light does not fit the kernels.
+        ContractError: If there is no such lens, its light does not fit the kernels, or there are
+            no frames of it.
     """
+    if recipe.haze is not None:
+        return _of_frames(frames_folder(cache_folder, recipe), recipe)
     lens = find_lens(recipe.lens.prescription, recipe_folder)
     bank = build_lens_bank(recipe, lens, cache_folder)
     return BayerMaterial(bank=bank, designed={PRESCRIPTION: format_prescription(lens).encode()})

@@ -4,12 +4,12 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, astuple, dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Final
 
 from camkit.bundle.sensor import BayerSensor
-from camkit.bundle.stages import Together, Wiener
+from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import ContractError
 from camkit.models_def.toml_table import section, typed
@@ -26,8 +26,8 @@ from camkit.models_def.training.recipe import (
 )
 
 ROLES: Final = (DEFAULT_ROLE,)
-OWN: Final = ("object_distance_mm", "scale", "wiener", "lens", "fine_tuning")
-CAMERA_PARTS: Final = ("name", "object_distance_mm", "scale", "sensor", "wiener", "lens")
+OWN: Final = ("object_distance_mm", "scale", "haze", "wiener", "lens", "frames", "fine_tuning")
+CAMERA_PARTS: Final = ("name", "object_distance_mm", "scale", "sensor", "haze", "wiener", "lens")
 """What says which camera it is; how its networks are trained may differ."""
 _OLDER: Final = {"final": "fine_tuning"}
 
@@ -138,6 +138,34 @@ class BayerDataRecipe(DataRecipe):
             )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FramesRecipe:
+    """How whole frames are photographed, which tiles are cut from.
+
+    A frame is a scene of the whole sensor, put together from crops of pictures and drawn scenes;
+    every shot of it has an ISO of its own.
+
+    Attributes:
+        count: Frames to train on.
+        validation_count: Frames of other pictures and other copies of the lens, to choose by.
+        crop_px: Side of the crops.
+        shots: Of every frame.
+        tiles: Cut from every shot.
+        validation_tiles: Likewise, to choose by.
+    """
+
+    count: int = 16
+    validation_count: int = 2
+    crop_px: int = 1000
+    shots: int = 2
+    tiles: int = 80
+    validation_tiles: int = 30
+
+    def __post_init__(self) -> None:
+        if min(astuple(self)) < 1:
+            raise ContractError(f"sizes and counts of frames must be positive; got {self}")
+
+
 FINE_TUNING_SCHEDULE: Final = ScheduleRecipe(
     steps=20_000, batch=4, patch_px=256, learning_rate=1e-4, final_rate=0.0, precision="float32"
 )
@@ -200,6 +228,8 @@ class BayerRecipe(Recipe):
         wiener: Prior and blocks of the Wiener bank in front of the networks.
         lens: The lens, and how far its copies vary.
         fine_tuning: Later training.
+        haze: How the haze of the lens is undone before the bank; None for a lens without.
+        frames: Of a lens with a haze, whose samples are cut from whole frames.
     """
 
     sensor: BayerSensor
@@ -209,8 +239,12 @@ class BayerRecipe(Recipe):
     wiener: Wiener
     lens: LensRecipe
     fine_tuning: FineTuningRecipe = field(default_factory=FineTuningRecipe)
+    haze: Dehaze | None = None
+    frames: FramesRecipe = field(default_factory=FramesRecipe)
 
     def __post_init__(self) -> None:
+        if self.haze is not None and self.lens.depths_mm:
+            raise ContractError("a lens with a haze has one object distance; leave depths_mm out")
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
         if shares and shares != depths:
             raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
@@ -241,6 +275,8 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
         lens=section("lens", LensRecipe, table.get("lens", {})),
         data=section("data", BayerDataRecipe, table.get("data", {})),
         fine_tuning=_fine_tuning(table.get("fine_tuning", {})),
+        haze=model("haze", Dehaze, table) if "haze" in table else None,
+        frames=section("frames", FramesRecipe, table.get("frames", {})),
     )
 
 
@@ -262,4 +298,6 @@ def samples_digest(recipe: BayerRecipe, seed: int) -> str:
         "object_distance_mm": str(recipe.object_distance_mm),
         "seed": seed,
     }
+    if recipe.haze is not None:
+        content |= {"haze": recipe.haze.model_dump(mode="json"), "frames": asdict(recipe.frames)}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -98,6 +98,7 @@ class Circumstances:
         frozen: (1, 3, kh, kw) kernels of the block that the place belongs to.
         illumination: Relative illumination of the place.
         height_mm: Field height of the block.
+        noise_rise: What was done before the bank multiplied the variance of every colour by.
     """
 
     noise: NoiseModel
@@ -105,6 +106,13 @@ class Circumstances:
     frozen: Tensor
     illumination: float
     height_mm: float = 0.0
+    noise_rise: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+    @property
+    def met(self) -> tuple[Tensor, Tensor]:
+        """Give the noise that the bank meets: shot and read variance of the colours."""
+        noise = self.noise.raised(self.noise_rise)
+        return torch.tensor(noise.shot), torch.tensor(noise.read_variance)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,7 +257,7 @@ def finish_shot(developed: Developed, recipe: BayerRecipe) -> Shot:
     data, noise = recipe.data, given.noise
     shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
     restored = wiener_restore(
-        planes, given.frozen, shot, read, recipe.wiener, unknown, height_mm=given.height_mm
+        planes, given.frozen, *given.met, recipe.wiener, unknown, height_mm=given.height_mm
     )
     stable = [
         stabilise(cut_middle(x, data.sample_px), shot, read, scale=recipe.scale)

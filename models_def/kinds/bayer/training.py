@@ -15,9 +15,11 @@ from camkit.bundle.stages import (
     Network,
     RaiseClipped,
     Repair,
+    Stage,
     Undistort,
     WhiteBalance,
 )
+from camkit.models_def.kinds.bayer.frames.samples import TileMaker, validation_captures
 from camkit.models_def.kinds.bayer.material import BayerMaterial, read_material, trace_material
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import (
@@ -36,7 +38,7 @@ from camkit.models_def.kinds.bayer.samples import (
 )
 from camkit.models_def.kinds.bayer.validation import BayerJudge, make_validation_captures
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.training.kind import Design
+from camkit.models_def.training.kind import Design, SampleMaker
 from camkit.models_def.training.pictures import SceneSource, open_source
 from camkit.models_def.training.sample import Sample, SampleLayout
 
@@ -46,6 +48,8 @@ FAILS_ON: Final = (
     "and lenses off by more than the fabrication errors it was trained with (radius 0.2 %, "
     "thickness 0.03 mm, index 0.0005, focus 0.02 mm)",
 )
+
+FAILS_BEHIND_HAZE: Final = "lamps that clip: they throw more haze than the sensor tells"
 
 
 class BayerMaker:
@@ -93,21 +97,28 @@ class BayerTraining:
 
     def design(self, recipe: BayerRecipe) -> Design:
         """Give the stages of every camera of this kind, with the recipe's bank."""
+        restoring: tuple[Stage, ...] = (recipe.wiener, Network(scale=recipe.scale))
+        if recipe.haze is not None:
+            (clear,) = recipe.haze.gives
+            restoring = (
+                recipe.haze,
+                recipe.wiener.model_copy(update={"takes": (clear, *recipe.wiener.takes[1:])}),
+                Network(takes=(clear, *recipe.wiener.gives), scale=recipe.scale),
+            )
         return Design(
             stages=(
                 Linearise(),
                 Repair(),
                 WhiteBalance(),
                 Demosaic(method="fast"),
-                recipe.wiener,
-                Network(scale=recipe.scale),
+                *restoring,
                 RaiseClipped(),
                 Illumination(),
                 Undistort(interpolation="cubic"),
                 Color(),
             ),
             object_distance_mm=recipe.object_distance_mm,
-            fails_on=FAILS_ON,
+            fails_on=FAILS_ON if recipe.haze is None else (*FAILS_ON, FAILS_BEHIND_HAZE),
         )
 
     def build_network(self, name: str, **config: Any) -> nn.Module:
@@ -141,9 +152,12 @@ class BayerTraining:
         material: BayerMaterial,
         pictures: Path | None,
         seed: int,
-    ) -> BayerMaker:
+    ) -> SampleMaker:
         """Open the scenes."""
         del role
+        if material.frames is not None:
+            tiles = material.frames.tiles("train", pictures)
+            return TileMaker(recipe, material.bank, tiles, seed)
         return BayerMaker(recipe, material.bank, pictures, seed)
 
     def judge(
@@ -151,9 +165,12 @@ class BayerTraining:
     ) -> BayerJudge:
         """Photograph pictures that are never trained on."""
         del role
-        return BayerJudge(
-            captures=make_validation_captures(recipe, material.bank, pictures), recipe=recipe
-        )
+        if material.frames is not None:
+            tiles = material.frames.tiles("valid", pictures)
+            captures = validation_captures(recipe, material.bank, tiles)
+        else:
+            captures = make_validation_captures(recipe, material.bank, pictures)
+        return BayerJudge(captures=captures, recipe=recipe)
 
 
 PART: Final = BayerTraining()

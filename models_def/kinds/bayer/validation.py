@@ -149,10 +149,9 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
             _psnr(capture, recipe, restore(capture.shot.sample.stacked(LAYOUT)[None])[0])
             for capture in captures
         ]
-    by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in captures]) for iso in ISOS}
-    by_field = {
-        f"{f:g}": _mean(values, [c.field_share == f for c in captures]) for f in FIELD_SHARES
-    }
+    isos, shares = sorted({c.iso for c in captures}), sorted({c.field_share for c in captures})
+    by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in captures]) for iso in isos}
+    by_field = {f"{f:g}": _mean(values, [c.field_share == f for c in captures]) for f in shares}
     parts = {"by_iso": by_iso, "by_field": by_field}
     copies = sorted({c.copy for c in captures})
     if len(copies) > 1:

@@ -212,6 +212,28 @@ def arriving(angles_rad: Array, heights_px: Array) -> Array:
     return np.asarray(sides / sides[0])
 
 
+def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
+    """Give how far the peaks of a lens lie from where a frozen PSF has them, at most.
+
+    Args:
+        lens: The lens.
+        psf: Core kernels of `freeze_hazy`, whose distortion tells the angles of their fields.
+        rays: In half the stop.
+    """
+    distortion, efl_mm = psf.distortion, paraxial_data(lens).efl_mm
+    dense_mm = np.linspace(0.0, 2 * distortion.radius_mm, 4001)
+    powers = np.stack([(dense_mm / distortion.radius_mm) ** (2 * k + 1) for k in range(_TERMS)])
+    landed_mm = distortion.radius_mm * (distortion.coefficients[0] @ powers)
+    rising = slice(0, int(np.argmax(landed_mm)) + 1)
+    ideal_mm = np.interp(psf.field_heights_mm, landed_mm[rising], dense_mm[rising])
+    pitch_um = psf.pixel_pitch_um
+    found = [
+        _height_px(lens, math.atan(ideal / efl_mm), lens.reference_wavelength_um, pitch_um, rays)
+        for ideal in ideal_mm[1:]
+    ]
+    return float(np.abs(found - psf.field_heights_mm[1:] / to_mm(pitch_um)).max())
+
+
 def flat_light(lens: Lens, heights_px: Array, pitch_um: float, *, rays: int) -> Array:
     """Give how an even scene lights the sensor, haze and walls counted, 1 on the axis.
 

@@ -31,10 +31,11 @@ OPTIONS = {
     "stress": "--scenarios --quick --data --sizes --scenes --compare --out-dir --write --list "
     "--json --debug",
     "train": "--size --data --steps --max-minutes --resume --fine-tune --vgg --pairs --debug",
+    "prepare": "--psf --haze --data --valid --out-dir --seed --overwrite --json --debug",
     "fit-bank": "-o --data --samples --steps --seed --cache-dir --overwrite --json --debug",
     "design": "--data --out-dir --steps --lens-rate --prescription --seed --pictures --threads "
     "--resume --overwrite --json --debug",
-    "export": "-o --psf --stress-psf --prescription --debug",
+    "export": "-o --psf --haze --stress-psf --prescription --debug",
     "doctor": "--json --debug",
 }
 

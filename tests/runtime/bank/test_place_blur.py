@@ -11,6 +11,7 @@ from camkit.runtime.bank.place_blur import (
     Nodes,
     PlaceBlur,
     _whole_pairs,
+    few_kernels,
     lay_nodes,
 )
 from camkit.runtime.bank.psf import FieldKernels
@@ -60,7 +61,7 @@ CASES = {
 def _laid(kernels: FieldKernels) -> tuple[Nodes, FloatArray]:
     nodes = lay_nodes(kernels, _window())
     light = 0.4 + 0.1 * np.arange(2 * len(kernels.kernels)).reshape(-1, 2)
-    return nodes, NodeKernels(kernels, light, nodes).of(1)
+    return nodes, NodeKernels(kernels, light).of(1)
 
 
 def _slowly(picture: FloatArray, nodes: Nodes, kernels: FloatArray) -> FloatArray:
@@ -81,7 +82,7 @@ def _slowly(picture: FloatArray, nodes: Nodes, kernels: FloatArray) -> FloatArra
 def test_the_blur_is_the_sum_over_all_cells(kernels: FieldKernels) -> None:
     nodes, made = _laid(kernels)
     picture = np.random.default_rng(0).random((9, 12), dtype=np.float32)
-    blur = PlaceBlur(made, nodes, terms=len(made))
+    blur = PlaceBlur(few_kernels(made, len(made)), nodes)
     np.testing.assert_allclose(blur(picture), _slowly(picture, nodes, made), atol=FLOAT32)
 
 
@@ -98,7 +99,7 @@ def test_a_cell_on_a_node_has_its_kernel() -> None:
     at = int(laid.near[0, 0, np.argmax(laid.share[0, 0])])
     assert at == 1 + AZIMUTHS + 8
     np.testing.assert_allclose(
-        NodeKernels(kernels, np.ones((3, 2)), laid).of(0)[at],
+        NodeKernels(kernels, np.ones((3, 2))).of(0)[at],
         kernels.at(0.5, 0.0)[0],
         atol=FLOAT32,
     )
@@ -114,9 +115,9 @@ def test_mirrored_nodes_have_mirrored_kernels() -> None:
 def test_few_kernels_stand_for_many_and_more_of_them_are_nearer() -> None:
     nodes, made = _laid(_kernels("radial", 3))
     picture = np.random.default_rng(0).random((9, 12), dtype=np.float32)
-    exact = PlaceBlur(made, nodes, terms=len(made))(picture)
+    exact = PlaceBlur(few_kernels(made, len(made)), nodes)(picture)
     off = [
-        float(np.abs(PlaceBlur(made, nodes, terms=terms)(picture) - exact).max())
+        float(np.abs(PlaceBlur(few_kernels(made, terms), nodes)(picture) - exact).max())
         for terms in (2, 8, 32)
     ]
     assert off[0] > 2 * off[1] > 4 * off[2]
@@ -132,7 +133,7 @@ def test_the_solver_undoes_a_blur_that_is_the_same_everywhere() -> None:
     nodes, made = _laid(CASES["uniform"])
     made = np.zeros_like(made)
     made[0, SIDE // 2, SIDE // 2], made[0, 0, 0] = 0.7, 0.2
-    blur = PlaceBlur(made, nodes, terms=1)
+    blur = PlaceBlur(few_kernels(made, 1), nodes)
     picture = np.zeros((9, 12), np.float32)
     picture[4, 6] = 1
     np.testing.assert_allclose(blur.solver(1e-6)(blur(picture)), picture, atol=1e-2)
@@ -141,4 +142,4 @@ def test_the_solver_undoes_a_blur_that_is_the_same_everywhere() -> None:
 def test_other_numbers_of_kernels_are_refused() -> None:
     nodes, made = _laid(CASES["uniform"])
     with pytest.raises(ContractError, match="1 nodes need a kernel each"):
-        PlaceBlur(np.concatenate([made, made]), nodes, terms=4)
+        PlaceBlur(few_kernels(np.concatenate([made, made]), 4), nodes)

@@ -12,6 +12,7 @@ from camkit.bundle.stages import Dehaze
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.bank.cell_means import cell_means
+from camkit.runtime.bank.haze import few_of
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options
@@ -77,6 +78,25 @@ def test_it_is_found_once_though_bank_and_rows_ask(
     monkeypatch.setattr(haze, "coarse_band", watched)
     _filled(bundle, _capture())
     assert len(calls) == 1
+
+
+def test_what_follows_from_the_optics_is_computed_for_the_first_capture_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+    weighed = haze.hazy_kernels
+
+    def watched(*args: Any, **options: Any) -> Any:
+        calls.append(args)
+        return weighed(*args, **options)
+
+    monkeypatch.setattr(haze, "hazy_kernels", watched)
+    own = write_hazy_bundle(tmp_path)
+    first = _filled(own, _capture())
+    found = few_of.cache_info().misses
+    np.testing.assert_array_equal(_filled(own, _capture()), first)
+    assert len(calls) == 1
+    assert few_of.cache_info().misses == found
 
 
 def test_a_crop_knows_its_place(bundle: Bundle) -> None:

@@ -8,10 +8,10 @@ import pytest
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.geometry.shrink import shrunk
 from camkit.runtime.twin.exposure import sample_planes
 from camkit.runtime.twin.light import (
     LightOptions,
-    cell_means,
     crop_light,
     lens_of,
     light_of,
@@ -47,11 +47,11 @@ def test_a_pixel_sees_the_mean_of_its_samples_and_the_truth_stays_fine(scene: Fl
     ripple -= ripple.mean(axis=(2, 4), keepdims=True)
     fine = np.maximum(fine + 0.05 * ripple.reshape(1, 128, 192), 0)
     psf, options = delta_psf(SENSOR), SimulationOptions(noise=False)
-    coarse = simulate(cell_means(fine, 2), SENSOR, psf, options)
+    coarse = simulate(shrunk(fine, 2), SENSOR, psf, options)
     made = simulate(fine, SENSOR, psf, replace(options, scale=2))
     np.testing.assert_array_equal(made.samples, coarse.samples)
     assert made.clean.shape == (3, 128, 192)
-    np.testing.assert_allclose(cell_means(made.clean, 2), coarse.clean, atol=2e-6)
+    np.testing.assert_allclose(shrunk(made.clean, 2), coarse.clean, atol=2e-6)
     assert made.window == coarse.window
 
 
@@ -60,10 +60,10 @@ def test_the_fine_truth_is_distorted_as_the_light_is() -> None:
     blob = np.exp(-((x - 40) ** 2 + (y - 30) ** 2) / 72).astype(np.float32)
     psf = make_psf(SENSOR, distortion=(1.0, -0.1, 0.0, 0.0))
     made = simulate(np.stack([blob] * 3), SENSOR, psf, SimulationOptions(noise=False, scale=2))
-    means = cell_means(made.clean, 2)[1]
-    coarse = simulate(cell_means(np.stack([blob] * 3), 2), SENSOR, psf, SimulationOptions())
+    means = shrunk(made.clean, 2)[1]
+    coarse = simulate(shrunk(np.stack([blob] * 3), 2), SENSOR, psf, SimulationOptions())
     np.testing.assert_allclose(means, coarse.clean[1], atol=0.02)
-    assert np.abs(means - cell_means(blob[None], 2)[0]).max() > 0.1
+    assert np.abs(means - shrunk(blob[None], 2)[0]).max() > 0.1
 
 
 def test_a_scene_of_broken_pixels_is_refused(scene: FloatArray) -> None:

@@ -10,6 +10,7 @@ from camkit.bundle.stages import Together
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.kinds.bayer import bank_fit
 from camkit.models_def.kinds.bayer.bank_fit import FIRST, fit_bank, spread_of, transfer_errors
+from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.samples import draw_exposure, photograph, scene_side_px
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.models_def.training.bank_fitting import (
@@ -44,7 +45,7 @@ def options(tmp_path, **changed):
 
 def test_a_fitted_bank_beats_the_one_of_each_colour_alone(recipe, coloured, tmp_path):
     told = []
-    found = fit_bank(recipe, coloured, options(tmp_path), told.append)
+    found = fit_bank(recipe, BayerMaterial(bank=coloured), options(tmp_path), told.append)
     assert found.gain_db > 0.5
     assert found.samples <= 24
     assert "step 40" in told[-1]
@@ -119,7 +120,7 @@ def test_errors_of_copies_are_those_of_their_transfer(bank):
 
 def test_too_few_samples_are_refused(recipe, bank, tmp_path):
     with pytest.raises(ContractError, match="too few to fit a bank to; raise --samples"):
-        fit_bank(recipe, bank, options(tmp_path, samples=3), print)
+        fit_bank(recipe, BayerMaterial(bank=bank), options(tmp_path, samples=3), print)
     with pytest.raises(ContractError, match="samples and steps must be >= 1"):
         options(tmp_path, steps=0)
 

@@ -13,6 +13,7 @@ from camkit.models_def.optics.thin.freezing import (
     corner_angle_rad,
     flat_light,
     freeze_hazy,
+    peaks_off_px,
 )
 from camkit.models_def.optics.thin.peak import land_light, peak_height_px
 from tests.bundle_factory import tiny_sensor
@@ -95,3 +96,10 @@ def test_peaks_are_where_the_field_heights_say(frozen: tuple) -> None:  # type: 
     assert psf.field_heights_mm[0] == 0
     assert psf.field_heights_mm[-1] == pytest.approx(half, rel=0.02)
     assert abs(psf.distortion.coefficients[0, 0] - 1) < 0.5
+
+
+def test_peaks_tell_a_lens_from_another(frozen: tuple) -> None:  # type: ignore[type-arg]
+    psf = frozen[0].psf
+    assert peaks_off_px(LENS, psf, rays=RAYS) < 1
+    longer = perfect_lens(44.0, 3.0, defocus_mm=6.4)
+    assert peaks_off_px(longer, psf, rays=RAYS) > 3

@@ -1,0 +1,336 @@
+"""Whole frames of a camera with a haze, photographed and cleared, for training: a patch holds none.
+
+    crops of pictures -> a scene of the whole sensor -> light through a copy of the lens
+        -> shots at ISOs of their own -> the runtime, up to the stage `haze` -> tiles
+
+What networks are trained on is what the runtime gives them: nothing of it is written again for
+training (`camkit.models_def.kinds.bayer.frames` takes tiles through the bank).
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.chain import rewired
+from camkit.bundle.frozen_optics import FrozenOptics
+from camkit.bundle.golden import IMAGE
+from camkit.bundle.manifest import Manifest, format_of, planes_of
+from camkit.bundle.reader import PRESCRIPTION, Bundle
+from camkit.bundle.stages import Network, Parts
+from camkit.bundle.writer import write_bundle
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.frames.tiles import (
+    PARTS,
+    Tile,
+    Tiles,
+    create_tiles,
+    frames_folder,
+    write_header,
+)
+from camkit.models_def.kinds.bayer.psf_bank import PsfBank
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.kinds.bayer.samples import tint_crop
+from camkit.models_def.optics.kernel_bank import focused_copies
+from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.optics.prescription import Lens, format_prescription
+from camkit.models_def.optics.thin.freezing import freeze_hazy
+from camkit.models_def.training.kind import training_kind
+from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.runtime.bank.haze import hazy_kernels
+from camkit.runtime.geometry.illumination import illumination_band
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.twin.exposure import Setting, expose
+from camkit.runtime.twin.light import Light, LightOptions, lens_of, light_of, scene_window
+
+Tell = Callable[[str], None]
+Generator = np.random.Generator
+
+COPY_RAYS: Final = 8000
+"""In half the stop: a copy is one draw of errors, not what a bundle holds."""
+SPREAD_EV: Final = 0.7
+"""How much crops of a frame differ in their exposure."""
+VALIDATION_ISOS: Final = (100.0, 1600.0)
+LICENCE: Final = "Apache-2.0"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameSources:
+    """What is photographed, and with what.
+
+    Attributes:
+        pictures: Part of `PARTS` -> folder of pictures; None for procedural scenes alone.
+        optics: Core kernels and haze of the lens as designed.
+        copies: Of its fabricated copies, those to choose by last.
+        designed: The lens as a bundle holds it.
+        seed: Of scenes, places, ISOs and noise.
+    """
+
+    pictures: Mapping[str, Path | None]
+    optics: FrozenOptics
+    copies: Sequence[FrozenOptics]
+    designed: Mapping[str, bytes]
+    seed: int = 0
+
+
+def freeze_copies(
+    recipe: BayerRecipe, recipe_folder: Path, tell: Tell
+) -> tuple[Lens, tuple[FrozenOptics, ...]]:
+    """Freeze the fabricated copies of a recipe's lens.
+
+    Returns:
+        The lens as designed, and core and haze of its copies.
+
+    Raises:
+        ContractError: If there is no such lens, or no peak of a copy reaches the corner.
+    """
+    choices = recipe.lens
+    lens = find_lens(choices.prescription, recipe_folder)
+    count = choices.copies + choices.validation_copies
+    frozen = []
+    for number, copy in enumerate(focused_copies(lens, 1 + count, choices.seed)[1:], start=1):
+        optics, _ = freeze_hazy(copy, recipe.sensor, rays=COPY_RAYS)
+        frozen.append(optics)
+        tell(f"copy {number} of {count} frozen")
+    return lens, tuple(frozen)
+
+
+def designed_lens(lens: Lens) -> dict[str, bytes]:
+    """Give a lens as a bundle holds it."""
+    return {PRESCRIPTION: format_prescription(lens).encode()}
+
+
+def prepare_frames(
+    recipe: BayerRecipe, sources: FrameSources, runs: Path, tell: Tell
+) -> dict[str, Any]:
+    """Photograph the frames of a recipe and cut their tiles.
+
+    Args:
+        recipe: Of a camera with a haze.
+        sources: Pictures and optics.
+        runs: The folder of its runs; see `frames_folder`.
+        tell: Takes a line for every frame.
+
+    Returns:
+        What was made: folder, tiles of every part, bytes.
+
+    Raises:
+        ContractError: If the recipe undoes no haze, or its optics have none.
+    """
+    if recipe.haze is None or sources.optics.haze is None:
+        raise ContractError(
+            f"{recipe.name} has no haze; its samples are made while it trains, leave prepare out"
+        )
+    folder, chosen = frames_folder(runs, recipe), recipe.frames
+    folder.mkdir(parents=True, exist_ok=True)
+    first_unseen = len(sources.copies) - recipe.lens.validation_copies
+    plans = {
+        PARTS[0]: (chosen.count, chosen.tiles, range(first_unseen)),
+        PARTS[1]: (
+            chosen.validation_count,
+            chosen.validation_tiles,
+            range(first_unseen, len(sources.copies)),
+        ),
+    }
+    counts = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        bundle = physics_bundle(recipe, sources.optics, Path(scratch) / "physics.camkit")
+        for part, (frames, tiles, copies) in plans.items():
+            studio = _Studio(recipe, sources, part, bundle, tiles)
+            counts[part] = frames * chosen.shots * tiles
+            store = create_tiles(folder, part, counts[part], recipe)
+            for number in range(frames):
+                studio.fill(store, number, copies[number % len(copies)])
+                tell(f"{part}: frame {number + 1} of {frames}")
+    bank = _bank(recipe, sources)
+    write_header(folder, recipe, bank, sources.pictures, sources.designed)
+    size = sum(path.stat().st_size for path in folder.iterdir())
+    return {"folder": str(folder), **counts, "bytes": size}
+
+
+def physics_bundle(recipe: BayerRecipe, optics: FrozenOptics, out: Path) -> Bundle:
+    """Write the camera of a recipe without its networks, and open it."""
+    design = training_kind(recipe.kind).design(recipe)
+    kept = [stage for stage in design.stages if not isinstance(stage, Network)]
+    stages = rewired(kept, design.stages)
+    stated = optics.entry(design.object_distance_mm)
+    manifest = Manifest(
+        format_version=format_of(optics.psf, hazy=optics.haze is not None),
+        kind=recipe.kind,
+        name=recipe.name,
+        version="0.1.0",
+        licence=LICENCE,
+        training_data="none: no network",
+        sensor=recipe.sensor,
+        optics=stated,
+        stages=stages,
+        planes=planes_of(stages, Parts(sensor=recipe.sensor, optics=stated, networks={})),
+        products={IMAGE: stages[-1].gives[0]},
+    )
+    return write_bundle(out, manifest, optics.members)
+
+
+class _Studio:
+    """Photographs the frames of one part."""
+
+    def __init__(
+        self, recipe: BayerRecipe, sources: FrameSources, part: str, bundle: Bundle, tiles: int
+    ) -> None:
+        data = recipe.data
+        self._recipe, self._sources, self._tiles = recipe, sources, tiles
+        self._choosing = part == PARTS[1]
+        self._pipeline = Pipeline(bundle, Options(threads=1))
+        self._scenes = open_source(
+            sources.pictures[part],
+            picture_share=1.0 if self._choosing else data.picture_share,
+            scenes=data.procedural_scenes,
+            scene_px=data.scene_px,
+            edge_share=0.0 if self._choosing else data.edge_share,
+            night_share=0.0 if self._choosing else data.night_share,
+            lamp_share=0.0 if self._choosing else data.lamp_share,
+        )
+
+    def fill(self, store: Tiles, number: int, copy: int) -> None:
+        """Photograph a frame and store its tiles."""
+        recipe, seed = self._recipe, self._sources.seed
+        rng = np.random.default_rng((seed, int(self._choosing), number))
+        scene = draw_scene(rng, self._scenes, recipe, even=self._choosing)
+        optics = self._sources.copies[copy]
+        light = light_of(
+            scene,
+            recipe.sensor,
+            lens_of(optics.psf, recipe.sensor, haze=optics.haze),
+            scene_window(scene, recipe.sensor, None),
+            LightOptions(distort=False),
+        )
+        for shot in range(recipe.frames.shots):
+            iso = self._iso(rng, shot)
+            first = (number * recipe.frames.shots + shot) * self._tiles
+            setting = Setting(iso=iso, seed=int(rng.integers(2**31)))
+            cut = self._cut(rng, light, expose(light, recipe.sensor, setting), iso)
+            for index, tile in enumerate(cut, start=first):
+                store.store(index, tile(copy))
+
+    def _iso(self, rng: Generator, shot: int) -> float:
+        if self._choosing:
+            return VALIDATION_ISOS[shot % len(VALIDATION_ISOS)]
+        data = self._recipe.data
+        return float(np.exp(rng.uniform(np.log(data.iso_min), np.log(data.iso_max))))
+
+    def _cut(
+        self, rng: Generator, light: Light, samples: NDArray[np.uint16], iso: float
+    ) -> Iterator[Callable[[int], Tile]]:
+        """Yield the tiles of a shot, which lack the number of their copy."""
+        recipe = self._recipe
+        sensor, inner, margin = recipe.sensor, recipe.data.sample_px, recipe.data.margin_px
+        planes, rise = self._cleared(light, samples, iso)
+        clipped = (samples >= np.floor(sensor.white_level))[None]
+        for top, left in _places(rng, samples.shape, inner, self._tiles):
+            sharp = light.clean[:, top : top + inner, left : left + inner]
+            if light.vignetting is not None:
+                even = illumination_band(light.vignetting, light.window, top, top + inner)
+                sharp = sharp * even[:, left : left + inner]
+            middle = (inner - 1) / 2
+            x_mm, y_mm = light.window.to_mm(left + middle, top + middle)
+            given = {
+                "planes": _with_surroundings(planes, top, left, inner, margin),
+                "clipped": _with_surroundings(clipped, top, left, inner, margin)[0],
+                "sharp": sharp,
+                "x_mm": float(x_mm),
+                "y_mm": float(y_mm),
+                "iso": iso,
+                "noise_rise": rise,
+            }
+            yield lambda copy, given=given: Tile(copy=copy, **given)  # type: ignore[misc]
+
+    def _cleared(
+        self, light: Light, samples: NDArray[np.uint16], iso: float
+    ) -> tuple[FloatArray, tuple[float, ...]]:
+        """Give what the stage haze makes of a shot, and what its noise was raised by."""
+        haze = self._recipe.haze
+        assert haze is not None
+        capture = self._pipeline.capture_of(
+            samples,
+            iso=iso,
+            white_balance=light.gains,  # type: ignore[arg-type]
+            origin_px=(0, 0),
+        )
+        kept = self._pipeline.start(capture).keep(haze.gives[0])
+        rows = kept.rows()
+        assert kept.noise_rise is not None
+        return np.asarray(rows.read(0, rows.shape[1]), np.float32), kept.noise_rise()
+
+
+def draw_scene(
+    rng: Generator, source: SceneSource, recipe: BayerRecipe, *, even: bool = False
+) -> FloatArray:
+    """Put a scene of the whole sensor together, (3, h, w) float32 linear Rec.709.
+
+    Args:
+        rng: Draws crops, tints and exposures.
+        source: Of the crops.
+        recipe: Its frames and exposures.
+        even: Leave tints and exposures as they are.
+    """
+    extent, data, side = recipe.sensor.known_extent, recipe.data, recipe.frames.crop_px
+    scene = np.empty((3, extent.height_px, extent.width_px), np.float32)
+    least, most = data.exposure_min_ev, data.exposure_max_ev
+    usual = rng.triangular(least, min(max(0.0, least), most), most) if most > least else most
+    for top in range(0, extent.height_px, side):
+        for left in range(0, extent.width_px, side):
+            place = scene[:, top : top + side, left : left + side]
+            crop = source.draw_crop(rng, side)
+            if not even:
+                stops = np.clip(usual + SPREAD_EV * rng.standard_normal(), least, most)
+                crop = tint_crop(rng, crop) * np.float32(2.0**stops)
+            place[:] = crop[:, : place.shape[1], : place.shape[2]]
+    return np.maximum(scene, 0, out=scene)
+
+
+def _places(
+    rng: Generator, size: tuple[int, ...], side_px: int, count: int
+) -> Iterator[tuple[int, int]]:
+    """Yield where tiles begin, anywhere in the frame, at the first pixel of the mosaic's cell."""
+    rooms = [(length - side_px) // 2 + 1 for length in size]
+    for _ in range(count):
+        top, left = (2 * int(rng.integers(room)) for room in rooms)
+        yield top, left
+
+
+def _with_surroundings(
+    planes: NDArray[Any], top: int, left: int, inner_px: int, margin_px: int
+) -> NDArray[Any]:
+    """Cut a square and what lies around it; mirrored beyond the border of the frame."""
+
+    def along(first: int, length: int) -> NDArray[np.intp]:
+        at = np.abs(np.arange(first - margin_px, first + inner_px + margin_px))
+        return np.where(at < length, at, 2 * (length - 1) - at)
+
+    height, width = planes.shape[-2:]
+    rows, columns = along(top, height), along(left, width)
+    return np.ascontiguousarray(planes[:, rows[:, None], columns])
+
+
+def _bank(recipe: BayerRecipe, sources: FrameSources) -> PsfBank:
+    """Give the core kernels as training asks for them; copies have the fields of the lens."""
+
+    def core(optics: FrozenOptics) -> FloatArray:
+        assert optics.haze is not None
+        response = recipe.sensor.response_arrays()
+        return hazy_kernels(optics.psf, optics.haze, *response).core.kernels
+
+    heights = sources.optics.psf.field_heights_mm
+    return PsfBank(
+        copies=np.stack([core(copy) for copy in sources.copies]),
+        copy_heights_mm=heights,
+        frozen=core(sources.optics),
+        frozen_heights_mm=heights,
+        relative_illumination=sources.optics.psf.relative_illumination,
+        validation_copies=recipe.lens.validation_copies,
+    )
