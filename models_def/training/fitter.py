@@ -8,7 +8,12 @@ from torch import Tensor, nn
 
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights, take_first_weights
-from camkit.models_def.training.losses import overshoots, patch_errors, training_loss
+from camkit.models_def.training.losses import (
+    overshoots,
+    patch_distances,
+    patch_errors,
+    training_loss,
+)
 from camkit.models_def.training.precision import half_precision
 from camkit.models_def.training.recipe import NetworkRecipe
 from camkit.models_def.training.sample import Batch
@@ -59,8 +64,17 @@ class Fitter:
         build: NetworkBuilder,
         device: str,
         first: FirstWeights | None = None,
+        betas: tuple[float, float] = (0.9, 0.999),
     ) -> None:
-        """Build the network with random weights, or with the first ones given."""
+        """Build the network with random weights, or with the first ones given.
+
+        Args:
+            entry: The network and its schedule.
+            build: Builds it.
+            device: cpu or cuda.
+            first: First weights.
+            betas: Of AdamW.
+        """
         self.schedule, self.device = entry.schedule, torch.device(device)
         torch.manual_seed(entry.schedule.seed)
         self.network = _to_device(build(entry.network, **entry.config), self.device)
@@ -72,6 +86,7 @@ class Fitter:
         self._optimizer = torch.optim.AdamW(
             self.network.parameters(),
             lr=entry.schedule.learning_rate,
+            betas=betas,
             weight_decay=entry.schedule.weight_decay,
             fused=True,
         )
@@ -86,10 +101,11 @@ class Fitter:
         """
         output = self.run(batch.planes, progress)
         target, weight = batch.target.to(self.device), batch.weight.to(self.device)
-        errors = patch_errors(output, target, weight)
+        absolute = self.schedule.loss == "l1"
+        errors = (patch_distances if absolute else patch_errors)(output, target, weight)
         if self.schedule.overshoot:
             errors = errors + self.schedule.overshoot * overshoots(output, target, weight)
-        loss = training_loss(self.schedule.loss, errors)
+        loss = errors.mean() if absolute else training_loss(self.schedule.loss, errors)
         self.descend(loss, step, progress)
         return float(loss.detach())
 
