@@ -32,6 +32,7 @@ OPTIONS = {
     "--json --debug",
     "train": "--size --data --steps --max-minutes --resume --fine-tune --vgg --pairs --debug",
     "fit-bank": "-o --data --samples --steps --seed --cache-dir --overwrite --json --debug",
+    "freeze-norms": "-o --data --valid --samples --cache-dir --overwrite --json --debug",
     "design": "--data --out-dir --steps --lens-rate --prescription --seed --pictures --threads "
     "--resume --overwrite --json --debug",
     "export": "-o --psf --stress-psf --prescription --debug",
