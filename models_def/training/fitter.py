@@ -1,11 +1,12 @@
 """What changes during training: weights, their average, the optimiser; one step at a time."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import torch
 from torch import Tensor, nn
 
+from camkit.errors import ContractError
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights, take_first_weights
 from camkit.models_def.training.losses import (
@@ -18,6 +19,8 @@ from camkit.models_def.training.precision import half_precision
 from camkit.models_def.training.recipe import NetworkRecipe
 from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
+
+ANOTHER_LOSS: Final = "the checkpoint was trained by another loss; start without resume"
 
 NetworkBuilder = Callable[..., nn.Module]
 """Of a kind: name and configuration -> an untrained network."""
@@ -150,7 +153,13 @@ class Fitter:
         return self._optimizer.state_dict()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
+        """Go back to a saved state.
+
+        Raises:
+            ContractError: If it was saved by another fitter.
+        """
+        if "param_groups" not in optimizer:
+            raise ContractError(ANOTHER_LOSS)
         self.network.load_state_dict(weights)
         self.averaged.load_state_dict(average)
         self._optimizer.load_state_dict(optimizer)

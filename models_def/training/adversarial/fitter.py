@@ -29,7 +29,7 @@ from camkit.models_def.training.adversarial.wasserstein import (
 )
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights
-from camkit.models_def.training.fitter import Fitter, NetworkBuilder
+from camkit.models_def.training.fitter import ANOTHER_LOSS, Fitter, NetworkBuilder
 from camkit.models_def.training.recipe import CriticRecipe, NetworkRecipe, ScheduleRecipe
 from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import learning_rate
@@ -204,10 +204,11 @@ class PictureFitter:
         """Go back to a saved state.
 
         Raises:
-            ContractError: If it was saved with a critic and there is none now, or the reverse.
+            ContractError: If it was saved by another fitter, or with a critic where there is none
+                now, or the reverse.
         """
-        if (self.critic is None) == ("critic" in optimizer):
-            raise ContractError("the checkpoint was trained by another loss; start without resume")
+        if "generator" not in optimizer or (self.critic is None) == ("critic" in optimizer):
+            raise ContractError(ANOTHER_LOSS)
         self.generator.load(weights, average, optimizer["generator"])
         if self.critic is not None:
             self.critic.load(optimizer["critic"])

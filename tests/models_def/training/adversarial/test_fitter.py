@@ -2,11 +2,15 @@
 
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer import fitting
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.adversarial.fitter import PictureFitter, PictureParts
@@ -117,6 +121,30 @@ def test_a_checkpoint_of_another_loss_is_not_resumed(make):
     judged, alone = make(), make(loss="content")
     with pytest.raises(ContractError, match="trained by another loss"):
         alone.load(judged.weights(), judged.average(), judged.optimizer_state())
+    plain = alone.generator
+    with pytest.raises(ContractError, match="trained by another loss"):
+        alone.load(plain.weights(), plain.average(), plain.optimizer_state())
+    with pytest.raises(ContractError, match="trained by another loss"):
+        plain.load(alone.weights(), alone.average(), alone.optimizer_state())
+
+
+def test_real_pairs_take_the_places_that_the_recipe_gives_them(recipe_path, material, monkeypatch):
+    planes = np.full((3, 6, 64, 64), 0.25, dtype=np.float16)
+    pairs = PairSamples(
+        planes=planes, targets=planes[:, :3], weights=np.ones((3, 3), np.float32), alignments={}
+    )
+    asked = []
+    monkeypatch.setattr(fitting, "trace_recipe_distortion", lambda *_: None)
+    monkeypatch.setattr(fitting, "read_pairs", lambda *given, **_: asked.append(given) or pairs)
+    recipe = read_recipe(recipe_path)
+    own = own_fitting("bayer", request(recipe, "gram", pairs=Path("monitor")))
+    assert own.credit.endswith(", real pairs of monitor")
+    fitter = own.make(material)
+    mixed = fitter._parts.mix(batch(), 7)
+    assert asked == [(Path("monitor"), recipe, material.bank, None)]
+    assert (mixed.planes[0] == 0.25).all()
+    assert torch.equal(mixed.planes[1], batch().planes[1])
+    assert fitter.fit(batch(), 0, 0.0) > 0
 
 
 def request(recipe, size, **given):
