@@ -1,5 +1,6 @@
 """Torch checkpoint to bundle, in the order of the work.
 
+    frozen_norms    norms that look at a picture become constants, before
     golden_cases    small captures of known scenes
     onnx_graph      a network becomes ONNX, held against torch
     network_facts   what is measured about it

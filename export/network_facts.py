@@ -12,8 +12,9 @@ from torch import nn
 
 from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.contracts import FloatArray
-from camkit.errors import UnsupportedError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.export.onnx_graph import check_parity, to_fp16, to_onnx
+from camkit.models_def.networks.instance_norm import live_norms
 from camkit.models_def.training.sample import SampleLayout
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
@@ -42,9 +43,14 @@ def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> Export
         layout: What it takes and gives.
 
     Raises:
-        ContractError: If the network takes or gives something else.
+        ContractError: If the network takes or gives something else, or looks at whole pictures.
         ParityError: If torch and ONNX disagree.
     """
+    if live := live_norms(network):
+        raise ContractError(
+            f"{name} has {len(live)} norms that look at a whole picture ({live[0]}, ...), so it "
+            "cannot be tiled; make them constants first: camkit freeze-norms"
+        )
     model = to_onnx(network, channels=layout.input_channels, scale=layout.scale)
     graph = inspect_graph(model)
     facts = NetworkFacts(

@@ -13,6 +13,7 @@ from camkit.cli.design.design import design
 from camkit.cli.design.export import export
 from camkit.cli.design.fit_bank import fit_bank
 from camkit.cli.design.freeze import freeze
+from camkit.cli.design.freeze_norms import freeze_norms
 from camkit.cli.design.lens.app import lens_app
 from camkit.cli.design.plate.app import plate_app
 from camkit.cli.design.prepare import prepare
@@ -56,6 +57,7 @@ for command in (
     prepare,
     train,
     fit_bank,
+    freeze_norms,
     export,
 ):
     app.command()(command)

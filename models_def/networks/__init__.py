@@ -4,8 +4,10 @@
                             -> trimmed_unet   the thesis's trimmed U-Net, a reference
                             -> full_unet      its generator: the trimmed one with its deep scales
                             -> constant_unet  the single-stage U-Net of Deep Optics, a reference
+                            -> normed_unet    the generator of the thin plate, a reference
+                               instance_norm  its norms, and constants that stand in for them
                                catalog        their names, for recipes and checkpoints
-    restored and true picture -> discriminator   opponents in fine-tuning, never exported
+    restored and true picture -> discriminator   opponents in training, never exported
                               -> vgg             features of VGG-19, weights from the user
     capture of highlights     -> thesis          the networks of chapter 5, references
 

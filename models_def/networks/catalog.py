@@ -20,6 +20,7 @@ from camkit.models_def.networks.lean_unet import (
     LeanUnet,
 )
 from camkit.models_def.networks.near_lights import REACH_PX, NearLights
+from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
 from camkit.models_def.networks.trimmed_unet import TrimmedConfig, TrimmedUnet
 
 
@@ -43,6 +44,10 @@ def _constant(**config: Any) -> nn.Module:
     return ConstantUnet(ConstantConfig(**config))
 
 
+def _normed(**config: Any) -> nn.Module:
+    return NormedUnet(NormedConfig(**config))
+
+
 _NEAR_LIGHTS: Final[dict[str, Callable[..., nn.Module]]] = {
     "lights_s": partial(_near_lights, LIGHTS_S),
     "lights_m": partial(_near_lights, LIGHTS_M),
@@ -55,6 +60,7 @@ _BUILDERS: Final[dict[str, Callable[..., nn.Module]]] = {
     "trimmed_unet": _trimmed,
     "full_unet": _full,
     "constant_unet": _constant,
+    "normed_unet": _normed,
 }
 
 NETWORK_NAMES: Final = tuple(_BUILDERS)

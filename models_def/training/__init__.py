@@ -7,6 +7,7 @@
     pool, pool_worker              finished samples on disk, made beside the training
     losses, schedule, fitter       one step
     fitting                        the steps that a kind brings
+    adversarial                    such a step: content terms, and a critic
     trainer, progress, log         the run, its bar and its log
     similarity                     SSIM with gradients
     checkpoint, credits            what is kept, and what it was trained on

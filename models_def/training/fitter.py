@@ -1,18 +1,26 @@
 """What changes during training: weights, their average, the optimiser; one step at a time."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import torch
 from torch import Tensor, nn
 
+from camkit.errors import ContractError
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights, take_first_weights
-from camkit.models_def.training.losses import overshoots, patch_errors, training_loss
+from camkit.models_def.training.losses import (
+    overshoots,
+    patch_distances,
+    patch_errors,
+    training_loss,
+)
 from camkit.models_def.training.precision import half_precision
 from camkit.models_def.training.recipe import NetworkRecipe
 from camkit.models_def.training.sample import Batch
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
+
+ANOTHER_LOSS: Final = "the checkpoint was trained by another loss; start without resume"
 
 NetworkBuilder = Callable[..., nn.Module]
 """Of a kind: name and configuration -> an untrained network."""
@@ -59,8 +67,17 @@ class Fitter:
         build: NetworkBuilder,
         device: str,
         first: FirstWeights | None = None,
+        betas: tuple[float, float] = (0.9, 0.999),
     ) -> None:
-        """Build the network with random weights, or with the first ones given."""
+        """Build the network with random weights, or with the first ones given.
+
+        Args:
+            entry: The network and its schedule.
+            build: Builds it.
+            device: cpu or cuda.
+            first: First weights.
+            betas: Of AdamW.
+        """
         self.schedule, self.device = entry.schedule, torch.device(device)
         torch.manual_seed(entry.schedule.seed)
         self.network = _to_device(build(entry.network, **entry.config), self.device)
@@ -72,6 +89,7 @@ class Fitter:
         self._optimizer = torch.optim.AdamW(
             self.network.parameters(),
             lr=entry.schedule.learning_rate,
+            betas=betas,
             weight_decay=entry.schedule.weight_decay,
             fused=True,
         )
@@ -86,10 +104,11 @@ class Fitter:
         """
         output = self.run(batch.planes, progress)
         target, weight = batch.target.to(self.device), batch.weight.to(self.device)
-        errors = patch_errors(output, target, weight)
+        absolute = self.schedule.loss == "l1"
+        errors = (patch_distances if absolute else patch_errors)(output, target, weight)
         if self.schedule.overshoot:
             errors = errors + self.schedule.overshoot * overshoots(output, target, weight)
-        loss = training_loss(self.schedule.loss, errors)
+        loss = errors.mean() if absolute else training_loss(self.schedule.loss, errors)
         self.descend(loss, step, progress)
         return float(loss.detach())
 
@@ -134,7 +153,13 @@ class Fitter:
         return self._optimizer.state_dict()
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
+        """Go back to a saved state.
+
+        Raises:
+            ContractError: If it was saved by another fitter.
+        """
+        if "param_groups" not in optimizer:
+            raise ContractError(ANOTHER_LOSS)
         self.network.load_state_dict(weights)
         self.averaged.load_state_dict(average)
         self._optimizer.load_state_dict(optimizer)

@@ -7,13 +7,21 @@ The part of a kind with losses of its own defines `FITTING` beside its `PART`, w
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, Final, Protocol, cast
 
 from camkit.errors import ContractError
 from camkit.kinds import find_kind
 from camkit.models_def.training.first_weights import FirstWeights
 from camkit.models_def.training.fitter import Fits
-from camkit.models_def.training.recipe import NetworkRecipe
+from camkit.models_def.training.recipe import PICTURE_LOSSES, NetworkRecipe
+
+_FINE_TUNE: Final = ", or say --fine-tune FROM too"
+_FILES: Final = (
+    ("vgg", "VGG-19", _FINE_TUNE),
+    ("sharp", "sharp pictures without captures", ""),
+    ("pairs", "real pairs", _FINE_TUNE),
+)
+"""Files of a request: option, what it holds, what else it might be for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +35,9 @@ class FitRequest:
         device: cpu or cuda.
         first: First weights; None for random ones.
         vgg: Weights of VGG-19; None where none were given.
+        sharp: Folder of sharp pictures without captures; likewise.
+        pairs: Folder of real pairs; likewise.
+        recipe_folder: For what the recipe names by a path.
     """
 
     recipe: Any
@@ -35,6 +46,9 @@ class FitRequest:
     device: str = "cpu"
     first: FirstWeights | None = None
     vgg: Path | None = None
+    sharp: Path | None = None
+    pairs: Path | None = None
+    recipe_folder: Path = Path()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,11 +56,11 @@ class OwnFitting:
     """A fitter that a kind brings.
 
     Attributes:
-        make: Makes it.
+        make: Makes it, from the material of the samples.
         credit: What it adds to the training data, for the card.
     """
 
-    make: Callable[[], Fits]
+    make: Callable[[Any], Fits]
     credit: str = ""
 
 
@@ -62,14 +76,22 @@ def own_fitting(kind: str, request: FitRequest) -> OwnFitting | None:
     """Give the fitter that a kind brings for a role, None for the house's.
 
     Raises:
-        ContractError: If something is missing, or weights of VGG-19 were given in vain.
+        ContractError: If something is missing, or files were given in vain.
     """
     part = find_kind(kind).part("models_def")
     brought = cast("FittingKind | None", getattr(part, "FITTING", None))
     found = None if brought is None else brought.fitting(request)
-    if found is None and request.vgg is not None:
+    if found is not None:
+        return found
+    whose = f"{request.entry.network} in the role {request.role!r}"
+    if request.entry.schedule.loss in PICTURE_LOSSES:
         raise ContractError(
-            f"the loss of {request.entry.network} in the role {request.role!r} does not look at "
-            "VGG-19: leave --vgg away, or say --fine-tune FROM too"
+            f"{whose} of the kind {kind!r} cannot be trained by the loss "
+            f"{request.entry.schedule.loss}"
         )
-    return found
+    for option, what, instead in _FILES:
+        if getattr(request, option) is not None:
+            raise ContractError(
+                f"the loss of {whose} does not look at {what}: leave --{option} away{instead}"
+            )
+    return None

@@ -30,9 +30,20 @@ def patch_errors(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
     Returns:
         (b,) errors.
     """
-    judged = target >= 0
-    gap = torch.where(judged, output - target, 0.0) * weight[:, :, None, None]
+    judged, gap = _gap(output, target, weight)
     return gap.square().sum((1, 2, 3)) / judged.sum((1, 2, 3)).clamp(min=1)
+
+
+def patch_distances(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
+    """Give the mean |difference| per patch, (b,), as `patch_errors` has the mean square."""
+    judged, gap = _gap(output, target, weight)
+    return gap.abs().sum((1, 2, 3)) / judged.sum((1, 2, 3)).clamp(min=1)
+
+
+def _gap(output: Tensor, target: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
+    """Say what is judged, and give its difference in the square-root domain, 0 elsewhere."""
+    judged = target >= 0
+    return judged, torch.where(judged, output - target, 0.0) * weight[:, :, None, None]
 
 
 def overshoots(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:

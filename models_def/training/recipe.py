@@ -18,7 +18,9 @@ from camkit.bundle.sensor import BayerSensor, Sensor, nested_sensor
 from camkit.errors import ContractError
 from camkit.models_def.toml_table import check_keys, section, typed
 
-LOSSES = ("log_mse", "mse")
+PICTURE_LOSSES = ("content", "adversarial")
+"""Of what is seen on a display; by a fitter that a kind brings."""
+LOSSES = ("log_mse", "mse", "l1", *PICTURE_LOSSES)
 PRECISIONS = ("float32", "bfloat16")
 AHEAD: Final = 32
 """Samples made beyond those that a step may draw; their slots are taken."""
@@ -79,6 +81,71 @@ class DataRecipe:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ContentRecipe:
+    """What output and truth are compared by.
+
+    Attributes:
+        l1_weight: On the mean |difference| in the square-root domain.
+        gram_weight: On the Gram matrices of features, eq. (3.7).
+        feature_weight: On the features themselves, mean square; the authors' public code has it
+            beside the Gram matrices, the text has not.
+    """
+
+    l1_weight: float = 1.0
+    gram_weight: float = 0.0
+    feature_weight: float = 0.0
+
+    def __post_init__(self) -> None:
+        weights = self.l1_weight, self.gram_weight, self.feature_weight
+        if min(weights) < 0 or sum(weights) == 0:
+            raise ContractError(f"schedule.content needs weights >= 0, one > 0; got {weights}")
+
+    @property
+    def looks(self) -> bool:
+        """Whether pictures are looked at through features."""
+        return self.gram_weight + self.feature_weight > 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CriticRecipe:
+    """The critic, its training, and how much its opinion counts.
+
+    Attributes:
+        weight: lambda_a of eq. (3.9).
+        steps: Of the critic for each of the generator.
+        penalty: lambda_g of eq. (3.8). The thesis does not give it; 10 is what its source has.
+        layers: Strided layers: the text has five; the authors' public code has three.
+        width: Channels of the first; they double per layer, up to 8 times.
+        learning_rate: Peak of Adam's rate, with the decay of the schedule.
+        beta1: Of both optimisers.
+        sharp_share: Share of the true pictures that have no capture, where such are given.
+    """
+
+    weight: float = 0.1
+    steps: int = 5
+    penalty: float = 10.0
+    layers: int = 5
+    width: int = 64
+    learning_rate: float = 1e-4
+    beta1: float = 0.5
+    sharp_share: float = 0.5
+
+    def __post_init__(self) -> None:
+        if min(self.weight, self.penalty) < 0 or self.learning_rate <= 0:
+            raise ContractError("schedule.critic needs weight, penalty >= 0, learning_rate > 0")
+        if min(self.steps, self.layers, self.width) < 1:
+            raise ContractError(
+                "schedule.critic needs steps, layers and width >= 1; got "
+                f"{self.steps}, {self.layers}, {self.width}"
+            )
+        if not (0 <= self.beta1 < 1 and 0 <= self.sharp_share <= 1):
+            raise ContractError(
+                "schedule.critic needs beta1 in [0, 1) and sharp_share in 0..1; got "
+                f"{self.beta1}, {self.sharp_share}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScheduleRecipe:
     """How the network is fitted.
 
@@ -92,12 +159,15 @@ class ScheduleRecipe:
         weight_decay: AdamW's decay.
         gradient_clip: Largest norm of the gradient.
         ema_decay: Decay of the weight average that is validated and exported.
-        loss: log_mse or mse, both in the square-root domain of the signal.
+        loss: log_mse, mse or l1, all in the square-root domain of the signal; content, what
+            `content` weighs; adversarial, the same and a critic.
         overshoot: Weight of squared overshoots beside squared errors, against halos.
         precision: float32, or bfloat16: multiplies in it where the processor has instructions for
             that, and in float32 elsewhere (weights stay float32).
         float32_share: Share of the schedule, at its end, computed in float32 anyway.
         seed: Seed of weights, samples and order.
+        content: Weights of what is seen.
+        critic: Against whom.
     """
 
     steps: int = 40_000
@@ -114,6 +184,8 @@ class ScheduleRecipe:
     precision: str = "bfloat16"
     float32_share: float = 0.05
     seed: int = 1
+    content: ContentRecipe = field(default_factory=ContentRecipe)
+    critic: CriticRecipe = field(default_factory=CriticRecipe)
 
     def __post_init__(self) -> None:
         if self.loss not in LOSSES:
@@ -217,7 +289,7 @@ def common_tables(
         ContractError: If a key is unknown, missing or wrong.
     """
     check_keys("recipe", table, {*COMMON, *own})
-    schedule = section("schedule", ScheduleRecipe, table.get("schedule", {}))
+    schedule = own_schedule("schedule", table.get("schedule", {}), ScheduleRecipe())
     return CommonTables(
         name=typed("name", table.get("name"), str),
         kind=typed("kind", table.get("kind", DEFAULT_KIND), str),
@@ -273,7 +345,13 @@ def own_schedule(where: str, table: Any, base: ScheduleRecipe) -> ScheduleRecipe
     """
     if not isinstance(table, Mapping):
         raise ContractError(f"{where} must be a table; got {table!r}")
-    return section(where, ScheduleRecipe, asdict(base) | dict(table))
+    whole = asdict(base) | dict(table)
+    for name, kind in (("content", ContentRecipe), ("critic", CriticRecipe)):
+        own = table.get(name, {})
+        if not isinstance(own, Mapping):
+            raise ContractError(f"{where}.{name} must be a table; got {own!r}")
+        whole[name] = section(f"{where}.{name}", kind, asdict(getattr(base, name)) | dict(own))
+    return section(where, ScheduleRecipe, whole)
 
 
 def model(where: str, kind: type[M], table: Mapping[str, Any]) -> M:

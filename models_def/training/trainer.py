@@ -72,6 +72,8 @@ class TrainOptions:
         workers: Processes that make samples; 0 makes them in this process.
         device: cpu or cuda.
         vgg: Weights of VGG-19, where the loss of the role looks at it.
+        sharp_folder: Sharp pictures without captures, where the loss of the role has a critic.
+        pairs: Folder of real pairs, where the loss of the role takes them.
         checkpoint_s: Seconds between checkpoints.
         validate_s: Seconds between validations.
     """
@@ -92,6 +94,8 @@ class TrainOptions:
     workers: int = 1
     device: str = "cpu"
     vgg: Path | None = None
+    sharp_folder: Path | None = None
+    pairs: Path | None = None
     checkpoint_s: float = 100.0
     validate_s: float = 180.0
 
@@ -195,6 +199,9 @@ def train(
             device=options.device,
             first=first,
             vgg=options.vgg,
+            sharp=options.sharp_folder,
+            pairs=options.pairs,
+            recipe_folder=recipe_path.parent,
         )
         own = own_fitting(recipe.kind, request)
     path = checkpoint_path(recipe, options, refinement)
@@ -275,7 +282,7 @@ class _Run:
         self.data = data + ("" if first is None else first.credit(data))
         if own is not None:
             self.data += own.credit
-            self.fitter: Fits = own.make()
+            self.fitter: Fits = own.make(material)
         elif refinement is None:
             self.fitter = Fitter(self.entry, kind.build_network, options.device, first)
         else:

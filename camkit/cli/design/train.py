@@ -13,6 +13,8 @@ WITHOUT_VGG = (
     "no --vgg FILE: the perceptual term of eq. (6.12) compares sRGB values, not VGG-19 features"
 )
 
+SUBSTITUTE = "no --vgg FILE: features are those of random weights in place of VGG-19"
+
 if TYPE_CHECKING:
     from camkit.models_def.training.refinement import Refinement
 
@@ -55,8 +57,13 @@ def train(
         Path | None,
         typer.Option(help="VGG-19 weights (.pth or .safetensors), where a loss looks at them."),
     ] = None,
+    sharp: Annotated[
+        Path | None,
+        typer.Option(help="Folder of sharp pictures without captures, for a critic to know."),
+    ] = None,
     pairs: Annotated[
-        Path | None, typer.Option(help="With --fine-tune: folder of real pairs to fine-tune on.")
+        Path | None,
+        typer.Option(help="Folder of real pairs, where the loss or --fine-tune takes them."),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
     overwrite: Overwrite = False,
@@ -75,9 +82,11 @@ def train(
 
     refinement: Refinement | None = None
     if fine_tune is not None:
+        if sharp is not None:
+            raise ContractError("--sharp is for a critic; fine-tuning has none: leave it away")
         refinement = _fine_tuning(recipe, fine_tune, size, vgg, pairs, device)
-    elif pairs is not None:
-        raise ContractError("--pairs belongs to fine-tuning; say --fine-tune FROM too")
+    elif vgg is None:
+        _tell_substitute(recipe, size, role)
     result = run(
         recipe,
         TrainOptions(
@@ -96,10 +105,22 @@ def train(
             workers=workers,
             device=device,
             vgg=None if refinement is not None else vgg,
+            sharp_folder=sharp,
+            pairs=None if refinement is not None else pairs,
         ),
         refinement=refinement,
     )
     print_report(result.to_json(), json_)
+
+
+def _tell_substitute(recipe: Path, size: str, role: str | None) -> None:
+    """Say on stderr that features are a substitute, where a loss looks at any."""
+    from camkit.models_def.training.kind import read_recipe
+    from camkit.models_def.training.recipe import PICTURE_LOSSES
+
+    schedule = read_recipe(recipe).network(size, role).schedule
+    if schedule.loss in PICTURE_LOSSES and schedule.content.looks:
+        say(f"camkit: {SUBSTITUTE}", err=True)
 
 
 def _fine_tuning(

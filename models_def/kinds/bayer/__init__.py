@@ -9,10 +9,12 @@ validation             what a run is chosen by
 training               all of it as the trainer asks for it: PART
 bank_fit               the numbers of a bank that restores colours together: BANK_FITTING
 fine_tuning/           afterwards: discriminators, features, real pairs: REFINING
+fitting                by what a picture looks like, and against a critic: FITTING
 """
 
 from camkit.models_def.kinds.bayer.bank_fit import BANK_FITTING
 from camkit.models_def.kinds.bayer.fine_tuning.refinement import REFINING
+from camkit.models_def.kinds.bayer.fitting import FITTING
 from camkit.models_def.kinds.bayer.training import PART
 
-__all__ = ["BANK_FITTING", "PART", "REFINING"]
+__all__ = ["BANK_FITTING", "FITTING", "PART", "REFINING"]

@@ -103,7 +103,7 @@ class PlateFitting:
         if request.device != "cpu":
             raise ContractError(f"a plate is trained on the cpu; got {request.device}")
 
-        def make() -> Fits:
+        def make(_material: Any) -> Fits:
             return PlateFitter(request)
 
         return OwnFitting(make=make)

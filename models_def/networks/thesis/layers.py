@@ -5,21 +5,15 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
+from camkit.models_def.networks.instance_norm import instance_norm
+
 SLOPE: Final = 0.2
-VARIANCE_FLOOR: Final = 1e-5
-
-
-def instance_norm(x: Tensor) -> Tensor:
-    """Give (b, c, h, w) of mean 0 and variance 1 per picture and channel.
-
-    A channel of one pixel becomes 0.
-    """
-    variance, mean = torch.var_mean(x, dim=(2, 3), correction=0, keepdim=True)
-    return (x - mean) * torch.rsqrt(variance + VARIANCE_FLOOR)
 
 
 class ScaledNorm(nn.Module):
     """nm(x) = w0 x + w1 instance_norm(x); the identity at first. References: table 5.1."""
+
+    sees_whole_picture: Final = True
 
     def __init__(self) -> None:
         super().__init__()
@@ -33,6 +27,8 @@ class ScaledNorm(nn.Module):
 
 class InstanceNorm(nn.Module):
     """An instance norm with gain and offset of each channel. References: table 5.2."""
+
+    sees_whole_picture: Final = True
 
     def __init__(self, channels: int) -> None:
         super().__init__()

@@ -33,6 +33,7 @@ OPTIONS = {
     "train": "--size --data --steps --max-minutes --resume --fine-tune --vgg --pairs --debug",
     "prepare": "--psf --haze --data --valid --out-dir --seed --overwrite --json --debug",
     "fit-bank": "-o --data --samples --steps --seed --cache-dir --overwrite --json --debug",
+    "freeze-norms": "-o --data --valid --samples --cache-dir --overwrite --json --debug",
     "design": "--data --out-dir --steps --lens-rate --prescription --seed --pictures --threads "
     "--resume --overwrite --json --debug",
     "export": "-o --psf --haze --stress-psf --prescription --debug",

@@ -23,7 +23,7 @@ def test_a_kind_without_fitters_has_that_of_the_house():
 
 
 def test_what_a_kind_brings_is_asked_for_every_role(monkeypatch):
-    own = OwnFitting(make=lambda: None, credit="; by hand")
+    own = OwnFitting(make=lambda _: None, credit="; by hand")
     asked = []
 
     def fitting(request):

@@ -4,7 +4,7 @@
     alignment     a pair with distortion, homography and colours told apart
     pairs         a folder of real pairs -> samples like those of the pool
     vgg           features of VGG-19 from a weights file of the user's
-    content       output and truth as seen on a display; eq. (6.12)
+    content       features of output and truth; eq. (6.12)
     adversarial   RaGAN-LS, eq. (6.13) with its signs
     fitter        one step: discriminators, then generator, eq. (6.14)
     refinement    all of it as the ordinary trainer runs it

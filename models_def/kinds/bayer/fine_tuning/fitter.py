@@ -8,22 +8,17 @@ batch (+ real pairs) -> generator -> views -+-> discriminators, scores of output
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
 from camkit.models_def.kinds.bayer.fine_tuning.adversarial import discriminator_loss, generator_loss
-from camkit.models_def.kinds.bayer.fine_tuning.content import (
-    Views,
-    make_views,
-    perceptual_loss,
-    pixel_loss,
-)
+from camkit.models_def.kinds.bayer.fine_tuning.content import perceptual_loss
 from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
 from camkit.models_def.kinds.bayer.fine_tuning.vgg import VggFeatures
 from camkit.models_def.kinds.bayer.recipe import FineTuningRecipe
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
+from camkit.models_def.training.adversarial.views import Views, make_views, pixel_loss
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights
 from camkit.models_def.training.fitter import Fitter
@@ -86,7 +81,8 @@ class FineTuningFitter:
     def fit(self, batch: Batch, step: int, progress: float) -> float:
         """Make one step of all three networks and give the generator's loss."""
         if self._pairs is not None:
-            batch = self._mixed(batch, self._pairs, step)
+            share, seed = self.recipe.pair_share, self.schedule.seed
+            batch = self._pairs.mixed(batch, share, seed, step)
         device = self.generator.device
         output = self.generator.run(batch.planes, progress)
         views = make_views(
@@ -96,25 +92,6 @@ class FineTuningFitter:
         loss = self._total(views)
         self.generator.descend(loss, step, progress)
         return float(loss.detach())
-
-    def _mixed(self, batch: Batch, pairs: PairSamples, step: int) -> Batch:
-        """Replace the first patches of a batch by patches of real pairs."""
-        count, _, patch_px, _ = batch.target.shape
-        real = round(self.recipe.pair_share * count)
-        if real == 0:
-            return batch
-        # Drawn by the step alone, so that a resumed run draws the same.
-        drawn = pairs.draw_batch(
-            np.random.default_rng((self.schedule.seed, 3, step)), real, patch_px
-        )
-        return Batch(
-            inputs={
-                name: torch.cat([planes, batch.inputs[name][real:]])
-                for name, planes in drawn.inputs.items()
-            },
-            target=torch.cat([drawn.target, batch.target[real:]]),
-            weight=torch.cat([drawn.weight, batch.weight[real:]]),
-        )
 
     def _teach_opponents(self, views: Views, step: int, progress: float) -> None:
         decay = learning_rate(self.schedule, step, progress) / self.schedule.learning_rate

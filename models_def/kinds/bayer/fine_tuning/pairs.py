@@ -72,6 +72,29 @@ class PairSamples:
         weight = torch.from_numpy(self.weights[chosen])
         return Batch(inputs=LAYOUT.named(planes), target=targets, weight=weight)
 
+    def mixed(self, batch: Batch, share: float, seed: int, step: int) -> Batch:
+        """Replace the first patches of a batch by patches of real pairs.
+
+        Args:
+            batch: Patches.
+            share: How many of them are replaced.
+            seed: Of the draw.
+            step: Draws by itself alone, so that a resumed run draws the same.
+        """
+        count, _, patch_px, _ = batch.target.shape
+        real = round(share * count)
+        if real == 0:
+            return batch
+        drawn = self.draw_batch(np.random.default_rng((seed, 3, step)), real, patch_px)
+        return Batch(
+            inputs={
+                name: torch.cat([planes, batch.inputs[name][real:]])
+                for name, planes in drawn.inputs.items()
+            },
+            target=torch.cat([drawn.target, batch.target[real:]]),
+            weight=torch.cat([drawn.weight, batch.weight[real:]]),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairSettings:

@@ -184,7 +184,7 @@ class ThesisFitting:
             return None
         _check(request)
 
-        def make() -> Fits:
+        def make(_material: Any) -> Fits:
             return ThesisFitter(request)
 
         return OwnFitting(make=make, credit=_credit(request))

@@ -14,6 +14,7 @@ COMMANDS = {
     "freeze": ["lens.toml", "-o", "psf.safetensors"],
     "train": ["recipe.toml"],
     "fit-bank": ["recipe.toml", "-o", "with.toml"],
+    "freeze-norms": ["recipe.toml", "one.pt", "-o", "two.pt"],
     "export": ["one.pt", "-o", "one.camkit"],
 }
 
@@ -29,7 +30,7 @@ def test_without_torch_a_design_command_says_how_to_get_it(
     assert "pip install torch onnxscript" in outcome.err
 
 
-@pytest.mark.parametrize("command", ["freeze", "export"])
+@pytest.mark.parametrize("command", ["freeze", "freeze-norms", "export"])
 def test_an_existing_output_is_refused_before_any_work(
     command: str, camkit_command, tmp_path, monkeypatch
 ) -> None:
@@ -97,6 +98,10 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
             "2",
             "--workers",
             "0",
+            "--sharp",
+            "many",
+            "--pairs",
+            "shown",
         ),
         "--json",
     )
@@ -117,9 +122,24 @@ def test_train_hands_every_option_on(camkit_command, tmp_path, monkeypatch) -> N
                 resume=True,
                 threads=2,
                 workers=0,
+                sharp_folder=Path("many"),
+                pairs=Path("shown"),
             ),
         )
     ]
+
+
+def test_train_says_that_features_are_a_substitute_where_its_loss_looks_at_any(
+    camkit_command, tmp_path
+) -> None:
+    recipe = RECIPE.with_name("duet_losses.toml")
+    begun = tmp_path / "duet_losses_{}.pt"
+    for size, said in (("perceptual", True), ("adversarial", False)):
+        Path(str(begun).format(size)).write_bytes(b"precious")
+        outcome = camkit_command("train", recipe, "--size", size, "--out-dir", tmp_path)
+        assert outcome.code == ExitCode.USAGE
+        assert "give --resume to go on or --overwrite" in outcome.err
+        assert ("random weights in place of VGG-19" in outcome.err) == said
 
 
 def test_a_missing_recipe_is_a_usage_error(camkit_command, tmp_path) -> None:

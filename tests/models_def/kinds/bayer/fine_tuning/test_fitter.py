@@ -60,12 +60,12 @@ def test_scores_of_the_generator_do_not_move_the_discriminators(make):
         assert torch.allclose(parameter, before[name], atol=1e-9)
 
 
-def test_real_pairs_replace_their_share_of_a_batch_by_the_step_alone(make):
+def test_real_pairs_replace_their_share_of_a_batch_by_the_step_alone():
     planes = np.full((3, 6, 64, 64), 0.25, dtype=np.float16)
     pairs = PairSamples(
         planes=planes, targets=planes[:, :3], weights=np.ones((3, 3), np.float32), alignments={}
     )
-    mixed = make(pairs, pair_share=0.5)._mixed(batch(), pairs, 7)
+    mixed = pairs.mixed(batch(), 0.5, seed=1, step=7)
     assert (mixed.planes[0] == 0.25).all()
     assert torch.equal(mixed.planes[1], batch().planes[1])
 

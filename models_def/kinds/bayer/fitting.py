@@ -1,0 +1,40 @@
+"""Fitters of a camera behind a mosaic: the losses of what is seen, on simulated and real pairs."""
+
+from pathlib import Path
+from typing import Final
+
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
+from camkit.models_def.kinds.bayer.fine_tuning.refinement import trace_recipe_distortion
+from camkit.models_def.kinds.bayer.material import BayerMaterial
+from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.networks.catalog import build_network
+from camkit.models_def.training.adversarial.fitter import Mix
+from camkit.models_def.training.adversarial.fitting import picture_fitting
+from camkit.models_def.training.fitting import FitRequest, OwnFitting
+from camkit.models_def.training.sample import Batch
+
+
+class BayerFitting:
+    """Fulfils `camkit.models_def.training.fitting.FittingKind`."""
+
+    def fitting(self, request: FitRequest) -> OwnFitting | None:
+        """Give the fitter of the losses content and adversarial, None for the others.
+
+        Of real pairs, `[fine_tuning]` says how many samples are cut and their share of a batch.
+        """
+        recipe: BayerRecipe = request.recipe
+        seed = request.entry.schedule.seed
+
+        def mixer(folder: Path, material: BayerMaterial) -> Mix:
+            distortion = trace_recipe_distortion(recipe, request.recipe_folder)
+            pairs = read_pairs(folder, recipe, material.bank, distortion, seed=seed)
+
+            def mix(batch: Batch, step: int) -> Batch:
+                return pairs.mixed(batch, recipe.fine_tuning.pair_share, seed, step)
+
+            return mix
+
+        return picture_fitting(request, build_network, mixer)
+
+
+FITTING: Final = BayerFitting()

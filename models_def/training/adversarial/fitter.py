@@ -1,0 +1,214 @@
+"""One step: a critic several times, then the generator that it judges.
+
+batch -> generator -> views -+-> critic, its scores of true and generated pictures   several times
+                             +-> content terms       |
+       weights of the generator <- total loss, eq. (3.9)
+
+Generated pictures are the same for all steps of the critic; the true ones are partly drawn anew,
+where there are sharp pictures without captures. All that is drawn follows from the number of the
+step.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from camkit.errors import ContractError
+from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
+from camkit.models_def.training.adversarial.content import Features, content_terms
+from camkit.models_def.training.adversarial.sharp import SharpCrops
+from camkit.models_def.training.adversarial.views import Views, make_views
+from camkit.models_def.training.adversarial.wasserstein import (
+    critic_loss,
+    generator_loss,
+    gradient_penalty,
+)
+from camkit.models_def.training.checkpoint import State
+from camkit.models_def.training.first_weights import FirstWeights
+from camkit.models_def.training.fitter import ANOTHER_LOSS, Fitter, NetworkBuilder
+from camkit.models_def.training.recipe import CriticRecipe, NetworkRecipe, ScheduleRecipe
+from camkit.models_def.training.sample import Batch
+from camkit.models_def.training.schedule import learning_rate
+
+Mix = Callable[[Batch, int], Batch]
+"""A batch and the number of its step -> the batch with patches of real pairs among its own."""
+
+BETA2: Final = 0.999
+USUAL_BETA1: Final = 0.9
+CRITIC_SEED: Final = 3
+SHARP_SEED: Final = 4
+STEP_SEED: Final = 1_000_003
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureParts:
+    """What a `PictureFitter` is given besides its network and schedule.
+
+    Attributes:
+        to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
+        features: Looked through, or None where nothing looks.
+        sharp: Sharp pictures without captures, or None.
+        mix: Real pairs, or None.
+        first: First weights, or None for random ones.
+        device: cpu or cuda.
+    """
+
+    to_rec709: Tensor
+    features: nn.Module | None = None
+    sharp: SharpCrops | None = None
+    mix: Mix | None = None
+    first: FirstWeights | None = None
+    device: str = "cpu"
+
+
+class CriticTraining:
+    """A critic with its optimiser."""
+
+    def __init__(self, schedule: ScheduleRecipe, device: torch.device) -> None:
+        self.recipe: CriticRecipe = schedule.critic
+        self._schedule = schedule
+        torch.manual_seed(schedule.seed + CRITIC_SEED)
+        shape = DiscriminatorConfig(layers=self.recipe.layers, width=self.recipe.width)
+        self.network = Discriminator(shape).to(device)
+        self._optimizer = torch.optim.Adam(
+            self.network.parameters(),
+            lr=self.recipe.learning_rate,
+            betas=(self.recipe.beta1, BETA2),
+        )
+
+    def scores(self, pictures: Tensor) -> Tensor:
+        """Give (b,) scores of (b, 3, h, w) sRGB pictures in 0..1: means over all places."""
+        return torch.as_tensor(self.network(pictures)).mean((1, 2, 3))
+
+    def learn(
+        self, real: Tensor, fake: Tensor, draw: torch.Generator, *, decay: float
+    ) -> tuple[Tensor, Tensor]:
+        """Make one step; give the loss without its penalty, and the penalty before its weight.
+
+        Args:
+            real: (b, 3, h, w) true pictures.
+            fake: (b, 3, h, w) generated ones.
+            draw: Of places between them.
+            decay: Of the learning rate.
+        """
+        for group in self._optimizer.param_groups:
+            group["lr"] = self.recipe.learning_rate * decay
+        self.network.requires_grad_(requires_grad=True)
+        apart = critic_loss(self.scores(real), self.scores(fake))
+        penalty = gradient_penalty(self.scores, real, fake, draw)
+        self._optimizer.zero_grad(set_to_none=True)
+        (apart + self.recipe.penalty * penalty).backward()  # type: ignore[no-untyped-call]
+        self._optimizer.step()
+        return apart.detach(), penalty.detach()
+
+    def opinion(self, fake: Tensor) -> Tensor:
+        """Give what the generator minimises; the critic does not move."""
+        self.network.requires_grad_(requires_grad=False)
+        return generator_loss(self.scores(fake))
+
+    def state(self) -> dict[str, Any]:
+        """Give weights and optimiser."""
+        return {
+            "weights": dict(self.network.state_dict()),
+            "optimizer": self._optimizer.state_dict(),
+        }
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Go back to a saved state."""
+        self.network.load_state_dict(state["weights"])
+        self._optimizer.load_state_dict(state["optimizer"])
+
+
+class PictureFitter:
+    """Fits a generator to the content terms, with a critic where the loss asks for one."""
+
+    def __init__(self, entry: NetworkRecipe, build: NetworkBuilder, parts: PictureParts) -> None:
+        self.schedule, self._parts = entry.schedule, parts
+        judged = entry.schedule.loss == "adversarial"
+        betas = (entry.schedule.critic.beta1 if judged else USUAL_BETA1, BETA2)
+        self.generator = Fitter(entry, build, parts.device, parts.first, betas)
+        device = self.generator.device
+        self.critic = CriticTraining(entry.schedule, device) if judged else None
+        self._to_rec709 = parts.to_rec709.float().to(device)
+        self._features: Features | None = (
+            None if parts.features is None else parts.features.to(device)
+        )
+        self._notes: dict[str, list[float]] = {}
+
+    def fit(self, batch: Batch, step: int, progress: float) -> float:
+        """Make one step of all networks and give the generator's loss."""
+        if self._parts.mix is not None:
+            batch = self._parts.mix(batch, step)
+        device = self.generator.device
+        output = self.generator.run(batch.planes, progress)
+        views = make_views(
+            output, batch.target.to(device), batch.weight.to(device), self._to_rec709
+        )
+        if self.critic is not None:
+            self._teach(self.critic, views, step, progress)
+        loss = self._total(views)
+        self.generator.descend(loss, step, progress)
+        return float(loss.detach())
+
+    def _teach(self, critic: CriticTraining, views: Views, step: int, progress: float) -> None:
+        decay = learning_rate(self.schedule, step, progress) / self.schedule.learning_rate
+        draw = torch.Generator().manual_seed(self.schedule.seed * STEP_SEED + step)
+        rng = np.random.default_rng((self.schedule.seed, SHARP_SEED, step))
+        sharp, share = self._parts.sharp, critic.recipe.sharp_share
+        fake = views.seen.detach()
+        for _ in range(critic.recipe.steps):
+            real = views.real if sharp is None else sharp.put_among(rng, views.real, share)
+            apart, penalty = critic.learn(real, fake, draw, decay=decay)
+            self._note("critic", apart)
+            self._note("penalty", penalty)
+
+    def _total(self, views: Views) -> Tensor:
+        terms = content_terms(views, self.schedule.content, self._features)
+        if self.critic is not None:
+            terms["adversarial"] = self.critic.recipe.weight, self.critic.opinion(views.seen)
+        for name, (_, value) in terms.items():
+            self._note(name, value)
+        return torch.stack([weight * value for weight, value in terms.values()]).sum()
+
+    def _note(self, name: str, value: Tensor) -> None:
+        self._notes.setdefault(name, []).append(float(value.detach()))
+
+    def notes(self) -> dict[str, float]:
+        """Give the mean of each term since the last call."""
+        means = {name: sum(values) / len(values) for name, values in self._notes.items()}
+        self._notes.clear()
+        return means
+
+    def restore(self, planes: Tensor) -> Tensor:
+        """Run the averaged generator on (1, c, h, w) planes; float32 on the CPU comes back."""
+        return self.generator.restore(planes)
+
+    def weights(self) -> State:
+        """Give the generator's weights being trained."""
+        return self.generator.weights()
+
+    def average(self) -> State:
+        """Give the generator's averaged weights."""
+        return self.generator.average()
+
+    def optimizer_state(self) -> dict[str, Any]:
+        """Give the generator's optimiser, and the critic with its own: tensors and numbers."""
+        state = {"generator": self.generator.optimizer_state()}
+        return state if self.critic is None else state | {"critic": self.critic.state()}
+
+    def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
+        """Go back to a saved state.
+
+        Raises:
+            ContractError: If it was saved by another fitter, or with a critic where there is none
+                now, or the reverse.
+        """
+        if "generator" not in optimizer or (self.critic is None) == ("critic" in optimizer):
+            raise ContractError(ANOTHER_LOSS)
+        self.generator.load(weights, average, optimizer["generator"])
+        if self.critic is not None:
+            self.critic.load(optimizer["critic"])

@@ -1,0 +1,259 @@
+"""What a loss is worth where it was trained, and elsewhere: table 3.1 re-done.
+
+    python -m tools.comparison.loss_table LAB.toml --wild WILD.toml \
+        --rows supervised adversarial perceptual --data PICTURES --fresh OTHERS --minutes 60
+
+LAB is the recipe whose samples are trained on: what a display shows, say (pictures alone, one
+distance, one exposure). Rows are its sizes of network; `SIZE=FILE.toml` is that of another recipe,
+of another lens say. WILD is a recipe of the same camera in other circumstances: lamps, other
+exposures and depths. Every row is trained for so many CPU minutes and judged on samples of both
+recipes, cut from pictures that it never saw. Rows that need no training are `capture`, the input,
+and `wiener`, the bank alone. PSNR and SSIM are those of sRGB; `perceptual` is the 1-norm of Gram
+matrices (eq. 3.7), by random features unless `--vgg FILE` gives those of VGG-19. What is finished
+is in the journal of the folder and not done again; a row that was interrupted goes on.
+"""
+
+import argparse
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from camkit.colorimetry import rec709_from_camera
+from camkit.models_def.training.adversarial.content import Features, Relu32, gram_loss
+from camkit.models_def.training.adversarial.views import make_views
+from camkit.models_def.training.checkpoint import load_network, read_checkpoint
+from camkit.models_def.training.kind import Restorer, read_recipe, training_kind
+from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.models_def.training.similarity import ssim
+from camkit.models_def.training.trainer import TrainOptions, train
+from tools.comparison.compact_json import to_compact_json
+from tools.lens_table import kept
+
+UNTRAINED: Final = ("capture", "wiener")
+METRICS: Final = ("psnr_db", "ssim", "perceptual")
+DOMAINS: Final = ("lab", "wild")
+JUDGE_SEED: Final = 909
+DIGITS: Final = 5
+LEAST_ERROR: Final = 1e-12
+
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """What is the same for all rows.
+
+    Attributes:
+        wild: Recipe of the other circumstances.
+        data: Pictures to train on.
+        fresh: Pictures to judge on.
+        sharp: Pictures for the critic.
+        vgg: Weights of VGG-19.
+        minutes: CPU time of a row.
+        samples: To judge on, of each domain.
+        out_dir: Where everything goes.
+    """
+
+    wild: Path
+    data: Path | None
+    fresh: Path | None
+    sharp: Path | None
+    vgg: Path | None
+    minutes: float
+    samples: int
+    out_dir: Path
+
+    def digest(self, row: str, recipe: Path) -> str:
+        """Give a hash of all that decides a row."""
+        files = [path.read_text(encoding="utf-8") for path in (recipe, self.wild)]
+        given = [self.data, self.fresh, self.sharp, self.vgg, self.minutes, self.samples]
+        return hashlib.sha256("\n".join([row, *files, *map(str, given)]).encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Domain:
+    """Samples to judge on.
+
+    Attributes:
+        samples: Never trained on.
+        layout: Of them.
+        to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
+    """
+
+    samples: Sequence[Sample]
+    layout: SampleLayout
+    to_rec709: Tensor
+
+    def score(self, restore: Restorer, features: Features) -> Entry:
+        """Judge a restoration by `METRICS`, means over the samples."""
+        found: list[tuple[float, float, float]] = []
+        for sample in self.samples:
+            output = restore(sample.stacked(self.layout)[None])
+            views = make_views(output, sample.target[None], sample.weight[None], self.to_rec709)
+            error = max(float((views.seen - views.real).square().mean()), LEAST_ERROR)
+            look = gram_loss(features(views.seen), features(views.real))
+            found.append(
+                (-10 * float(np.log10(error)), float(ssim(views.seen, views.real)), float(look))
+            )
+        return dict(zip(METRICS, np.mean(found, axis=0).tolist(), strict=True))
+
+
+def main() -> int:
+    """Train and judge every row, and write the table."""
+    arguments = parse()
+    conditions = Conditions(
+        wild=arguments.wild,
+        data=arguments.data,
+        fresh=arguments.fresh,
+        sharp=arguments.sharp,
+        vgg=arguments.vgg,
+        minutes=arguments.minutes,
+        samples=arguments.samples,
+        out_dir=arguments.out_dir,
+    )
+    conditions.out_dir.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(1)
+    rows: dict[str, Entry] = {}
+    for name in (*UNTRAINED, *arguments.rows):
+        size, recipe = row_of(name, arguments.lab)
+        rows[name] = kept(
+            conditions.out_dir,
+            conditions.digest(size, recipe),
+            lambda size=size, recipe=recipe: measure(size, recipe, conditions),
+        )
+        print(line(name, rows[name]), flush=True)
+    report = {
+        "lab": arguments.lab.stem,
+        "wild": conditions.wild.stem,
+        "minutes": conditions.minutes,
+        "samples": conditions.samples,
+        "features": "random" if conditions.vgg is None else conditions.vgg.name,
+        "rows": rows,
+    }
+    written = conditions.out_dir / "loss_table.json"
+    written.write_text(to_compact_json(report, DIGITS) + "\n", encoding="utf-8")
+    written.with_suffix(".md").write_text(table(rows), encoding="utf-8")
+    print(f"{written}, .md")
+    return 0
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("lab", type=Path)
+    parser.add_argument("--wild", type=Path, required=True)
+    parser.add_argument("--rows", nargs="+", required=True, help="SIZE or SIZE=RECIPE.toml")
+    parser.add_argument("--data", type=Path, help="pictures to train on")
+    parser.add_argument("--fresh", type=Path, help="pictures to judge on")
+    parser.add_argument("--sharp", type=Path, help="pictures without captures, for the critic")
+    parser.add_argument("--vgg", type=Path, help="weights of VGG-19")
+    parser.add_argument("--minutes", type=float, default=60.0, help="CPU time of a row")
+    parser.add_argument("--samples", type=int, default=48, help="to judge on, of each recipe")
+    parser.add_argument("--out-dir", type=Path, default=Path("out/loss-table"))
+    return parser.parse_args()
+
+
+def row_of(name: str, lab: Path) -> tuple[str, Path]:
+    """Give size and recipe of a row."""
+    size, _, recipe = name.partition("=")
+    return size, Path(recipe) if recipe else lab
+
+
+def measure(row: str, recipe: Path, conditions: Conditions) -> Entry:
+    """Train a row, where it needs that, and judge it in both domains."""
+    trained: Entry = {}
+    if row in UNTRAINED:
+        restore = _UNTRAINED[row]
+    else:
+        restore, trained = restorer(row, recipe, conditions)
+    features = Relu32(conditions.vgg)
+    scores = {
+        name: domain(path, conditions).score(restore, features)
+        for name, path in zip(DOMAINS, (recipe, conditions.wild), strict=True)
+    }
+    return trained | scores
+
+
+def domain(recipe_path: Path, conditions: Conditions) -> Domain:
+    """Make the samples of a recipe that rows are judged on."""
+    recipe = read_recipe(recipe_path)
+    kind, role = training_kind(recipe.kind), recipe.role(None)
+    matrix = getattr(recipe.sensor, "color_matrix", None)
+    if matrix is None:
+        raise SystemExit(f"{recipe_path} has no sensor.color_matrix, to see pictures")
+    material = kind.prepare(recipe, recipe_path.parent, conditions.out_dir)
+    maker = kind.maker(recipe, role, material, conditions.fresh, JUDGE_SEED)
+    return Domain(
+        samples=[maker.make(number) for number in range(conditions.samples)],
+        layout=kind.layout(recipe, role),
+        to_rec709=torch.from_numpy(rec709_from_camera(np.array(matrix))).float(),
+    )
+
+
+def restorer(size: str, recipe: Path, conditions: Conditions) -> tuple[Restorer, Entry]:
+    """Train a network, or go on with it; give it, and what was spent."""
+    schedule = read_recipe(recipe).network(size).schedule
+    folder = conditions.out_dir / recipe.stem
+    options = TrainOptions(
+        out_dir=folder,
+        size=size,
+        data_folder=conditions.data,
+        max_cpu_minutes=conditions.minutes,
+        resume=any(folder.glob(f"*_{size}.pt")),
+        sharp_folder=conditions.sharp if schedule.loss == "adversarial" else None,
+        vgg=conditions.vgg if schedule.content.looks else None,
+    )
+    result = train(recipe, options)
+    network = load_network(read_checkpoint(result.checkpoint))
+
+    def restore(planes: Tensor) -> Tensor:
+        with torch.no_grad():
+            return torch.as_tensor(network(planes))
+
+    spent = {"steps": result.steps, "cpu_s": result.cpu_s, "valid_db": result.valid_db}
+    return restore, {"loss": schedule.loss, "trained": spent}
+
+
+def _capture(planes: Tensor) -> Tensor:
+    return planes[:, :3]
+
+
+def _wiener(planes: Tensor) -> Tensor:
+    return planes[:, -3:]
+
+
+_UNTRAINED: Final[dict[str, Callable[[Tensor], Tensor]]] = {
+    "capture": _capture,
+    "wiener": _wiener,
+}
+
+
+def line(name: str, entry: Entry) -> str:
+    """Give a row for people while it runs."""
+    told = (f"{where} {entry[where]['psnr_db']:.2f} dB" for where in DOMAINS)
+    return f"{name:24} {', '.join(told)}"
+
+
+def table(rows: dict[str, Entry]) -> str:
+    """Give the table as Markdown; the last column is what a row loses abroad."""
+    heads = [f"{where} {metric}" for where in DOMAINS for metric in METRICS]
+    lines = [f"| row | {' | '.join(heads)} | steps | lab - wild, dB |"]
+    lines.append("|---" * (len(heads) + 3) + "|")
+    for name, entry in rows.items():
+        cells = [f"{entry[where][metric]:.3f}" for where in DOMAINS for metric in METRICS]
+        lost = entry["lab"]["psnr_db"] - entry["wild"]["psnr_db"]
+        steps = entry.get("trained", {}).get("steps", "")
+        lines.append(f"| {name} | {' | '.join(cells)} | {steps} | {lost:.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
