@@ -18,6 +18,7 @@ from camkit.cli.design.plate.app import plate_app
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.interrupts import none_is_lost
+from camkit.cli.judge.analyse.app import analyse_app
 from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
@@ -57,6 +58,7 @@ for command in (
     export,
 ):
     app.command()(command)
+app.add_typer(analyse_app)
 app.add_typer(lens_app)
 app.add_typer(calibrate_app)
 app.add_typer(plate_app)

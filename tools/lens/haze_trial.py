@@ -18,29 +18,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from camkit.bundle.chain import rewired
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.haze_file import read_haze
-from camkit.bundle.manifest import Manifest, format_of, planes_of
 from camkit.bundle.psf_file import read_psf
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.bundle.stages import (
-    Color,
-    Dehaze,
-    Demosaic,
-    Illumination,
-    Linearise,
-    Parts,
-    RaiseClipped,
-    Repair,
-    Stage,
-    Undistort,
-    WhiteBalance,
-    Wiener,
-)
-from camkit.bundle.writer import write_bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
+from camkit.report.analysis.physical import write_physical
+from camkit.report.analysis.recovery import filled
 from camkit.report.quality import read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -70,7 +55,8 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         out = chosen.output or Path(folder) / f"{NAME}.camkit"
         optics = FrozenOptics(psf=read_psf(chosen.psf), haze=read_haze(chosen.haze))
-        bundle = build(optics, out, terms=chosen.terms, rounds=chosen.rounds)
+        sensor = light_sensor(open_bundle(find_bundle("duet")).manifest)
+        bundle = write_physical(out, NAME, optics, sensor, terms=chosen.terms, rounds=chosen.rounds)
         whole = bundle.manifest.sensor.known_extent
         size = tuple(chosen.size or (whole.width_px, whole.height_px))
         made, seconds = timed(
@@ -87,46 +73,6 @@ def main() -> None:
         print("|---|---|---|---|")
         for method in METHODS:
             print(measured(bundle, made, method, chosen.iso), flush=True)
-
-
-def build(optics: FrozenOptics, out: Path, *, terms: int, rounds: int) -> Bundle:
-    """Write a camera of physics alone behind optics with a haze, and open it."""
-    assert optics.haze is not None
-    like = open_bundle(find_bundle("duet")).manifest
-    usual: tuple[Stage, ...] = (
-        Linearise(),
-        Repair(),
-        WhiteBalance(),
-        Demosaic(),
-        Dehaze(shrink=optics.haze.cell_px, terms=terms, rounds=rounds),
-        Wiener(takes=("clear", "unknown"), prior_scale=3e-4, prior_exponent=2.0),
-        RaiseClipped(takes=("restored",)),
-        Illumination(takes=("neutral",)),
-        Undistort(),
-        Color(),
-    )
-    stages = rewired(usual, usual)
-    stated = optics.entry(np.inf)
-    manifest = Manifest(
-        format_version=format_of(optics.psf, hazy=True),
-        name=NAME,
-        version="0.1.0",
-        licence="Apache-2.0",
-        training_data="none: no network",
-        sensor=like.sensor,
-        optics=stated,
-        stages=stages,
-        planes=planes_of(stages, Parts(sensor=like.sensor, optics=stated, networks={})),
-        products={"image": stages[-1].gives[0]},
-    )
-    write_bundle(out, manifest, optics.members)
-    return open_bundle(out)
-
-
-def filled(picture: FloatArray, width: int, height: int) -> FloatArray:
-    """Repeat a picture (3, h, w), every second one mirrored, until it fills a frame."""
-    pad = [(0, 0), (0, max(height - picture.shape[1], 0)), (0, max(width - picture.shape[2], 0))]
-    return np.ascontiguousarray(np.pad(picture, pad, mode="symmetric")[:, :height, :width])
 
 
 def measured(bundle: Bundle, made: Simulation, method: str, iso: float) -> str:
