@@ -5,7 +5,7 @@ names -> subjects -> images of points -> shares, widths, bars, MTF   (by field)
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -104,7 +104,7 @@ class LensField:
     subject: Subject
     points: tuple[FieldPoint, ...]
     recovered: Recovered | None = None
-    note: str | None = field(default=None)
+    note: str | None = None
 
 
 def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = None) -> LensField:
@@ -121,7 +121,8 @@ def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = N
     told = tell or (lambda _: None)
     told(f"{subject.name}: points")
     images = subject.images(_band(subject, options), options.fields)
-    recovered, note = None, None
+    recovered: Recovered | None = None
+    note: str | None = None
     if options.pictures:
         told(f"{subject.name}: pictures")
         # a lens that no kernels hold is still measured
@@ -129,7 +130,9 @@ def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = N
             recovered = _recover(subject, images, options)
         except ContractError as error:
             note = f"not photographed: {error}"
-    zones = [None] * len(images) if recovered is None else recovered.zones
+    zones: Sequence[tuple[float, float, float] | None] = (
+        (None,) * len(images) if recovered is None else recovered.zones
+    )
     points = tuple(
         _point(image, images[0], zone, subject, options)
         for image, zone in zip(images, zones, strict=True)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Value = Callable[[FieldPoint], float | None]
+Value = Callable[[FieldPoint], float]
 LEAST_SHARE: Final = 1e-3
 _MOST_PEAKS: Final = 5
 _FREQUENCIES: Final = np.linspace(0.0, 0.5, 101)
@@ -83,13 +83,12 @@ def draw_mtf(found: Sequence[LensField]) -> "Figure":
 
 def draw_recovery(found: Sequence[LensField]) -> "Figure | None":
     """Draw dB before (dashed) and after recovery; None where nothing was photographed."""
-    shown = [lens for lens in found if lens.recovered is not None]
+    shown = [(number, lens) for number, lens in enumerate(found) if lens.recovered is not None]
     if not shown:
         return None
     figure = new_figure(6.0, 3.4)
     panel = figure.subplots()
-    for lens in shown:
-        number = found.index(lens)
+    for number, lens in shown:
         color = FIELD_COLORS[number % len(FIELD_COLORS)]
         points = [p for p in lens.points if p.psnr_db is not None]
         at = [p.image.height_mm for p in points]

@@ -176,6 +176,8 @@ def analyse(
         ContractError: If a scene holds no whole patch.
     """
     rig = Rig(bundle, options.sizes or _usual(bundle))
+    filtered = next(m.name for m in rig.methods[::-1] if not m.networks)
+    primary = rig.primary if rig.networks else filtered
     gathered: dict[str, _Gathered] = {}
     places: set[tuple[str, tuple[int, int]]] = set()
     for scene in scenes:
@@ -185,19 +187,19 @@ def analyse(
         pictures = dict(rig.restore(shot).pictures)
         clean = true_picture(shot.light.clean, rig.sensor)
         truth = encode_srgb(clean)
-        corners = corners_of(*truth.shape[1:], options.side_px)
+        corners = corners_of(truth.shape[1], truth.shape[2], options.side_px)
         if not corners:
             raise ContractError(
                 f"{scene.name} holds no patch of {options.side_px} px within its border"
             )
-        control = plant(pictures[rig.primary], corners, options.side_px, seed=scene.number)
+        control = plant(pictures[primary], corners, options.side_px, seed=scene.number)
         places |= {(scene.name, place) for place in control.places}
-        pictures |= {rig.primary + PLANTED: control.picture}
+        pictures |= {primary + PLANTED: control.picture}
         view = _View(
             shot=shot,
             truth=truth,
             capture=encode_srgb(pictures[INPUT]),
-            filtered=unexplained(pictures[rig.rivals[-1]], shot, rig.lens),
+            filtered=unexplained(pictures[filtered], shot, rig.lens),
             lens=rig.lens,
         )
         for name, picture in ({TRUTH: clean} | pictures).items():
@@ -211,7 +213,7 @@ def analyse(
         )
         for name, held in gathered.items()
     )
-    return Report(options=options, methods=methods, control=_judge(methods, rig.primary, places))
+    return Report(options=options, methods=methods, control=_judge(methods, primary, places))
 
 
 def _usual(bundle: Bundle) -> tuple[str, ...]:
@@ -225,7 +227,7 @@ def _take(held: _Gathered, picture: FloatArray, view: _View, options: Options) -
     chi2 = unexplained(picture, shot, view.lens)
     cell = np.ones((shot.scene.scale, shot.scene.scale))
     denied = {
-        name: np.kron(plane, cell)
+        name: np.asarray(np.kron(plane, cell), np.float64)
         for name, plane in (("chi2", chi2), ("excess", chi2 - view.filtered))
     }
     patches = measure_patches(

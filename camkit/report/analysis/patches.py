@@ -71,7 +71,7 @@ def measure_patches(
     }
     over = overshoot_of(got, truth)
     found = []
-    for y, x in corners_of(*truth.shape[1:], side_px):
+    for y, x in corners_of(truth.shape[1], truth.shape[2], side_px):
         cut = np.s_[y : y + side_px, x : x + side_px]
         values = {name: _mean(plane[cut]) for name, plane in maps.items()}
         values["l2"] = float(np.sqrt(values["l2"]))

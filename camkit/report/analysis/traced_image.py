@@ -115,15 +115,16 @@ def image_of(
 
 def _line(place: Array, share: Array) -> Array:
     reach = int(np.abs(place).max())
-    return np.bincount((place + reach).astype(np.intp), share, minlength=2 * reach + 1)
+    made = np.bincount((place + reach).astype(np.intp), share, minlength=2 * reach + 1)
+    return np.asarray(made, np.float64)
 
 
 def _patch(rows: Array, columns: Array, share: Array) -> Array:
     side = 2 * PATCH_PX + 1
     inside = (np.abs(rows) <= PATCH_PX) & (np.abs(columns) <= PATCH_PX)
     place = ((rows + PATCH_PX) * side + columns + PATCH_PX)[inside].astype(np.intp)
-    patch = np.bincount(place, share[inside], minlength=side * side).reshape(side, side)
-    patch = (patch + patch[:, ::-1]) / 2
+    made = np.bincount(place, share[inside], minlength=side * side).reshape(side, side)
+    patch = np.asarray((made + made[:, ::-1]) / 2, np.float64)
     # where rays lie thinly their chance is no peak: every place is the mean of so many
     near = int((np.hypot(rows, columns) < MIDDLE_PX).sum()) / (np.pi * MIDDLE_PX**2)
     sigma_px = np.sqrt(SMOOTH_RAYS / (8 * np.pi * max(near, 1e-3)))

@@ -158,12 +158,12 @@ class Pinhole:
         seen = np.fft.fftshift(seen)[::finer, ::finer] * finer**2
         middle, reach = seen.shape[0] // 2, side_px // 2
         cut = slice(middle - reach, middle + reach + 1)
-        return np.maximum(seen[cut, cut], 0) / (np.abs(wave) ** 2).sum()
+        return np.asarray(np.maximum(seen[cut, cut], 0) / (np.abs(wave) ** 2).sum(), np.float64)
 
     def _side(self, wanted_mm: float, finest_mm: float, step_mm: float) -> int:
         """Give the side of a grid on which the waves do not wrap into the kernel."""
         least = (wanted_mm + 2 * self.diameter_mm + 16 * finest_mm) / step_mm
-        size = 2 ** math.ceil(math.log2(max(least, 64)))
+        size = 1 << math.ceil(math.log2(max(least, 64)))
         if size > MOST_SIDE:
             raise ContractError(
                 f"light of {self.name} at {self.distance_mm:g} mm is too wide for its samples of "

@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from camkit.cli.exit_code import ExitCode
+from camkit.scenes import procedural_scene
 from tests.bundle_factory import tiny_sensor
 from tests.haze_bundle import write_hazy_bundle
 
@@ -27,19 +30,22 @@ KEYS = {
 
 def test_a_bundle_is_measured_and_shown(tmp_path: Path, camkit_command) -> None:
     bundle = write_hazy_bundle(tmp_path, sensor=tiny_sensor(192, 160))
-    page = tmp_path / "page.html"
-    outcome = camkit_command(
-        "analyse", "field", bundle.path, "--fields", "3", "--page", page, "--json"
-    )
+    page, data = tmp_path / "page.html", tmp_path / "data"
+    data.mkdir()
+    levels = np.rint(255 * procedural_scene(3, 96, 96)).astype(np.uint8)
+    cv2.imwrite(str(data / "a.png"), levels.transpose(1, 2, 0)[..., ::-1])
+    arguments = ("--fields", "3", "--data", data, "--page", page, "--json")
+    outcome = camkit_command("analyse", "field", bundle.path, *arguments)
     assert outcome.code == 0, outcome.err
     told = json.loads(outcome.out)
     fields = told["lenses"][str(bundle.path)]["fields"]
     assert len(fields) == 3
     assert all(set(field) >= KEYS for field in fields)
     assert fields[0]["shift_correlation"] == 1
-    assert fields[0]["psnr_db"] is None
+    assert fields[0]["psnr_db"]["after"] > fields[0]["psnr_db"]["before"]
+    assert told["lenses"][str(bundle.path)]["method"] == "filter"
     assert set(fields[0]["mtf"]) == {"radial", "tangential"}
-    assert page.read_text(encoding="utf-8").count("<img") == 4
+    assert page.read_text(encoding="utf-8").count("<img") == 5
     again = camkit_command("analyse", "field", bundle.path, "--page", page)
     assert again.code == ExitCode.USAGE
     assert "--overwrite" in again.err

@@ -65,6 +65,7 @@ def test_the_capture_taken_for_the_scene_is_denied(report: Report) -> None:
 
 def test_what_was_planted_is_found(by_filter: Report) -> None:
     control = by_filter.control
+    assert control.method == "wiener"
     assert control.planted == 8
     assert control.found == control.planted
     assert control.first == control.planted
