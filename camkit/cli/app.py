@@ -20,6 +20,7 @@ from camkit.cli.design.prepare import prepare
 from camkit.cli.design.train import train
 from camkit.cli.exit_code import ExitCode, exit_code_of
 from camkit.cli.interrupts import none_is_lost
+from camkit.cli.judge.analyse.app import analyse_app
 from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
@@ -61,6 +62,7 @@ for command in (
     export,
 ):
     app.command()(command)
+app.add_typer(analyse_app)
 app.add_typer(lens_app)
 app.add_typer(calibrate_app)
 app.add_typer(plate_app)

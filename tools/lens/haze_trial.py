@@ -29,6 +29,7 @@ from camkit.contracts import FloatArray
 from camkit.export.frames import physics_bundle
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.kind import read_recipe
+from camkit.report.analysis.recovery import filled
 from camkit.report.quality import read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -88,12 +89,6 @@ def build(
     assert optics.haze is not None
     stage = Dehaze(shrink=optics.haze.cell_px, terms=terms, rounds=rounds)
     return physics_bundle(replace(recipe, haze=stage), optics, out)
-
-
-def filled(picture: FloatArray, width: int, height: int) -> FloatArray:
-    """Repeat a picture (3, h, w), every second one mirrored, until it fills a frame."""
-    pad = [(0, 0), (0, max(height - picture.shape[1], 0)), (0, max(width - picture.shape[2], 0))]
-    return np.ascontiguousarray(np.pad(picture, pad, mode="symmetric")[:, :height, :width])
 
 
 def measured(bundle: Bundle, made: Simulation, method: str, iso: float) -> str:

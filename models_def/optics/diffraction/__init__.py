@@ -13,4 +13,5 @@
 - `shares`: where the light goes, and where the streaks lie
 - `plate_optics`: a plate as freezing sees it, and its kernels as arrays
 - `freezing`: its PSF, frozen whole
+- `pinhole`: a hole and no lens, by its shadow and its diffraction
 """

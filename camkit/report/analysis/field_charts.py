@@ -1,0 +1,173 @@
+"""Charts of lenses over the field: light, detection, CDP, contrast, MTF, recovery."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from camkit.report.analysis.field import THESIS_WIDTHS, FieldPoint, LensField
+from camkit.report.analysis.point_image import PATCH_PX
+from camkit.report.figure import FIELD_COLORS, GRID_COLOR, MARKS, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Value = Callable[[FieldPoint], float]
+LEAST_SHARE: Final = 1e-3
+_MOST_PEAKS: Final = 5
+_FREQUENCIES: Final = np.linspace(0.0, 0.5, 101)
+
+
+def draw_light(found: Sequence[LensField]) -> "Figure":
+    """Draw the shares near the peak and within 900 px, and the width of the peak."""
+    figure = new_figure(9.0, 3.0)
+    near, far, width = figure.subplots(1, 3)
+    _lines(near, found, lambda p: p.image.near_share)
+    near.set_yscale("log")
+    near.set_ylim(LEAST_SHARE, 1.3)
+    near.set_ylabel("light within 10 px", fontsize=8)
+    _lines(far, found, lambda p: p.image.far_share)
+    far.set_ylim(0, 1.05)
+    far.set_ylabel("light within 900 px", fontsize=8)
+    _lines(width, found, lambda p: p.image.fwhm_px)
+    width.set_yscale("log")
+    width.set_ylabel("width of the peak, px", fontsize=8)
+    _legend(near)
+    return figure
+
+
+def draw_detection(found: Sequence[LensField], bars_px: int) -> "Figure":
+    """Draw contrast, detection and CDP of bars; the thesis's below."""
+    figure = new_figure(9.0, 5.6)
+    rows = figure.subplots(2, 3, sharex=True)
+    said = (f"bars of {bars_px} px", f"bars of {THESIS_WIDTHS} widths of the peak")
+    for row, (title, panels) in enumerate(zip(said, rows, strict=True)):
+        contrast, detection, cdp = panels
+        _lines(contrast, found, _of_bars(row, "contrast"))
+        contrast.axhline(0, color="black", linewidth=0.6)
+        contrast.set_ylabel("contrast", fontsize=8)
+        contrast.set_title(title, fontsize=8)
+        _lines(detection, found, _of_bars(row, "detection"), interval=_interval(row))
+        detection.axhline(0.95, color="black", linewidth=0.6, linestyle=":")
+        detection.axhline(0.05, color="black", linewidth=0.6, linestyle=":")
+        detection.set_ylim(-0.03, 1.03)
+        detection.set_ylabel("told apart at 95 %", fontsize=8)
+        _lines(cdp, found, _of_bars(row, "cdp"))
+        cdp.set_ylim(-0.03, 1.03)
+        cdp.set_ylabel("CDP, within half of nominal", fontsize=8)
+    _legend(rows[0][0])
+    return figure
+
+
+def draw_mtf(found: Sequence[LensField]) -> "Figure":
+    """Draw the MTF on the axis, in the middle of the field and at its end; across dashed."""
+    figure = new_figure(9.0, 3.0)
+    for panel, share in zip(figure.subplots(1, 3, sharey=True), (0.0, 0.5, 1.0), strict=True):
+        for number, lens in enumerate(found):
+            image = lens.points[round(share * (len(lens.points) - 1))].image
+            color = FIELD_COLORS[number % len(FIELD_COLORS)]
+            for direction, style in (("radial", "-"), ("tangential", "--")):
+                mtf = image.mtf(direction, _FREQUENCIES)  # type: ignore[arg-type]
+                label = lens.subject.name if style == "-" else None
+                panel.plot(_FREQUENCIES, mtf, style, color=color, linewidth=1, label=label)
+        panel.set_title(f"{share:g} of the field", fontsize=8)
+        panel.set_xlabel("cycles/px", fontsize=8)
+        panel.set_ylim(0, 1.02)
+        _plain(panel)
+        if share == 0:
+            panel.set_ylabel("MTF", fontsize=8)
+            _legend(panel)
+    return figure
+
+
+def draw_recovery(found: Sequence[LensField]) -> "Figure | None":
+    """Draw dB before (dashed) and after recovery; None where nothing was photographed."""
+    shown = [(number, lens) for number, lens in enumerate(found) if lens.recovered is not None]
+    if not shown:
+        return None
+    figure = new_figure(6.0, 3.4)
+    panel = figure.subplots()
+    for number, lens in shown:
+        color = FIELD_COLORS[number % len(FIELD_COLORS)]
+        points = [p for p in lens.points if p.psnr_db is not None]
+        at = [p.image.height_mm for p in points]
+        triples = [p.psnr_db for p in points if p.psnr_db is not None]
+        assert lens.recovered is not None
+        panel.plot(at, [t[0] for t in triples], "--", color=color, linewidth=1)
+        panel.plot(
+            at,
+            [t[2] for t in triples],
+            marker=MARKS[number % len(MARKS)],
+            color=color,
+            linewidth=1,
+            markersize=4,
+            label=f"{lens.subject.name}, {lens.recovered.method}",
+        )
+    panel.set_xlabel("mm from the axis", fontsize=8)
+    panel.set_ylabel("PSNR, dB of sRGB", fontsize=8)
+    _plain(panel)
+    _legend(panel)
+    return figure
+
+
+def draw_peaks(found: Sequence[LensField]) -> "Figure":
+    """Draw the peaks of every lens over the field, square root of the light."""
+    columns = min(_MOST_PEAKS, max(len(lens.points) for lens in found))
+    figure = new_figure(1.5 * columns, 1.6 * len(found))
+    rows = figure.subplots(len(found), columns, squeeze=False)
+    for lens, panels in zip(found, rows, strict=True):
+        chosen = np.linspace(0, len(lens.points) - 1, columns).round().astype(int)
+        for panel, index in zip(panels, chosen, strict=True):
+            image = lens.points[index].image
+            light = np.sqrt(np.maximum(image.patch, 0) / image.patch.max())
+            reach = PATCH_PX
+            panel.imshow(light, cmap="magma", vmin=0, vmax=1, extent=(-reach, reach, reach, -reach))
+            panel.set_title(f"{image.height_mm:.1f} mm", fontsize=7)
+            panel.set_xticks([])
+            panel.set_yticks([])
+        panels[0].set_ylabel(lens.subject.name, fontsize=7)
+    return figure
+
+
+def _of_bars(row: int, name: str) -> Value:
+    return lambda p: float(getattr((p.bars, p.thesis)[row][p.weaker], name))
+
+
+def _interval(row: int) -> Callable[[FieldPoint], tuple[float, float]]:
+    return lambda p: (p.bars, p.thesis)[row][p.weaker].detection_ci
+
+
+def _lines(
+    panel: "Axes",
+    found: Sequence[LensField],
+    value: Value,
+    *,
+    interval: Callable[[FieldPoint], tuple[float, float]] | None = None,
+) -> None:
+    for number, lens in enumerate(found):
+        color = FIELD_COLORS[number % len(FIELD_COLORS)]
+        at = [p.image.height_mm for p in lens.points]
+        panel.plot(
+            at,
+            [value(p) for p in lens.points],
+            marker=MARKS[number % len(MARKS)],
+            color=color,
+            linewidth=1,
+            markersize=4,
+            label=lens.subject.name,
+        )
+        if interval is not None:
+            low, high = zip(*(interval(p) for p in lens.points), strict=True)
+            panel.fill_between(at, low, high, color=color, alpha=0.2, linewidth=0)
+    panel.set_xlabel("mm from the axis", fontsize=8)
+    _plain(panel)
+
+
+def _legend(panel: "Axes") -> None:
+    panel.legend(fontsize=6, frameon=False)
+
+
+def _plain(panel: "Axes") -> None:
+    panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
+    panel.tick_params(labelsize=7)

@@ -1,0 +1,108 @@
+"""The page of lenses over the field."""
+
+from collections.abc import Sequence
+
+from camkit.report.analysis.bars import PAIRS, WHITE
+from camkit.report.analysis.field import THESIS_WIDTHS, FieldOptions, FieldPoint, LensField
+from camkit.report.analysis.field_charts import (
+    draw_detection,
+    draw_light,
+    draw_mtf,
+    draw_peaks,
+    draw_recovery,
+)
+from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.figure import to_png
+from camkit.units import to_degrees
+
+
+def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
+    """Give the page."""
+    colour = (
+        "the middle colour of each sensor"
+        if options.wavelength_um is None
+        else f"{options.wavelength_um:g} um"
+    )
+    sections = [
+        Section(
+            title="Light of a point",
+            paragraph=f"In {colour}, all light that arrives is 1. The peak is the densest disc of "
+            "5 px; its width is that of a disc of the area above half its height.",
+            pictures={
+                "Light and width over the field.": to_png(draw_light(found)),
+                "Peaks, 129 px wide; square root of the light.": to_png(draw_peaks(found)),
+            },
+        ),
+        Section(
+            title="Bars",
+            paragraph=f"Bars of full contrast at ISO {options.iso:g}, white on the axis at "
+            f"{WHITE:g} of the white level for every lens, {PAIRS} pairs of pixels each. Told "
+            "apart means: the bright pixel exceeds the dark one by more than two equal pixels "
+            "differ in 19 of 20 pairs; 0.05 is chance. CDP is the share of pairs whose contrast "
+            f"lies within half of the nominal one. Below: bars {THESIS_WIDTHS} widths of the peak "
+            "wide. Of two directions the one with less contrast at the bars above is shown.",
+            pictures={"Bars over the field.": to_png(draw_detection(found, options.bars_px))},
+        ),
+        Section(
+            title="MTF",
+            pictures={
+                "Detail along the radius (line) and across it (dashed).": to_png(draw_mtf(found))
+            },
+        ),
+    ]
+    recovery = draw_recovery(found)
+    if recovery is not None:
+        sections.append(
+            Section(
+                title="Recovery",
+                paragraph=f"{len(options.pictures)} whole picture(s), photographed and restored.",
+                pictures={"Capture (dashed) and what was made of it.": to_png(recovery)},
+            )
+        )
+    sections += [_table(lens) for lens in found]
+    return to_html("Over the field", sections)
+
+
+def _table(lens: LensField) -> Section:
+    header = (
+        "mm",
+        "degrees",
+        "10 px",
+        "900 px",
+        "lost",
+        "width, px",
+        "like the axis",
+        "contrast",
+        "told apart",
+        "95 %",
+        "CDP",
+        "dB before",
+        "filter",
+        "after",
+    )
+    return Section(
+        title=lens.subject.name,
+        paragraph=lens.note,
+        table=Table(header=header, rows=tuple(_row(point) for point in lens.points)),
+    )
+
+
+def _row(point: FieldPoint) -> tuple[str, ...]:
+    image, bars = point.image, point.bars[point.weaker]
+    low, high = bars.detection_ci
+    psnr = ("-", "-", "-") if point.psnr_db is None else tuple(f"{v:.1f}" for v in point.psnr_db)
+    angle = image.field_angle_rad
+    return (
+        f"{image.height_mm:.2f}",
+        "-" if angle is None else f"{to_degrees(angle):.1f}",
+        f"{image.near_share:.3f}",
+        f"{image.far_share:.3f}",
+        "-" if image.lost_share is None else f"{image.lost_share:.3f}",
+        f"{image.fwhm_px:.1f}",
+        f"{point.likeness:.2f}",
+        f"{bars.contrast:+.3f}",
+        f"{bars.detection:.3f}",
+        f"{low:.3f} to {high:.3f}",
+        f"{bars.cdp:.3f}",
+        *psnr,
+    )

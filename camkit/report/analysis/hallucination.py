@@ -1,0 +1,352 @@
+"""`camkit analyse hallucination`: what restored pictures show that their captures do not hold.
+
+    pictures -> captures -> every method -> patches: against the truth, and against the capture
+                                         -> the same with detail planted: the control
+
+Measures against the truth say how wrong a patch is, chi^2 how far it is from its capture. No
+picture is without residual at edges, where demosaicking and regularisation leave some; so what
+counts is the excess: chi^2 less that of the filter alone. Below 0 the capture confirms what a
+method added, above 0 it denies it. Detail that the optics pass nothing of is denied by no capture;
+only the truth knows it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.bundle.reader import Bundle
+from camkit.colorimetry import encode_srgb
+from camkit.contracts import FloatArray
+from camkit.errors import ContractError
+from camkit.report.analysis.patches import MEASURES, Patch, corners_of, measure_patches, summary
+from camkit.report.analysis.perceptual import SUBSTITUTE, Measure, looks_different
+from camkit.report.analysis.planted import plant
+from camkit.report.analysis.point_image import Array
+from camkit.report.analysis.unexplained import unexplained
+from camkit.report.stress.rig import INPUT, Rig
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.shot import Shot
+from camkit.runtime.plan.rules.size import REFERENCE
+from camkit.runtime.twin.exposure import Setting
+from camkit.runtime.twin.light import Lens
+from camkit.runtime.twin.truth import true_picture
+
+SIDE_PX: Final = 64
+WORST: Final = 16
+TRUTH: Final = "truth"
+"""The method whose chi^2 must be about 1."""
+PLANTED: Final = " planted"
+"""Marks the control."""
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What is measured.
+
+    Attributes:
+        iso: Sensitivity.
+        side_px: Of a patch.
+        sizes: Of the networks; empty for the usual one.
+        perceptual: Gives (h, w) of two pictures of sRGB values.
+        perceptual_name: Which it is.
+    """
+
+    iso: float = 100.0
+    side_px: int = SIDE_PX
+    sizes: tuple[str, ...] = ()
+    perceptual: Measure = looks_different
+    perceptual_name: str = SUBSTITUTE
+
+    def __post_init__(self) -> None:
+        if self.side_px < 16 or self.side_px % 2:
+            raise ContractError(f"a patch has an even side of at least 16 px; got {self.side_px}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crop:
+    """A patch to look at, sRGB values (3, n, n).
+
+    Attributes:
+        patch: What is known of it.
+        truth: The scene.
+        capture: Developed only.
+        restored: By the method.
+    """
+
+    patch: Patch
+    truth: FloatArray
+    capture: FloatArray
+    restored: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Method:
+    """What is known of one method.
+
+    Attributes:
+        name: As reports have it.
+        patches: Of all pictures.
+        maps: Picture -> chi^2 of its patches, by row and column.
+        worst: Of the largest excess, the first the worst; none of the truth.
+    """
+
+    name: str
+    patches: tuple[Patch, ...]
+    maps: dict[str, Array]
+    worst: tuple[Crop, ...] = ()
+
+    def values(self, measure: str) -> Array:
+        """Give a measure of every patch."""
+        return np.array([patch.values[measure] for patch in self.patches])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """Detail that was planted into the pictures of one method.
+
+    Attributes:
+        method: Which.
+        planted: How many patches.
+        found: How many of them have a larger excess than 99 of 100 patches of the method itself.
+        first: How many of as many patches of the largest excess are among them.
+        rise: Least chi^2 of a planted patch less that of the same patch without.
+    """
+
+    method: str
+    planted: int
+    found: int
+    first: int
+    rise: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _View:
+    """A capture and what it is compared with: truth and capture as sRGB, chi^2 of the filter."""
+
+    shot: Shot
+    truth: FloatArray
+    capture: FloatArray
+    filtered: Array
+    lens: Lens
+
+
+@dataclass(slots=True, kw_only=True)
+class _Gathered:
+    """What is gathered of a method, picture by picture."""
+
+    patches: list[Patch] = field(default_factory=list)
+    maps: dict[str, Array] = field(default_factory=dict)
+    crops: list[Crop] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """What was found.
+
+    Attributes:
+        options: What was measured.
+        methods: The truth first, then from doing nothing to the networks, the control last.
+        control: How well it was found.
+    """
+
+    options: Options
+    methods: tuple[Method, ...]
+    control: Control
+
+    def method(self, name: str) -> Method:
+        """Give a method by its name."""
+        return next(method for method in self.methods if method.name == name)
+
+
+def analyse(
+    bundle: Bundle, scenes: Sequence[Scene], options: Options, tell: Tell | None = None
+) -> Report:
+    """Restore the captures of scenes and judge the patches.
+
+    Args:
+        bundle: The camera.
+        scenes: Sharp, at their places on the sensor.
+        options: What is measured.
+        tell: Takes lines about what is being done.
+
+    Raises:
+        ContractError: If a scene holds no whole patch.
+    """
+    rig = Rig(bundle, options.sizes or _usual(bundle))
+    filtered = next(m.name for m in rig.methods[::-1] if not m.networks)
+    primary = rig.primary if rig.networks else filtered
+    gathered: dict[str, _Gathered] = {}
+    places: set[tuple[str, tuple[int, int]]] = set()
+    for scene in scenes:
+        if tell is not None:
+            tell(scene.name)
+        shot = rig.shoot(scene, lens=rig.lens, setting=Setting(iso=options.iso))
+        pictures = dict(rig.restore(shot).pictures)
+        clean = true_picture(shot.light.clean, rig.sensor)
+        truth = encode_srgb(clean)
+        corners = corners_of(truth.shape[1], truth.shape[2], options.side_px)
+        if not corners:
+            raise ContractError(
+                f"{scene.name} holds no patch of {options.side_px} px within its border"
+            )
+        control = plant(pictures[primary], corners, options.side_px, seed=scene.number)
+        places |= {(scene.name, place) for place in control.places}
+        pictures |= {primary + PLANTED: control.picture}
+        view = _View(
+            shot=shot,
+            truth=truth,
+            capture=encode_srgb(pictures[INPUT]),
+            filtered=unexplained(pictures[filtered], shot, rig.lens),
+            lens=rig.lens,
+        )
+        for name, picture in ({TRUTH: clean} | pictures).items():
+            _take(gathered.setdefault(name, _Gathered()), picture, view, options)
+    methods = tuple(
+        Method(
+            name=name,
+            patches=tuple(held.patches),
+            maps=held.maps,
+            worst=() if name == TRUTH else tuple(_worst(held.crops)),
+        )
+        for name, held in gathered.items()
+    )
+    return Report(options=options, methods=methods, control=_judge(methods, primary, places))
+
+
+def _usual(bundle: Bundle) -> tuple[str, ...]:
+    sizes = bundle.manifest.sizes
+    return (REFERENCE,) if REFERENCE in sizes else tuple(sizes[-1:])
+
+
+def _take(held: _Gathered, picture: FloatArray, view: _View, options: Options) -> None:
+    """Measure a picture and keep its worst patches."""
+    shot, side = view.shot, options.side_px
+    chi2 = unexplained(picture, shot, view.lens)
+    cell = np.ones((shot.scene.scale, shot.scene.scale))
+    denied = {
+        name: np.asarray(np.kron(plane, cell), np.float64)
+        for name, plane in (("chi2", chi2), ("excess", chi2 - view.filtered))
+    }
+    patches = measure_patches(
+        shot.scene.name, picture, view.truth, denied, side, options.perceptual
+    )
+    held.patches += patches
+    columns = len({patch.place[1] for patch in patches})
+    held.maps[shot.scene.name] = np.array([p.values["chi2"] for p in patches]).reshape(-1, columns)
+    restored = encode_srgb(picture)
+    for patch in sorted(patches, key=_rank)[:WORST]:
+        y, x = patch.place
+        cut = np.s_[:, y : y + side, x : x + side]
+        held.crops.append(
+            Crop(
+                patch=patch,
+                truth=view.truth[cut].copy(),
+                capture=view.capture[cut].copy(),
+                restored=restored[cut].copy(),
+            )
+        )
+
+
+def _rank(patch: Patch) -> float:
+    excess = patch.values["excess"]
+    return -excess if np.isfinite(excess) else np.inf
+
+
+def _worst(crops: Sequence[Crop]) -> list[Crop]:
+    return sorted(crops, key=lambda crop: _rank(crop.patch))[:WORST]
+
+
+def _judge(
+    methods: Sequence[Method], primary: str, places: set[tuple[str, tuple[int, int]]]
+) -> Control:
+    named = {method.name: method for method in methods}
+    plain, planted = named[primary], named[primary + PLANTED]
+    known = plain.values("excess")
+    known = known[np.isfinite(known)]
+    limit = float(np.percentile(known, 99)) if known.size else np.inf
+    before, after = ({(p.scene, p.place): p.values for p in m.patches} for m in (plain, planted))
+    ranked = [(p.scene, p.place) for p in sorted(planted.patches, key=_rank)]
+    rises = [after[key]["chi2"] - before[key]["chi2"] for key in places]
+    return Control(
+        method=primary,
+        planted=len(places),
+        found=sum(after[key]["excess"] > limit for key in places),
+        first=len(places & set(ranked[: len(places)])),
+        rise=float(np.nanmin(rises)) if np.isfinite(rises).any() else 0.0,
+    )
+
+
+def to_json(report: Report, crops: Sequence[str] = ()) -> dict[str, Any]:
+    """Give what was found as plain JSON values.
+
+    Args:
+        report: It.
+        crops: Names of the files of the worst patches of the control's method; empty for none.
+    """
+    control = report.control
+    return {
+        "iso": report.options.iso,
+        "patch_px": report.options.side_px,
+        "patches": len(report.methods[0].patches),
+        "perceptual": report.options.perceptual_name,
+        "methods": {method.name: _method(method, report, crops) for method in report.methods},
+        "control": {
+            "method": control.method,
+            "planted": control.planted,
+            "found": control.found,
+            "first": control.first,
+            "least_rise": round(control.rise, 4),
+        },
+    }
+
+
+def _method(method: Method, report: Report, crops: Sequence[str]) -> dict[str, Any]:
+    told: dict[str, Any] = {name: summary(method.values(name)) for name in MEASURES}
+    told["chi2"] |= {
+        "map": {
+            scene: [[_known(v) for v in row] for row in values]
+            for scene, values in method.maps.items()
+        }
+    }
+    named = crops if method.name == report.control.method else ()
+    told["worst"] = [
+        {
+            "picture": crop.patch.scene,
+            "x_px": crop.patch.place[1],
+            "y_px": crop.patch.place[0],
+            **{name: _known(crop.patch.values[name]) for name in MEASURES},
+            "crop": named[number] if number < len(named) else None,
+        }
+        for number, crop in enumerate(method.worst)
+    ]
+    return told
+
+
+def _known(value: float) -> float | None:
+    return round(float(value), 6) if np.isfinite(value) else None
+
+
+def to_text(told: dict[str, Any]) -> str:
+    """Give what was found, as `to_json` has it, as a table."""
+    lines = [f"{told['patches']} patches of {told['patch_px']} px, ISO {told['iso']:g}"]
+    lines.append(f"perceptual: {told['perceptual']}")
+    lines.append(f"  {'':16}" + "".join(f"{name + ' median, p99':>24}" for name in MEASURES))
+    for name, method in told["methods"].items():
+        cells = [_pair(method[measure]) for measure in MEASURES]
+        lines.append(f"  {name:16}" + "".join(f"{cell:>24}" for cell in cells))
+    control = told["control"]
+    lines.append(
+        f"control: {control['found']} of {control['planted']} patches with planted detail found in "
+        f"{control['method']}, {control['first']} of them first; chi2 rose by "
+        f"{control['least_rise']:.2f} at least"
+    )
+    return "\n".join(lines)
+
+
+def _pair(found: dict[str, Any]) -> str:
+    if found["median"] is None:
+        return "-"
+    return f"{found['median']:.4g}, {found['p99']:.4g}"

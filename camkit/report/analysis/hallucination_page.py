@@ -1,0 +1,149 @@
+"""The page of what pictures show and captures do not hold: histograms, maps, worst patches."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.report.analysis.hallucination import PLANTED, TRUTH, Crop, Method, Report
+from camkit.report.analysis.patches import MEASURES, summary
+from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.figure import FIELD_COLORS, GRID_COLOR, new_figure, to_png
+from camkit.report.stress.rig import INPUT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_BINS: Final = 40
+_ENLARGED: Final = 2
+_MOST_MAPS: Final = 5
+_COLUMNS: Final = 4
+_GAP_PX: Final = 4
+
+
+def hallucination_html(report: Report) -> str:
+    """Give the page."""
+    control = report.control
+    shown = [m for m in report.methods if m.name not in {TRUTH, INPUT}]
+    primary = report.method(control.method)
+    planted = report.method(control.method + PLANTED)
+    sections = [
+        Section(
+            title="Patches",
+            paragraph=f"{len(primary.patches)} patches of {report.options.side_px} px at ISO "
+            f"{report.options.iso:g}. l1, l2 and overshoot in sRGB values against the truth; "
+            f"perceptual: {report.options.perceptual_name}. chi2: mean square of |PSF * x - y| / "
+            "sigma, 1 for the truth. excess: chi2 less that of the filter alone; above 0 the "
+            "capture denies what a method added.",
+            table=_table(report),
+            pictures={"Patches by measure.": to_png(draw_histograms(shown))},
+        ),
+        Section(
+            title="Control",
+            paragraph=f"Bars planted into {control.planted} patches of {control.method}: "
+            f"{control.found} have a larger excess than 99 of 100 patches without, {control.first} "
+            f"of the {control.planted} largest are theirs. chi2 rose by {control.rise:.2f} at "
+            "least.",
+            pictures={
+                f"chi2 of patches: {control.method}, below with what was planted.": to_png(
+                    draw_maps(primary, planted)
+                )
+            },
+        ),
+        *(
+            Section(
+                title=f"The worst patches of {method.name}",
+                paragraph="By excess. Each: truth, capture, restored.",
+                pictures={"The first is the worst; row by row.": crops_png(method.worst)},
+            )
+            for method in shown
+            if method.worst
+        ),
+    ]
+    return to_html("What the capture does not hold", sections)
+
+
+def draw_histograms(methods: Sequence[Method]) -> "Figure":
+    """Draw how many patches have which value, of every measure; both axes logarithmic."""
+    figure = new_figure(10.0, 2.6)
+    for panel, measure in zip(figure.subplots(1, len(MEASURES)), MEASURES, strict=True):
+        for number, method in enumerate(methods):
+            values = method.values(measure)
+            values = np.log10(np.maximum(values[np.isfinite(values)], 1e-5))
+            color = FIELD_COLORS[number % len(FIELD_COLORS)]
+            panel.hist(values, _BINS, histtype="step", color=color, label=method.name, linewidth=1)
+        panel.set_yscale("log")
+        panel.set_xlabel(f"log10 {measure}", fontsize=8)
+        panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
+        panel.tick_params(labelsize=7)
+        if measure == MEASURES[0]:
+            panel.set_ylabel("patches", fontsize=8)
+            panel.legend(fontsize=6, frameon=False)
+    return figure
+
+
+def draw_maps(plain: Method, planted: Method) -> "Figure":
+    """Draw chi^2 of the patches of some pictures, logarithm, without and with what was planted."""
+    names = list(plain.maps)[:_MOST_MAPS]
+    figure = new_figure(1.9 * len(names) + 0.6, 3.6)
+    panels = figure.subplots(2, len(names), squeeze=False)
+    image = None
+    for row, method in zip(panels, (plain, planted), strict=True):
+        for panel, name in zip(row, names, strict=True):
+            light = np.log10(np.maximum(method.maps[name], 1e-2))
+            image = panel.imshow(light, cmap="magma", vmin=-0.3, vmax=1.5)
+            panel.set_title(name[:24], fontsize=6)
+            panel.set_xticks([])
+            panel.set_yticks([])
+    if image is not None:
+        figure.colorbar(image, ax=panels.ravel().tolist(), fraction=0.03, label="log10 chi2")
+    return figure
+
+
+def crop_picture(crop: Crop) -> NDArray[np.uint8]:
+    """Give truth, capture and restored side by side, (h, w, 3) BGR, twice as large."""
+    parts = (crop.truth, crop.capture, crop.restored)
+    wide = np.concatenate([np.clip(part, 0, 1) for part in parts], axis=2)
+    levels = np.rint(255 * wide[::-1].transpose(1, 2, 0)).astype(np.uint8)
+    enlarged = levels.repeat(_ENLARGED, axis=0).repeat(_ENLARGED, axis=1)
+    return np.ascontiguousarray(enlarged)
+
+
+def crop_png(crop: Crop) -> bytes:
+    """Give the PNG of `crop_picture`."""
+    return _png(crop_picture(crop))
+
+
+def crops_png(crops: Sequence[Crop]) -> bytes:
+    """Give the PNG of several, in rows of four."""
+    pictures = [
+        np.pad(crop_picture(crop), ((0, _GAP_PX), (0, _GAP_PX), (0, 0)), constant_values=255)
+        for crop in crops
+    ]
+    blank = np.full_like(pictures[0], 255)
+    pictures += [blank] * (-len(pictures) % _COLUMNS)
+    rows = [
+        np.concatenate(pictures[i : i + _COLUMNS], axis=1)
+        for i in range(0, len(pictures), _COLUMNS)
+    ]
+    return _png(np.concatenate(rows, axis=0))
+
+
+def _png(picture: NDArray[np.uint8]) -> bytes:
+    done, data = cv2.imencode(".png", picture)
+    assert done
+    return bytes(data)
+
+
+def _table(report: Report) -> Table:
+    header = ("method", *(f"{name} {part}" for name in MEASURES for part in ("median", "p99")))
+    rows = []
+    for method in report.methods:
+        cells = [method.name]
+        for name in MEASURES:
+            found = summary(method.values(name))
+            cells += ["-" if found[k] is None else f"{found[k]:.4g}" for k in ("median", "p99")]
+        rows.append(tuple(cells))
+    return Table(header=header, rows=tuple(rows))

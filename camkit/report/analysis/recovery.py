@@ -1,0 +1,157 @@
+"""How well whole frames are restored, zone by zone: photographed by the twin, undone by a camera.
+
+    picture -> repeated until it fills the frame -> capture -> developed | filter | network -> dB
+
+Frames are whole since haze reaches across them. Pictures are compared in the geometry of the
+sensor as sRGB values, each zone the ring of the frame that lies nearest to a field.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.bundle.reader import Bundle
+from camkit.colorimetry import encode_srgb
+from camkit.contracts import FloatArray
+from camkit.report.quality import BORDER_PX
+from camkit.report.stress.rig import INPUT, Method, Rig
+from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.plan.rules.size import REFERENCE
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph
+from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
+
+BEST_DB: Final = 120.0
+FILTER: Final = "filter"
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recovered:
+    """How well frames were restored.
+
+    Attributes:
+        method: What restored them: the size of a network, or the filter alone.
+        zones: By field, dB of sRGB of the developed capture, of the filter alone and of the
+            method; None where the frame does not reach.
+        overall: The same of all of the frame.
+    """
+
+    method: str
+    zones: tuple[tuple[float, float, float] | None, ...]
+    overall: tuple[float, float, float]
+
+
+def recover(
+    bundle: Bundle,
+    pictures: Iterable[FloatArray],
+    heights_mm: Array,
+    *,
+    iso: float,
+    frame_px: tuple[int, int] | None = None,
+) -> Recovered:
+    """Photograph frames and restore them.
+
+    Args:
+        bundle: The camera.
+        pictures: (3, h, w) float32 linear Rec.709 each, at least one.
+        heights_mm: (field,) from the axis, not decreasing.
+        iso: Sensitivity.
+        frame_px: (width, height) about the middle of the sensor; None for all of it.
+    """
+    manifest = bundle.manifest
+    scale, sensor = picture_scale(manifest), light_sensor(manifest)
+    sizes = tuple(s for s in manifest.sizes if s == REFERENCE) or tuple(manifest.sizes[-1:])
+    rig = Rig(bundle, sizes)
+    methods = _chosen(rig)
+    extent = sensor.known_extent
+    width, height = frame_px or (extent.width_px, extent.height_px)
+    width, height = min(width, extent.width_px), min(height, extent.height_px)
+    square = np.zeros((len(methods), heights_mm.size))
+    whole = np.zeros(len(methods))
+    count = np.zeros(heights_mm.size)
+    for number, picture in enumerate(pictures):
+        options = SimulationOptions(
+            iso=iso,
+            seed=number,
+            scale=scale,
+            depth_mm=bundle.reference_depth_mm,
+            distort=False,
+        )
+        made = photograph(filled(picture, scale * width, scale * height), bundle, options)
+        truth = encode_srgb(true_picture(made.clean, sensor))
+        zone = zones_of(made.window, scale, heights_mm)
+        inside = np.s_[
+            BORDER_PX : truth.shape[1] - BORDER_PX, BORDER_PX : truth.shape[2] - BORDER_PX
+        ]
+        near = zone[inside].ravel()
+        count += np.bincount(near, minlength=heights_mm.size)
+        for row, method in enumerate(methods):
+            error = _error(method, made, truth)[inside].ravel()
+            square[row] += np.bincount(near, error, minlength=heights_mm.size)
+    whole = square.sum(axis=1) / count.sum()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = square / count
+    found = [
+        None if count[i] == 0 else _three([_decibels(v) for v in means[:, i]])
+        for i in range(heights_mm.size)
+    ]
+    last = methods[-1]
+    return Recovered(
+        method=last.name if last.networks else FILTER,
+        zones=tuple(found),
+        overall=_three([_decibels(v) for v in whole]),
+    )
+
+
+def filled(picture: FloatArray, width: int, height: int) -> FloatArray:
+    """Repeat a picture (3, h, w), every second one mirrored, until it fills a frame."""
+    pad = [(0, 0), (0, max(height - picture.shape[1], 0)), (0, max(width - picture.shape[2], 0))]
+    return np.ascontiguousarray(np.pad(picture, pad, mode="symmetric")[:, :height, :width])
+
+
+def zones_of(window: SensorWindow, scale: int, heights_mm: Array) -> NDArray[np.intp]:
+    """Give the number of the nearest field (h, w) of every sample of a picture.
+
+    Of fields at one height the first counts.
+    """
+    width, height = window.size_px
+    fine = window.resampled(1 / scale, (scale * width, scale * height)) if scale > 1 else window
+    y, x = (np.arange(scale * side, dtype=np.float64) for side in (height, width))
+    x_mm, y_mm = fine.to_mm(x[None], y[:, None])
+    rising = np.flatnonzero(np.diff(heights_mm, prepend=-1.0) > 0)
+    kept = heights_mm[rising]
+    edges = (kept[1:] + kept[:-1]) / 2
+    return rising[np.searchsorted(edges, np.hypot(x_mm, y_mm))]
+
+
+def _chosen(rig: Rig) -> Sequence[Method]:
+    """Give the capture, the last method without networks, and the network where there is one."""
+    simple = [method for method in rig.methods if not method.networks]
+    capture = next(method for method in simple if method.name == INPUT)
+    named = {method.name: method for method in rig.networks}
+    network = named.get(rig.primary)
+    return (capture, simple[-1]) if network is None else (capture, simple[-1], network)
+
+
+def _error(method: Method, made: Simulation, truth: FloatArray) -> FloatArray:
+    """Give the squared error (h, w) of sRGB values, the mean over colours."""
+    capture = method.pipeline.capture_of(
+        made.samples,
+        iso=made.iso,
+        white_balance=made.white_balance,  # type: ignore[arg-type]
+        origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
+    )
+    picture = method.pipeline.start(capture).fill()
+    return np.asarray(np.square(encode_srgb(picture) - truth).mean(axis=0))
+
+
+def _decibels(square: float) -> float:
+    return min(-10 * float(np.log10(max(square, 1e-30))), BEST_DB)
+
+
+def _three(values: Sequence[float]) -> tuple[float, float, float]:
+    """Give capture, filter and method; the filter twice where it is the method."""
+    return values[0], values[1], values[-1]
