@@ -91,7 +91,7 @@ def test_other_roles_have_the_fitter_of_the_house(tiny: SpadRecipe) -> None:
     assert FITTING.fitting(_request(tiny, "upscale")) is None
     own = FITTING.fitting(_request(tiny))
     assert own is not None
-    assert isinstance(own.make(), PlateFitter)
+    assert isinstance(own.make(None), PlateFitter)
 
 
 def test_a_network_of_another_role_or_another_device_is_refused(

@@ -114,7 +114,7 @@ def test_weights_of_a_file_go_into_network_average_and_losses(small_recipe, tmp_
     request = request_of(small_recipe(random_vgg=False), "split", vgg=path)
     fitting = FITTING.fitting(request)
     assert "with VGG-19 of vgg.pth (sha256 " in fitting.credit
-    fitter = fitting.make()
+    fitter = fitting.make(None)
     for network in (fitter.inner.network, fitter.inner.averaged):
         found = network.body.vgg.state_dict()
         assert all(torch.equal(found[name], tensor + 1) for name, tensor in state.items())
