@@ -1,11 +1,13 @@
 """The log of a training run: one JSON object per line, and its chart."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from camkit.errors import ContractError
+
+_COUNTED: Final = frozenset({"step", "seconds", "cpu_s"})
 
 
 class RunLog:
@@ -50,11 +52,29 @@ def read_log(path: Path) -> list[dict[str, Any]]:
     return entries
 
 
-def plot_logs(logs: dict[str, Path], chart: Path) -> None:
+def read_parts(paths: Sequence[Path]) -> list[dict[str, Any]]:
+    """Read the logs of runs that began where others ended, steps and times counted on.
+
+    Raises:
+        ContractError: If a line is not a JSON object with a step.
+    """
+    entries: list[dict[str, Any]] = []
+    before = dict.fromkeys(_COUNTED, 0.0)
+    for path in paths:
+        part = read_log(path)
+        entries += [
+            {**e, **{key: e[key] + before[key] for key in _COUNTED & e.keys()}} for e in part
+        ]
+        for key in _COUNTED:
+            before[key] += max((e[key] for e in part if key in e), default=0)
+    return entries
+
+
+def plot_logs(logs: Mapping[str, Path | Sequence[Path]], chart: Path) -> None:
     """Draw loss and validation PSNR of runs over the CPU time.
 
     Args:
-        logs: Name of the run -> its log.
+        logs: Name of the run -> its log, or those of its parts in order.
         chart: PNG to write.
     """
     from matplotlib.figure import Figure
@@ -63,7 +83,7 @@ def plot_logs(logs: dict[str, Path], chart: Path) -> None:
     left, right = figure.subplots(1, 2)
     floors: set[float] = set()
     for name, path in logs.items():
-        entries = read_log(path)
+        entries = read_parts([path] if isinstance(path, Path) else path)
         losses = [(e["cpu_s"] / 60, e["loss"]) for e in entries if "loss" in e]
         scores = [(e["cpu_s"] / 60, e["valid_db"]) for e in entries if "valid_db" in e]
         if losses:
