@@ -50,6 +50,7 @@ from camkit.models_def.training.checkpoint import (
     read_checkpoint,
     recipe_of,
 )
+from camkit.models_def.training.credits import joined_credits
 from camkit.models_def.training.kind import Design, TrainingKind, training_kind
 from camkit.models_def.training.recipe import Recipe, differing_part
 from camkit.runtime.kind import part_of
@@ -270,14 +271,14 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
     }
     stages = tuple(_on_frozen_grid(stage, camera.freeze) for stage in design.stages)
     known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
-    data = dict.fromkeys(c.training_data for s in camera.checkpoints.values() for c in s.values())
+    data = (c.training_data for sizes in camera.checkpoints.values() for c in sizes.values())
     return Manifest(
         format_version=format_of(camera.optics.psf, hazy=camera.optics.haze is not None),
         kind=recipe.kind,
         name=recipe.name,
         version=parts.version,
         licence=LICENCE,
-        training_data="; ".join(data),
+        training_data=joined_credits(data),
         sensor=recipe.sensor,
         optics=optics,
         stages=stages,

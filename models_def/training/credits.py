@@ -2,13 +2,16 @@
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Final
 
 from camkit.models_def.training.pictures import list_pictures
 from camkit.models_def.training.recipe import DataRecipe
 
 ROW = re.compile(r"^\| `(?P<file>[^`]+)` \|(?P<rest>.*)\|$")
 LICENCE_COLUMN = 2
+FIRST_WEIGHTS: Final = "; first weights: "
 
 
 def describe_data(data: DataRecipe, pictures: Path | None) -> str:
@@ -28,6 +31,15 @@ def describe_data(data: DataRecipe, pictures: Path | None) -> str:
         f"{len(files)} photographs of {pictures.name} ({share:.0f} % of the samples; "
         f"licences {stated or 'not stated'}) and {scenes}"
     )
+
+
+def joined_credits(texts: Iterable[str]) -> str:
+    """Join what the networks of a bundle were trained on: what they share is said once."""
+    heads: dict[str, dict[str, None]] = {}
+    for text in texts:
+        head, *tail = text.partition(FIRST_WEIGHTS)
+        heads.setdefault(head, {})["".join(tail)] = None
+    return "; ".join(head + "".join(tails) for head, tails in heads.items())
 
 
 def _licences(readme: Path, names: set[str]) -> Counter[str]:

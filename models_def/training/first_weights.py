@@ -20,6 +20,7 @@ from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import BundleError, ContractError
 from camkit.models_def.networks.full_unet import FullUnet, start_from_trimmed
 from camkit.models_def.training.checkpoint import State, read_table, recipe_of, to_checkpoint
+from camkit.models_def.training.credits import FIRST_WEIGHTS
 
 # what an export computed beforehand; no weight
 _CONSTANT: Final = re.compile(r"c\d+")
@@ -46,7 +47,9 @@ class FirstWeights:
         before = self.training_data
         if data and before.startswith(data):
             before = "the same" + before.removeprefix(data)
-        return f"; first weights: {self.whose}, trained on {before}"
+        once = f"{FIRST_WEIGHTS}{self.whose}, trained on the same"
+        # parts of one training are told once
+        return f"{FIRST_WEIGHTS}{self.whose}, trained on {before}".replace(once + once, once)
 
 
 def read_first_weights(source: Path, size: str, role: str = DEFAULT_ROLE) -> FirstWeights:

@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 
-from camkit.models_def.training.credits import describe_data
+from camkit.models_def.training.credits import describe_data, joined_credits
 from tests.data_folder import data_path
 
 
@@ -35,3 +35,14 @@ def test_every_picture_of_the_training_set_has_a_licence(recipe):
         for part in text.split("licences ")[1].split(", ")
     ]
     assert sum(counts) == 186
+
+
+def test_what_networks_share_is_said_once():
+    small, large = (
+        "a; first weights: x S, trained on the same",
+        "a; first weights: x M, trained on b",
+    )
+    assert joined_credits([small, large, small]) == (
+        "a; first weights: x S, trained on the same; first weights: x M, trained on b"
+    )
+    assert joined_credits(["a", "b", "a", small]) == "a; first weights: x S, trained on the same; b"

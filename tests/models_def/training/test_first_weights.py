@@ -1,5 +1,6 @@
 """First weights are those that were trained, wherever they are read from, or a clear error."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import onnx
@@ -55,6 +56,13 @@ def test_networks_of_a_built_in_bundle_can_be_trained_further(bundle, size):
     assert first.credit(first.training_data).endswith("trained on the same")
     pictures = first.training_data.split(";")[0]
     assert pictures not in first.credit(pictures)
+
+
+def test_parts_of_one_training_are_told_once():
+    first = FirstWeights(source="x.pt", whose="x S", training_data="a", state={})
+    second = replace(first, training_data="a" + first.credit("a"))
+    assert second.credit("a") == first.credit("a") == "; first weights: x S, trained on the same"
+    assert second.credit("b").count("first weights") == 2
 
 
 def test_bundle_without_the_size_names_those_it_has():
