@@ -17,6 +17,8 @@ from camkit.models_def.design.plate.recipe import (
 )
 
 RECIPES = Path(__file__).resolve().parents[4] / "models_def" / "recipes"
+# `thin_plate` is a camera; its lens is a plate of another kind
+PLATES = sorted(path for path in RECIPES.glob("*_plate.toml") if path.stem != "thin_plate")
 
 
 def table(**changes: Any) -> dict[str, Any]:
@@ -33,7 +35,7 @@ def table(**changes: Any) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("path", sorted(RECIPES.glob("*_plate.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", PLATES, ids=lambda path: path.stem)
 def test_recipes_that_are_shipped_are_sound(path: Path) -> None:
     recipe = read_plate_recipe(path)
     assert recipe.name == path.stem.removesuffix("_plate").replace("_", "-")
