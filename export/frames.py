@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 
 from camkit.bundle.chain import rewired
 from camkit.bundle.frozen_optics import FrozenOptics
-from camkit.bundle.golden import IMAGE
-from camkit.bundle.manifest import Manifest, format_of, planes_of
 from camkit.bundle.reader import PRESCRIPTION, Bundle
-from camkit.bundle.stages import Network, Parts
-from camkit.bundle.writer import write_bundle
+from camkit.bundle.stages import Network
+from camkit.bundle.writer import write_physics
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.tiles import (
@@ -57,7 +55,6 @@ COPY_RAYS: Final = 8000
 SPREAD_EV: Final = 0.7
 """How much crops of a frame differ in their exposure."""
 VALIDATION_ISOS: Final = (100.0, 1600.0)
-LICENCE: Final = "Apache-2.0"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,21 +156,8 @@ def physics_bundle(recipe: BayerRecipe, optics: FrozenOptics, out: Path) -> Bund
     design = training_kind(recipe.kind).design(recipe)
     kept = [stage for stage in design.stages if not isinstance(stage, Network)]
     stages = rewired(kept, design.stages)
-    stated = optics.entry(design.object_distance_mm)
-    manifest = Manifest(
-        format_version=format_of(optics.psf, hazy=optics.haze is not None),
-        kind=recipe.kind,
-        name=recipe.name,
-        version="0.1.0",
-        licence=LICENCE,
-        training_data="none: no network",
-        sensor=recipe.sensor,
-        optics=stated,
-        stages=stages,
-        planes=planes_of(stages, Parts(sensor=recipe.sensor, optics=stated, networks={})),
-        products={IMAGE: stages[-1].gives[0]},
-    )
-    return write_bundle(out, manifest, optics.members)
+    named = {"kind": recipe.kind, "name": recipe.name}
+    return write_physics(out, stages, recipe.sensor, optics, design.object_distance_mm, **named)
 
 
 class _Studio:

@@ -26,6 +26,7 @@ from pydantic import Field, ValidationError, model_validator
 from camkit.bundle.chain import CAPTURE, capture_plane, check_haze, check_use, join_stages
 from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Sorted, Word
 from camkit.bundle.facts import Card, NetworkFacts
+from camkit.bundle.golden import IMAGE
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
@@ -219,6 +220,32 @@ def planes_of(stages: tuple[Stage, ...], parts: Parts) -> dict[str, Plane]:
         return join_stages(stages, parts)
     except JoinError as error:
         raise BundleError(str(error)) from error
+
+
+def manifest_without_networks(
+    stages: tuple[Stage, ...], sensor: Sensor, optics: Optics | None, **facts: Any
+) -> Manifest:
+    """Give the manifest of a camera of physics alone; its only product is what comes last.
+
+    Args:
+        stages: In order, none of them a network.
+        sensor: What the camera sees with.
+        optics: What it sees through; None where no stage needs to know.
+        facts: Other entries: `name`, `version`, `licence` and what else a `Manifest` holds.
+
+    Raises:
+        BundleError: If the stages do not join.
+    """
+    stated = {"training_data": "none: no network"} | facts
+    parts = Parts(sensor=sensor, optics=optics, networks={})
+    return Manifest(
+        sensor=sensor,
+        optics=optics,
+        stages=stages,
+        planes=planes_of(stages, parts),
+        products={IMAGE: stages[-1].gives[0]},
+        **stated,
+    )
 
 
 class _Head(Entry, extra="ignore"):

@@ -12,11 +12,20 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from camkit.bundle.container import MAX_RATIO
-from camkit.bundle.manifest import Manifest, Member, manifest_to_bytes
+from camkit.bundle.frozen_optics import FrozenOptics
+from camkit.bundle.manifest import (
+    Manifest,
+    Member,
+    format_of,
+    manifest_to_bytes,
+    manifest_without_networks,
+)
 from camkit.bundle.reader import MANIFEST, Bundle, bundle_from_bytes
+from camkit.bundle.sensor import Sensor
+from camkit.bundle.stages import Stage
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 _DEFLATE_LEVEL: Final = 9
@@ -82,3 +91,35 @@ def write_bundle(path: Path, manifest: Manifest, members: Mapping[str, bytes]) -
         Path(name).unlink(missing_ok=True)
         raise
     return bundle
+
+
+def write_physics(
+    path: Path,
+    stages: tuple[Stage, ...],
+    sensor: Sensor,
+    optics: FrozenOptics,
+    object_distance_mm: float,
+    **facts: Any,
+) -> Bundle:
+    """Write a camera of physics alone: sensor, frozen optics, no network.
+
+    Args:
+        path: The .camkit file, replaced if it is there.
+        stages: In order, none of them a network.
+        sensor: What the camera sees with.
+        optics: What it sees through.
+        object_distance_mm: For which it is focused; inf for far away.
+        facts: Other entries of the manifest, see `manifest_without_networks`; `version` and
+            `licence` have defaults.
+
+    Raises:
+        BundleError: If the stages do not join, or a reader would refuse the result.
+    """
+    manifest = manifest_without_networks(
+        stages,
+        sensor,
+        optics.entry(object_distance_mm),
+        format_version=format_of(optics.psf, hazy=optics.haze is not None),
+        **({"version": "0.1.0", "licence": "Apache-2.0"} | facts),
+    )
+    return write_bundle(path, manifest, optics.members)

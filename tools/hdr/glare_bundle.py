@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.golden import IMAGE, NO_SIZE, GoldenArrays, golden_to_bytes
-from camkit.bundle.manifest import GoldenCase, Manifest, planes_of
+from camkit.bundle.manifest import GoldenCase, Manifest, manifest_without_networks
 from camkit.bundle.reader import CARD, GOLDEN
 from camkit.bundle.sensor import BayerSensor, IsoNoise
 from camkit.bundle.stages import (
@@ -24,7 +24,6 @@ from camkit.bundle.stages import (
     Deglare,
     Demosaic,
     Linearise,
-    Parts,
     RaiseClipped,
     Stage,
     WhiteBalance,
@@ -116,15 +115,13 @@ def _manifest(deglare: Deglare) -> Manifest:
         RaiseClipped(takes=deglare.gives),
         Color(takes=("neutral",)),
     )
-    return Manifest(
+    return manifest_without_networks(
+        stages,
+        sensor,
+        None,
         name=NAME,
         version=VERSION,
         licence="Apache-2.0",
-        training_data="none: no network",
-        sensor=sensor,
-        stages=stages,
-        planes=planes_of(stages, Parts(sensor=sensor, optics=None, networks={})),
-        products={IMAGE: stages[-1].gives[0]},
         exported_with={name: metadata.version(name) for name in ("camkit", "numpy", "scipy")},
     )
 

@@ -31,7 +31,7 @@ from camkit.bundle.reader import (
 from camkit.bundle.sensor import BayerSensor, ColorSensor
 from camkit.errors import ContractError, UnsupportedError
 from camkit.report.analysis.frozen_image import frozen_images, sensor_heights_mm
-from camkit.report.analysis.physical import write_physical
+from camkit.report.analysis.physical import write_camera
 from camkit.report.analysis.point_image import Band, PointImage
 from camkit.report.kind_finder import check_photographs
 from camkit.runtime.geometry.distortion import reference_channel, undistort_points
@@ -42,7 +42,8 @@ USUAL_SENSOR: Final = "duet"
 LENS: Final = "lens:"
 LENS_SUFFIXES: Final = (".toml", ".zmx")
 PSF_SUFFIX: Final = ".safetensors"
-BESIDE: Final = "+"
+BESIDE: Final = re.compile(r"(?<=\.safetensors)\+", re.IGNORECASE)
+"""Between the two files of optics with a haze; a + elsewhere belongs to a name."""
 PINHOLE: Final = re.compile(r"pinhole-(?P<diameter>[0-9.]+)(?:@(?P<distance>[0-9.]+))?")
 PINHOLE_MM: Final = 43.0
 """Distance from hole to sensor: the focal length of the thin plate."""
@@ -121,9 +122,9 @@ def _of_bundle(name: str) -> Subject:
 
 
 def _of_files(name: str, sensor: ColorSensor) -> Subject:
-    psf, *haze = name.split(BESIDE)
+    psf, *haze = BESIDE.split(name)
     if len(haze) > 1:
-        raise ContractError(f"frozen optics are PSF or PSF{BESIDE}HAZE; got {name}")
+        raise ContractError(f"frozen optics are PSF.safetensors[+HAZE.safetensors]; got {name}")
     read = read_optics_file(Path(psf), channels=len(sensor.channels))
     optics = FrozenOptics(psf=read.psf, haze=read_haze(Path(haze[0])) if haze else None)
     pitch_um = sensor.known_extent.pixel_pitch_um
@@ -137,7 +138,7 @@ def _of_files(name: str, sensor: ColorSensor) -> Subject:
         kind="frozen",
         sensor=sensor,
         images=_frozen(optics, sensor, float(optics.psf.depths_mm[-1]), lambda _: None),
-        camera=lambda folder: write_physical(
+        camera=lambda folder: write_camera(
             folder / "frozen.camkit", "frozen", optics, _mosaic(sensor)
         ),
     )
@@ -171,9 +172,7 @@ def _of_lens(name: str, sensor: ColorSensor) -> Subject:
         from camkit.report.analysis.frozen_lens import freeze_lens
 
         frozen = freeze_lens(lens, sensor)
-        return write_physical(
-            folder / "lens.camkit", _manifest_name(asked), frozen, _mosaic(sensor)
-        )
+        return write_camera(folder / "lens.camkit", _manifest_name(asked), frozen, _mosaic(sensor))
 
     return Subject(
         name=name,
@@ -216,7 +215,7 @@ def _of_hole(name: str, said: re.Match[str], sensor: ColorSensor) -> Subject:
         kind="pinhole",
         sensor=sensor,
         images=images,
-        camera=lambda folder: write_physical(
+        camera=lambda folder: write_camera(
             folder / "pinhole.camkit", "pinhole", optics(), _mosaic(sensor)
         ),
     )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.chain import rewired
-from camkit.bundle.manifest import PROFILE_VERSION, Manifest, planes_of
+from camkit.bundle.manifest import PROFILE_VERSION, Manifest, manifest_without_networks
 from camkit.bundle.optics import LensProfile
 from camkit.bundle.sensor import BayerSensor, Extent, IsoNoise, PlanesSensor, Row
 from camkit.bundle.stages import (
@@ -20,7 +20,6 @@ from camkit.bundle.stages import (
     Demosaic,
     Illumination,
     Linearise,
-    Parts,
     RaiseClipped,
     Repair,
     Stage,
@@ -78,19 +77,17 @@ def manifest_of(
     """Give the manifest of a bundle for captures like one, and notes."""
     sensor, notes = _sensor(capture, frame)
     stages = _stages(profile, mosaic=capture.cfa is not None)
-    parts = Parts(sensor=sensor, optics=profile, networks={})
-    return Manifest(
+    made = manifest_without_networks(
+        stages,
+        sensor,
+        profile,
         format_version=".".join(map(str, PROFILE_VERSION)),
         name=name,
         version="1.0.0",
         licence=LICENCE,
         training_data="no network; distortion and vignetting of lensfun's database",
-        sensor=sensor,
-        optics=profile,
-        stages=stages,
-        planes=planes_of(stages, parts),
-        products={"image": stages[-1].gives[0]},
-    ), notes
+    )
+    return made, notes
 
 
 def slug(text: str) -> str:

@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 
 from camkit.bundle.container import MAX_RATIO
 from camkit.bundle.reader import bundle_from_bytes, open_bundle
-from camkit.bundle.writer import bundle_to_bytes, write_bundle
+from camkit.bundle.stages import Network
+from camkit.bundle.writer import bundle_to_bytes, write_bundle, write_physics
 from camkit.errors import BundleError
-from tests.bundle_factory import tiny_manifest, tiny_members
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_sensor, tiny_stages
 from tests.disk_watch import nothing_written
+from tests.haze_bundle import hazy_optics, hazy_stages
 
 NAMES = st.from_regex(r"[a-z][a-z0-9_.-]{0,20}", fullmatch=True).filter(
     lambda name: name not in {"manifest.json", *tiny_members()}
@@ -74,3 +76,26 @@ def test_members_that_shrink_too_well_are_stored(size: int) -> None:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         info = archive.getinfo("zeros")
     assert info.file_size <= MAX_RATIO * info.compress_size
+
+
+def test_a_camera_of_physics_alone_states_its_optics_planes_and_format(tmp_path: Path) -> None:
+    optics, path = hazy_optics(), tmp_path / "a.camkit"
+    made = write_physics(path, hazy_stages(), tiny_sensor(), optics, 500.0, name="bare")
+    known = open_bundle(path).manifest
+    assert known == made.manifest
+    assert (known.format_version, known.name, known.networks) == ("2.7", "bare", {})
+    assert (known.licence, known.training_data) == ("Apache-2.0", "none: no network")
+    assert known.optics == optics.entry(500.0)
+    assert known.products == {"image": known.stages[-1].gives[0]}
+    assert set(made.names) == set(optics.members)
+    said = {"name": "bare", "licence": "MIT", "version": "2.0.0"}
+    own = write_physics(path, hazy_stages(), tiny_sensor(), optics, float("inf"), **said)
+    assert (own.manifest.licence, own.manifest.version) == ("MIT", "2.0.0")
+    assert own.reference_depth_mm == float("inf")
+
+
+def test_a_camera_of_physics_alone_has_no_network(tmp_path: Path) -> None:
+    stages = tiny_stages()
+    assert any(isinstance(stage, Network) for stage in stages)
+    with nothing_written(), pytest.raises(BundleError, match="network"):
+        write_physics(tmp_path / "a.camkit", stages, tiny_sensor(), hazy_optics(), 500.0, name="x")

@@ -16,12 +16,10 @@ import numpy as np
 
 from camkit.bundle.chain import rewired
 from camkit.bundle.frozen_optics import FrozenOptics, psf_of_streaks
-from camkit.bundle.manifest import Manifest, planes_of
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
-from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.streak_file import write_streaks
-from camkit.bundle.writer import write_bundle
+from camkit.bundle.writer import write_physics
 from camkit.models_def.kinds.hdr.material import HdrMaterial, compute_material
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
 from camkit.models_def.training.kind import read_recipe, training_kind
@@ -64,21 +62,9 @@ def write_camera(folder: Path, plate: str) -> tuple[Path, Bundle]:
     design = training_kind(recipe.kind).design(recipe)
     kept = [stage for stage in design.stages if not isinstance(stage, Network)]
     stages = rewired(kept, design.stages)
-    entry = optics.entry(design.object_distance_mm)
-    manifest = Manifest(
-        kind=recipe.kind,
-        name=plate,
-        version="0.1.0",
-        licence="CC-BY-4.0",
-        training_data="none: no network",
-        sensor=recipe.sensor,
-        optics=entry,
-        stages=stages,
-        planes=planes_of(stages, KnownParts(sensor=recipe.sensor, optics=entry, networks={})),
-        products={"image": stages[-1].gives[0]},
-        exported_with={},
-    )
-    return frozen, write_bundle(folder / f"{plate}.camkit", manifest, dict([optics.member]))
+    path, named = folder / f"{plate}.camkit", {"kind": recipe.kind, "name": plate}
+    distance_mm = design.object_distance_mm
+    return frozen, write_physics(path, stages, recipe.sensor, optics, distance_mm, **named)
 
 
 @lru_cache
