@@ -1,5 +1,7 @@
 """The entry that lensfun reads: the model that misses a distortion least, written as XML.
 
+    bundle or geometry -> source -> models of distortion and vignetting -> XML
+
 Ideal pictures may have any scale, and lensfun's models fix it: d = 1 at r = 1 (ptlens, poly3), or
 d = r near the middle (poly5). So a polynomial with the powers of a model is fitted by least
 squares, and ideal radii are scaled until it has the model's form:
@@ -12,7 +14,8 @@ with 1 / s the ideal radius that falls on d = 1, or s = p1 for poly5.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
@@ -20,8 +23,9 @@ from numpy.typing import NDArray
 
 from camkit.contracts import RadialDistortion, RadialIllumination
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.calibration.lensfun.database import check_positive
 from camkit.runtime.calibration.lensfun.models import TERMS, Distortion, Vignetting
-from camkit.runtime.calibration.lensfun.source import Source
+from camkit.runtime.calibration.lensfun.source import Source, read_source
 from camkit.runtime.calibration.lensfun.xml import ROOT
 from camkit.runtime.geometry.distortion import check_distortion, undistort_points
 
@@ -31,7 +35,65 @@ SAMPLES: Final = 1001
 SAME_PX: Final = 1e-3
 """Models that differ by less are as good: the one with fewer terms is taken."""
 FAR_M: Final = 1000.0
+ANY: Final = "Generic"
+"""Maker and mount where nobody states them."""
+MOST_RESIDUAL_PX: Final = 0.5
 _DIGITS: Final = 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EntryOptions:
+    """What an entry is for.
+
+    Attributes:
+        focal_mm: Focal length.
+        lens_name: Model of the lens; None for the name of the source.
+        maker: Of the lens.
+        mount: Of the camera, as lensfun's database names it.
+        crop_factor: Of the camera; None for that of the source, which a geometry does not know.
+        aperture: F-number; None leaves vignetting out.
+        most_residual_px: By which the model may miss the distortion.
+    """
+
+    focal_mm: float
+    lens_name: str | None = None
+    maker: str = ANY
+    mount: str = ANY
+    crop_factor: float | None = None
+    aperture: float | None = None
+    most_residual_px: float = MOST_RESIDUAL_PX
+
+    def __post_init__(self) -> None:
+        """Refuse what no entry can say.
+
+        Raises:
+            ContractError: If a number is not > 0, or a name is empty or cannot be printed.
+        """
+        for option in ("focal_mm", "crop_factor", "aperture", "most_residual_px"):
+            value = getattr(self, option)
+            if value is not None:
+                check_positive(value, option)
+        for option in ("lens_name", "maker", "mount"):
+            text = getattr(self, option)
+            if text is not None and not (text.strip() and text.isprintable()):
+                raise ContractError(f"{option} must be a name; got {text!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Name:
+    """What lensfun knows a lens by.
+
+    Attributes:
+        maker: Who made it.
+        model: Its name.
+        mount: Of the camera, as lensfun's database names it.
+        crop_factor: Of the camera.
+    """
+
+    maker: str
+    model: str
+    mount: str
+    crop_factor: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +109,84 @@ class Fit:
     distortion: Distortion
     residual_px: float
     scale: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """An entry of lensfun's database.
+
+    Attributes:
+        name: What lensfun knows the lens by.
+        size_px: Width and height of the pictures.
+        fit: Its distortion.
+        vignetting: And the most that it misses, as a share of the light; None for none.
+        notes: What is lost.
+    """
+
+    name: Name
+    size_px: tuple[int, int]
+    fit: Fit
+    vignetting: tuple[Vignetting, float] | None
+    notes: tuple[str, ...]
+
+    def to_xml(self) -> str:
+        """Give the file that lensfun reads."""
+        light = None if self.vignetting is None else self.vignetting[0]
+        return to_xml(self.name, self.size_px, self.fit.distortion, light)
+
+    def to_record(self) -> dict[str, Any]:
+        """Give plain values."""
+        known = self.fit.distortion
+        light = None
+        if self.vignetting is not None:
+            made, missed = self.vignetting
+            light = {"terms": list(made.terms), "residual": missed}
+        return {
+            "lens": self.name.model,
+            "crop_factor": self.name.crop_factor,
+            "model": known.model,
+            "focal_mm": known.focal_mm,
+            "terms": dict(zip(TERMS[known.model], known.terms, strict=True)),
+            "residual_px": round(self.fit.residual_px, 6),
+            "scale": self.fit.scale,
+            "vignetting": light,
+            "notes": list(self.notes),
+        }
+
+
+def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
+    """Make the entry of a bundle, or of a measured geometry.
+
+    Args:
+        path: The bundle, by its path or name, or what `camkit calibrate geometry` wrote (.toml).
+        options: What the entry is for.
+
+    Raises:
+        DecodeError: If the file is neither, states no distortion, or one that no model of lensfun's
+            fits as well as asked.
+        BundleError: If the bundle is refused.
+        ContractError: If nothing says how large the sensor is.
+    """
+    source = read_source(path)
+    crop = source.crop_factor if options.crop_factor is None else options.crop_factor
+    if crop is None:
+        raise ContractError(f"{path} does not tell how large the sensor is: say --crop-factor")
+    fit = fit_distortion(source, options.focal_mm)
+    if fit.residual_px > options.most_residual_px:
+        raise DecodeError(
+            f"{fit.distortion.model}, the nearest of lensfun's models, misses the distortion of "
+            f"{source.name} by {fit.residual_px:.2f} px; --most-residual-px is "
+            f"{options.most_residual_px:g}"
+        )
+    notes, light = source.notes, None
+    if source.light is not None and options.aperture is not None:
+        half_px = math.hypot(*source.size_px) / 2
+        light = fit_vignetting(source.light, half_px, options.focal_mm, options.aperture)
+    elif source.light is not None:
+        notes = (*notes, "vignetting is left out: it needs --aperture")
+    model = source.name if options.lens_name is None else options.lens_name
+    named = Name(maker=options.maker, model=model, mount=options.mount, crop_factor=crop)
+    return Entry(name=named, size_px=source.size_px, fit=fit, vignetting=light, notes=notes)
 
 
 def fit_distortion(source: Source, focal_mm: float) -> Fit:
@@ -125,23 +265,6 @@ def fit_vignetting(
     terms = (_rounded(k1), _rounded(k2), _rounded(k3))
     made = Vignetting(focal_mm=focal_mm, aperture=aperture, distance_m=FAR_M, terms=terms)
     return made, float(np.abs(made.light(np.sqrt(u)) - known).max())
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Name:
-    """What lensfun knows a lens by.
-
-    Attributes:
-        maker: Who made it.
-        model: Its name.
-        mount: Of the camera, as lensfun's database names it.
-        crop_factor: Of the camera.
-    """
-
-    maker: str
-    model: str
-    mount: str
-    crop_factor: float
 
 
 def to_xml(

@@ -11,12 +11,14 @@ import pytest
 from camkit.bundle.sensor import Extent
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import RadialDistortion, RadialIllumination
-from camkit.errors import DecodeError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.lensfun.database import Database
 from camkit.runtime.calibration.lensfun.entry import (
+    EntryOptions,
     Name,
     fit_distortion,
     fit_vignetting,
+    lensfun_entry,
     to_xml,
 )
 from camkit.runtime.calibration.lensfun.models import Distortion, Vignetting
@@ -226,3 +228,55 @@ def test_what_is_no_toml_is_refused(tmp_path: Path) -> None:
 def test_the_factory_database_holds_every_model(tmp_path: Path) -> None:
     database = Database(write_database(tmp_path))
     assert {one.model for name in ("Folding 8mm", "Small 50mm") for one in database.find(name)[0].distortion} == {"poly3", "poly5"}  # noqa: E501 # fmt: skip
+
+
+def test_the_entry_of_a_bundle_is_what_its_parts_give(tmp_path: Path) -> None:
+    path = write_bundle(tmp_path / "plain.camkit", profile_manifest(), {}).path
+    source = read_source(path)
+    made = lensfun_entry(path, EntryOptions(focal_mm=50.0, aperture=2.8))
+    assert made.fit == fit_distortion(source, 50.0)
+    assert made.vignetting is not None
+    light, missed = made.vignetting
+    assert (made.name.model, made.name.maker, made.name.mount) == (
+        source.name,
+        "Generic",
+        "Generic",
+    )
+    assert made.name.crop_factor == source.crop_factor
+    assert made.to_xml() == to_xml(made.name, source.size_px, made.fit.distortion, light)
+    record = json.loads(json.dumps(made.to_record(), allow_nan=False))
+    assert record["vignetting"] == {"terms": list(light.terms), "residual": missed}
+    assert record["notes"] == list(source.notes)
+    bare = lensfun_entry(path, EntryOptions(focal_mm=50.0, crop_factor=1.7, lens_name="Own"))
+    assert (bare.name.model, bare.name.crop_factor, bare.vignetting) == ("Own", 1.7, None)
+    assert bare.notes[-1] == "vignetting is left out: it needs --aperture"
+
+
+def test_an_entry_of_a_geometry_needs_its_crop_factor_and_obeys_the_limit(tmp_path: Path) -> None:
+    path = tmp_path / "camera.toml"
+    path.write_text(to_toml(GEOMETRY), encoding="utf-8")
+    with pytest.raises(ContractError, match="how large the sensor is"):
+        lensfun_entry(path, EntryOptions(focal_mm=10.0))
+    made = lensfun_entry(path, EntryOptions(focal_mm=10.0, crop_factor=1.5))
+    assert made.fit.residual_px > 0
+    least = EntryOptions(focal_mm=10.0, crop_factor=1.5, most_residual_px=made.fit.residual_px / 2)
+    with pytest.raises(DecodeError, match="misses the distortion of camera"):
+        lensfun_entry(path, least)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"focal_mm": 0.0},
+        {"focal_mm": float("nan")},
+        {"crop_factor": -1.0},
+        {"aperture": float("inf")},
+        {"most_residual_px": 0.0},
+        {"maker": " "},
+        {"mount": ""},
+        {"lens_name": "a\nb"},
+    ],
+)
+def test_options_that_no_entry_can_say_are_named(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ContractError, match=next(iter(wrong))):
+        EntryOptions(**({"focal_mm": 50.0} | wrong))
