@@ -97,6 +97,20 @@ def levels_of(sensor: ColorSensor, setting: Setting) -> tuple[float, float]:
     return float(np.rint(sensor.black_level * white / sensor.white_level)), white
 
 
+def variance_of(signal: NDArray[np.float64], noise: NoiseModel, step: float) -> NDArray[np.float64]:
+    """Give the variance of samples: photons, amplifier, converter.
+
+    Args:
+        signal: Without noise, 1.0 = white level; what lies below 0 counts as dark.
+        noise: At the ISO, alike in all channels.
+        step: Of the converter, in the same unit.
+    References: EMVA 1288 release 4.0, eq. (15) with the converter's variance of step^2 / 12.
+    """
+    middle = len(noise.shot) // 2
+    dark = noise.read_variance[middle] + step * step / 12
+    return np.asarray(noise.shot[middle] * np.maximum(signal, 0) + dark)
+
+
 def record(
     signal: NDArray[np.float64],
     noise: NoiseModel,

@@ -17,7 +17,7 @@ from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
 from camkit.report.analysis.point_image import Array, Direction, PointImage
-from camkit.runtime.twin.exposure import Setting, levels_of, noise_of, record
+from camkit.runtime.twin.exposure import Setting, levels_of, noise_of, record, variance_of
 
 CONFIDENCE: Final = 0.95
 """With which a difference must be said to be one, and of the interval of a share."""
@@ -82,6 +82,9 @@ def see_bars(
         width_px: Of a bar.
         sensor: Full well, noise, levels; a pixel of its middle colour sees white as `WHITE`.
         iso: Sensitivity.
+
+    Raises:
+        ContractError: If a bar is narrower than a pixel, or the ISO is not > 0.
     """
     contrast = contrast_of(image.lines[direction], width_px)
     mean = WHITE * image.illumination / 2
@@ -105,40 +108,23 @@ def see_bars(
 
 
 def least_difference(mean: float, noise: NoiseModel, step: float) -> float:
-    """Give the difference that two pixels of the same mean light exceed once in twenty only."""
-    return float(norm.ppf(CONFIDENCE) * np.sqrt(2 * deviation(mean, noise, step) ** 2))
-
-
-def deviation(signal: float, noise: NoiseModel, step: float) -> float:
-    """Give the standard deviation of a pixel: photons, amplifier, converter.
+    """Give the difference that two pixels of the same mean light exceed once in twenty only.
 
     Args:
-        signal: 1.0 = white level.
-        noise: At the ISO; its middle channel counts, as in the twin.
-        step: Of the converter.
-    """
-    middle = len(noise.shot) // 2
-    variance = noise.shot[middle] * signal + noise.read_variance[middle] + step * step / 12
-    return float(np.sqrt(variance))
-
-
-def expected_detection(signals: tuple[float, float], noise: NoiseModel, step: float) -> float:
-    """Give what `Bars.detection` is of two pixels whose noise is Gaussian.
-
-    Args:
-        signals: Of the bright and the dark pixel, 1.0 = white level.
+        mean: Their light, 1.0 = white level.
         noise: At the ISO.
-        step: Of the converter.
+        step: Of the converter, in the same unit.
     """
-    bright, dark = signals
-    both = float(np.hypot(deviation(bright, noise, step), deviation(dark, noise, step)))
-    least = least_difference((bright + dark) / 2, noise, step)
-    return float(norm.sf((least - (bright - dark)) / both))
+    variance = variance_of(np.array(mean), noise, step)
+    return float(norm.ppf(CONFIDENCE) * np.sqrt(2 * variance))
 
 
 def interval(count: int, total: int) -> tuple[float, float]:
-    """Give the interval of a share that was counted.
+    """Give the interval (95 %) of a share that was counted.
 
+    Args:
+        count: Those that count.
+        total: Of all, > 0.
     References: Wilson 1927.
     """
     z = float(norm.ppf(0.5 + CONFIDENCE / 2))

@@ -25,10 +25,9 @@ from camkit.report.analysis.perceptual import SUBSTITUTE, Measure, looks_differe
 from camkit.report.analysis.planted import plant
 from camkit.report.analysis.point_image import Array
 from camkit.report.analysis.unexplained import unexplained
-from camkit.report.stress.rig import INPUT, Rig
+from camkit.report.stress.rig import INPUT, Rig, usual_sizes
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.shot import Shot
-from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.twin.exposure import Setting
 from camkit.runtime.twin.light import Lens
 from camkit.runtime.twin.truth import true_picture
@@ -175,7 +174,7 @@ def analyse(
     Raises:
         ContractError: If a scene holds no whole patch.
     """
-    rig = Rig(bundle, options.sizes or _usual(bundle))
+    rig = Rig(bundle, options.sizes or usual_sizes(bundle.manifest))
     filtered = next(m.name for m in rig.methods[::-1] if not m.networks)
     primary = rig.primary if rig.networks else filtered
     gathered: dict[str, _Gathered] = {}
@@ -214,11 +213,6 @@ def analyse(
         for name, held in gathered.items()
     )
     return Report(options=options, methods=methods, control=_judge(methods, primary, places))
-
-
-def _usual(bundle: Bundle) -> tuple[str, ...]:
-    sizes = bundle.manifest.sizes
-    return (REFERENCE,) if REFERENCE in sizes else tuple(sizes[-1:])
 
 
 def _take(held: _Gathered, picture: FloatArray, view: _View, options: Options) -> None:

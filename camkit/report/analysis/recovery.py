@@ -17,9 +17,8 @@ from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.quality import BORDER_PX
-from camkit.report.stress.rig import INPUT, Method, Rig
+from camkit.report.stress.rig import INPUT, Method, Rig, usual_sizes
 from camkit.runtime.geometry.sensor_window import SensorWindow
-from camkit.runtime.plan.rules.size import REFERENCE
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph
 from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
 
@@ -60,17 +59,18 @@ def recover(
         heights_mm: (field,) from the axis, not decreasing.
         iso: Sensitivity.
         frame_px: (width, height) about the middle of the sensor; None for all of it.
+
+    Raises:
+        ContractError: If the bundle states no optics.
     """
     manifest = bundle.manifest
     scale, sensor = picture_scale(manifest), light_sensor(manifest)
-    sizes = tuple(s for s in manifest.sizes if s == REFERENCE) or tuple(manifest.sizes[-1:])
-    rig = Rig(bundle, sizes)
+    rig = Rig(bundle, usual_sizes(manifest))
     methods = _chosen(rig)
     extent = sensor.known_extent
     width, height = frame_px or (extent.width_px, extent.height_px)
     width, height = min(width, extent.width_px), min(height, extent.height_px)
     square = np.zeros((len(methods), heights_mm.size))
-    whole = np.zeros(len(methods))
     count = np.zeros(heights_mm.size)
     for number, picture in enumerate(pictures):
         options = SimulationOptions(

@@ -13,7 +13,7 @@ from camkit.contracts import FloatArray
 from camkit.report.analysis.point_image import Array
 from camkit.report.stress.consistency import CLIPPED_REACH_PX, near
 from camkit.report.stress.shot import Shot
-from camkit.runtime.twin.exposure import signal_of
+from camkit.runtime.twin.exposure import signal_of, variance_of
 from camkit.runtime.twin.light import Lens, LightOptions, light_of
 
 
@@ -32,14 +32,7 @@ def unexplained(picture: FloatArray, shot: Shot, lens: Lens) -> Array:
     light = light_of(seen, shot.sensor, lens, shot.light.window, options)
     predicted = signal_of(light, shot.sensor).astype(np.float64)
     captured = capture.linear_rows(0, capture.height).astype(np.float64)
-    step = 1 / (capture.white_level - float(capture.black_level.max()))
-    middle = len(shot.noise.shot) // 2
-    variance = (
-        shot.noise.shot[middle] * np.maximum(predicted, 0)
-        + shot.noise.read_variance[middle]
-        + step * step / 12
-    )
-    chi2 = np.square(captured - predicted) / variance
+    chi2 = np.square(captured - predicted) / variance_of(predicted, shot.noise, shot.step)
     chi2[near(capture.saturated_rows(0, capture.height), CLIPPED_REACH_PX)] = np.nan
     # planes are as many samples of a pixel
     return np.asarray(chi2 if chi2.ndim == 2 else chi2.mean(axis=0))

@@ -17,11 +17,11 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
-from camkit.contracts import FloatArray, NoiseModel
+from camkit.contracts import FloatArray
 from camkit.report.stress.shot import Shot
 from camkit.runtime.geometry.scatter import scatter
 from camkit.runtime.geometry.shrink import shrunk
-from camkit.runtime.twin.exposure import sample_planes
+from camkit.runtime.twin.exposure import sample_planes, variance_of
 from camkit.runtime.twin.light import Lens
 
 LIMIT: Final = 1.3
@@ -87,10 +87,9 @@ def residual(planes: FloatArray, shot: Shot, lens: Lens) -> Residual | None:
     predicted = sample_planes(blurred, shot.sensor, gains).astype(np.float64)[judged]
     contrast = sample_planes(_contrast(blurred), shot.sensor, gains)[judged].astype(np.float64)
     captured = capture.linear_rows(rows.start, rows.stop)[..., columns][judged]
-    step = 1 / (capture.white_level - float(capture.black_level.max()))
     return Residual(
         squared=np.square(captured.astype(np.float64) - predicted),
-        noise_variance=_variance(shot.noise, predicted) + step * step / 12,
+        noise_variance=variance_of(predicted, shot.noise, shot.step),
         contrast=np.square(contrast),
     )
 
@@ -170,11 +169,6 @@ def calibrate(nominal: Residual) -> Scale:
         middle = (low + high) / 2
         low, high = (middle, high) if nominal.chi2(middle) > 1 else (low, middle)
     return Scale(model_error=high)
-
-
-def _variance(noise: NoiseModel, signal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the variance of samples; the twin's noise is alike in all channels."""
-    return noise.shot[0] * np.maximum(signal, 0) + noise.read_variance[0]
 
 
 def _contrast(planes: FloatArray) -> FloatArray:

@@ -246,6 +246,11 @@ class Rig:
         return known
 
 
+def usual_sizes(manifest: Manifest) -> tuple[str, ...]:
+    """Give the size of network that stands for a bundle: M, else the largest; none without any."""
+    return (REFERENCE,) if REFERENCE in manifest.sizes else manifest.sizes[-1:]
+
+
 def restored_plane(manifest: Manifest) -> str | None:
     """Name the plane that holds the light when all that restores is done; None if none does."""
     last = next((s for s in manifest.stages[::-1] if stage_module(s.type).METHODS), None)

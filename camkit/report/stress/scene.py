@@ -109,5 +109,5 @@ def _from_folder(
             return tuple(found)
     raise ContractError(
         f"{folder} holds {len(found)} picture(s) of at least {width}x{height} px, {count} are "
-        "needed; add pictures or lower --scenes"
+        "needed; add pictures or ask for fewer"
     )

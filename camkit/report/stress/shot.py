@@ -42,6 +42,11 @@ class Shot:
     border_px: int = 32
     away_from_clipped: bool = False
 
+    @property
+    def step(self) -> float:
+        """Give the step of the converter, 1.0 = white level."""
+        return 1 / (self.capture.white_level - float(self.capture.black_level.max()))
+
 
 def spoil(shot: Shot, percent: float, values: tuple[float, ...], seed: int) -> Shot:
     """Give a capture some of whose samples hold another value.

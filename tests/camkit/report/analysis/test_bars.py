@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError
@@ -9,8 +10,8 @@ from camkit.report.analysis.bars import (
     CONFIDENCE,
     WHITE,
     contrast_of,
-    expected_detection,
     interval,
+    least_difference,
     see_bars,
 )
 from camkit.runtime.twin.exposure import Setting, noise_of
@@ -44,6 +45,14 @@ def test_a_bar_has_a_width() -> None:
         contrast_of(np.ones(3), 0)
 
 
+def _expected(signals: tuple[float, float], noise: NoiseModel, step: float) -> float:
+    """Give the share of pairs that are told apart where noise is Gaussian."""
+    shot, read = noise.shot[1], noise.read_variance[1] + step**2 / 12
+    bright, dark = signals
+    least = 1.6449 * np.sqrt(2 * (shot * (bright + dark) / 2 + read))
+    return float(norm.sf((least - (bright - dark)) / np.sqrt(shot * (bright + dark) + 2 * read)))
+
+
 @pytest.mark.parametrize("sigma_px", [5.5, 6.5, 7.3, 8.0])
 def test_detection_is_what_two_gaussians_give(sigma_px: float) -> None:
     """Counted with photons and a converter, against the normal distribution."""
@@ -53,7 +62,7 @@ def test_detection_is_what_two_gaussians_give(sigma_px: float) -> None:
     mean = WHITE / 2
     noise = noise_of(sensor, Setting(iso=iso))
     step = 1 / (sensor.white_level - sensor.black_level)
-    told = expected_detection((mean * (1 + bars.contrast), mean * (1 - bars.contrast)), noise, step)
+    told = _expected((mean * (1 + bars.contrast), mean * (1 - bars.contrast)), noise, step)
     assert bars.detection == pytest.approx(told, abs=0.015)
     low, high = bars.detection_ci
     assert low <= bars.detection <= high
@@ -97,5 +106,7 @@ def test_the_interval_of_a_share_holds_it_in_19_of_20_draws() -> None:
 
 
 def test_equal_signals_are_told_apart_by_chance() -> None:
-    noise = NoiseModel(shot=(1e-4,) * 3, read_variance=(1e-8,) * 3)
-    assert expected_detection((0.4, 0.4), noise, 0.0) == pytest.approx(1 - CONFIDENCE)
+    noise, rng = NoiseModel(shot=(1e-4,) * 3, read_variance=(1e-8,) * 3), np.random.default_rng(2)
+    one, other = 0.4 + np.sqrt(1e-4 * 0.4 + 1e-8) * rng.standard_normal((2, 100_000))
+    told = (one - other > least_difference(0.4, noise, 0.0)).mean()
+    assert told == pytest.approx(1 - CONFIDENCE, abs=3e-3)
