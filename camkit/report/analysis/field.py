@@ -17,7 +17,6 @@ from camkit.errors import ContractError
 from camkit.report.analysis.bars import Bars, see_bars
 from camkit.report.analysis.point_image import (
     DIRECTIONS,
-    Band,
     Direction,
     PointImage,
     band_of,
@@ -25,6 +24,7 @@ from camkit.report.analysis.point_image import (
 )
 from camkit.report.analysis.recovery import Recovered, recover
 from camkit.report.analysis.subject import Subject
+from camkit.runtime.twin.exposure import Setting
 from camkit.units import to_degrees
 
 FIELDS: Final = 9
@@ -47,7 +47,7 @@ class FieldOptions:
         wavelength_um: Of the points; None for the middle colour of each sensor.
         pictures: Sharp pictures (3, h, w), linear Rec.709, that are photographed; none leaves
             recovery out.
-        frame_px: (width, height) of these photographs; None for whole frames.
+        frame_px: (width, height) of these photographs; None for whole frames, and without pictures.
     """
 
     iso: float = ISO
@@ -58,12 +58,20 @@ class FieldOptions:
     frame_px: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
+        """Refuse what cannot be measured.
+
+        Raises:
+            ContractError: If a number is out of range, or a frame is asked for without pictures.
+        """
+        Setting(iso=self.iso)  # refuses what is no sensitivity
         if self.fields < 2:
             raise ContractError(f"a field needs 2 points at least; got {self.fields}")
         if self.bars_px < 1:
             raise ContractError(f"a bar is at least 1 px wide; got {self.bars_px}")
         if self.frame_px is not None and min(self.frame_px) < 128:
             raise ContractError(f"a frame has sides of at least 128 px; got {self.frame_px}")
+        if self.frame_px is not None and not self.pictures:
+            raise ContractError("only pictures are framed: give --data too, or leave --frame out")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +128,7 @@ def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = N
     """
     told = tell or (lambda _: None)
     told(f"{subject.name}: points")
-    images = subject.images(_band(subject, options), options.fields)
+    images = subject.images(band_of(subject.sensor, options.wavelength_um), options.fields)
     recovered: Recovered | None = None
     note: str | None = None
     if options.pictures:
@@ -138,10 +146,6 @@ def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = N
         for image, zone in zip(images, zones, strict=True)
     )
     return LensField(subject=subject, points=points, recovered=recovered, note=note)
-
-
-def _band(subject: Subject, options: FieldOptions) -> Band:
-    return band_of(subject.sensor, options.wavelength_um)
 
 
 def _recover(subject: Subject, images: Sequence[PointImage], options: FieldOptions) -> Recovered:

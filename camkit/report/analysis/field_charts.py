@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camkit.report.analysis.field import THESIS_WIDTHS, FieldPoint, LensField
-from camkit.report.analysis.point_image import PATCH_PX
+from camkit.report.analysis.point_image import DIRECTIONS, PATCH_PX
 from camkit.report.figure import FIELD_COLORS, GRID_COLOR, MARKS, new_figure
 
 if TYPE_CHECKING:
@@ -67,8 +67,8 @@ def draw_mtf(found: Sequence[LensField]) -> "Figure":
         for number, lens in enumerate(found):
             image = lens.points[round(share * (len(lens.points) - 1))].image
             color = FIELD_COLORS[number % len(FIELD_COLORS)]
-            for direction, style in (("radial", "-"), ("tangential", "--")):
-                mtf = image.mtf(direction, _FREQUENCIES)  # type: ignore[arg-type]
+            for direction, style in zip(DIRECTIONS, ("-", "--"), strict=True):
+                mtf = image.mtf(direction, _FREQUENCIES)
                 label = lens.subject.name if style == "-" else None
                 panel.plot(_FREQUENCIES, mtf, style, color=color, linewidth=1, label=label)
         panel.set_title(f"{share:g} of the field", fontsize=8)
@@ -170,4 +170,4 @@ def _legend(panel: "Axes") -> None:
 
 def _plain(panel: "Axes") -> None:
     panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
-    panel.tick_params(labelsize=7)
+    panel.tick_params(labelsize=7, which="both")

@@ -55,12 +55,21 @@ def field_html(found: Sequence[LensField], options: FieldOptions) -> str:
         sections.append(
             Section(
                 title="Recovery",
-                paragraph=f"{len(options.pictures)} whole picture(s), photographed and restored.",
+                paragraph=_photographed(options),
                 pictures={"Capture (dashed) and what was made of it.": to_png(recovery)},
             )
         )
     sections += [_table(lens) for lens in found]
     return to_html("Over the field", sections)
+
+
+def _photographed(options: FieldOptions) -> str:
+    frame = (
+        "Whole frames"
+        if options.frame_px is None
+        else "{}x{} px about the middle of frames".format(*options.frame_px)
+    )
+    return f"{frame}, filled with {len(options.pictures)} picture(s), photographed and restored."
 
 
 def _table(lens: LensField) -> Section:

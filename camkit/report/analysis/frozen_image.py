@@ -8,7 +8,16 @@ import numpy as np
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import FloatArray
-from camkit.report.analysis.point_image import FAR_PX, NEAR_PX, Array, Band, PointImage, find_peak
+from camkit.report.analysis.point_image import (
+    DIRECTIONS,
+    FAR_PX,
+    NEAR_PX,
+    Array,
+    Band,
+    Direction,
+    PointImage,
+    find_peak,
+)
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.bank.psf import color_kernels
 from camkit.units import to_mm
@@ -34,6 +43,9 @@ def frozen_images(
         heights_mm: (n,) along +y; along the diagonal of optics whose kernels lie on a grid.
         depth_mm: Object distance; None where there is one.
         angle_at: Gives the field angle of a height in radians, or None.
+
+    Raises:
+        ContractError: If kernels of several depths are not known for this one.
     """
     psf, response = optics.psf, (band.wavelengths_um, band.weights[None])
     haze: Lookup | None = None
@@ -88,25 +100,24 @@ def _image(
     down, across = (np.arange(side) for side in core.shape)
     distance = np.hypot(down[:, None] - peak.row, across - peak.column)
     near, far = (float(core[distance < radius].sum()) for radius in (NEAR_PX, FAR_PX))
-    lines = {
-        "radial": _centred(core.sum(axis=1), off[0]),
-        "tangential": _centred(core.sum(0), off[1]),
+    lines: dict[Direction, Array] = {
+        name: _centred(core.sum(axis=1 - along), off[along])
+        for along, name in enumerate(DIRECTIONS)
     }
     patch = peak.patch
     if cells is not None:
         cells = cells / total
         near += within_cells(cells, cell_px, off, NEAR_PX)
         far += within_cells(cells, cell_px, off, FAR_PX)
-        for axis, name in ((1, "radial"), (0, "tangential")):
-            lines[name] = _sum(
-                lines[name], _in_pixels(cells.sum(axis=axis), cell_px, off[1 - axis])
-            )
+        for along, name in enumerate(DIRECTIONS):
+            spread = _in_pixels(cells.sum(axis=1 - along), cell_px, off[along])
+            lines[name] = _sum(lines[name], spread)
         patch = patch + cells[cells.shape[0] // 2, cells.shape[1] // 2] / cell_px**2
     return PointImage(
         height_mm=height_mm,
         field_angle_rad=angle_rad,
         patch=patch,
-        lines=lines,  # type: ignore[arg-type]
+        lines=lines,
         near_share=near,
         far_share=far,
         illumination=illumination,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from camkit.report.analysis.hallucination import PLANTED, TRUTH, Crop, Method, Report
 from camkit.report.analysis.patches import MEASURES, summary
+from camkit.report.analysis.point_image import Array
 from camkit.report.calibration.page import Section, Table, to_html
 from camkit.report.figure import FIELD_COLORS, GRID_COLOR, new_figure, to_png
 from camkit.report.stress.rig import INPUT
@@ -16,6 +17,8 @@ from camkit.report.stress.rig import INPUT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+LEAST: Final = 1e-5
+"""Of what is drawn by its logarithm."""
 _BINS: Final = 40
 _ENLARGED: Final = 2
 _MOST_MAPS: Final = 5
@@ -66,22 +69,41 @@ def hallucination_html(report: Report) -> str:
 
 
 def draw_histograms(methods: Sequence[Method]) -> "Figure":
-    """Draw how many patches have which value, of every measure; both axes logarithmic."""
+    """Draw how many patches have which value, of every measure; both axes logarithmic.
+
+    Values below 1e-5 are drawn as that. The excess has a sign and keeps it: its logarithm is that
+    of 1 + |excess|. The filter has none.
+    """
     figure = new_figure(10.0, 2.6)
-    for panel, measure in zip(figure.subplots(1, len(MEASURES)), MEASURES, strict=True):
+    panels = figure.subplots(1, len(MEASURES))
+    for panel, measure in zip(panels, MEASURES, strict=True):
         for number, method in enumerate(methods):
             values = method.values(measure)
-            values = np.log10(np.maximum(values[np.isfinite(values)], 1e-5))
+            values = _logarithm(values[np.isfinite(values)], signed=measure == "excess")
+            if not values.any():
+                continue
             color = FIELD_COLORS[number % len(FIELD_COLORS)]
             panel.hist(values, _BINS, histtype="step", color=color, label=method.name, linewidth=1)
         panel.set_yscale("log")
-        panel.set_xlabel(f"log10 {measure}", fontsize=8)
+        panel.set_xlabel(_label(measure), fontsize=8)
         panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
-        panel.tick_params(labelsize=7)
+        panel.tick_params(labelsize=7, which="both")
         if measure == MEASURES[0]:
             panel.set_ylabel("patches", fontsize=8)
-            panel.legend(fontsize=6, frameon=False)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=9, fontsize=7
+    )
     return figure
+
+
+def _logarithm(values: Array, *, signed: bool) -> Array:
+    if signed:
+        return np.asarray(np.sign(values) * np.log10(1 + np.abs(values)))
+    return np.asarray(np.log10(np.maximum(values, LEAST)))
+
+
+def _label(measure: str) -> str:
+    return "± log10 (1 + |excess|)" if measure == "excess" else f"log10 {measure}"
 
 
 def draw_maps(plain: Method, planted: Method) -> "Figure":

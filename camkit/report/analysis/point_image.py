@@ -130,7 +130,7 @@ class PointImage:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PeakShare:
+class Peak:
     """Where the peak of light by pixel lies.
 
     Attributes:
@@ -144,18 +144,24 @@ class PeakShare:
     patch: Array = field(repr=False)
 
 
-def find_peak(light: Array) -> PeakShare:
-    """Find the middle of the disc of `PEAK_PX` that holds most light; (h, w) by pixel."""
+def find_peak(light: Array) -> Peak:
+    """Find the middle of the disc of `PEAK_PX` that holds most light.
+
+    Of several that hold as much it is the mean: of a plateau its middle, of two that mirror each
+    other a place on the meridian between them.
+
+    Args:
+        light: (h, w) by pixel.
+    """
     if min(light.shape) <= 1:
         row, column = (side // 2 for side in light.shape)
     else:
         held = scipy.signal.fftconvolve(light, disc(PEAK_PX), mode="same")
         held[held < held.max() * (1 - 1e-9)] = 0
-        # of several places that hold as much: the nearest to their mean
         row, column = (round(float(v.mean())) for v in np.nonzero(held))
     padded = np.pad(light, PATCH_PX)
     cut = padded[row : row + 2 * PATCH_PX + 1, column : column + 2 * PATCH_PX + 1]
-    return PeakShare(row=row, column=column, patch=cut.copy())
+    return Peak(row=row, column=column, patch=cut.copy())
 
 
 def disc(radius_px: float) -> Array:
@@ -178,7 +184,7 @@ def likeness(first: PointImage, second: PointImage) -> float:
 
 
 def _finer(patch: Array) -> Array:
-    """Give the surroundings of the highest pixel on a finer grid."""
+    """Give a patch on a grid `_FINER` times finer, linear between the pixels."""
     return np.asarray(
         scipy.ndimage.zoom(patch, _FINER, order=1, grid_mode=True, mode="grid-constant")
     )

@@ -134,11 +134,12 @@ def _patch(rows: Array, columns: Array, share: Array) -> Array:
 
 
 def _illumination(lens: Lens, heights_px: Array, pitch_um: float) -> Array:
-    """Give how an even scene lights the sensor, 1 on the axis.
+    """Give how an even scene lights the sensor, (n,) of heights (n,), 1 on the axis.
 
     Haze counts; a lens none of whose peaks lies at the corner is taken by its chief rays.
     """
-    rising = np.flatnonzero(np.diff(heights_px, prepend=-1.0) > 0)
+    # where peaks jump, a height that lies further in than one before it is known by its neighbours
+    rising = np.flatnonzero(np.diff(np.maximum.accumulate(heights_px), prepend=-1.0) > 0)
     known = heights_px[rising]
     try:
         lit = flat_light(lens, known, pitch_um, rays=SEARCH_RAYS)

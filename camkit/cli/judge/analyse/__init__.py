@@ -2,4 +2,5 @@
 
 field           light, detection and recovery over the field
 hallucination   what restored pictures show that their captures do not hold
+outputs         the page that both leave, and what they say
 """

@@ -1,14 +1,12 @@
 """`camkit analyse field`: light, detection and recovery over the field, of several lenses."""
 
-import json
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.say import say
+from camkit.cli.judge.analyse.outputs import deliver, tell
 from camkit.cli.use.calibrate.outputs import Page, check_page
 from camkit.errors import ContractError
 
@@ -68,17 +66,14 @@ def field(
         pictures=() if data is None else tuple(map(read_picture, list_set(data, pictures))),
         frame_px=frame_px,
     )
-    found = [measure_field(subject, options, _tell) for subject in subjects]
-    told = to_json(found, options)
-    if page is not None:
-        from camkit.report.analysis.field_page import field_html
-        from camkit.runtime.output.part_file import atomic_output
+    found = [measure_field(subject, options, tell) for subject in subjects]
 
-        page.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_output(page) as part:
-            part.write_text(field_html(found, options), encoding="utf-8")
-        told["page"] = str(page)
-    say(json.dumps(told, allow_nan=False) if json_ else to_text(told))
+    def html() -> str:
+        from camkit.report.analysis.field_page import field_html
+
+        return field_html(found, options)
+
+    deliver(to_json(found, options), page, html, to_text, as_json=json_)
 
 
 def _frame_px(text: str) -> tuple[int, int]:
@@ -87,8 +82,3 @@ def _frame_px(text: str) -> tuple[int, int]:
         raise ContractError(f"--frame takes WIDTHxHEIGHT in pixels; got {text!r}")
     # whole cells of a mosaic
     return int(sides[0]) // 2 * 2, int(sides[1]) // 2 * 2
-
-
-def _tell(line: str) -> None:
-    if sys.stderr.isatty():
-        say(line, err=True)

@@ -1,14 +1,12 @@
 """`camkit analyse hallucination`: what restored pictures show that their captures do not hold."""
 
-import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.say import say
+from camkit.cli.judge.analyse.outputs import deliver, tell
 from camkit.cli.use.calibrate.outputs import Page, check_page
 from camkit.errors import ContractError
 
@@ -41,26 +39,23 @@ def hallucination(
     A control plants detail that no capture holds; the report says whether it was found.
     """
     check_page(page, overwrite=overwrite)
-    if crops is not None and crops.exists() and not overwrite:
-        raise ContractError(f"{crops} exists; say --overwrite or another name")
+    if crops is not None:
+        _check_crops(crops, overwrite=overwrite)
     from camkit.bundle.reader import find_bundle, open_bundle
     from camkit.report.analysis.hallucination import analyse, to_json, to_text
     from camkit.report.stress.scene import stress_scenes
 
     options = _options(iso, patch_px, sizes, vgg)
     bundle = open_bundle(find_bundle(name))
-    report = analyse(bundle, stress_scenes(bundle, pictures, data), options, _tell)
+    report = analyse(bundle, stress_scenes(bundle, pictures, data), options, tell)
     files = [] if crops is None else _write_crops(report, crops)
-    told = to_json(report, files)
-    if page is not None:
-        from camkit.report.analysis.hallucination_page import hallucination_html
-        from camkit.runtime.output.part_file import atomic_output
 
-        page.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_output(page) as part:
-            part.write_text(hallucination_html(report), encoding="utf-8")
-        told["page"] = str(page)
-    say(json.dumps(told, allow_nan=False) if json_ else to_text(told))
+    def html() -> str:
+        from camkit.report.analysis.hallucination_page import hallucination_html
+
+        return hallucination_html(report)
+
+    deliver(to_json(report, files), page, html, to_text, as_json=json_)
 
 
 def _options(iso: float, patch_px: int, sizes: str | None, vgg: Path | None) -> "Options":
@@ -82,18 +77,28 @@ def _options(iso: float, patch_px: int, sizes: str | None, vgg: Path | None) -> 
     return replace(options, perceptual=vgg_measure(vgg), perceptual_name=VGG)
 
 
+def _check_crops(folder: Path, *, overwrite: bool) -> None:
+    """Refuse a folder that is there and may not be filled anew, or is none.
+
+    Raises:
+        ContractError: If so.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ContractError(f"--crops is a folder; {folder} is a file")
+    if folder.exists() and not overwrite:
+        raise ContractError(f"{folder} exists; say --overwrite or another name")
+
+
 def _write_crops(report: "Report", folder: Path) -> list[str]:
+    """Write the worst patches of the control's method; those of a run before go."""
     from camkit.report.analysis.hallucination_page import crop_png
 
     folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("worst-[0-9][0-9].png"):
+        old.unlink()
     written = []
     for number, crop in enumerate(report.method(report.control.method).worst, start=1):
         path = folder / f"worst-{number:02}.png"
         path.write_bytes(crop_png(crop))
         written.append(str(path))
     return written
-
-
-def _tell(line: str) -> None:
-    if sys.stderr.isatty():
-        say(line, err=True)

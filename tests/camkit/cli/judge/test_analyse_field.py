@@ -58,6 +58,7 @@ def test_a_bundle_is_measured_and_shown(tmp_path: Path, camkit_command) -> None:
         (["duet", "--lens", "duet"], "named once"),
         (["duet", "--frame", "12"], "WIDTHxHEIGHT"),
         (["duet", "--frame", "64x64"], "128 px"),
+        (["duet", "--frame", "256x256"], "give --data too"),
         (["pinhole-0"], "> 0 mm"),
         (["pinhole-1.2.3"], "pinhole-DIAMETER"),
         (["no.safetensors"], "no.safetensors"),

@@ -28,13 +28,25 @@ def test_pictures_are_judged_and_the_worst_patches_kept(tmp_path: Path, camkit_c
     again = camkit_command(*arguments, "--crops", crops)
     assert again.code == ExitCode.USAGE
     assert "--overwrite" in again.err
+    (crops / "worst-99.png").touch()
+    (crops / "own.txt").touch()
+    again = camkit_command(*arguments, "--crops", crops, "--patch-px", "128", "--overwrite")
+    assert again.code == 0, again.err
+    assert not (crops / "worst-99.png").exists()
+    assert (crops / "own.txt").exists()
 
 
 def test_bad_input_is_one_line(tmp_path: Path, camkit_command) -> None:
     bundle = write_wide_bundle(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "few").mkdir()
+    levels = np.zeros((240, 320, 3), np.uint8)
+    cv2.imwrite(str(tmp_path / "few" / "a.png"), levels)
     for arguments, words in (
         (["--data", tmp_path / "nowhere"], "nowhere"),
         (["--data", tmp_path, "--patch-px", "9"], "even side"),
+        (["--data", tmp_path / "few", "--pictures", "2"], "ask for fewer"),
+        (["--data", tmp_path, "--crops", tmp_path / "file", "--overwrite"], "is a file"),
         (["--data", tmp_path, "--vgg", tmp_path / "none.pth"], "none.pth"),
     ):
         outcome = camkit_command("analyse", "hallucination", bundle.path, *arguments)

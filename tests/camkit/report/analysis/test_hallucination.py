@@ -16,7 +16,11 @@ from camkit.report.analysis.hallucination import (
     to_json,
     to_text,
 )
-from camkit.report.analysis.hallucination_page import crop_png, hallucination_html
+from camkit.report.analysis.hallucination_page import (
+    crop_png,
+    draw_histograms,
+    hallucination_html,
+)
 from camkit.report.analysis.patches import MEASURES, corners_of, overshoot_of, summary
 from camkit.report.analysis.planted import plant
 from camkit.report.stress.rig import INPUT
@@ -117,6 +121,15 @@ def test_report_and_page_hold_every_method(report: Report) -> None:
     page = hallucination_html(report)
     assert page.count("<img") >= 4
     assert crop_png(report.method(report.control.method).worst[0]).startswith(b"\x89PNG")
+
+
+def test_the_chart_of_the_excess_keeps_its_sign_and_leaves_the_filter_out(report: Report) -> None:
+    methods = [report.method(name) for name in (TRUTH, "wiener", "M")]
+    panel = draw_histograms(methods).axes[MEASURES.index("excess")]
+    labels = panel.get_legend_handles_labels()[1]
+    assert labels == [TRUTH, "M"]
+    low, _ = panel.get_xlim()
+    assert -5 < low < 0
 
 
 def test_overshoot_is_what_leaves_the_range_around() -> None:

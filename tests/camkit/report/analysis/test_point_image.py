@@ -78,6 +78,13 @@ def test_the_peak_is_the_densest_disc_and_not_the_highest_pixel() -> None:
     assert peak.patch[64, 64] == 1.0
 
 
+def test_the_peak_of_two_that_mirror_each_other_lies_between_them() -> None:
+    light = np.zeros((101, 101))
+    light[40, [30, 70]] = 1.0
+    peak = find_peak(light)
+    assert (peak.row, peak.column) == (40, 50)
+
+
 def test_a_colour_is_weighed_by_its_response() -> None:
     band = band_of(tiny_sensor())
     assert band.weights.sum() == pytest.approx(1)

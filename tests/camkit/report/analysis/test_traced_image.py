@@ -5,7 +5,7 @@ import pytest
 
 from camkit.models_def.optics.thin.peak import LandedLight
 from camkit.report.analysis.point_image import NEAR_PX, band_of
-from camkit.report.analysis.traced_image import image_of, land_band
+from camkit.report.analysis.traced_image import _illumination, image_of, land_band
 from tests.bundle_factory import tiny_sensor
 from tests.thin_factory import perfect_lens
 
@@ -33,6 +33,15 @@ def test_defocus_spreads_light_over_a_disc() -> None:
     # a disc's line is half an ellipse
     middle = image.lines["tangential"][image.lines["tangential"].size // 2]
     assert middle == pytest.approx(2 / (np.pi * radius_px), rel=0.1)
+
+
+def test_light_is_known_where_peaks_jump_inward() -> None:
+    """Heights that fall stand between those that rise; the first of them is 1."""
+    lens = perfect_lens(20.0, 2.0)
+    jumped = _illumination(lens, np.array([0.0, 900.0, 300.0, 1500.0]), 6.0)
+    rising = _illumination(lens, np.array([0.0, 900.0, 1500.0]), 6.0)
+    np.testing.assert_allclose(jumped[[0, 1, 3]], rising)
+    assert jumped[2] == pytest.approx(1 + (rising[1] - 1) / 3)
 
 
 def test_what_is_lost_counts_as_missing_and_the_rest_as_all() -> None:

@@ -1,0 +1,42 @@
+"""What a command of `camkit analyse` leaves: a page if one is asked for, and what is said."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from camkit.cli.say import say
+
+
+def deliver(
+    told: dict[str, Any],
+    page: Path | None,
+    html: Callable[[], str],
+    text: Callable[[dict[str, Any]], str],
+    *,
+    as_json: bool,
+) -> None:
+    """Write the page and say what was found.
+
+    Args:
+        told: What was found, as plain JSON values.
+        page: Where the page goes; None for none.
+        html: Gives it; called only where one is asked for.
+        text: Gives what is said without --json.
+        as_json: Print one object instead.
+    """
+    if page is not None:
+        from camkit.runtime.output.part_file import atomic_output
+
+        page.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_output(page) as part:
+            part.write_text(html(), encoding="utf-8")
+        told = {**told, "page": str(page)}
+    say(json.dumps(told, allow_nan=False) if as_json else text(told))
+
+
+def tell(line: str) -> None:
+    """Say on stderr what is being done, where a person sees it."""
+    if sys.stderr.isatty():
+        say(line, err=True)
