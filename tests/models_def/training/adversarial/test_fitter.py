@@ -140,7 +140,7 @@ def test_real_pairs_take_the_places_that_the_recipe_gives_them(recipe_path, mate
     own = own_fitting("bayer", request(recipe, "gram", pairs=Path("monitor")))
     assert own.credit.endswith(", real pairs of monitor")
     fitter = own.make(material)
-    mixed = fitter._parts.mix(batch(), 7)
+    mixed = fitter._mix(batch(), 7)
     assert asked == [(Path("monitor"), recipe, material.bank, None)]
     assert (mixed.planes[0] == 0.25).all()
     assert torch.equal(mixed.planes[1], batch().planes[1])
