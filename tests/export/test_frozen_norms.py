@@ -1,5 +1,7 @@
 """Norms become constants at a stated cost; then the network tiles exactly, before it is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -84,6 +86,16 @@ def test_a_frozen_checkpoint_states_its_cost_and_is_begun_from(
         assert torch.allclose(network(shifted)[..., :8], network(window)[..., :8], atol=1e-5)
     with pytest.raises(ContractError, match="no norms that look at a picture"):
         freeze_checkpoint(recipe_path, out, out, options(tmp_path), material=material)
+
+
+def test_folders_without_pictures_are_refused_before_anything_is_traced(
+    tmp_path,
+    recipe_path,  # noqa: F811
+):
+    for name in ("pictures", "valid"):
+        given = replace(options(tmp_path), **{name: tmp_path / "none"})
+        with pytest.raises(ContractError, match="none is not there"):
+            freeze_checkpoint(recipe_path, tmp_path / "x.pt", tmp_path / "y.pt", given)
 
 
 def test_numbers_of_samples_are_checked(tmp_path):

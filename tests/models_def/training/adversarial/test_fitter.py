@@ -175,6 +175,7 @@ def test_files_that_no_term_looks_at_are_refused(recipe_path, sharp_folder):
         ({"critic": {"penalty": -1.0}}, "penalty >= 0"),
         ({"content": {"l1_weight": 0.0}}, "weights >= 0, one > 0"),
         ({"loss": "gan"}, "schedule.loss must be one of"),
+        ({"loss": "content", "overshoot": 1.5}, "content has no term for overshoots"),
     ],
 )
 def test_tables_of_the_losses_are_checked(schedule, said):
