@@ -1,5 +1,6 @@
 """One step moves each player by its own loss; a run that is resumed keeps its bits."""
 
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -174,6 +175,7 @@ def test_files_that_no_term_looks_at_are_refused(recipe_path, sharp_folder):
         ({"critic": {"beta1": 1.0}}, r"beta1 in \[0, 1\)"),
         ({"critic": {"penalty": -1.0}}, "penalty >= 0"),
         ({"content": {"l1_weight": 0.0}}, "weights >= 0, one > 0"),
+        ({"critic": {"weight": math.nan}}, "schedule.critic.weight must be a number; got nan"),
         ({"loss": "gan"}, "schedule.loss must be one of"),
         ({"loss": "content", "overshoot": 1.5}, "content has no term for overshoots"),
     ],
