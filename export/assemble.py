@@ -191,7 +191,8 @@ def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
             f"the recipe {recipe.name} undoes a haze: make it with `camkit freeze --haze`, say "
             "--haze"
             if undone
-            else f"the recipe {recipe.name} undoes no haze; leave {parts.haze} out"
+            else f"the recipe {recipe.name} undoes no haze, but there is {parts.haze}: freeze the "
+            "PSF without it, or keep the two in a folder of their own"
         )
     return optics if parts.haze is None else replace(optics, haze=read_haze(parts.haze))
 

@@ -94,15 +94,27 @@ def _plate_of(parts: Parts, carried: Mapping[str, bytes]) -> Plate | None:
     return plate_of_members(carried, "the checkpoints")
 
 
+def check_peaks(lens: Lens, psf: FrozenPsf, path: Path) -> None:
+    """Refuse core kernels that were frozen from another lens with a haze.
+
+    Raises:
+        ContractError: If their peaks lie elsewhere.
+    """
+    _refuse_other(lens, path, peaks_off_px(lens, psf), SAME_PEAKS_PX)
+
+
 def _check_lens(lens: Lens, psf: FrozenPsf, parts: Parts) -> None:
     """Refuse a PSF that was frozen from another lens: no two have the same distortion."""
-    if parts.haze is None:
-        off_px, most_px = _distortion_off_px(lens, psf), SAME_LENS_PX
+    if parts.haze is not None:
+        check_peaks(lens, psf, parts.psf)
     else:
-        off_px, most_px = peaks_off_px(lens, psf), SAME_PEAKS_PX
+        _refuse_other(lens, parts.psf, _distortion_off_px(lens, psf), SAME_LENS_PX)
+
+
+def _refuse_other(lens: Lens, path: Path, off_px: float, most_px: float) -> None:
     if off_px > most_px:
         raise ContractError(
-            f"{parts.psf} was not frozen from the lens {lens.name}: their distortion differs by "
+            f"{path} was not frozen from the lens {lens.name}: their distortion differs by "
             f"{off_px:.2g} px; freeze, train and export the same lens"
         )
 

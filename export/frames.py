@@ -35,11 +35,10 @@ from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import tint_crop
 from camkit.models_def.optics.kernel_bank import focused_copies
-from camkit.models_def.optics.lens_file.lens_file import find_lens
 from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.thin.freezing import freeze_hazy
 from camkit.models_def.training.kind import training_kind
-from camkit.models_def.training.pictures import SceneSource, open_source
+from camkit.models_def.training.pictures import SceneSource, list_pictures, open_source
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.options import Options
@@ -76,26 +75,42 @@ class FrameSources:
     seed: int = 0
 
 
-def freeze_copies(
-    recipe: BayerRecipe, recipe_folder: Path, tell: Tell
-) -> tuple[Lens, tuple[FrozenOptics, ...]]:
-    """Freeze the fabricated copies of a recipe's lens.
-
-    Returns:
-        The lens as designed, and core and haze of its copies.
+def check_frames(recipe: BayerRecipe, pictures: Mapping[str, Path | None] | None = None) -> None:
+    """Refuse, before anything takes long, what no frames can be made of.
 
     Raises:
-        ContractError: If there is no such lens, or no peak of a copy reaches the corner.
+        ContractError: If the recipe undoes no haze, its tiles do not fit the sensor, or a folder
+            holds no pictures.
+    """
+    if recipe.haze is None:
+        raise ContractError(
+            f"{recipe.name} has no haze; its samples are made while it trains, leave prepare out"
+        )
+    extent, data = recipe.sensor.known_extent, recipe.data
+    room = min(extent.width_px, extent.height_px)
+    if data.sample_px > room or data.margin_px >= room:
+        raise ContractError(
+            f"tiles need a sensor of at least data.sample_px ({data.sample_px}) and more than "
+            f"data.margin_px ({data.margin_px}); got {extent.width_px}x{extent.height_px} px"
+        )
+    for folder in (pictures or {}).values():
+        list_pictures(folder)
+
+
+def freeze_copies(recipe: BayerRecipe, lens: Lens, tell: Tell) -> tuple[FrozenOptics, ...]:
+    """Freeze core and haze of the fabricated copies of a lens, those to choose by last.
+
+    Raises:
+        ContractError: If no peak of a copy reaches the corner.
     """
     choices = recipe.lens
-    lens = find_lens(choices.prescription, recipe_folder)
     count = choices.copies + choices.validation_copies
     frozen = []
     for number, copy in enumerate(focused_copies(lens, 1 + count, choices.seed)[1:], start=1):
         optics, _ = freeze_hazy(copy, recipe.sensor, rays=COPY_RAYS)
         frozen.append(optics)
         tell(f"copy {number} of {count} frozen")
-    return lens, tuple(frozen)
+    return tuple(frozen)
 
 
 def designed_lens(lens: Lens) -> dict[str, bytes]:
@@ -118,12 +133,9 @@ def prepare_frames(
         What was made: folder, tiles of every part, bytes.
 
     Raises:
-        ContractError: If the recipe undoes no haze, or its optics have none.
+        ContractError: As `check_frames`.
     """
-    if recipe.haze is None or sources.optics.haze is None:
-        raise ContractError(
-            f"{recipe.name} has no haze; its samples are made while it trains, leave prepare out"
-        )
+    check_frames(recipe, sources.pictures)
     folder, chosen = frames_folder(runs, recipe), recipe.frames
     folder.mkdir(parents=True, exist_ok=True)
     first_unseen = len(sources.copies) - recipe.lens.validation_copies
@@ -175,6 +187,7 @@ class _Studio:
             picture_share=1.0 if self._choosing else data.picture_share,
             scenes=data.procedural_scenes,
             scene_px=data.scene_px,
+            first_scene=-data.procedural_scenes if self._choosing else 0,
             edge_share=0.0 if self._choosing else data.edge_share,
             night_share=0.0 if self._choosing else data.night_share,
             lamp_share=0.0 if self._choosing else data.lamp_share,
@@ -197,9 +210,10 @@ class _Studio:
             iso = self._iso(rng, shot)
             first = (number * recipe.frames.shots + shot) * self._tiles
             setting = Setting(iso=iso, seed=int(rng.integers(2**31)))
-            cut = self._cut(rng, light, expose(light, recipe.sensor, setting), iso)
+            samples = expose(light, recipe.sensor, setting)
+            cut = self._cut(rng, light, samples, iso=iso, copy=copy)
             for index, tile in enumerate(cut, start=first):
-                store.store(index, tile(copy))
+                store.store(index, tile)
 
     def _iso(self, rng: Generator, shot: int) -> float:
         if self._choosing:
@@ -208,9 +222,15 @@ class _Studio:
         return float(np.exp(rng.uniform(np.log(data.iso_min), np.log(data.iso_max))))
 
     def _cut(
-        self, rng: Generator, light: Light, samples: NDArray[np.uint16], iso: float
-    ) -> Iterator[Callable[[int], Tile]]:
-        """Yield the tiles of a shot, which lack the number of their copy."""
+        self,
+        rng: Generator,
+        light: Light,
+        samples: NDArray[np.uint16],
+        *,
+        iso: float,
+        copy: int,
+    ) -> Iterator[Tile]:
+        """Yield the tiles of a shot."""
         recipe = self._recipe
         sensor, inner, margin = recipe.sensor, recipe.data.sample_px, recipe.data.margin_px
         planes, rise = self._cleared(light, samples, iso)
@@ -222,20 +242,20 @@ class _Studio:
                 sharp = sharp * even[:, left : left + inner]
             middle = (inner - 1) / 2
             x_mm, y_mm = light.window.to_mm(left + middle, top + middle)
-            given = {
-                "planes": _with_surroundings(planes, top, left, inner, margin),
-                "clipped": _with_surroundings(clipped, top, left, inner, margin)[0],
-                "sharp": sharp,
-                "x_mm": float(x_mm),
-                "y_mm": float(y_mm),
-                "iso": iso,
-                "noise_rise": rise,
-            }
-            yield lambda copy, given=given: Tile(copy=copy, **given)  # type: ignore[misc]
+            yield Tile(
+                planes=_with_surroundings(planes, top, left, inner, margin),
+                clipped=_with_surroundings(clipped, top, left, inner, margin)[0],
+                sharp=sharp,
+                x_mm=float(x_mm),
+                y_mm=float(y_mm),
+                iso=iso,
+                noise_rise=rise,
+                copy=copy,
+            )
 
     def _cleared(
         self, light: Light, samples: NDArray[np.uint16], iso: float
-    ) -> tuple[FloatArray, tuple[float, ...]]:
+    ) -> tuple[FloatArray, tuple[float, float, float]]:
         """Give what the stage haze makes of a shot, and what its noise was raised by."""
         haze = self._recipe.haze
         assert haze is not None
@@ -248,7 +268,8 @@ class _Studio:
         kept = self._pipeline.start(capture).keep(haze.gives[0])
         rows = kept.rows()
         assert kept.noise_rise is not None
-        return np.asarray(rows.read(0, rows.shape[1]), np.float32), kept.noise_rise()
+        red, green, blue = kept.noise_rise()
+        return np.asarray(rows.read(0, rows.shape[1]), np.float32), (red, green, blue)
 
 
 def draw_scene(

@@ -6,7 +6,6 @@ The twin is the same network with `frozen = true` in its configuration; it is ex
 trained further (`camkit train --start`), like any other.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -23,6 +22,7 @@ from camkit.models_def.training.checkpoint import (
     write_checkpoint,
 )
 from camkit.models_def.training.kind import Material, Restorer, read_recipe, training_kind
+from camkit.models_def.training.pictures import list_pictures
 
 FIRST_SAMPLE: Final = 50_000_000
 """Number of the first calibration sample: none that a training has seen."""
@@ -94,8 +94,11 @@ def freeze_checkpoint(
         material: What samples are made with; None has the kind prepare it.
 
     Raises:
-        ContractError: If the checkpoint has no norms to freeze, or was trained with other kernels.
+        ContractError: If the checkpoint has no norms to freeze, or was trained with other kernels,
+            or a folder holds no pictures.
     """
+    for folder in (options.pictures, options.valid):
+        list_pictures(folder)  # before anything is traced
     saved = read_checkpoint(source)
     recipe = read_recipe(recipe_path)
     kind, seed = training_kind(recipe.kind), recipe.network(saved.size, saved.role).schedule.seed
@@ -111,12 +114,9 @@ def freeze_checkpoint(
         raise ContractError(f"{source} was trained with other kernels than those of {recipe_path}")
     layout = kind.layout(recipe, saved.role)
     maker = kind.maker(recipe, saved.role, material, options.pictures, seed)
-
-    def planes() -> Iterator[Tensor]:
-        for number in range(options.samples):
-            yield maker.make(FIRST_SAMPLE + number).stacked(layout)[None]
-
-    norms = freeze_norms(live, frozen, list(planes()))
+    numbers = range(FIRST_SAMPLE, FIRST_SAMPLE + options.samples)
+    pictures = [maker.make(number).stacked(layout)[None] for number in numbers]
+    norms = freeze_norms(live, frozen, pictures)
     judge = kind.judge(recipe, saved.role, material, options.valid)
     report = FrozenReport(
         norms=norms,

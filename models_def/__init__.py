@@ -5,6 +5,7 @@
     sensors/                   the forward model and the front end, differentiable
     networks/                  the recovery networks
     training/                  samples, trainer, validation
+    toml_table, torch_file     what people wrote, what torch wrote, checked
 
 `models_def` and `runtime` never import each other.
 """

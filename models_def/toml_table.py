@@ -1,5 +1,6 @@
 """TOML tables turned into dataclasses; unknown, missing and wrong keys are errors naming them."""
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
@@ -88,6 +89,8 @@ def typed(where: str, value: Any, kind: Any) -> Any:
     kind = get_origin(kind) or kind
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
+    if isinstance(value, float) and math.isnan(value):
+        raise ContractError(f"{where} must be a number; got nan")
     if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
         raise ContractError(f"{where} must be of type {kind.__name__}; got {value!r}")
     return value

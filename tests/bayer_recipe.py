@@ -2,6 +2,7 @@
 
 import pytest
 
+from camkit.models_def.kinds.bayer import validation
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.samples import corner_height_mm
 from camkit.models_def.training.kind import read_recipe
@@ -63,11 +64,24 @@ schedule = { steps = 60, precision = "float32", learning_rate = 4e-3 }
 """
 
 
+def write_recipe(tmp_path_factory, tables=""):
+    """Write the recipe with more tables behind it, and give its path."""
+    path = tmp_path_factory.mktemp("recipe") / "tiny.toml"
+    path.write_text(RECIPE + tables, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_picture_to_validate_on():
+    """Ten validation cases instead of eighty."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(validation, "PROCEDURAL_PICTURES", 1)
+        yield
+
+
 @pytest.fixture(scope="session")
 def recipe_path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("recipe") / "tiny.toml"
-    path.write_text(RECIPE, encoding="utf-8")
-    return path
+    return write_recipe(tmp_path_factory)
 
 
 @pytest.fixture(scope="session")

@@ -42,6 +42,7 @@ from camkit.models_def.optics.search.beam import LEAD
 from camkit.models_def.optics.search.problem import trace_batch
 from camkit.models_def.sensors.forward import blur
 from camkit.models_def.sensors.tone import encode_srgb
+from camkit.models_def.torch_file import load_torch
 from tools.design.score import DENSE_RAYS, at_lens
 
 LINE_UM: Final = 5e-4
@@ -134,7 +135,7 @@ def dense_parts(recipe: DesignRecipe, arguments: argparse.Namespace) -> DesignPa
     if arguments.checkpoint is None:
         parts = replace(parts, network=None)
     elif parts.network is not None:
-        table = torch.load(arguments.checkpoint, map_location="cpu", weights_only=True)
+        table = load_torch(arguments.checkpoint, "checkpoint of camkit")
         parts.network.load_state_dict(table["best"]["network"])
     return at_lens(parts, begin, rays=DENSE_RAYS)
 

@@ -104,5 +104,7 @@ def build_network(name: str, **config: Any) -> nn.Module:
     frozen = {k: tuple(v) if isinstance(v, list) else v for k, v in config.items()}
     try:
         return _BUILDERS[name](**frozen)
-    except TypeError as error:
+    except ContractError:
+        raise
+    except (TypeError, ValueError) as error:
         raise ContractError(f"network {name} does not take this configuration: {error}") from error

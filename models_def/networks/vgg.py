@@ -7,7 +7,6 @@ References: Simonyan and Zisserman 2015.
 """
 
 import hashlib
-import pickle
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -18,6 +17,7 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from camkit.errors import ContractError
+from camkit.models_def.torch_file import load_torch
 
 MEAN: Final = (0.485, 0.456, 0.406)
 DEVIATION: Final = (0.229, 0.224, 0.225)
@@ -134,11 +134,11 @@ def _read_tensors(path: Path) -> Mapping[str, Any]:
     try:
         if path.suffix == ".safetensors":
             return load_file(path)
-        table = torch.load(path, map_location="cpu", weights_only=True)
     except OSError as error:
         raise ContractError(f"cannot read {path}: {error.strerror}") from error
-    except (SafetensorError, pickle.UnpicklingError, RuntimeError, EOFError) as error:
+    except SafetensorError as error:
         raise ContractError(f"{path} holds no plain tensors: {error}") from error
+    table = load_torch(path, "file of weights")
     if not isinstance(table, Mapping):
         raise ContractError(f"{path} must hold a table of tensors; got {type(table).__name__}")
     return table

@@ -4,7 +4,6 @@ Plain numbers, strings and tensors only, so that torch's weights-only reader tak
 is complete or absent (written beside, then renamed).
 """
 
-import pickle
 import tomllib
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -17,6 +16,7 @@ from torch import Tensor, nn
 from camkit.bundle.reader import PRESCRIPTION
 from camkit.bundle.stages.network import DEFAULT_ROLE
 from camkit.errors import ContractError
+from camkit.models_def.torch_file import load_torch
 from camkit.models_def.training.kind import to_recipe, training_kind
 from camkit.models_def.training.recipe import Recipe
 
@@ -103,12 +103,7 @@ def read_table(path: Path) -> dict[str, Any]:
     Raises:
         ContractError: If it is missing or something else.
     """
-    try:
-        table = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError as error:
-        raise ContractError(f"cannot read checkpoint {path}: {error.strerror}") from error
-    except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
-        raise ContractError(f"{path} is no checkpoint of camkit: {error}") from error
+    table = load_torch(path, "checkpoint of camkit")
     if not isinstance(table, dict) or "format" not in table:
         raise ContractError(f"{path} is no checkpoint of camkit")
     return table

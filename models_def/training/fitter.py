@@ -104,11 +104,11 @@ class Fitter:
         """
         output = self.run(batch.planes, progress)
         target, weight = batch.target.to(self.device), batch.weight.to(self.device)
-        absolute = self.schedule.loss == "l1"
-        errors = (patch_distances if absolute else patch_errors)(output, target, weight)
+        measure = patch_distances if self.schedule.loss == "l1" else patch_errors
+        errors = measure(output, target, weight)
         if self.schedule.overshoot:
             errors = errors + self.schedule.overshoot * overshoots(output, target, weight)
-        loss = errors.mean() if absolute else training_loss(self.schedule.loss, errors)
+        loss = training_loss(self.schedule.loss, errors)
         self.descend(loss, step, progress)
         return float(loss.detach())
 

@@ -71,7 +71,7 @@ def overshoots(output: Tensor, target: Tensor, weight: Tensor) -> Tensor:
 
 
 def training_loss(loss: str, errors: Tensor) -> Tensor:
-    """Give the scalar to minimise from the (b,) errors of the patches.
+    """Give the scalar to minimise from the (b,) errors of the patches, of l1 their distances.
 
     `log_mse` weighs patches by their relative error, as the mean of PSNR does, down to a floor
     below which a patch counts as good.
@@ -79,8 +79,8 @@ def training_loss(loss: str, errors: Tensor) -> Tensor:
     Raises:
         ContractError: If the loss is unknown.
     """
-    if loss == "mse":
+    if loss in {"mse", "l1"}:
         return errors.mean()
     if loss == "log_mse":
         return torch.log(errors + LOG_FLOOR).mean()
-    raise ContractError(f"loss must be log_mse or mse; got {loss!r}")
+    raise ContractError(f"loss must be log_mse, mse or l1; got {loss!r}")

@@ -75,6 +75,7 @@ class SceneSource:
         edge_share: Probability of clean edges instead of either.
         night_share: Probability of stars and discs on black.
         lamp_share: Probability of lamps in whatever else is drawn.
+        first_scene: Number of the first procedural scene; others draw other scenes.
     """
 
     pictures: Sequence[Path]
@@ -85,6 +86,7 @@ class SceneSource:
     edge_share: float = 0.0
     night_share: float = 0.0
     lamp_share: float = 0.0
+    first_scene: int = 0
 
     def draw_crop(self, rng: Generator, side_px: int) -> FloatArray:
         """Cut a random crop, the livelier of two candidates of one picture.
@@ -120,7 +122,8 @@ class SceneSource:
         number = int(rng.integers(self.scenes))
         key = -1 - number
         if key not in self._held:
-            scene = procedural_scene(SCENE_SEED + number, self.scene_px, self.scene_px)
+            seed = SCENE_SEED + self.first_scene + number
+            scene = procedural_scene(seed, self.scene_px, self.scene_px)
             self._held[key] = scene.transpose(1, 2, 0).astype(np.float16)
         return self._held[key]
 
@@ -134,6 +137,7 @@ def open_source(
     edge_share: float = 0.0,
     night_share: float = 0.0,
     lamp_share: float = 0.0,
+    first_scene: int = 0,
 ) -> SceneSource:
     """Open a source of crops; without a folder it is procedural only."""
     return SceneSource(
@@ -145,6 +149,7 @@ def open_source(
         edge_share=edge_share,
         night_share=night_share,
         lamp_share=lamp_share,
+        first_scene=first_scene,
     )
 
 

@@ -161,7 +161,8 @@ class ScheduleRecipe:
         ema_decay: Decay of the weight average that is validated and exported.
         loss: log_mse, mse or l1, all in the square-root domain of the signal; content, what
             `content` weighs; adversarial, the same and a critic.
-        overshoot: Weight of squared overshoots beside squared errors, against halos.
+        overshoot: Weight of squared overshoots beside the errors, against halos; 0 where the loss
+            is content or adversarial.
         precision: float32, or bfloat16: multiplies in it where the processor has instructions for
             that, and in float32 elsewhere (weights stay float32).
         float32_share: Share of the schedule, at its end, computed in float32 anyway.
@@ -196,6 +197,10 @@ class ScheduleRecipe:
             )
         if self.overshoot < 0:
             raise ContractError(f"schedule.overshoot must be >= 0; got {self.overshoot}")
+        if self.overshoot and self.loss in PICTURE_LOSSES:
+            raise ContractError(
+                f"the loss {self.loss} has no term for overshoots; set schedule.overshoot = 0.0"
+            )
         check_share("schedule.float32_share", self.float32_share)
         check_share("schedule.ema_decay", self.ema_decay)
         if min(self.steps, self.batch, self.patch_px) < 1 or self.learning_rate <= 0:

@@ -180,8 +180,17 @@ def test_a_network_trains_on_tiles(recipe_path: Path, runs: Path, tmp_path: Path
     options = TrainOptions(out_dir=tmp_path, size="S", steps=4, workers=0)
     result = train(recipe_path, options)
     assert result.steps == 4
-    assert result.baselines["wiener"] > result.baselines["capture"]
     assert read_checkpoint(result.checkpoint).designed == LENS
+
+
+def test_the_bank_sharpens_tiles_to_choose_by(recipe: BayerRecipe, runs: Path) -> None:
+    kind = training_kind("bayer")
+    judge = kind.judge(recipe, "restore", kind.prepare(recipe, Path(), runs), None)
+    capture, wiener = (
+        judge.score(lambda planes, first=first: planes[:, first : first + 3]).parts["by_iso"]["100"]  # type: ignore[misc]
+        for first in (0, 3)
+    )
+    assert wiener > capture
 
 
 def test_a_bank_is_fitted_to_tiles(recipe: BayerRecipe, runs: Path) -> None:
@@ -229,6 +238,10 @@ def test_frames_of_other_pictures_or_another_recipe_are_refused(
         read_frames(runs / "tiny_frames", other)
     with pytest.raises(ContractError, match="make them with `camkit prepare`"):
         read_frames(tmp_path, recipe)
+    for damaged in ("", "[]", '{"camera": ""}', "\0"):
+        (tmp_path / "tiles.json").write_text(damaged)
+        with pytest.raises(ContractError, match=r"tiles\.json is damaged; say `camkit prepare`"):
+            read_frames(tmp_path)
 
 
 def test_a_camera_without_a_haze_needs_no_frames(recipe: BayerRecipe, tmp_path: Path) -> None:

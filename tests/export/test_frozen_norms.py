@@ -1,5 +1,7 @@
 """Norms become constants at a stated cost; then the network tiles exactly, before it is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -7,7 +9,6 @@ import torch
 from camkit.errors import ContractError
 from camkit.export.frozen_norms import FreezeOptions, freeze_checkpoint
 from camkit.export.network_facts import draft_network
-from camkit.models_def.kinds.bayer import validation
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.instance_norm import freeze_norms
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
@@ -16,28 +17,10 @@ from camkit.models_def.training.trainer import TrainOptions, train
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
-from tests.bayer_recipe import RECIPE, bank, material, recipe  # noqa: F401
+from tests.bayer_recipe import bank, material, one_picture_to_validate_on, recipe  # noqa: F401
+from tests.normed_recipe import recipe_path  # noqa: F401
 
 REACH_PX = 128
-NETWORK = """
-[networks.normed]
-network = "normed_unet"
-config = { width = 4, stages = 3 }
-schedule = { loss = "l1", steps = 4, precision = "float32" }
-"""
-
-
-@pytest.fixture(autouse=True)
-def one_picture_to_validate_on(monkeypatch):
-    """Ten validation cases instead of eighty."""
-    monkeypatch.setattr(validation, "PROCEDURAL_PICTURES", 1)
-
-
-@pytest.fixture(scope="session")
-def recipe_path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("recipe") / "tiny.toml"
-    path.write_text(RECIPE + NETWORK, encoding="utf-8")
-    return path
 
 
 def options(folder):
@@ -78,8 +61,12 @@ def test_reach_is_the_one_counted_by_hand():
     assert 1 + sum(2**i for i in range(6)) + sum(2**i for i in range(6)) + 1 == REACH_PX
 
 
-def test_a_frozen_checkpoint_states_its_cost_and_is_begun_from(tmp_path, recipe_path, material):  # noqa: F811
-    given = TrainOptions(out_dir=tmp_path, size="normed", workers=0)
+def test_a_frozen_checkpoint_states_its_cost_and_is_begun_from(
+    tmp_path,
+    recipe_path,  # noqa: F811
+    material,  # noqa: F811
+):
+    given = TrainOptions(out_dir=tmp_path, size="l1", workers=0)
     trained = train(recipe_path, given, material=material)
     out = tmp_path / "frozen.pt"
     report = freeze_checkpoint(
@@ -99,6 +86,16 @@ def test_a_frozen_checkpoint_states_its_cost_and_is_begun_from(tmp_path, recipe_
         assert torch.allclose(network(shifted)[..., :8], network(window)[..., :8], atol=1e-5)
     with pytest.raises(ContractError, match="no norms that look at a picture"):
         freeze_checkpoint(recipe_path, out, out, options(tmp_path), material=material)
+
+
+def test_folders_without_pictures_are_refused_before_anything_is_traced(
+    tmp_path,
+    recipe_path,  # noqa: F811
+):
+    for name in ("pictures", "valid"):
+        given = replace(options(tmp_path), **{name: tmp_path / "none"})
+        with pytest.raises(ContractError, match="none is not there"):
+            freeze_checkpoint(recipe_path, tmp_path / "x.pt", tmp_path / "y.pt", given)
 
 
 def test_numbers_of_samples_are_checked(tmp_path):

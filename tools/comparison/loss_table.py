@@ -4,18 +4,24 @@
         --rows supervised adversarial perceptual --data PICTURES --fresh OTHERS --minutes 60
 
 LAB is the recipe whose samples are trained on: what a display shows, say (pictures alone, one
-distance, one exposure). Rows are its sizes of network; `SIZE=FILE.toml` is that of another recipe,
-of another lens say. WILD is a recipe of the same camera in other circumstances: lamps, other
-exposures and depths. Every row is trained for so many CPU minutes and judged on samples of both
-recipes, cut from pictures that it never saw. Rows that need no training are `capture`, the input,
-and `wiener`, the bank alone. PSNR and SSIM are those of sRGB; `perceptual` is the 1-norm of Gram
-matrices (eq. 3.7), by random features unless `--vgg FILE` gives those of VGG-19. What is finished
-is in the journal of the folder and not done again; a row that was interrupted goes on.
+distance, one exposure). WILD is a recipe of the same camera in other circumstances: lamps, other
+exposures and depths. Rows are sizes of LAB's network; `SIZE=LAB.toml,WILD.toml` is one of other
+recipes, of another lens say. Every row is trained for so many CPU minutes and judged on samples of
+both recipes, cut from pictures that it never saw. Rows that need no training are `capture`, the
+input, `wiener`, the bank alone, and of cameras behind a mosaic `wiener-alone` (each colour for
+itself), `rl` and `admm-tv` (`tools.comparison.classical`). PSNR and SSIM are those of sRGB;
+`perceptual` is the 1-norm of Gram matrices (eq. 3.7), by random features unless `--vgg FILE` gives
+those of VGG-19. What is finished is in the journal of the folder and not done again; a row that was
+interrupted goes on.
+
+A lens with a haze has its frames made before: with `--data PICTURES` in OUT_DIR/LAB to train on,
+with `--data OTHERS` in OUT_DIR/LAB_judged and OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the
+names of the recipes without .toml).
 """
 
 import argparse
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -32,10 +38,10 @@ from camkit.models_def.training.kind import Restorer, read_recipe, training_kind
 from camkit.models_def.training.sample import Sample, SampleLayout
 from camkit.models_def.training.similarity import ssim
 from camkit.models_def.training.trainer import TrainOptions, train
+from tools.comparison.classical import METHODS, numbers, with_method
 from tools.comparison.compact_json import to_compact_json
 from tools.lens_table import kept
 
-UNTRAINED: Final = ("capture", "wiener")
 METRICS: Final = ("psnr_db", "ssim", "perceptual")
 DOMAINS: Final = ("lab", "wild")
 JUDGE_SEED: Final = 909
@@ -50,7 +56,6 @@ class Conditions:
     """What is the same for all rows.
 
     Attributes:
-        wild: Recipe of the other circumstances.
         data: Pictures to train on.
         fresh: Pictures to judge on.
         sharp: Pictures for the critic.
@@ -60,7 +65,6 @@ class Conditions:
         out_dir: Where everything goes.
     """
 
-    wild: Path
     data: Path | None
     fresh: Path | None
     sharp: Path | None
@@ -69,11 +73,26 @@ class Conditions:
     samples: int
     out_dir: Path
 
-    def digest(self, row: str, recipe: Path) -> str:
+    def digest(self, row: "Row") -> str:
         """Give a hash of all that decides a row."""
-        files = [path.read_text(encoding="utf-8") for path in (recipe, self.wild)]
+        files = [path.read_text(encoding="utf-8") for path in (row.lab, row.wild)]
         given = [self.data, self.fresh, self.sharp, self.vgg, self.minutes, self.samples]
-        return hashlib.sha256("\n".join([row, *files, *map(str, given)]).encode()).hexdigest()
+        return hashlib.sha256("\n".join([row.size, *files, *map(str, given)]).encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A row of the table.
+
+    Attributes:
+        size: Of a network, or one of `UNTRAINED`.
+        lab: Recipe that it is trained by.
+        wild: Recipe of the same camera in other circumstances.
+    """
+
+    size: str
+    lab: Path
+    wild: Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,11 +103,13 @@ class Domain:
         samples: Never trained on.
         layout: Of them.
         to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
+        designed: The lens that they were taken with, as a bundle holds it.
     """
 
     samples: Sequence[Sample]
     layout: SampleLayout
     to_rec709: Tensor
+    designed: Mapping[str, bytes]
 
     def score(self, restore: Restorer, features: Features) -> Entry:
         """Judge a restoration by `METRICS`, means over the samples."""
@@ -108,7 +129,6 @@ def main() -> int:
     """Train and judge every row, and write the table."""
     arguments = parse()
     conditions = Conditions(
-        wild=arguments.wild,
         data=arguments.data,
         fresh=arguments.fresh,
         sharp=arguments.sharp,
@@ -121,19 +141,19 @@ def main() -> int:
     torch.set_num_threads(1)
     rows: dict[str, Entry] = {}
     for name in (*UNTRAINED, *arguments.rows):
-        size, recipe = row_of(name, arguments.lab)
+        row = row_of(name, arguments.lab, arguments.wild)
         rows[name] = kept(
-            conditions.out_dir,
-            conditions.digest(size, recipe),
-            lambda size=size, recipe=recipe: measure(size, recipe, conditions),
+            conditions.out_dir, conditions.digest(row), lambda row=row: measure(row, conditions)
         )
         print(line(name, rows[name]), flush=True)
+    best = max(CLASSICAL, key=lambda name: float(rows[name]["lab"]["psnr_db"]))
     report = {
         "lab": arguments.lab.stem,
-        "wild": conditions.wild.stem,
+        "wild": arguments.wild.stem,
         "minutes": conditions.minutes,
         "samples": conditions.samples,
         "features": "random" if conditions.vgg is None else conditions.vgg.name,
+        "classical": {"best": best, **numbers()},
         "rows": rows,
     }
     written = conditions.out_dir / "loss_table.json"
@@ -150,51 +170,73 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument("lab", type=Path)
     parser.add_argument("--wild", type=Path, required=True)
-    parser.add_argument("--rows", nargs="+", required=True, help="SIZE or SIZE=RECIPE.toml")
+    parser.add_argument("--rows", nargs="+", required=True, help="SIZE or SIZE=LAB.toml,WILD.toml")
     parser.add_argument("--data", type=Path, help="pictures to train on")
     parser.add_argument("--fresh", type=Path, help="pictures to judge on")
     parser.add_argument("--sharp", type=Path, help="pictures without captures, for the critic")
     parser.add_argument("--vgg", type=Path, help="weights of VGG-19")
     parser.add_argument("--minutes", type=float, default=60.0, help="CPU time of a row")
-    parser.add_argument("--samples", type=int, default=48, help="to judge on, of each recipe")
+    parser.add_argument("--samples", type=count, default=48, help="to judge on, of each recipe")
     parser.add_argument("--out-dir", type=Path, default=Path("out/loss-table"))
     return parser.parse_args()
 
 
-def row_of(name: str, lab: Path) -> tuple[str, Path]:
-    """Give size and recipe of a row."""
-    size, _, recipe = name.partition("=")
-    return size, Path(recipe) if recipe else lab
+def count(text: str) -> int:
+    """Read a number of samples."""
+    number = int(text)
+    if number < 1:
+        raise ValueError(text)
+    return number
 
 
-def measure(row: str, recipe: Path, conditions: Conditions) -> Entry:
+def row_of(name: str, lab: Path, wild: Path) -> Row:
+    """Give the row of a word of the command line."""
+    size, _, recipes = name.partition("=")
+    own = recipes.split(",") if recipes else [str(lab), str(wild)]
+    if len(own) != 2:
+        raise SystemExit(f"{name}: a row is SIZE or SIZE=LAB.toml,WILD.toml")
+    return Row(size=size, lab=Path(own[0]), wild=Path(own[1]))
+
+
+def measure(row: Row, conditions: Conditions) -> Entry:
     """Train a row, where it needs that, and judge it in both domains."""
+    method = row.size if row.size in METHODS else None
+    home, abroad = (domain(path, conditions, method) for path in (row.lab, row.wild))
+    if home.designed != abroad.designed:
+        raise SystemExit(f"{row.lab} and {row.wild} are of two lenses; a row needs two of one")
     trained: Entry = {}
-    if row in UNTRAINED:
-        restore = _UNTRAINED[row]
+    if row.size in UNTRAINED:
+        restore = UNTRAINED[row.size]
     else:
-        restore, trained = restorer(row, recipe, conditions)
+        restore, trained = restorer(row.size, row.lab, conditions)
     features = Relu32(conditions.vgg)
-    scores = {
-        name: domain(path, conditions).score(restore, features)
-        for name, path in zip(DOMAINS, (recipe, conditions.wild), strict=True)
-    }
-    return trained | scores
+    pairs = zip(DOMAINS, (home, abroad), strict=True)
+    return trained | {name: one.score(restore, features) for name, one in pairs}
 
 
-def domain(recipe_path: Path, conditions: Conditions) -> Domain:
-    """Make the samples of a recipe that rows are judged on."""
+def domain(recipe_path: Path, conditions: Conditions, method: str | None = None) -> Domain:
+    """Make the samples of a recipe that rows are judged on.
+
+    Args:
+        recipe_path: Of the recipe.
+        conditions: Pictures and number.
+        method: One of `METHODS` in place of the bank.
+    """
     recipe = read_recipe(recipe_path)
     kind, role = training_kind(recipe.kind), recipe.role(None)
     matrix = getattr(recipe.sensor, "color_matrix", None)
     if matrix is None:
         raise SystemExit(f"{recipe_path} has no sensor.color_matrix, to see pictures")
-    material = kind.prepare(recipe, recipe_path.parent, conditions.out_dir)
+    folder = conditions.out_dir / f"{recipe_path.stem}_judged"
+    folder.mkdir(parents=True, exist_ok=True)
+    material = kind.prepare(recipe, recipe_path.parent, folder)
     maker = kind.maker(recipe, role, material, conditions.fresh, JUDGE_SEED)
+    maker = maker if method is None else with_method(method, maker, recipe)
     return Domain(
         samples=[maker.make(number) for number in range(conditions.samples)],
         layout=kind.layout(recipe, role),
         to_rec709=torch.from_numpy(rec709_from_camera(np.array(matrix))).float(),
+        designed=material.designed,
     )
 
 
@@ -230,10 +272,13 @@ def _wiener(planes: Tensor) -> Tensor:
     return planes[:, -3:]
 
 
-_UNTRAINED: Final[dict[str, Callable[[Tensor], Tensor]]] = {
+UNTRAINED: Final[dict[str, Restorer]] = {
     "capture": _capture,
     "wiener": _wiener,
+    **dict.fromkeys(METHODS, _wiener),
 }
+"""Of a row without training: what it makes of a sample's planes."""
+CLASSICAL: Final[tuple[str, ...]] = ("wiener", *METHODS)
 
 
 def line(name: str, entry: Entry) -> str:

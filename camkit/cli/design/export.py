@@ -26,7 +26,7 @@ def export(
     ] = None,
     haze: Annotated[
         Path | None,
-        typer.Option(help=f"The haze beside it; default: {HAZE_NAME} there, if any."),
+        typer.Option(help=f"The haze of its optics; default: {HAZE_NAME} beside it, if any."),
     ] = None,
     stress_psf: Annotated[
         Path | None,
@@ -74,7 +74,7 @@ def export(
         Parts(
             checkpoints=tuple(checkpoints),
             psf=frozen,
-            haze=haze or _beside(folder, HAZE_NAME),
+            haze=haze or _beside(frozen.parent, HAZE_NAME),
             stress_psf=stress_psf or _beside(folder, STRESS_NAME),
             prescription=prescription,
             plate=None if plate in (None, NO_PLATE) else Path(plate),

@@ -34,41 +34,21 @@ def prepare(
 ) -> None:
     """Photograph whole frames and take their haze away, for `train` (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
-    from camkit.errors import ContractError
 
     require_torch("camkit prepare")
-    from camkit.bundle.frozen_optics import FrozenOptics
-    from camkit.bundle.haze_file import read_haze
-    from camkit.bundle.psf_file import read_psf
-    from camkit.export.frames import FrameSources, designed_lens, freeze_copies, prepare_frames
-    from camkit.models_def.kinds.bayer.frames.tiles import HEADER, frames_folder
-    from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+    from camkit.export.preparing import PrepareOptions, preparing_kind
     from camkit.models_def.training.kind import read_recipe
 
     plan = read_recipe(recipe)
-    if not isinstance(plan, BayerRecipe) or plan.haze is None:
-        raise ContractError(
-            f"{plan.name} has no haze; its samples are made while it trains, leave prepare out"
-        )
-    refuse_existing([frames_folder(out_dir, plan) / HEADER], overwrite=overwrite)
-    optics = FrozenOptics(
-        psf=read_psf(psf or out_dir / PSF_NAME), haze=read_haze(haze or out_dir / HAZE_NAME)
+    kind = preparing_kind(plan.kind)
+    refuse_existing([kind.written_last(plan, out_dir)], overwrite=overwrite)
+    options = PrepareOptions(
+        psf=psf or out_dir / PSF_NAME,
+        haze=haze or out_dir / HAZE_NAME,
+        pictures=data,
+        valid=valid,
+        recipe_folder=recipe.parent,
+        runs=out_dir,
+        seed=seed,
     )
-
-    def tell(line: str) -> None:
-        say(line, err=True)
-
-    lens, copies = freeze_copies(plan, recipe.parent, tell)
-    made = prepare_frames(
-        plan,
-        FrameSources(
-            pictures={"train": data, "valid": valid},
-            optics=optics,
-            copies=copies,
-            designed=designed_lens(lens),
-            seed=seed,
-        ),
-        out_dir,
-        tell,
-    )
-    print_report(made, json_)
+    print_report(kind.prepare(plan, options, lambda line: say(line, err=True)), json_)

@@ -8,10 +8,9 @@ from camkit.models_def.kinds.bayer.fine_tuning.refinement import trace_recipe_di
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.networks.catalog import build_network
-from camkit.models_def.training.adversarial.fitter import Mix
 from camkit.models_def.training.adversarial.fitting import picture_fitting
+from camkit.models_def.training.adversarial.judged import Mix
 from camkit.models_def.training.fitting import FitRequest, OwnFitting
-from camkit.models_def.training.sample import Batch
 
 
 class BayerFitting:
@@ -28,11 +27,7 @@ class BayerFitting:
         def mixer(folder: Path, material: BayerMaterial) -> Mix:
             distortion = trace_recipe_distortion(recipe, request.recipe_folder)
             pairs = read_pairs(folder, recipe, material.bank, distortion, seed=seed)
-
-            def mix(batch: Batch, step: int) -> Batch:
-                return pairs.mixed(batch, recipe.fine_tuning.pair_share, seed, step)
-
-            return mix
+            return pairs.mixer(recipe.fine_tuning.pair_share, seed)
 
         return picture_fitting(request, build_network, mixer)
 

@@ -61,9 +61,10 @@ class LensRecipe:
     validation_copies: int = 1
 
     def __post_init__(self) -> None:
-        if self.validation_copies < 1:
+        if min(self.copies, self.validation_copies) < 1:
             raise ContractError(
-                f"lens.validation_copies must be >= 1; got {self.validation_copies}"
+                "lens.copies and lens.validation_copies must be >= 1; got "
+                f"{self.copies}, {self.validation_copies}"
             )
         if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
             raise ContractError(f"lens.depths_mm must increase from above 0; got {self.depths_mm}")

@@ -251,14 +251,31 @@ def photograph(
     )
 
 
-def finish_shot(developed: Developed, recipe: BayerRecipe) -> Shot:
-    """Filter and stabilise developed planes, as the runtime does."""
-    planes, unknown, given = developed.planes, developed.unknown, developed.given
-    data, noise = recipe.data, given.noise
-    shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
-    restored = wiener_restore(
-        planes, given.frozen, *given.met, recipe.wiener, unknown, height_mm=given.height_mm
+def filtered(developed: Developed, recipe: BayerRecipe) -> Tensor:
+    """Give (1, 3, S, S) of developed planes behind the recipe's bank, linear."""
+    given = developed.given
+    return wiener_restore(
+        developed.planes,
+        given.frozen,
+        *given.met,
+        recipe.wiener,
+        developed.unknown,
+        height_mm=given.height_mm,
     )
+
+
+def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | None = None) -> Shot:
+    """Filter and stabilise developed planes, as the runtime does.
+
+    Args:
+        developed: What was photographed.
+        recipe: Camera and sample sizes.
+        restored: (1, 3, S, S) of another filter than the recipe's bank, linear.
+    """
+    planes, given, data = developed.planes, developed.given, recipe.data
+    noise = given.noise
+    shot, read = torch.tensor(noise.shot), torch.tensor(noise.read_variance)
+    restored = filtered(developed, recipe) if restored is None else restored
     stable = [
         stabilise(cut_middle(x, data.sample_px), shot, read, scale=recipe.scale)
         for x in (planes, restored)

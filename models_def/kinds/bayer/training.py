@@ -31,8 +31,10 @@ from camkit.models_def.kinds.bayer.recipe import (
 )
 from camkit.models_def.kinds.bayer.samples import (
     LAYOUT,
+    Developed,
     draw_exposure,
-    make_shot,
+    finish_shot,
+    photograph,
     scene_side_px,
     tint_crop,
 )
@@ -69,13 +71,16 @@ class BayerMaker:
             lamp_share=recipe.data.lamp_share,
         )
 
-    def make(self, index: int) -> Sample:
-        """Photograph a crop of a scene."""
+    def developed(self, index: int) -> Developed:
+        """Photograph a crop of a scene, and develop it."""
         rng = np.random.default_rng((self._seed, index))
         exposure = draw_exposure(rng, self._recipe, self._bank)
         crop = self._source.draw_crop(rng, scene_side_px(self._recipe, self._bank))
-        crop = tint_crop(rng, crop)
-        return make_shot(crop, exposure, self._recipe, self._bank, rng).sample
+        return photograph(tint_crop(rng, crop), exposure, self._recipe, self._bank, rng)
+
+    def make(self, index: int) -> Sample:
+        """Photograph a crop of a scene."""
+        return finish_shot(self.developed(index), self._recipe).sample
 
 
 class BayerTraining:

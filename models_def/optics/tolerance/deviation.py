@@ -17,6 +17,7 @@ FIELDS: Final[dict[ErrorClass, str]] = {
     "index": "index",
     "abbe": "abbe",
     "conic": "conic",
+    "groove_depth": "groove_depth",
     "surface_decentre": "surface_decentre_mm",
     "surface_tilt": "surface_tilt_rad",
     "element_decentre": "element_decentre_mm",
@@ -35,6 +36,7 @@ class Deviations:
         index: (copy, surface), of the medium after it.
         abbe: (copy, surface), relative.
         conic: (copy, surface).
+        groove_depth: (copy, surface), relative.
         surface_decentre_mm: (copy, surface, 2), x and y.
         surface_tilt_rad: (copy, surface, 2), a rotation vector: its x turns y towards z.
         element_decentre_mm: (copy, element, 2).
@@ -47,6 +49,7 @@ class Deviations:
     index: Array
     abbe: Array
     conic: Array
+    groove_depth: Array
     surface_decentre_mm: Array
     surface_tilt_rad: Array
     element_decentre_mm: Array
@@ -57,6 +60,11 @@ class Deviations:
     def copies(self) -> int:
         """How many there are."""
         return len(self.focus_mm)
+
+    def of_copy(self, number: int) -> "Deviations":
+        """Give those of one copy alone."""
+        one = slice(number, number + 1)
+        return Deviations(**{f.name: getattr(self, f.name)[one] for f in fields(self)})
 
 
 def draw_deviations(
@@ -86,9 +94,12 @@ def draw_deviations(
         raise ContractError(f"a seed must be >= 0; got {seed}")
     elements, surfaces = glass_elements(lens), len(lens.surfaces)
     rows = [_uniform(seed, i, surfaces, len(elements)) for i in copies]
-    flat, on_surface, on_element, focus = (np.stack(part) for part in zip(*rows, strict=True))
+    flat, on_surface, on_element, focus, relief = (
+        np.stack(part) for part in zip(*rows, strict=True)
+    )
     glass = np.array([surface.glass != "air" for surface in lens.surfaces], dtype=np.float64)
     curved = np.array([surface.curvature_per_mm != 0 for surface in lens.surfaces])
+    grooved = np.array([surface.grooves is not None for surface in lens.surfaces])
     refracting = np.zeros(surfaces)
     for element in elements:
         refracting[element.start : element.stop] = 1
@@ -112,6 +123,7 @@ def draw_deviations(
         index=signed(tolerances.index, flat[:, 2]) * glass,
         abbe=signed(tolerances.abbe, flat[:, 3]) * glass,
         conic=signed(tolerances.conic, flat[:, 4]) * refracting,
+        groove_depth=signed(tolerances.groove_depth, relief) * grooved,
         surface_decentre_mm=vector(tolerances.surface_decentre, on_surface[:, 0])
         * refracting[:, None],
         surface_tilt_rad=vector(tolerances.surface_tilt, on_surface[:, 1]) * refracting[:, None],
@@ -133,14 +145,18 @@ def _arrays(deviations: Deviations) -> Iterator[tuple[str, Array]]:
 
 def _uniform(
     seed: int, number: int, surfaces: int, elements: int
-) -> tuple[Array, Array, Array, np.float64]:
-    """Give draws of 0..1: (5, surface), (2, surface, 2), (2, element, 2) and one number."""
+) -> tuple[Array, Array, Array, np.float64, Array]:
+    """Give draws of 0..1: (5, surface), (2, surface, 2), (2, element, 2), 1 number, (surface,).
+
+    A class that is new draws last: the errors of a seed stay what they were.
+    """
     rng = np.random.default_rng((seed, number))
     return (
         rng.random((5, surfaces)),
         rng.random((2, surfaces, 2)),
         rng.random((2, elements, 2)),
         np.float64(rng.random()),
+        rng.random(surfaces),
     )
 
 

@@ -24,6 +24,7 @@ KEYS: Final[dict[str, tuple[ErrorClass, float]]] = {
     "index": ("index", 1.0),
     "abbe_percent": ("abbe", 0.01),
     "conic": ("conic", 1.0),
+    "groove_depth_percent": ("groove_depth", 0.01),
     "surface_decentre_mm": ("surface_decentre", 1.0),
     "surface_tilt_arcmin": ("surface_tilt", _ARCMIN),
     "surface_tilt_deg": ("surface_tilt", to_radians(1.0)),
@@ -94,6 +95,7 @@ def in_file_units(error_class: ErrorClass, value: float) -> str:
     texts = {
         "radius": (0.01, " %"),
         "abbe": (0.01, " %"),
+        "groove_depth": (0.01, " %"),
         "thickness": (1.0, " mm"),
         "focus": (1.0, " mm"),
         "surface_decentre": (1.0, " mm"),

@@ -20,6 +20,7 @@ ErrorClass = Literal[
     "index",
     "abbe",
     "conic",
+    "groove_depth",
     "surface_decentre",
     "surface_tilt",
     "element_decentre",
@@ -94,6 +95,8 @@ class Tolerances:
         index: Of every glass.
         abbe: Relative, of the Abbe number of every glass, the index at the d line kept.
         conic: Of every surface of a glass.
+        groove_depth: Relative, of the relief of every surface with grooves: its heights are so
+            many times too large, its walls stand where they should.
         surface_decentre: mm.
         surface_tilt: Radians.
         element_decentre: mm.
@@ -108,6 +111,7 @@ class Tolerances:
     index: ErrorWidth = field(default=ErrorWidth(half_width=_BASE.index))
     abbe: ErrorWidth = _NOTHING
     conic: ErrorWidth = _NOTHING
+    groove_depth: ErrorWidth = _NOTHING
     surface_decentre: ErrorWidth = _DECENTRE
     surface_tilt: ErrorWidth = _TILT
     element_decentre: ErrorWidth = _DECENTRE
@@ -120,8 +124,11 @@ class Tolerances:
             raise ContractError(
                 f"a compensator is one of {', '.join(COMPENSATORS)}; got {self.compensator!r}"
             )
-        if max(self.radius.half_width, self.abbe.half_width) > _MAX_SHARE:
-            raise ContractError(f"radius and abbe errors must be at most 50 %; got {self}")
+        shares = self.radius, self.abbe, self.groove_depth
+        if max(share.half_width for share in shares) > _MAX_SHARE:
+            raise ContractError(
+                f"radius, abbe and groove_depth errors must be at most 50 %; got {self}"
+            )
         if max(self.surface_tilt.half_width, self.element_tilt.half_width) > MAX_TILT_RAD:
             raise ContractError(f"tilts must be at most {MAX_TILT_RAD} rad; got {self}")
 

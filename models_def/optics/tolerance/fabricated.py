@@ -1,7 +1,8 @@
 """Copies of a lens as tensors: their beams aimed at the stop, traced and refocused."""
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import torch
@@ -86,8 +87,14 @@ def fabricated_tensors(
         lens: Nominal.
         deviations: The errors; the focus error is added to the last thickness.
         wavelengths_um: (wave,).
+
+    Raises:
+        ContractError: If copies have grooves of different depths; trace them one by one.
     """
     nominal = surface_tensors(lens, wavelengths_um)
+    relief = 1 + deviations.groove_depth
+    if (relief != relief[:1]).any():
+        raise ContractError("copies whose grooves are of different depths are traced one by one")
 
     def column(values: Array) -> Tensor:
         """Give (surface, copy, 1, 1, 1) from (copy, surface)."""
@@ -107,15 +114,22 @@ def fabricated_tensors(
     thickness = wide(nominal.thickness_mm) + column(deviations.thickness_mm)
     focus = torch.zeros_like(thickness)
     focus[-1] = torch.from_numpy(deviations.focus_mm)[:, None, None, None]
+    # a profile s times as high: s sag(r) has the curvature s c, 1 + k over s^2 and terms s a
+    deeper = column(relief)
+    curvature = wide(nominal.curvature_per_mm) / (1 + column(deviations.radius))
+    conic = wide(nominal.conic) + column(deviations.conic)
     return SurfaceTensors(
-        curvature_per_mm=wide(nominal.curvature_per_mm) / (1 + column(deviations.radius)),
-        conic=wide(nominal.conic) + column(deviations.conic),
-        even_asphere=nominal.even_asphere[:, :, None, None, None, None],
+        curvature_per_mm=curvature * deeper,
+        conic=torch.where(deeper == 1, conic, (1 + conic) / deeper**2 - 1),
+        even_asphere=nominal.even_asphere[:, :, None, None, None, None] * deeper[:, None],
         thickness_mm=thickness + focus,
         semi_diameter_mm=wide(nominal.semi_diameter_mm),
         index=torch.cat([torch.ones_like(index[:1]), index]),
         aspheric=nominal.aspheric,
-        grooves=nominal.grooves,
+        grooves=tuple(
+            None if groove is None else replace(groove, depth_mm=groove.depth_mm * float(s))
+            for groove, s in zip(nominal.grooves, relief[0], strict=True)
+        ),
     )
 
 
@@ -134,6 +148,9 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
     Raises:
         ContractError: If the chief ray of a copy is lost, or no ray arrives.
     """
+    if deviations.groove_depth.any() and deviations.copies > 1:
+        alone = (deviations.of_copy(number) for number in range(deviations.copies))
+        return _joined([land(lens, one, view, compensator) for one in alone])
     fixed = with_fixed_stop(lens)
     with torch.no_grad():
         rays, weight = _trace(fixed, deviations, view)
@@ -153,6 +170,19 @@ def land(lens: Lens, deviations: Deviations, view: View, compensator: Compensato
         chief_x_mm=chief.x[:, :, 0, 0],
         chief_y_mm=chief.y[:, :, 0, 0],
         refocus_mm=shift,
+    )
+
+
+def _joined(parts: list[Landing]) -> Landing:
+    """Put the landings of single copies together."""
+
+    def cat(values: Iterable[Tensor]) -> Tensor:
+        return torch.cat(list(values))
+
+    names = [f.name for f in fields(Rays) if f.name != "path_mm"]
+    return Landing(
+        rays=Rays(**{name: cat(getattr(p.rays, name) for p in parts) for name in names}),
+        **{f.name: cat(getattr(p, f.name) for p in parts) for f in fields(Landing)[1:]},
     )
 
 

@@ -4,6 +4,7 @@
     content       |difference|, Gram matrices and features; eqs. (3.6), (3.7)
     wasserstein   a critic's loss, its gradient penalty, a generator's loss; eq. (3.8)
     sharp         pictures without captures, for the critic
+    judged        what fitters of a judged generator have in common
     fitter        one step: the critic several times, then the generator; eq. (3.9)
     fitting       the fitter of any kind whose cameras make three colours
 

@@ -9,7 +9,6 @@ where there are sharp pictures without captures. All that is drawn follows from 
 step.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -20,8 +19,9 @@ from torch import Tensor, nn
 from camkit.errors import ContractError
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
 from camkit.models_def.training.adversarial.content import Features, content_terms
+from camkit.models_def.training.adversarial.judged import JudgedFitter, Mix
 from camkit.models_def.training.adversarial.sharp import SharpCrops
-from camkit.models_def.training.adversarial.views import Views, make_views
+from camkit.models_def.training.adversarial.views import Views
 from camkit.models_def.training.adversarial.wasserstein import (
     critic_loss,
     generator_loss,
@@ -31,11 +31,6 @@ from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights
 from camkit.models_def.training.fitter import ANOTHER_LOSS, Fitter, NetworkBuilder
 from camkit.models_def.training.recipe import CriticRecipe, NetworkRecipe, ScheduleRecipe
-from camkit.models_def.training.sample import Batch
-from camkit.models_def.training.schedule import learning_rate
-
-Mix = Callable[[Batch, int], Batch]
-"""A batch and the number of its step -> the batch with patches of real pairs among its own."""
 
 BETA2: Final = 0.999
 USUAL_BETA1: Final = 0.9
@@ -70,7 +65,6 @@ class CriticTraining:
 
     def __init__(self, schedule: ScheduleRecipe, device: torch.device) -> None:
         self.recipe: CriticRecipe = schedule.critic
-        self._schedule = schedule
         torch.manual_seed(schedule.seed + CRITIC_SEED)
         shape = DiscriminatorConfig(layers=self.recipe.layers, width=self.recipe.width)
         self.network = Discriminator(shape).to(device)
@@ -123,77 +117,43 @@ class CriticTraining:
         self._optimizer.load_state_dict(state["optimizer"])
 
 
-class PictureFitter:
+class PictureFitter(JudgedFitter):
     """Fits a generator to the content terms, with a critic where the loss asks for one."""
 
     def __init__(self, entry: NetworkRecipe, build: NetworkBuilder, parts: PictureParts) -> None:
-        self.schedule, self._parts = entry.schedule, parts
-        judged = entry.schedule.loss == "adversarial"
-        betas = (entry.schedule.critic.beta1 if judged else USUAL_BETA1, BETA2)
-        self.generator = Fitter(entry, build, parts.device, parts.first, betas)
-        device = self.generator.device
-        self.critic = CriticTraining(entry.schedule, device) if judged else None
-        self._to_rec709 = parts.to_rec709.float().to(device)
+        schedule = entry.schedule
+        judged = schedule.loss == "adversarial"
+        betas = (schedule.critic.beta1 if judged else USUAL_BETA1, BETA2)
+        generator = Fitter(entry, build, parts.device, parts.first, betas)
+        super().__init__(generator, parts.to_rec709, parts.mix)
+        self.critic = CriticTraining(schedule, generator.device) if judged else None
+        self._sharp = parts.sharp
         self._features: Features | None = (
-            None if parts.features is None else parts.features.to(device)
+            None if parts.features is None else parts.features.to(generator.device)
         )
-        self._notes: dict[str, list[float]] = {}
 
-    def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step of all networks and give the generator's loss."""
-        if self._parts.mix is not None:
-            batch = self._parts.mix(batch, step)
-        device = self.generator.device
-        output = self.generator.run(batch.planes, progress)
-        views = make_views(
-            output, batch.target.to(device), batch.weight.to(device), self._to_rec709
-        )
-        if self.critic is not None:
-            self._teach(self.critic, views, step, progress)
-        loss = self._total(views)
-        self.generator.descend(loss, step, progress)
-        return float(loss.detach())
-
-    def _teach(self, critic: CriticTraining, views: Views, step: int, progress: float) -> None:
-        decay = learning_rate(self.schedule, step, progress) / self.schedule.learning_rate
+    def teach(self, views: Views, step: int, decay: float) -> None:
+        """Make the critic's steps."""
+        critic, sharp = self.critic, self._sharp
+        if critic is None:
+            return
         draw = torch.Generator().manual_seed(self.schedule.seed * STEP_SEED + step)
         rng = np.random.default_rng((self.schedule.seed, SHARP_SEED, step))
-        sharp, share = self._parts.sharp, critic.recipe.sharp_share
-        fake = views.seen.detach()
+        fake, share = views.seen.detach(), critic.recipe.sharp_share
         for _ in range(critic.recipe.steps):
             real = views.real if sharp is None else sharp.put_among(rng, views.real, share)
             apart, penalty = critic.learn(real, fake, draw, decay=decay)
-            self._note("critic", apart)
-            self._note("penalty", penalty)
+            self.note("critic", apart)
+            self.note("penalty", penalty)
 
-    def _total(self, views: Views) -> Tensor:
+    def total(self, views: Views) -> Tensor:
+        """Give the content terms, and the critic's opinion. References: eq. (3.9)."""
         terms = content_terms(views, self.schedule.content, self._features)
         if self.critic is not None:
             terms["adversarial"] = self.critic.recipe.weight, self.critic.opinion(views.seen)
         for name, (_, value) in terms.items():
-            self._note(name, value)
+            self.note(name, value)
         return torch.stack([weight * value for weight, value in terms.values()]).sum()
-
-    def _note(self, name: str, value: Tensor) -> None:
-        self._notes.setdefault(name, []).append(float(value.detach()))
-
-    def notes(self) -> dict[str, float]:
-        """Give the mean of each term since the last call."""
-        means = {name: sum(values) / len(values) for name, values in self._notes.items()}
-        self._notes.clear()
-        return means
-
-    def restore(self, planes: Tensor) -> Tensor:
-        """Run the averaged generator on (1, c, h, w) planes; float32 on the CPU comes back."""
-        return self.generator.restore(planes)
-
-    def weights(self) -> State:
-        """Give the generator's weights being trained."""
-        return self.generator.weights()
-
-    def average(self) -> State:
-        """Give the generator's averaged weights."""
-        return self.generator.average()
 
     def optimizer_state(self) -> dict[str, Any]:
         """Give the generator's optimiser, and the critic with its own: tensors and numbers."""

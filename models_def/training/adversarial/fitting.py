@@ -14,7 +14,8 @@ from camkit.colorimetry import rec709_from_camera
 from camkit.errors import ContractError
 from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.training.adversarial.content import Relu32
-from camkit.models_def.training.adversarial.fitter import Mix, PictureFitter, PictureParts
+from camkit.models_def.training.adversarial.fitter import PictureFitter, PictureParts
+from camkit.models_def.training.adversarial.judged import Mix
 from camkit.models_def.training.adversarial.sharp import SharpCrops
 from camkit.models_def.training.fitter import Fits, NetworkBuilder
 from camkit.models_def.training.fitting import FitRequest, OwnFitting

@@ -64,6 +64,12 @@ def test_unknown_name_lists_the_known_ones() -> None:
         build_network("unet")
 
 
+@pytest.mark.parametrize("config", [{"width": 2.5}, {"width": "wide"}, {"stages": None}])
+def test_values_that_torch_cannot_take_are_refused_in_one_line(config: dict[str, object]) -> None:
+    with pytest.raises(ContractError, match="normed_unet does not take this configuration"):
+        build_network("normed_unet", **config)
+
+
 def test_unknown_field_is_refused() -> None:
     with pytest.raises(ContractError, match="lean_m does not take this configuration"):
         build_network("lean_m", depth=3)

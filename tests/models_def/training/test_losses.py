@@ -36,12 +36,13 @@ def test_log_loss_cares_for_relative_errors():
     small = training_loss("log_mse", torch.tensor([1e-2, 4e-2]))
     swapped = training_loss("log_mse", torch.tensor([2e-2, 2e-2]))
     assert float(small) == pytest.approx(float(swapped), abs=0.05)
-    assert float(training_loss("mse", torch.tensor([1e-2, 4e-2]))) == pytest.approx(2.5e-2)
+    for plain in ("mse", "l1"):
+        assert float(training_loss(plain, torch.tensor([1e-2, 4e-2]))) == pytest.approx(2.5e-2)
 
 
 def test_unknown_loss_is_refused():
-    with pytest.raises(ContractError, match="log_mse or mse"):
-        training_loss("l1", torch.ones(1))
+    with pytest.raises(ContractError, match="log_mse, mse or l1"):
+        training_loss("l3", torch.ones(1))
 
 
 def test_what_stays_within_the_range_around_is_no_overshoot():

@@ -36,6 +36,16 @@ def test_8_bit_values_are_decoded_by_the_srgb_curve():
     assert np.allclose(to_linear(values), expected, atol=1e-7)
 
 
+def test_scenes_behind_the_first_ones_are_others():
+    def drawn(**first):
+        source = open_source(None, picture_share=0.0, scenes=2, scene_px=32, **first)
+        return {float(source.draw_crop(np.random.default_rng(i), 32).sum()) for i in range(8)}
+
+    assert drawn() == drawn(first_scene=0)
+    assert len(drawn()) == 2
+    assert not drawn() & drawn(first_scene=-2)
+
+
 @pytest.mark.parametrize("side", [16, 64, 200])
 def test_crops_have_the_asked_size_even_of_smaller_pictures(folder, side):
     source = open_source(folder, picture_share=1.0, scenes=1, scene_px=64)

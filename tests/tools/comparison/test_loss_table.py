@@ -6,39 +6,26 @@ from pathlib import Path
 import pytest
 import torch
 
-from camkit.models_def.kinds.bayer import training, validation
-from tests.bayer_recipe import RECIPE, bank, material, recipe, recipe_path  # noqa: F401
+from camkit.models_def.kinds.bayer import training
+from camkit.models_def.kinds.bayer.material import BayerMaterial
+from tests.bayer_recipe import bank, material, one_picture_to_validate_on, recipe  # noqa: F401
+from tests.normed_recipe import NORMED_RECIPE, recipe_path  # noqa: F401
 from tests.tiny_design import run_tool
 from tools.comparison import loss_table
+from tools.comparison.classical import METHODS
 from tools.comparison.loss_table import METRICS
 
-NETWORKS = """
-[networks.supervised]
-network = "normed_unet"
-config = { width = 4, stages = 3 }
-schedule = { loss = "l1", steps = 2, precision = "float32" }
-
-[networks.adversarial]
-network = "normed_unet"
-config = { width = 4, stages = 3 }
-
-[networks.adversarial.schedule]
-loss = "adversarial"
-steps = 2
-precision = "float32"
-critic = { layers = 2, width = 4, steps = 1 }
-"""
+FREE = ["capture", "wiener", *METHODS]
 
 
 @pytest.fixture
 def recipes(tmp_path, monkeypatch, material):  # noqa: F811
     """The tiny camera at home, and with more light; its kernels need no tracing."""
-    monkeypatch.setattr(validation, "PROCEDURAL_PICTURES", 1)
     monkeypatch.setattr(training, "trace_material", lambda *_: material)
     lab, wild = tmp_path / "lab.toml", tmp_path / "wild.toml"
-    lab.write_text(RECIPE + NETWORKS, encoding="utf-8")
-    brighter = RECIPE.replace("[data]", "[data]\nlamp_share = 1.0\nexposure_max_ev = 2.0")
-    wild.write_text(brighter + NETWORKS, encoding="utf-8")
+    lab.write_text(NORMED_RECIPE, encoding="utf-8")
+    brighter = NORMED_RECIPE.replace("[data]", "[data]\nlamp_share = 1.0\nexposure_max_ev = 2.0")
+    wild.write_text(brighter, encoding="utf-8")
     return lab, wild
 
 
@@ -47,37 +34,57 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
 ) -> None:
     lab, wild = recipes
     out = tmp_path / "out"
-    options = [lab, "--wild", wild, "--rows", "supervised", "adversarial", "--samples", 2]
+    options = [lab, "--wild", wild, "--rows", "l1", "adversarial", "--samples", 2]
     options += ["--minutes", 10, "--out-dir", out]
     assert run_tool(monkeypatch, "comparison.loss_table", *options) == 0
     report = json.loads((out / "loss_table.json").read_text(encoding="utf-8"))
     rows = report["rows"]
-    assert list(rows) == ["capture", "wiener", "supervised", "adversarial"]
+    assert list(rows) == [*FREE, "l1", "adversarial"]
     assert all(
         set(METRICS) <= set(row[where]) for row in rows.values() for where in ("lab", "wild")
     )
-    assert rows["supervised"]["trained"]["steps"] == 2
-    # two steps from the bank: still close to it
-    gap = rows["supervised"]["lab"]["psnr_db"] - rows["wiener"]["lab"]["psnr_db"]
+    assert rows["l1"]["trained"]["steps"] == 3
+    # three steps from the bank: still close to it
+    gap = rows["l1"]["lab"]["psnr_db"] - rows["wiener"]["lab"]["psnr_db"]
     assert abs(gap) < 3
     assert rows["capture"]["lab"]["psnr_db"] != rows["capture"]["wild"]["psnr_db"]
+    best = report["classical"]["best"]
+    assert rows[best]["lab"]["psnr_db"] == max(rows[name]["lab"]["psnr_db"] for name in FREE[1:])
+    assert report["classical"]["rl"]["least_rounds"] == 10
     assert "| adversarial |" in (out / "loss_table.md").read_text(encoding="utf-8")
     monkeypatch.setattr(loss_table, "measure", lambda *_: pytest.fail("measured again"))
     assert run_tool(monkeypatch, "comparison.loss_table", *options) == 0
 
 
-def test_a_perfect_restoration_is_seen_as_one(recipes: tuple[Path, Path], tmp_path: Path) -> None:
-    conditions = loss_table.Conditions(
-        wild=recipes[1],
-        data=None,
-        fresh=None,
-        sharp=None,
-        vgg=None,
-        minutes=1.0,
-        samples=1,
-        out_dir=tmp_path,
+def test_a_row_of_another_lens_has_two_recipes_of_its_own(
+    recipes: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    lab, wild = recipes
+    assert loss_table.row_of("S", lab, wild) == loss_table.Row(size="S", lab=lab, wild=wild)
+    own = loss_table.row_of("S=a.toml,b.toml", lab, wild)
+    assert (own.lab, own.wild) == (Path("a.toml"), Path("b.toml"))
+    for word in ("S=a.toml", "S=a,b,c"):
+        with pytest.raises(SystemExit, match=r"SIZE=LAB\.toml,WILD\.toml"):
+            loss_table.row_of(word, lab, wild)
+
+    def traced(_recipe: object, _folder: Path, cache: Path) -> BayerMaterial:
+        return BayerMaterial(bank=gaussian, designed={"prescription.toml": cache.name.encode()})
+
+    gaussian = training.trace_material(None, None, None).bank  # type: ignore[arg-type]
+    monkeypatch.setattr(training, "trace_material", traced)
+    row = loss_table.Row(size="l1", lab=lab, wild=wild)
+    with pytest.raises(SystemExit, match="are of two lenses"):
+        loss_table.measure(row, conditions(tmp_path))
+
+
+def conditions(folder: Path) -> loss_table.Conditions:
+    return loss_table.Conditions(
+        data=None, fresh=None, sharp=None, vgg=None, minutes=1.0, samples=1, out_dir=folder
     )
-    home = loss_table.domain(recipes[0], conditions)
+
+
+def test_a_perfect_restoration_is_seen_as_one(recipes: tuple[Path, Path], tmp_path: Path) -> None:
+    home = loss_table.domain(recipes[0], conditions(tmp_path))
     truth = home.samples[0].target[None]
     perfect = home.score(lambda _: truth, loss_table.Relu32(None))
     assert perfect["psnr_db"] > 60

@@ -1,13 +1,10 @@
 """What fine-tuning compares, eq. (6.12): pixels (`pixel_loss`) and features."""
 
-from collections.abc import Callable
-
 import torch
 from torch import Tensor
 
+from camkit.models_def.training.adversarial.content import Features
 from camkit.models_def.training.adversarial.views import Views
-
-Features = Callable[[Tensor], Tensor]
 
 
 def perceptual_loss(views: Views, features: Features | None) -> Tensor:

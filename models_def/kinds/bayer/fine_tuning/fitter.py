@@ -13,18 +13,16 @@ from torch import Tensor, nn
 
 from camkit.models_def.kinds.bayer.fine_tuning.adversarial import discriminator_loss, generator_loss
 from camkit.models_def.kinds.bayer.fine_tuning.content import perceptual_loss
-from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples
 from camkit.models_def.kinds.bayer.fine_tuning.vgg import VggFeatures
 from camkit.models_def.kinds.bayer.recipe import FineTuningRecipe
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
-from camkit.models_def.training.adversarial.views import Views, make_views, pixel_loss
+from camkit.models_def.training.adversarial.judged import JudgedFitter, Mix
+from camkit.models_def.training.adversarial.views import Views, pixel_loss
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights
 from camkit.models_def.training.fitter import Fitter
 from camkit.models_def.training.recipe import NetworkRecipe
-from camkit.models_def.training.sample import Batch
-from camkit.models_def.training.schedule import learning_rate
 
 OPPONENT_SEED: Final = 2
 BETAS: Final = (0.9, 0.999)
@@ -38,27 +36,26 @@ class FineTuningParts:
         first: Weights that the generator starts from.
         to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
         features: VGG-19, or None.
-        pairs: Samples of real pairs, or None.
+        mix: Real pairs, or None.
         device: cpu or cuda.
     """
 
     first: FirstWeights
     to_rec709: Tensor
     features: VggFeatures | None = None
-    pairs: PairSamples | None = None
+    mix: Mix | None = None
     device: str = "cpu"
 
 
-class FineTuningFitter:
+class FineTuningFitter(JudgedFitter):
     """Fits a generator against a global and a local discriminator. References: eq. (6.14)."""
 
     def __init__(
         self, entry: NetworkRecipe, recipe: FineTuningRecipe, parts: FineTuningParts
     ) -> None:
-        self.recipe, self.schedule, self._pairs = recipe, entry.schedule, parts.pairs
-        self.generator = Fitter(entry, build_network, parts.device, parts.first)
-        device = self.generator.device
-        self._to_rec709 = parts.to_rec709.float().to(device)
+        generator = Fitter(entry, build_network, parts.device, parts.first)
+        super().__init__(generator, parts.to_rec709, parts.mix)
+        self.recipe, device = recipe, generator.device
         self._features = None if parts.features is None else parts.features.to(device)
         torch.manual_seed(entry.schedule.seed + OPPONENT_SEED)
         self.opponents = nn.ModuleDict(
@@ -76,25 +73,10 @@ class FineTuningFitter:
         self._optimizer = torch.optim.Adam(
             self.opponents.parameters(), lr=recipe.discriminator_rate, betas=BETAS
         )
-        self._notes: dict[str, list[float]] = {}
 
-    def fit(self, batch: Batch, step: int, progress: float) -> float:
-        """Make one step of all three networks and give the generator's loss."""
-        if self._pairs is not None:
-            share, seed = self.recipe.pair_share, self.schedule.seed
-            batch = self._pairs.mixed(batch, share, seed, step)
-        device = self.generator.device
-        output = self.generator.run(batch.planes, progress)
-        views = make_views(
-            output, batch.target.to(device), batch.weight.to(device), self._to_rec709
-        )
-        self._teach_opponents(views, step, progress)
-        loss = self._total(views)
-        self.generator.descend(loss, step, progress)
-        return float(loss.detach())
-
-    def _teach_opponents(self, views: Views, step: int, progress: float) -> None:
-        decay = learning_rate(self.schedule, step, progress) / self.schedule.learning_rate
+    def teach(self, views: Views, step: int, decay: float) -> None:
+        """Make one step of both discriminators."""
+        del step
         for group in self._optimizer.param_groups:
             group["lr"] = self.recipe.discriminator_rate * decay
         self.opponents.requires_grad_(requires_grad=True)
@@ -106,40 +88,20 @@ class FineTuningFitter:
         torch.stack([*losses.values()]).sum().backward()  # type: ignore[no-untyped-call]
         self._optimizer.step()
         for name, loss in losses.items():
-            self._note(f"discriminator_{name}", loss)
+            self.note(f"discriminator_{name}", loss)
 
-    def _total(self, views: Views) -> Tensor:
+    def total(self, views: Views) -> Tensor:
+        """Give pixels, features and what the discriminators say; they do not move."""
         self.opponents.requires_grad_(requires_grad=False)
         pixel, perceptual = pixel_loss(views), perceptual_loss(views, self._features)
-        self._note("pixel", pixel)
-        self._note("perceptual", perceptual)
+        self.note("pixel", pixel)
+        self.note("perceptual", perceptual)
         total = self.recipe.perceptual_weight * perceptual + self.recipe.pixel_weight * pixel
         for name, judge in self.opponents.items():
             adversarial = generator_loss(judge(views.real), judge(views.seen))
-            self._note(f"adversarial_{name}", adversarial)
+            self.note(f"adversarial_{name}", adversarial)
             total = total + self._shares[name] * adversarial
         return total
-
-    def _note(self, name: str, value: Tensor) -> None:
-        self._notes.setdefault(name, []).append(float(value.detach()))
-
-    def notes(self) -> dict[str, float]:
-        """Give the mean of each term since the last call."""
-        means = {name: sum(values) / len(values) for name, values in self._notes.items()}
-        self._notes.clear()
-        return means
-
-    def restore(self, planes: Tensor) -> Tensor:
-        """Run the averaged generator on (1, 6, h, w) planes; float32 on the CPU comes back."""
-        return self.generator.restore(planes)
-
-    def weights(self) -> State:
-        """Give the generator's weights being trained."""
-        return self.generator.weights()
-
-    def average(self) -> State:
-        """Give the generator's averaged weights."""
-        return self.generator.average()
 
     def optimizer_state(self) -> dict[str, Any]:
         """Give both optimisers and the discriminators: tensors and plain numbers."""

@@ -33,6 +33,7 @@ from camkit.models_def.kinds.bayer.samples import (
     Developed,
     finish_shot,
 )
+from camkit.models_def.training.adversarial.judged import Mix
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample
@@ -72,28 +73,30 @@ class PairSamples:
         weight = torch.from_numpy(self.weights[chosen])
         return Batch(inputs=LAYOUT.named(planes), target=targets, weight=weight)
 
-    def mixed(self, batch: Batch, share: float, seed: int, step: int) -> Batch:
-        """Replace the first patches of a batch by patches of real pairs.
+    def mixer(self, share: float, seed: int) -> Mix:
+        """Give what replaces the first patches of a batch by patches of real pairs.
 
         Args:
-            batch: Patches.
             share: How many of them are replaced.
-            seed: Of the draw.
-            step: Draws by itself alone, so that a resumed run draws the same.
+            seed: Of the draw; a step draws by itself alone, so that a resumed run draws the same.
         """
-        count, _, patch_px, _ = batch.target.shape
-        real = round(share * count)
-        if real == 0:
-            return batch
-        drawn = self.draw_batch(np.random.default_rng((seed, 3, step)), real, patch_px)
-        return Batch(
-            inputs={
-                name: torch.cat([planes, batch.inputs[name][real:]])
-                for name, planes in drawn.inputs.items()
-            },
-            target=torch.cat([drawn.target, batch.target[real:]]),
-            weight=torch.cat([drawn.weight, batch.weight[real:]]),
-        )
+
+        def mix(batch: Batch, step: int) -> Batch:
+            count, _, patch_px, _ = batch.target.shape
+            real = round(share * count)
+            if real == 0:
+                return batch
+            drawn = self.draw_batch(np.random.default_rng((seed, 3, step)), real, patch_px)
+            return Batch(
+                inputs={
+                    name: torch.cat([planes, batch.inputs[name][real:]])
+                    for name, planes in drawn.inputs.items()
+                },
+                target=torch.cat([drawn.target, batch.target[real:]]),
+                weight=torch.cat([drawn.weight, batch.weight[real:]]),
+            )
+
+        return mix
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ import torch
 from camkit.colorimetry import rec709_from_camera
 from camkit.contracts import RadialDistortion
 from camkit.models_def.kinds.bayer.fine_tuning.fitter import FineTuningFitter, FineTuningParts
-from camkit.models_def.kinds.bayer.fine_tuning.pairs import PairSamples, read_pairs
+from camkit.models_def.kinds.bayer.fine_tuning.pairs import read_pairs
 from camkit.models_def.kinds.bayer.fine_tuning.vgg import read_vgg
 from camkit.models_def.kinds.bayer.material import BayerMaterial
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
@@ -18,6 +18,7 @@ from camkit.models_def.kinds.bayer.samples import corner_height_mm
 from camkit.models_def.networks.vgg import file_digest
 from camkit.models_def.optics.distortion import trace_distortion
 from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.models_def.training.adversarial.judged import Mix
 from camkit.models_def.training.first_weights import read_first_weights
 from camkit.models_def.training.fitter import Fits
 from camkit.models_def.training.recipe import NetworkRecipe
@@ -51,20 +52,16 @@ def make_refinement(
     matrix = rec709_from_camera(np.array(recipe.sensor.color_matrix))
 
     def make_fitter(entry: NetworkRecipe, material: BayerMaterial) -> Fits:
-        pairs: PairSamples | None = None
+        mix: Mix | None = None
         if options.pairs is not None:
-            pairs = read_pairs(
-                options.pairs,
-                recipe,
-                material.bank,
-                distort(recipe, options.recipe_folder),
-                seed=entry.schedule.seed,
-            )
+            seed, distortion = entry.schedule.seed, distort(recipe, options.recipe_folder)
+            pairs = read_pairs(options.pairs, recipe, material.bank, distortion, seed=seed)
+            mix = pairs.mixer(recipe.fine_tuning.pair_share, seed)
         parts = FineTuningParts(
             first=first,
             to_rec709=torch.from_numpy(matrix),
             features=features,
-            pairs=pairs,
+            mix=mix,
             device=options.device,
         )
         return FineTuningFitter(entry, recipe.fine_tuning, parts)

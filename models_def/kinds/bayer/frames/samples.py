@@ -66,13 +66,17 @@ class TileMaker:
     def __init__(self, recipe: BayerRecipe, bank: PsfBank, tiles: Tiles, seed: int) -> None:
         self._recipe, self._bank, self._tiles, self._seed = recipe, bank, tiles, seed
 
-    def make(self, index: int) -> Sample:
-        """Take a tile through the bank."""
+    def developed(self, index: int) -> Developed:
+        """Give a tile as the bank meets it."""
         turn, place = divmod(index, len(self._tiles))
         order = np.random.default_rng((self._seed, 0, turn)).permutation(len(self._tiles))
         rng = np.random.default_rng((self._seed, 1, index))
         tile = self._tiles.read(int(order[place]))
-        return finish_shot(draw_developed(rng, tile, self._recipe, self._bank), self._recipe).sample
+        return draw_developed(rng, tile, self._recipe, self._bank)
+
+    def make(self, index: int) -> Sample:
+        """Take a tile through the bank."""
+        return finish_shot(self.developed(index), self._recipe).sample
 
 
 def validation_captures(

@@ -33,10 +33,10 @@ PARTS: Final = ("train", "valid")
 FACTS: Final = ("x_mm", "y_mm", "iso", "rise_red", "rise_green", "rise_blue", "copy")
 """Of a tile: its middle from the axis, the ISO, what the variance of the noise of every colour was
 multiplied by, and the copy of the lens."""
-
-
 _OF_THE_POOL: Final = ("pool_samples", "first_samples", "steps_per_sample", "block_jitter_px")
 """What tiles do not depend on."""
+_HEADER_KEYS: Final = {"camera", "pictures", "designed"}
+"""What is read again of a header."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -213,6 +213,10 @@ def read_frames(folder: Path, recipe: BayerRecipe | None = None) -> Frames:
             "samples of a lens with a haze are cut from whole frames, and there are none in "
             f"{folder}: make them with `camkit prepare`"
         ) from None
+    except ValueError as error:
+        raise ContractError(f"{folder / HEADER} is damaged; say `camkit prepare` again") from error
+    if not isinstance(header, dict) or not header.keys() >= _HEADER_KEYS:
+        raise ContractError(f"{folder / HEADER} is damaged; say `camkit prepare` again")
     if recipe is not None and header["camera"] != camera_digest(recipe):
         raise ContractError(
             f"the frames in {folder} were photographed for another recipe; say `camkit prepare` "

@@ -219,8 +219,11 @@ def test_export_finds_what_lies_beside_the_checkpoint(
         optimizer={},
     )
     write_checkpoint(tmp_path / "one.pt", checkpoint)
-    for name in ("psf.safetensors", "freeze.json", "plan.json"):
+    for name in ("psf.safetensors", "haze.safetensors", "freeze.json", "plan.json"):
         (tmp_path / name).write_bytes(b"{}")
+    elsewhere = tmp_path / "other"
+    elsewhere.mkdir()
+    (elsewhere / "psf.safetensors").write_bytes(b"{}")
     seen = []
 
     def fake(parts: Parts, out: Path) -> dict[str, str]:
@@ -230,10 +233,13 @@ def test_export_finds_what_lies_beside_the_checkpoint(
     monkeypatch.setattr(assemble, "export_bundle", fake)
     call = ("export", tmp_path / "one.pt", "-o", tmp_path / "one.camkit")
     plates = (("--plate", "streak-4"), ("--plate", "none"))
-    for chosen in ((), ("--plan", tmp_path / "other.json"), *plates):
+    optics = ("--psf", elsewhere / "psf.safetensors")
+    for chosen in ((), ("--plan", tmp_path / "other.json"), *plates, optics):
         outcome = camkit_command(*call, *chosen)
         assert outcome.code == 0, outcome.err
-    parts, other, named, without = seen
+    parts, other, named, without, apart = seen
+    assert parts.haze == tmp_path / "haze.safetensors"
+    assert apart.haze is None, "the haze of other optics lies beside them"
     assert (parts.psf, parts.freeze) == (tmp_path / "psf.safetensors", tmp_path / "freeze.json")
     assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
     assert parts.stress_psf is None

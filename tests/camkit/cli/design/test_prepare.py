@@ -1,6 +1,7 @@
 """`camkit prepare`: frames of a camera with a haze, or a line that says why not."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,8 +9,9 @@ import pytest
 from camkit.bundle.haze_file import write_haze
 from camkit.bundle.psf_file import write_psf
 from camkit.cli.exit_code import ExitCode
-from camkit.export import frames
-from camkit.models_def.optics.lens_file.lens_file import find_lens
+from camkit.errors import UnsupportedError
+from camkit.export.kinds import bayer
+from camkit.export.preparing import preparing_kind
 from tests.bayer_recipe import RECIPE as PLAIN
 from tests.hazy_recipe import RECIPE, hazy_optics
 
@@ -22,15 +24,22 @@ def _recipe(folder: Path, text: str) -> Path:
     return path
 
 
+def _write_optics(folder: Path, *, stretched: float = 1.0) -> None:
+    """Write optics whose peaks lie where those of the lens do, or so many times further out."""
+    optics = hazy_optics()
+    assert optics.haze is not None
+    own = optics.psf.distortion
+    distortion = replace(own, coefficients=own.coefficients * stretched)
+    write_psf(folder / "psf.safetensors", replace(optics.psf, distortion=distortion))
+    write_haze(folder / "haze.safetensors", optics.haze)
+
+
 def test_frames_are_prepared_once(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    optics = hazy_optics()
-    assert optics.haze is not None
-    write_psf(tmp_path / "psf.safetensors", optics.psf)
-    write_haze(tmp_path / "haze.safetensors", optics.haze)
-    frozen = find_lens("duet", tmp_path), (hazy_optics(0.48), hazy_optics(0.5), hazy_optics(0.52))
-    monkeypatch.setattr(frames, "freeze_copies", lambda *_: frozen)
+    _write_optics(tmp_path)
+    frozen = (hazy_optics(0.48), hazy_optics(0.5), hazy_optics(0.52))
+    monkeypatch.setattr(bayer, "freeze_copies", lambda *_: frozen)
     words = ("prepare", _recipe(tmp_path, SMALL), "--out-dir", tmp_path, "--json")
     outcome = camkit_command(*words)
     assert outcome.code == 0, outcome.err
@@ -52,3 +61,28 @@ def test_a_recipe_without_a_haze_and_missing_optics_are_refused(
     outcome = camkit_command("prepare", _recipe(tmp_path, RECIPE), "--out-dir", tmp_path)
     assert outcome.code != 0
     assert "cannot read the PSF" in outcome.err
+
+
+def test_what_would_fail_later_is_refused_before_copies_are_frozen(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bayer, "freeze_copies", lambda *_: pytest.fail("frozen in vain"))
+    _write_optics(tmp_path)
+    words = ("prepare", _recipe(tmp_path, RECIPE), "--out-dir", tmp_path)
+    outcome = camkit_command(*words, "--valid", tmp_path / "none")
+    assert outcome.code == ExitCode.USAGE
+    assert "none is not there" in outcome.err
+    large = _recipe(tmp_path, RECIPE.replace("sample_px = 64", "sample_px = 256"))
+    outcome = camkit_command("prepare", large, "--out-dir", tmp_path)
+    assert outcome.code == ExitCode.USAGE
+    assert "sample_px (256)" in outcome.err
+    _write_optics(tmp_path, stretched=1.2)
+    outcome = camkit_command("prepare", _recipe(tmp_path, RECIPE), "--out-dir", tmp_path)
+    assert outcome.code == ExitCode.USAGE
+    assert "was not frozen from the lens" in outcome.err
+
+
+def test_kinds_without_frames_are_told_so() -> None:
+    for name in ("hdr", "spad"):
+        with pytest.raises(UnsupportedError, match=f"kind '{name}' are made while it trains"):
+            preparing_kind(name)

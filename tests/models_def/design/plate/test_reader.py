@@ -154,7 +154,7 @@ def test_a_digest_follows_what_the_table_only_names(folder: Path) -> None:
         ({"size": "two"}, "lean_s does not take the 3 channels of its role"),
         ({"patch_px": 30}, "multiple of 4"),
         ({"scene_px": 64}, "reader.scene_px >= 72; got 64"),
-        ({"begin": "none.pt"}, "cannot read checkpoint none.pt"),
+        ({"begin": "none.pt"}, "cannot read checkpoint of camkit none.pt"),
     ],
 )
 def test_a_reader_that_cannot_be_is_refused(

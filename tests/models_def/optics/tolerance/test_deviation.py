@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from camkit.errors import ContractError
+from camkit.models_def.optics.grooves import Grooves
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.tolerance.deviation import (
     draw_deviations,
@@ -13,6 +14,7 @@ from camkit.models_def.optics.tolerance.deviation import (
 )
 from camkit.models_def.optics.tolerance.elements import glass_elements
 from camkit.models_def.optics.tolerance.errors import ErrorWidth, Tolerances
+from tests.thin_factory import perfect_lens
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
 DUET = read_lens(PRESCRIPTIONS / "duet.toml")
@@ -50,6 +52,21 @@ def test_errors_touch_only_what_they_belong_to() -> None:
     assert not drawn.conic[:, 0].any()
     assert drawn.index[:, [1, 3]].all()
     assert np.hypot(*drawn.element_decentre_mm.T).max() <= 0.02
+
+
+def test_depths_of_grooves_are_off_where_there_are_grooves_and_move_nothing_else() -> None:
+    lens = perfect_lens(40.0, 6.0, grooves=Grooves(depth_um=110.0))
+    wide = replace(Tolerances(), groove_depth=ErrorWidth(half_width=0.02))
+    old, new = (draw_deviations(lens, given, range(20), 1) for given in (Tolerances(), wide))
+    assert not new.groove_depth[:, :2].any()
+    assert new.groove_depth[:, 2].all()
+    assert np.abs(new.groove_depth).max() <= 0.02
+    for field in fields(new):
+        if field.name != "groove_depth":
+            np.testing.assert_array_equal(getattr(new, field.name), getattr(old, field.name))
+    singles, arrays = single_deviations(lens, wide.only("groove_depth"))
+    assert [(one.part, one.value) for one in singles] == [(2, 0.02), (2, -0.02)]
+    assert arrays.of_copy(1).groove_depth.tolist() == [[0.0, 0.0, -0.02]]
 
 
 def test_at_limits_every_error_has_its_full_size() -> None:

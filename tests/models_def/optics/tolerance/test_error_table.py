@@ -67,5 +67,7 @@ def test_damaged_file_is_refused(tmp_path: Path) -> None:
 
 def test_people_see_the_units_of_the_file() -> None:
     assert in_file_units("radius", 0.002) == "0.2 %"
+    assert in_file_units("groove_depth", 0.01) == "1 %"
+    assert parse_tolerances({"groove_depth_percent": 1.0}).groove_depth.half_width == 0.01
     assert in_file_units("element_tilt", math.radians(-1 / 60)) == "-1'"
     assert in_file_units("index", 0.0005) == "0.0005"

@@ -16,7 +16,7 @@ def test_defaults_are_those_of_training_plus_decentre_and_tilt() -> None:
     assert given.focus.half_width == base.focus_mm
     assert given.element_decentre.half_width == given.surface_decentre.half_width == 0.02
     assert np.rad2deg(given.element_tilt.half_width) == pytest.approx(1 / 60)
-    assert set(ERROR_CLASSES) - set(given.active()) == {"abbe", "conic"}
+    assert set(ERROR_CLASSES) - set(given.active()) == {"abbe", "conic", "groove_depth"}
 
 
 def test_uniform_errors_fill_their_range_evenly() -> None:
@@ -58,6 +58,7 @@ def test_only_keeps_one_class_and_the_compensator() -> None:
         lambda: ErrorWidth(half_width=float("nan")),
         lambda: ErrorWidth(half_width=1.0, distribution="flat"),  # type: ignore[arg-type]
         lambda: Tolerances(radius=ErrorWidth(half_width=0.6)),
+        lambda: Tolerances(groove_depth=ErrorWidth(half_width=0.6)),
         lambda: Tolerances(element_tilt=ErrorWidth(half_width=1.0)),
         lambda: Tolerances(compensator="hope"),  # type: ignore[arg-type]
     ],

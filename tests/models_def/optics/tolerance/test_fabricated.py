@@ -1,5 +1,5 @@
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +8,7 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.models_def.optics.glass.dispersion import C_LINE_UM, D_LINE_UM, F_LINE_UM
+from camkit.models_def.optics.grooves import Grooves
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.paraxial import paraxial_data, paraxial_image
 from camkit.models_def.optics.prescription import Lens, Surface
@@ -21,6 +22,9 @@ from camkit.models_def.optics.tolerance.fabricated import View, fabricated_tenso
 from camkit.models_def.optics.tolerance.landing import copy_kernels, spot_rms_mm, window_px
 from camkit.models_def.optics.tolerance.misaligned_trace import trace_misaligned
 from camkit.models_def.optics.tolerance.pose import poses
+from camkit.models_def.optics.trace import SurfaceTensors
+from camkit.models_def.optics.tracing.profile import sag
+from tests.thin_factory import GLASS, index_at, perfect_lens
 
 PRESCRIPTIONS = Path(__file__).resolve().parents[4] / "models_def" / "prescriptions"
 DUET = read_lens(PRESCRIPTIONS / "duet.toml")
@@ -160,6 +164,90 @@ def test_abbe_error_changes_dispersion_and_keeps_the_index_at_the_d_line() -> No
     assert float(after[0]) == pytest.approx(float(before[0]), abs=1e-15)
     abbe = [(float(n[0]) - 1) / float(n[1] - n[2]) for n in (before, after)]
     assert abbe[1] == pytest.approx(1.02 * abbe[0], rel=1e-12)
+
+
+def _grooved_parabola(bend_per_mm: float, depth_um: float) -> Lens:
+    """Give a stop, a plane into glass, and a relief of -a r^2 out of it."""
+    return Lens(
+        name="relief",
+        surfaces=(
+            Surface(curvature_per_mm=0.0, thickness_mm=1.0),
+            Surface(curvature_per_mm=0.0, thickness_mm=3.0, glass=GLASS),
+            Surface(
+                curvature_per_mm=0.0,
+                thickness_mm=80.0,
+                even_asphere=(-bend_per_mm,),
+                semi_diameter_mm=9.0,
+                grooves=Grooves(depth_um=depth_um),
+            ),
+        ),
+        stop=0,
+        aperture_kind="stop_semi_diameter_mm",
+        aperture_value=8.0,
+    )
+
+
+def test_deeper_grooves_bend_light_by_what_their_slopes_have_grown() -> None:
+    """A ray along the axis meets z = s (h - k d) under atan(s h'), and Snell does the rest."""
+    lens, depth_mm, bend = _grooved_parabola(0.01, 100.0), 0.1, 0.01
+    view = view_of(lens, [0.0], [0.0], 40)
+    errors = np.array([0.02, -0.03, 0.0])
+    drawn = draw_deviations(lens, Tolerances(), range(3), 1)
+    none = {f.name: np.zeros_like(getattr(drawn, f.name)) for f in fields(drawn)}
+    none["groove_depth"] = errors[:, None] * np.array([0.0, 0.0, 1.0])
+    landing = land(lens, Deviations(**none), view, "none")
+    radius = 8.0 * np.hypot(view.samples.x.numpy(), view.samples.y.numpy())
+    height = -bend * radius**2
+    scale = 1 + errors[:, None]
+    z_mm = scale * (height - depth_mm * np.trunc(height / depth_mm))
+    lean = np.arctan(2 * bend * radius * scale)
+    turned = np.arcsin(index_at(0.55) * np.sin(lean)) - lean
+    wanted = radius - (80.0 - z_mm) * np.tan(turned)
+    outward = np.hypot(landing.rays.x.numpy(), landing.rays.y.numpy())[:, 0, 0]
+    assert bool((landing.weight > 0).all())
+    np.testing.assert_allclose(outward, np.abs(wanted), rtol=0, atol=1e-9)
+    # to first order the shift is that of the phase: proportional to the error
+    shift = wanted[:2] - wanted[2]
+    np.testing.assert_allclose(shift[0] / 0.02, shift[1] / -0.03, rtol=0.05)
+
+
+def test_deeper_grooves_are_refocused_by_their_power() -> None:
+    lens = _grooved_parabola(0.01, 100.0)
+    focus_mm = 1 / (0.02 * (index_at(0.55) - 1))
+    found = land(
+        lens,
+        with_error(lens, groove_depth=[0.0, 0.0, 0.01]),
+        view_of(lens, [0.0], [0.0]),
+        "paraxial",
+    )
+    assert float(found.refocus_mm) == pytest.approx(focus_mm / 1.01 - focus_mm, rel=1e-9)
+
+
+def test_a_deeper_profile_is_the_same_at_every_radius_but_so_many_times_higher() -> None:
+    lens = perfect_lens(40.0, 6.0, grooves=Grooves(depth_um=110.0))
+    one = torch.tensor([0.55], dtype=torch.float64)
+    plain, deep = (
+        fabricated_tensors(lens, with_error(lens, groove_depth=[0.0, 0.0, error]), one)
+        for error in (0.0, 0.1)
+    )
+    square = torch.linspace(0, 36, 50, dtype=torch.float64)
+
+    def height(tensors: SurfaceTensors) -> torch.Tensor:
+        c, k = (v[2].flatten() for v in (tensors.curvature_per_mm, tensors.conic))
+        return sag(c, k, torch.zeros(0, dtype=torch.float64), square)
+
+    torch.testing.assert_close(height(deep), 1.1 * height(plain), rtol=1e-12, atol=0)
+    assert deep.grooves[2].depth_mm == pytest.approx(0.121)  # type: ignore[union-attr]
+    assert deep.grooves[:2] == plain.grooves[:2] == (None, None)
+    assert bool(torch.equal(plain.conic, fabricated_tensors(lens, no_deviations(lens), one).conic))
+
+
+def test_grooves_of_different_depths_are_no_one_set_of_tensors() -> None:
+    lens = _grooved_parabola(0.01, 100.0)
+    wide = replace(Tolerances(), groove_depth=ErrorWidth(half_width=0.01))
+    drawn = draw_deviations(lens, wide, range(2), 1)
+    with pytest.raises(ContractError, match="traced one by one"):
+        fabricated_tensors(lens, drawn, torch.tensor([0.55], dtype=torch.float64))
 
 
 def test_a_decentred_lens_carries_its_image_along() -> None:

@@ -1,5 +1,6 @@
 """One step moves each player by its own loss; a run that is resumed keeps its bits."""
 
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -140,7 +141,7 @@ def test_real_pairs_take_the_places_that_the_recipe_gives_them(recipe_path, mate
     own = own_fitting("bayer", request(recipe, "gram", pairs=Path("monitor")))
     assert own.credit.endswith(", real pairs of monitor")
     fitter = own.make(material)
-    mixed = fitter._parts.mix(batch(), 7)
+    mixed = fitter._mix(batch(), 7)
     assert asked == [(Path("monitor"), recipe, material.bank, None)]
     assert (mixed.planes[0] == 0.25).all()
     assert torch.equal(mixed.planes[1], batch().planes[1])
@@ -174,7 +175,9 @@ def test_files_that_no_term_looks_at_are_refused(recipe_path, sharp_folder):
         ({"critic": {"beta1": 1.0}}, r"beta1 in \[0, 1\)"),
         ({"critic": {"penalty": -1.0}}, "penalty >= 0"),
         ({"content": {"l1_weight": 0.0}}, "weights >= 0, one > 0"),
+        ({"critic": {"weight": math.nan}}, "schedule.critic.weight must be a number; got nan"),
         ({"loss": "gan"}, "schedule.loss must be one of"),
+        ({"loss": "content", "overshoot": 1.5}, "content has no term for overshoots"),
     ],
 )
 def test_tables_of_the_losses_are_checked(schedule, said):

@@ -2,9 +2,14 @@
 
 import pytest
 
-from camkit.models_def.kinds.bayer import validation
 from camkit.models_def.training.trainer import TrainOptions, train
-from tests.bayer_recipe import RECIPE, bank, material, recipe  # noqa: F401
+from tests.bayer_recipe import (
+    bank,  # noqa: F401
+    material,  # noqa: F401
+    one_picture_to_validate_on,  # noqa: F401
+    recipe,  # noqa: F401
+    write_recipe,
+)
 
 FINE_TUNING = """
 [networks.trimmed]
@@ -23,19 +28,9 @@ schedule = { steps = 6, batch = 2, patch_px = 64, warmup_steps = 2 }
 """
 
 
-@pytest.fixture(scope="package", autouse=True)
-def one_picture_to_validate_on():
-    """Ten validation cases instead of eighty."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(validation, "PROCEDURAL_PICTURES", 1)
-        yield
-
-
 @pytest.fixture(scope="session")
 def recipe_path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("recipe") / "tiny.toml"
-    path.write_text(RECIPE + FINE_TUNING, encoding="utf-8")
-    return path
+    return write_recipe(tmp_path_factory, FINE_TUNING)
 
 
 @pytest.fixture(scope="session")

@@ -19,11 +19,11 @@ from tests.bayer_recipe import RECIPE
 
 @pytest.fixture
 def make(recipe, trimmed_checkpoint):
-    def build(pairs=None, **changes):
+    def build(**changes):
         tuning = replace(recipe.fine_tuning, **changes)
         entry = replace(recipe.network("full"), schedule=tuning.schedule)
         first = read_first_weights(trimmed_checkpoint, "full")
-        parts = FineTuningParts(first=first, to_rec709=torch.eye(3), pairs=pairs)
+        parts = FineTuningParts(first=first, to_rec709=torch.eye(3))
         return FineTuningFitter(entry, tuning, parts)
 
     return build
@@ -65,7 +65,7 @@ def test_real_pairs_replace_their_share_of_a_batch_by_the_step_alone():
     pairs = PairSamples(
         planes=planes, targets=planes[:, :3], weights=np.ones((3, 3), np.float32), alignments={}
     )
-    mixed = pairs.mixed(batch(), 0.5, seed=1, step=7)
+    mixed = pairs.mixer(0.5, seed=1)(batch(), 7)
     assert (mixed.planes[0] == 0.25).all()
     assert torch.equal(mixed.planes[1], batch().planes[1])
 

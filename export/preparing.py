@@ -1,0 +1,71 @@
+"""What is made before training, for the kinds whose samples need the runtime.
+
+The part of such a kind (`camkit.export.kinds.NAME`, or the `export` of its own package) defines
+`PREPARING`, which fulfils `PreparingKind`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+from camkit.errors import UnsupportedError
+from camkit.kinds import find_kind
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrepareOptions:
+    """What is given besides a recipe.
+
+    Attributes:
+        psf: Core kernels of the lens as designed.
+        haze: The haze beside them.
+        pictures: Folder of pictures to train on; None for procedural scenes alone.
+        valid: Folder of pictures to choose by; likewise.
+        recipe_folder: For a lens that the recipe names by its path.
+        runs: Folder of the runs.
+        seed: Of scenes, places and noise.
+    """
+
+    psf: Path
+    haze: Path
+    pictures: Path | None
+    valid: Path | None
+    recipe_folder: Path
+    runs: Path
+    seed: int = 0
+
+
+class PreparingKind(Protocol):
+    """A kind of camera whose samples are prepared."""
+
+    def written_last(self, recipe: Any, runs: Path) -> Path:
+        """Give the file that is there when all is; raise ContractError if there is nothing to do.
+
+        Args:
+            recipe: Of the kind.
+            runs: Folder of the runs.
+        """
+        ...
+
+    def prepare(self, recipe: Any, options: PrepareOptions, tell: Tell) -> dict[str, Any]:
+        """Make it and say what was made; raise ContractError if something is missing or wrong."""
+        ...
+
+
+def preparing_kind(name: str) -> PreparingKind:
+    """Give the part of a kind that prepares.
+
+    Raises:
+        UnsupportedError: If its samples are made while it trains.
+    """
+    kind = find_kind(name)
+    if kind.has_part("export"):
+        part = kind.part("export")
+        if hasattr(part, "PREPARING"):
+            return cast("PreparingKind", part.PREPARING)
+    raise UnsupportedError(
+        f"samples of the kind {name!r} are made while it trains; leave prepare out"
+    )

@@ -1,0 +1,90 @@
+"""What fitters have in common whose generator is judged by what its pictures look like.
+
+batch (+ real pairs) -> generator -> views -+-> opponents learn
+                                            +-> total loss -> weights of the generator
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+from torch import Tensor
+
+from camkit.models_def.training.adversarial.views import Views, make_views
+from camkit.models_def.training.checkpoint import State
+from camkit.models_def.training.fitter import Fitter
+from camkit.models_def.training.sample import Batch
+from camkit.models_def.training.schedule import learning_rate
+
+Mix = Callable[[Batch, int], Batch]
+"""A batch and the number of its step -> the batch with patches of real pairs among its own."""
+
+
+class JudgedFitter(ABC):
+    """Fits a generator; who judges it, and by what, is left to others."""
+
+    def __init__(self, generator: Fitter, to_rec709: Tensor, mix: Mix | None) -> None:
+        """Take what is judged.
+
+        Args:
+            generator: Fits the network.
+            to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
+            mix: Real pairs, or None.
+        """
+        self.generator, self.schedule = generator, generator.schedule
+        self._to_rec709 = to_rec709.float().to(generator.device)
+        self._mix = mix
+        self._notes: dict[str, list[float]] = {}
+
+    @abstractmethod
+    def teach(self, views: Views, step: int, decay: float) -> None:
+        """Let the opponents learn, if there are any, at a share `decay` of their rate."""
+
+    @abstractmethod
+    def total(self, views: Views) -> Tensor:
+        """Give the loss of the generator."""
+
+    @abstractmethod
+    def optimizer_state(self) -> dict[str, Any]:
+        """Give the generator's optimiser, and the opponents with theirs: tensors and numbers."""
+
+    @abstractmethod
+    def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
+        """Go back to a saved state."""
+
+    def fit(self, batch: Batch, step: int, progress: float) -> float:
+        """Make one step of all networks and give the generator's loss."""
+        if self._mix is not None:
+            batch = self._mix(batch, step)
+        device = self.generator.device
+        output = self.generator.run(batch.planes, progress)
+        views = make_views(
+            output, batch.target.to(device), batch.weight.to(device), self._to_rec709
+        )
+        decay = learning_rate(self.schedule, step, progress) / self.schedule.learning_rate
+        self.teach(views, step, decay)
+        loss = self.total(views)
+        self.generator.descend(loss, step, progress)
+        return float(loss.detach())
+
+    def note(self, name: str, value: Tensor) -> None:
+        """Keep the value of a term for the log."""
+        self._notes.setdefault(name, []).append(float(value.detach()))
+
+    def notes(self) -> dict[str, float]:
+        """Give the mean of each term since the last call."""
+        means = {name: sum(values) / len(values) for name, values in self._notes.items()}
+        self._notes.clear()
+        return means
+
+    def restore(self, planes: Tensor) -> Tensor:
+        """Run the averaged generator on (1, c, h, w) planes; float32 on the CPU comes back."""
+        return self.generator.restore(planes)
+
+    def weights(self) -> State:
+        """Give the generator's weights being trained."""
+        return self.generator.weights()
+
+    def average(self) -> State:
+        """Give the generator's averaged weights."""
+        return self.generator.average()
