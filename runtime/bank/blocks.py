@@ -231,13 +231,13 @@ def taper_edges(samples: FloatArray, otf: ComplexArray, ring_px: int) -> FloatAr
     if ring == 0:
         return samples
     shrink = TAPER_SHRINK if size % TAPER_SHRINK == 0 else 1
-    small = _shrink(_shrink(samples, shrink, axis=1), shrink, axis=2)
+    tapered = np.array(samples)  # first of all: a mirrored block is slow to read
+    small = _shrink(_shrink(tapered, shrink, axis=1), shrink, axis=2)
     n = size // shrink
     half = otf[:, :, : n // 2 + 1]
     low = np.concatenate([half[:, : n - n // 2], half[:, size - n // 2 :]], axis=1)
     blurred = apply_transfer(small, low)
     keep = taper_weights(size, ring)
-    tapered = np.array(samples)
     inner = slice(ring, size - ring)
     for rows, cols in (
         (slice(0, ring), slice(0, size)),

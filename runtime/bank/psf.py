@@ -22,8 +22,8 @@ from camkit.errors import ContractError
 
 FloatGrid = NDArray[np.float64]
 
-PAD_PX: Final = 4
-"""Zeros around a kernel that is turned: a gather beyond its border finds zeros in all its taps."""
+PAD_PX: Final = 3
+"""Zeros around a kernel that is turned: as far as the taps of a sample lie beyond its border."""
 
 
 def wavelength_weights(
@@ -290,29 +290,45 @@ def _blend(kernels: FloatArray | FloatGrid, heights_mm: FloatGrid, height_mm: fl
 
 
 def _turn(kernel: FloatArray, out_x: float, out_y: float) -> FloatArray:
-    """Turn a (3, h, w) kernel so that its +y points along the unit vector (out_x, out_y)."""
+    """Turn a (3, h, w) kernel so that its +y points along the unit vector (out_x, out_y).
+
+    Only samples with a tap where the kernel has light are computed; most kernels are zero almost
+    everywhere.
+    """
     c, h, w = kernel.shape
     dy = np.arange(-(h // 2), h // 2 + 1, dtype=np.float64)[:, None]
     dx = np.arange(-(w // 2), w // 2 + 1, dtype=np.float64)
     rows = dx * out_x + dy * out_y + h // 2
     cols = dx * out_y - dy * out_x + w // 2
+    lit = np.flatnonzero(_reached(rows, kernel, axis=1) & _reached(cols, kernel, axis=2))
+    rows, cols = rows.take(lit), cols.take(lit)
     row0, col0 = np.floor(rows), np.floor(cols)
     row_weights, col_weights = (_catmull_rom(t) for t in (rows - row0, cols - col0))
-    padded = np.pad(kernel, ((0, 0), (PAD_PX, PAD_PX), (PAD_PX, PAD_PX))).reshape(c, -1)
-    width = w + 2 * PAD_PX
-    first_row = np.clip(row0, 1 - PAD_PX, h + 1).astype(np.intp) + (PAD_PX - 1)
-    first_col = np.clip(col0, 1 - PAD_PX, w + 1).astype(np.intp) + (PAD_PX - 1)
-    first = first_row * width + first_col
-    turned = np.zeros_like(kernel)
+    padded = np.zeros((c, h + 2 * PAD_PX, w + 2 * PAD_PX), dtype=np.float32)
+    padded[:, PAD_PX:-PAD_PX, PAD_PX:-PAD_PX] = kernel
+    width = padded.shape[2]
+    first = (row0.astype(np.intp) + (PAD_PX - 1)) * width + col0.astype(np.intp) + (PAD_PX - 1)
+    first = first + np.arange(0, padded.size, padded[0].size)[:, None]
+    flat = padded.reshape(-1)
+    found = np.zeros((c, lit.size), dtype=np.float32)
     for i in range(4):
-        line = np.zeros_like(kernel)
+        line = np.zeros_like(found)
         for j in range(4):
-            tap = padded[:, i * width + j :].take(first, axis=1)
+            tap = flat[i * width + j :].take(first)
             tap *= col_weights[j]
             line += tap
         line *= row_weights[i]
-        turned += line
+        found += line
+    turned = np.zeros_like(kernel)
+    turned.reshape(c, -1)[:, lit] = found
     return turned
+
+
+def _reached(places: FloatGrid, kernel: FloatArray, *, axis: int) -> NDArray[np.bool_]:
+    """Tell which positions along an axis of a kernel have taps between its first and last light."""
+    light = np.flatnonzero(kernel.any(axis=(0, 3 - axis)))
+    below, above = (light[0], light[-1]) if light.size else (0, kernel.shape[axis] - 1)
+    return (places >= below - 2) & (places < above + 2)
 
 
 def _catmull_rom(t: FloatGrid) -> list[FloatArray]:

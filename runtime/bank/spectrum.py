@@ -104,6 +104,24 @@ def packed_spectrum(half: ComplexArray, width: int) -> FloatArray:
     return packed
 
 
+def packed_power(packed: FloatArray) -> FloatArray:
+    """Give the power of spectra in packed planes (c, h, w), at both parts of every frequency."""
+    power = np.square(packed)
+    for column, _ in _packed_columns(packed.shape[2]):
+        _sum_pairs(power[:, :, column])
+    _sum_pairs(power)
+    return power
+
+
+def _sum_pairs(lines: FloatArray) -> None:
+    """Put the sum of re and im in the place of both; lines as in `_unpack_column`."""
+    count = (lines.shape[-1] - 1) // 2
+    re, im = (lines[..., first : first + 2 * count : 2] for first in (1, 2))
+    both = re + im
+    re[...] = both
+    im[...] = both
+
+
 def spread_weights(half: FloatArray, width: int) -> FloatArray:
     """Give real weights (c, h, w // 2 + 1), alike at f and -f, for packed planes (c, h, w)."""
     inner, height = (width - 1) // 2, half.shape[1]

@@ -38,6 +38,7 @@ from camkit.runtime.bank.spectrum import (
     from_packed,
     multiply_conjugate,
     packed_places,
+    packed_power,
     packed_spectrum,
     spread_weights,
     to_packed,
@@ -57,11 +58,11 @@ class Shapes:
     """What depends on the size of a block alone; float32.
 
     Attributes:
-        fall: (b, b // 2 + 1) F, times the samples of a block.
-        spread_fall: (b, b) the same for packed planes.
+        fall: (b, b) F, times the samples of a block; for packed planes.
         noise: (c, b, b) noise for a variance of one, times those samples; for packed planes.
-        low: (b, b // 2 + 1) number of the table's frequency below each one.
-        part: How far each lies from there to the next.
+        number: (b, b) which of the block's distinct frequencies lies where in a packed plane.
+        low: (f,) number of the table's frequency below each distinct one.
+        part: (f,) how far each lies from there to the next.
         band: Places of the real and imaginary parts of the frequencies that are measured, in packed
             planes.
         band_fall: (n,) F there, times the samples.
@@ -69,8 +70,8 @@ class Shapes:
     """
 
     fall: FloatArray
-    spread_fall: FloatArray
     noise: FloatArray
+    number: Places
     low: Places
     part: FloatArray
     band: tuple[Places, Places]
@@ -107,7 +108,8 @@ def shapes_of(together: Together, block_px: int) -> Shapes:
     lines = zip(together.noise, together.noise_rise, strict=True)
     noise = samples * np.exp(np.stack([n + 4 * rise * f2 for n, rise in lines]))
     places = np.array(together.spread.frequencies)
-    at = np.minimum(np.sqrt(f2), places[-1])
+    distinct, number = np.unique(f2, return_inverse=True)
+    at = np.minimum(np.sqrt(distinct), places[-1])
     low = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
     steps = [np.arange(0, side, BAND_STEP) for side in f2.shape]
     rows, columns = np.meshgrid(*steps, indexing="ij")
@@ -115,10 +117,12 @@ def shapes_of(together: Together, block_px: int) -> Shapes:
     band = packed_places(rows[in_band], columns[in_band], (block_px, block_px))
     spread_fall = spread_weights(fall[None], block_px)
     spread_noise = spread_weights(noise.astype(np.float32), block_px)
+    # float32 holds the numbers exactly: a block has far fewer frequencies than 2^24
+    spread_number = spread_weights(number.reshape(1, *f2.shape).astype(np.float32), block_px)
     return Shapes(
-        fall=fall,
-        spread_fall=spread_fall[0],
+        fall=spread_fall[0],
         noise=spread_noise,
+        number=spread_number[0].astype(np.intp),
         low=low,
         part=((at - places[low]) / (places[low + 1] - places[low])).astype(np.float32),
         band=band,
@@ -137,16 +141,14 @@ def transfer_of(otf: ComplexArray, height_mm: float, together: Together) -> Tran
     """
     block_px = otf.shape[1]
     shapes = shapes_of(together, block_px)
-    power = np.square(otf.real)
-    power += np.square(otf.imag)
-    doubt = _spread_at(together.spread, height_mm, shapes)
-    doubt *= np.float32(together.mistrust)
-    doubt += np.float32(together.own) * power
+    packed = packed_spectrum(otf, block_px)
+    seen = packed_power(packed)
+    doubt = _spread_at(together.spread, height_mm, shapes, np.float32(together.mistrust))
+    doubt += np.float32(together.own) * seen
     doubt *= shapes.fall
-    power *= shapes.fall
-    seen, doubt = spread_weights(power, block_px), spread_weights(doubt, block_px)
+    seen *= shapes.fall
     return Transfer(
-        otf=packed_spectrum(otf, block_px),
+        otf=packed,
         seen=seen,
         doubt=doubt,
         band_seen=_at(seen, shapes.band[0]),
@@ -154,8 +156,10 @@ def transfer_of(otf: ComplexArray, height_mm: float, together: Together) -> Tran
     )
 
 
-def _spread_at(spread: Spread, height_mm: float, shapes: Shapes) -> FloatArray:
-    """Give V of a field height, (c, b, b // 2 + 1); linear between the table's places."""
+def _spread_at(
+    spread: Spread, height_mm: float, shapes: Shapes, mistrust: np.float32
+) -> FloatArray:
+    """Give mistrust V of a field height, (c, b, b) packed; linear between the table's places."""
     table, heights = _table(spread)
     place = float(np.interp(height_mm, heights, np.arange(len(heights))))
     below = min(int(place), max(len(heights) - 2, 0))
@@ -165,7 +169,8 @@ def _spread_at(spread: Spread, height_mm: float, shapes: Shapes) -> FloatArray:
     found: FloatArray = steps.take(shapes.low, axis=1)
     found *= shapes.part
     found += lines.take(shapes.low, axis=1)
-    return found
+    found *= mistrust
+    return found.take(shapes.number, axis=1)
 
 
 @lru_cache(maxsize=4)
@@ -204,7 +209,7 @@ def restore_together(
     if together.follow:
         noise /= _measured(crossed, transfer, shapes, (share, noise, scale)) ** together.follow
     zero, found = spectrum[:, 0, 0].copy(), spectrum
-    light, rest = np.zeros_like(shapes.spread_fall), np.ones_like(shapes.spread_fall)
+    light, rest = np.zeros_like(shapes.fall), np.ones_like(shapes.fall)
     for c, seen in enumerate(found):  # plane by plane: what is at hand stays in cache
         cv2.scaleAdd(shapes.noise[c], float(noise[c]), transfer.doubt[c], dst=seen)
         np.reciprocal(seen, out=seen)
@@ -212,8 +217,8 @@ def restore_together(
         cv2.scaleAdd(crossed[c], float(1 / share[c]), light, dst=light)
         np.multiply(seen, transfer.seen[c], out=seen)
         np.add(rest, seen, out=rest)
-    light *= np.divide(shapes.spread_fall, rest, out=rest)
-    own = np.multiply(shapes.spread_fall, np.float32(together.own), out=rest)
+    light *= np.divide(shapes.fall, rest, out=rest)
+    own = np.multiply(shapes.fall, np.float32(together.own), out=rest)
     for c, plane in enumerate(found):
         np.multiply(plane, np.float32(-together.own * share[c]), out=plane)
         np.add(plane, np.float32(share[c]), out=plane)

@@ -8,6 +8,7 @@ from camkit.runtime.bank.spectrum import (
     inverse,
     multiply_conjugate,
     packed_places,
+    packed_power,
     packed_spectrum,
     spread_weights,
     to_packed,
@@ -92,6 +93,14 @@ def test_a_product_with_a_conjugate_is_that_of_the_half_spectra(size):
     wanted = inverse(transform(planes) * np.conj(transform(other)), size[1])
     given = from_packed(multiply_conjugate(to_packed(planes), to_packed(other)))
     np.testing.assert_allclose(given, wanted, atol=FLOAT32 * max(1, np.abs(wanted).max()))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_power_of_packed_planes_is_that_of_the_half_spectrum(size):
+    half = transform(planes_of(size))
+    power = np.square(half.real) + np.square(half.imag)
+    given = packed_power(packed_spectrum(half, size[1]))
+    np.testing.assert_array_equal(given, spread_weights(power, size[1]))
 
 
 @pytest.mark.parametrize("size", [(6, 4), (37, 37), (96, 96), (97, 60)])
