@@ -328,7 +328,8 @@ def _reached(places: FloatGrid, kernel: FloatArray, *, axis: int) -> NDArray[np.
     """Tell which positions along an axis of a kernel have taps between its first and last light."""
     light = np.flatnonzero(kernel.any(axis=(0, 3 - axis)))
     below, above = (light[0], light[-1]) if light.size else (0, kernel.shape[axis] - 1)
-    return (places >= below - 2) & (places < above + 2)
+    reached = (places >= below - 2) & (places < above + 2)
+    return np.asarray(reached, dtype=np.bool_)
 
 
 def _catmull_rom(t: FloatGrid) -> list[FloatArray]:
