@@ -1,5 +1,6 @@
 """Whole frames are photographed and cleared by the runtime; what is cut from them trains."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -242,6 +243,21 @@ def test_frames_of_other_pictures_or_another_recipe_are_refused(
         (tmp_path / "tiles.json").write_text(damaged)
         with pytest.raises(ContractError, match=r"tiles\.json is damaged; say `camkit prepare`"):
             read_frames(tmp_path)
+
+
+def test_tiles_that_were_cut_short_or_are_gone_are_one_line(runs: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "frames"
+    shutil.copytree(runs / "tiny_frames", folder)
+    frames = read_frames(folder)
+    planes = folder / "train.planes.npy"
+    whole = planes.read_bytes()
+    for left in (whole[:-1000], whole[:40], b""):
+        planes.write_bytes(left)
+        with pytest.raises(ContractError, match=r"\(train\) in .* are damaged; say `camkit prep"):
+            frames.tiles("train", None)
+    planes.unlink()
+    with pytest.raises(ContractError, match="are damaged"):
+        frames.tiles("train", None)
 
 
 def test_a_camera_without_a_haze_needs_no_frames(recipe: BayerRecipe, tmp_path: Path) -> None:

@@ -261,10 +261,13 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
     """Turn a parsed TOML table into a recipe.
 
     Raises:
-        ContractError: If a key is unknown, missing or wrong, or the sensor has no mosaic.
+        ContractError: If a key is unknown, missing or wrong, the sensor has no mosaic, or there are
+            frames without a haze.
     """
     table = with_new_names(table, _OLDER)
     common = common_tables(table, own=OWN, roles=ROLES)
+    if "frames" in table and "haze" not in table:
+        raise ContractError("[frames] is for a lens with a haze; there is no table [haze]")
     return BayerRecipe(
         name=common.name,
         kind=common.kind,

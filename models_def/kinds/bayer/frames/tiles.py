@@ -68,11 +68,20 @@ class Tiles:
     """The tiles of one part; files are mapped, not read."""
 
     def __init__(self, folder: Path, part: str, *, mode: Any = "r") -> None:
-        """Open the files of a part, to read or (`r+`) to fill."""
-        opened = [
-            np.load(folder / f"{part}.{name}.npy", mmap_mode=mode)
-            for name in ("planes", "clipped", "sharp", "facts")
-        ]
+        """Open the files of a part, to read or (`r+`) to fill.
+
+        Raises:
+            ContractError: If one is missing or damaged.
+        """
+        try:
+            opened = [
+                np.load(folder / f"{part}.{name}.npy", mmap_mode=mode)
+                for name in ("planes", "clipped", "sharp", "facts")
+            ]
+        except (OSError, ValueError, EOFError) as error:
+            raise ContractError(
+                f"the tiles ({part}) in {folder} are damaged; say `camkit prepare` again"
+            ) from error
         self._planes, self._clipped, self._sharp, self._facts = opened
 
     def __len__(self) -> int:

@@ -68,6 +68,7 @@ def test_network_schedule_overrides_the_common_one(recipe):
         ("sensor__type", "spad", "sensor"),
         ("sensor__channel_response", None, "channel_response"),
         ("fine_tuning", 3, "fine_tuning must be a table"),
+        ("frames", {"count": 2}, "there is no table .haze."),
         ("kind", 3, "kind must be of type str"),
         ("networks", {}, "at least one table"),
         ("name", None, "name must be of type str"),
