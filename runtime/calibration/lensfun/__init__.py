@@ -5,7 +5,8 @@ database   lenses by name, and their entries
 models     lensfun's formulas of distortion, as odd and even powers
 between    entries between measured focal lengths
 profile    the lens profile of a lens for captures like one
-camera     a bundle of that lens
+camera     sensor and stages of a bundle of that lens
+ordinary   database and capture to that bundle
 source     the distortion of a bundle or of a measured geometry
 entry      the entry that lensfun reads
 """

@@ -1,7 +1,7 @@
 """`camkit calibrate lensfun-in`: a lens of lensfun's database to a bundle of an ordinary camera."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -52,60 +52,20 @@ def lensfun_in(
     check_out(out, ".camkit", "a bundle", overwrite=overwrite)
     from camkit.bundle.writer import write_bundle
     from camkit.cli.use.mosaic import mosaic_options
-    from camkit.runtime.calibration.lensfun.camera import frame_of, manifest_of, slug
-    from camkit.runtime.calibration.lensfun.database import Database, check_positive
-    from camkit.runtime.calibration.lensfun.profile import profile_of
-    from camkit.runtime.raw import read_capture
+    from camkit.runtime.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
 
-    options = {"--focal-mm": focal_mm, "--aperture": aperture}
-    options |= {"--distance-m": distance_m, "--crop-factor": crop_factor}
-    options |= {"--scale": scale}
-    for option, value in options.items():
-        if value is not None:
-            check_positive(value, option)
-    said = mosaic_options(mosaic, black_level, white_level)
-    known = Database(database)
-    lenses = known.find(lens)
-    shot = read_capture(capture, mosaic=said)
-    frame, taken = frame_of(shot, crop_factor, known)
-    found = profile_of(
-        lenses,
-        focal_mm,
-        frame,
-        aperture=shot.metadata.f_number if aperture is None else aperture,
+    options = CameraOptions(
+        focal_mm=focal_mm,
+        aperture=aperture,
         distance_m=distance_m,
+        crop_factor=crop_factor,
         scale=scale,
+        mosaic=mosaic_options(mosaic, black_level, white_level),
     )
-    manifest, stood_in = manifest_of(slug(out.stem), shot, frame, found.profile)
+    made = lensfun_bundle(database, lens, capture, options, name=out.stem)
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_bundle(out, manifest, {})
-    notes = [*taken, *found.notes, *stood_in]
-    record = {**_record(found), "notes": notes, "out": str(out)}
-    tell(record, [_line(found)], as_json=json_)
-
-
-def _record(found: "Found") -> dict[str, Any]:
-    from camkit.runtime.calibration.lensfun.models import TERMS
-
-    entry, light = found.distortion, found.vignetting
-    terms = dict(zip(TERMS[entry.model], entry.terms, strict=True))
-    return {
-        "lens": found.lens.name,
-        "file": found.lens.file,
-        "crop_factor": found.lens.crop_factor,
-        "model": entry.model,
-        "focal_mm": entry.focal_mm,
-        "terms": terms,
-        "scale": found.scale,
-        "residual_px": round(found.residual_px, 6),
-        "vignetting": light
-        and {
-            "focal_mm": light.focal_mm,
-            "aperture": light.aperture,
-            "distance_m": light.distance_m,
-            "terms": list(light.terms),
-        },
-    }
+    write_bundle(out, made.manifest, {})
+    tell({**made.to_record(), "out": str(out)}, [_line(made.found)], as_json=json_)
 
 
 def _line(found: "Found") -> str:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from camkit.bundle.reader import open_bundle
+from camkit.bundle.writer import write_bundle
 from camkit.cli.exit_code import ExitCode
 from camkit.report.kind_finder import check_photographs
+from camkit.runtime.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
 from camkit.runtime.calibration.record import to_toml
 from camkit.runtime.geometry.distortion import distort_points
 from camkit.runtime.proof.check import check_bundle
@@ -54,6 +56,23 @@ def test_a_bundle_of_a_lens_is_made_and_passes_its_check(
     done = camkit_command(*asked, "--lens", ZOOM, "--focal-mm", 24, "--overwrite")
     assert done.code == 0
     assert f"{ZOOM}, ptlens at 24 mm, light evened as at f/2.8" in done.out
+
+
+def test_python_gives_the_bundle_of_the_command(camkit_command, tmp_path: Path) -> None:
+    shot, database = write_shot(tmp_path / "shot.dng"), write_database(tmp_path)
+    options = CameraOptions(focal_mm=24.0, aperture=4.0, crop_factor=1.4, scale=1.0)
+    made = lensfun_bundle(database, ZOOM, shot, options, name="own")
+    write_bundle(tmp_path / "python.camkit", made.manifest, {})
+    done = camkit_command(
+        *("calibrate", "lensfun-in", database, "--lens", ZOOM, "--capture", shot, "--json"),
+        *("--focal-mm", 24, "--aperture", 4, "--crop-factor", 1.4, "--scale", 1),
+        *("-o", tmp_path / "own.camkit"),
+    )
+    assert done.code == 0, done.err
+    assert (tmp_path / "python.camkit").read_bytes() == (tmp_path / "own.camkit").read_bytes()
+    told = json.loads(done.out)
+    assert told.pop("out") == str(tmp_path / "own.camkit")
+    assert told == json.loads(json.dumps(made.to_record()))
 
 
 def test_processing_evens_and_straightens_as_lensfun_says(
