@@ -34,12 +34,17 @@ def describe_data(data: DataRecipe, pictures: Path | None) -> str:
 
 
 def joined_credits(texts: Iterable[str]) -> str:
-    """Join what the networks of a bundle were trained on: what they share is said once."""
+    """Join what the networks of a bundle were trained on: what they share is said once.
+
+    Parts of one training that each began at the one before name the same first weights again.
+    """
     heads: dict[str, dict[str, None]] = {}
     for text in texts:
-        head, *tail = text.partition(FIRST_WEIGHTS)
-        heads.setdefault(head, {})["".join(tail)] = None
-    return "; ".join(head + "".join(tails) for head, tails in heads.items())
+        head, *tails = text.split(FIRST_WEIGHTS)
+        heads.setdefault(head, {}).update(dict.fromkeys(tails))
+    return "; ".join(
+        head + "".join(FIRST_WEIGHTS + tail for tail in tails) for head, tails in heads.items()
+    )
 
 
 def _licences(readme: Path, names: set[str]) -> Counter[str]:

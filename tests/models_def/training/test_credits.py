@@ -46,3 +46,10 @@ def test_what_networks_share_is_said_once():
         "a; first weights: x S, trained on the same; first weights: x M, trained on b"
     )
     assert joined_credits(["a", "b", "a", small]) == "a; first weights: x S, trained on the same; b"
+
+
+def test_parts_of_one_training_name_their_first_weights_once():
+    same = "; first weights: x S, trained on the same"
+    assert joined_credits([f"a{same}{same}; first weights: y S, trained on b"]) == (
+        f"a{same}; first weights: y S, trained on b"
+    )
