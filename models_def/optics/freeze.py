@@ -73,6 +73,9 @@ BLOCKS: Final = (
     (240, 80),
     (216, 96),
 )
+BLOCK_REACH: Final = 0.6
+"""Overlap of blocks over the side of a kernel, at least: with less, light that one block knows of
+and its neighbour does not leaves a step between them, however small the mean loss."""
 
 
 def _silent(_: str) -> None:
@@ -227,10 +230,13 @@ def between_mm(depths_mm: tuple[float, ...]) -> tuple[float, ...]:
 def choose_blocks(psf: FrozenPsf, bench: Bench, *, tell: Tell = _silent) -> tuple[Wiener, Loss]:
     """Give the cheapest block grid that loses `BLOCK_TOLERANCE_DB` more than the best at most.
 
-    Tried are `BLOCKS` and the grid of the bench's own settings. The cost of a grid is the area
-    filtered per area answered for. A small block may gain, since its prior is that of its place.
+    Tried are those of `BLOCKS` whose overlap suits the kernels (`BLOCK_REACH`; the widest where
+    none does) and the grid of the bench's own settings. The cost of a grid is the area filtered
+    per area answered for. A small block may gain, since its prior is that of its place.
     """
-    grids = {*BLOCKS, (bench.settings.block_px, bench.settings.overlap_px)}
+    reach_px = min(BLOCK_REACH * psf.kernels.shape[-1], max(overlap for _, overlap in BLOCKS))
+    suited = {grid for grid in BLOCKS if grid[1] >= reach_px}
+    grids = {*suited, (bench.settings.block_px, bench.settings.overlap_px)}
     cheapest_first = [
         bench.settings.model_copy(update={"block_px": block_px, "overlap_px": overlap_px})
         for block_px, overlap_px in sorted(grids, key=lambda b: ((b[0] / (b[0] - b[1])) ** 2, b))

@@ -160,6 +160,22 @@ def test_cheapest_block_grid_that_loses_little_is_taken(
     assert loss.mean_db == known[chosen_px]
 
 
+@pytest.mark.parametrize(("overlap_share", "chosen_px"), [(1.0, 240), (0.59, 384)])
+def test_blocks_that_overlap_less_than_kernels_reach_are_not_tried(
+    overlap_share: float, chosen_px: int, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    side_px = bench.nominal.kernels.shape[-1]
+    near, far = int(overlap_share * side_px), 2 * side_px
+    monkeypatch.setattr(freeze_module, "BLOCKS", ((240, near), (384, far)))
+    monkeypatch.setattr(freeze_module, "make_probes", lambda *_: ())
+    monkeypatch.setattr(
+        freeze_module, "block_loss", lambda *_: sampling.Loss(mean_db=0.1, worst_db=1.0)
+    )
+    own = bench.settings.model_copy(update={"block_px": 384, "overlap_px": far})
+    settings, _ = freeze_module.choose_blocks(bench.nominal, replace(bench, settings=own))
+    assert settings.block_px == chosen_px
+
+
 @pytest.fixture(scope="module")
 def deep(sensor: BayerSensor) -> Bench:
     with pytest.MonkeyPatch.context() as patch:
