@@ -31,6 +31,7 @@ from camkit.runtime.twin.haze import HazeLens, hazed, margin_px
 
 Gains = tuple[float, ...]
 KernelChange = Callable[[FloatArray], FloatArray]
+Response = tuple[NDArray[np.float64], NDArray[np.float64]]
 WIDE_MARGIN_PX: Final = 65
 """From here on kernels that are the same everywhere are spread at once; smaller ones keep the bits
 that captures of older bundles have."""
@@ -109,6 +110,7 @@ def lens_of(
     depth_mm: float | None = None,
     focus_um: float = 0.0,
     haze: Haze | None = None,
+    response: Response | None = None,
 ) -> Lens:
     """Give what the light goes through for one object distance.
 
@@ -118,6 +120,8 @@ def lens_of(
         depth_mm: Object distance; may only be left out where there is one depth.
         focus_um: How far the sensor lies from its nominal place, away from the lens.
         haze: What lies beside the kernels of the PSF.
+        response: What weights the wavelengths in place of the response of the sensor: (n,) um and
+            (channel, n), as under another light.
 
     Raises:
         ContractError: If there are several depths and none is given, or the PSF does not reach
@@ -126,9 +130,10 @@ def lens_of(
     if depth_mm is None and psf.depths_mm.size > 1:
         known = ", ".join(map(depth_name, psf.depths_mm))
         raise ContractError(f"light comes from one depth: give one of those the PSF knows, {known}")
+    weights = sensor.response_arrays() if response is None else response
     if haze is not None:
-        return _hazy_lens(psf, haze, sensor, depth_mm)
-    kernels = color_kernels(psf, *sensor.response_arrays(), depth_mm=depth_mm, focus_um=focus_um)
+        return _hazy_lens(psf, haze, weights, depth_mm)
+    kernels = color_kernels(psf, *weights, depth_mm=depth_mm, focus_um=focus_um)
     return Lens(
         psf=psf,
         kernels_at=kernels.at,
@@ -137,8 +142,8 @@ def lens_of(
     )
 
 
-def _hazy_lens(psf: FrozenPsf, haze: Haze, sensor: ColorSensor, depth_mm: float | None) -> Lens:
-    kernels = hazy_kernels(psf, haze, *sensor.response_arrays(), depth_mm=depth_mm)
+def _hazy_lens(psf: FrozenPsf, haze: Haze, response: Response, depth_mm: float | None) -> Lens:
+    kernels = hazy_kernels(psf, haze, *response, depth_mm=depth_mm)
     return Lens(
         psf=psf,
         kernels_at=kernels.core.at,
@@ -242,17 +247,23 @@ def _spread(planes: FloatArray, lens: Lens, window: SensorWindow, workers: int) 
     return scatter(planes, lens.kernels_at, window, margin_px=lens.margin_px, workers=workers)
 
 
+def lit_core(lens: Lens) -> KernelLookup:
+    """Give the kernels of a lens with the light that they hold: all of it without a haze."""
+    haze = lens.haze
+    if haze is None:
+        return lens.kernels_at
+    return lambda x_mm, y_mm: lens.kernels_at(x_mm, y_mm) * haze.share_at(x_mm, y_mm)[:, None, None]
+
+
 def _spread_hazy(
     wide: FloatArray, extended: FloatArray, lens: Lens, window: SensorWindow, workers: int
 ) -> FloatArray:
     """Spread core and haze, and divide by what they make of a scene of ones."""
     haze = lens.haze
     assert haze is not None
-
-    def lit(x_mm: float, y_mm: float) -> FloatArray:
-        return lens.kernels_at(x_mm, y_mm) * haze.share_at(x_mm, y_mm)[:, None, None]
-
-    core, ones = scatter_light(extended, lit, window, margin_px=lens.margin_px, workers=workers)
+    core, ones = scatter_light(
+        extended, lit_core(lens), window, margin_px=lens.margin_px, workers=workers
+    )
     around = (wide.shape[1] - window.size_px[1]) // 2
     veil, even = hazed(wide, haze, window, around_px=around, workers=workers)
     core += veil

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.report.stress.shot import Shot
-from camkit.runtime.geometry.scatter import scatter
+from camkit.runtime.geometry.scatter import scatter, scatter_light
 from camkit.runtime.geometry.shrink import shrunk
 from camkit.runtime.twin.exposure import sample_planes, variance_of
-from camkit.runtime.twin.light import Lens
+from camkit.runtime.twin.haze import hazed, margin_px
+from camkit.runtime.twin.light import Lens, lit_core
 
 LIMIT: Final = 1.3
 """chi^2 per pixel above which a restoration no longer fits its capture."""
@@ -102,7 +103,7 @@ def _middle(side_px: int) -> slice:
 
 
 def _blur(planes: FloatArray, shot: Shot, lens: Lens, part: tuple[slice, slice]) -> FloatArray:
-    """Blur a part of a picture with the light from around it."""
+    """Blur a part of a picture with the light from around it, through the haze too."""
     margin, (rows, columns) = lens.margin_px, part
     pad = ((0, 0), (margin, margin), (margin, margin))
     extended = np.pad(np.maximum(planes, 0), pad, mode="symmetric")
@@ -113,9 +114,18 @@ def _blur(planes: FloatArray, shot: Shot, lens: Lens, part: tuple[slice, slice])
         size_px=(columns.stop - columns.start, rows.stop - rows.start),
         origin_px=(x + columns.start, y + rows.start),
     )
-    return scatter(
-        extended[:, *around], lens.kernels_at, window, margin_px=margin, step_px=BLUR_STEP_PX
-    )
+    seen = extended[:, *around]
+    if lens.haze is None:
+        return scatter(seen, lens.kernels_at, window, margin_px=margin, step_px=BLUR_STEP_PX)
+    core, ones = scatter_light(seen, lit_core(lens), window, margin_px=margin, step_px=BLUR_STEP_PX)
+    # haze comes from all of the picture, and from farther than the core's margin
+    wide_px = margin_px(lens.haze, margin)
+    pad = ((0, 0), (wide_px, wide_px), (wide_px, wide_px))
+    wide = np.pad(np.maximum(planes, 0), pad, mode="symmetric")
+    veil, even = hazed(wide, lens.haze, shot.light.window, around_px=wide_px)
+    core += veil[:, rows, columns]
+    core /= ones + even[:, rows, columns]
+    return core
 
 
 def judged_pixels(shot: Shot) -> NDArray[np.bool_]:

@@ -35,6 +35,7 @@ from camkit.runtime.twin.light import (
     Lens,
     Light,
     LightOptions,
+    Response,
     lens_of,
     light_of,
     scene_window,
@@ -166,21 +167,43 @@ class Rig:
 
     def lens_at(self, depth_mm: float) -> Lens:
         """Give the lens as the bundle knows it, for one object distance."""
+        return self._lens(depth_mm)
+
+    def lens_under(self, response: Response) -> Lens:
+        """Give the lens at the reference depth where wavelengths weigh as `lens_of` says."""
+        return self._lens(self.bundle.reference_depth_mm, response)
+
+    def _lens(self, depth_mm: float, response: Response | None = None) -> Lens:
         haze = self.bundle.haze if self.bundle.manifest.has_haze else None
-        return lens_of(self.bundle.psf, self.sensor, depth_mm=depth_mm, haze=haze)
+        return lens_of(
+            self.bundle.psf, self.sensor, depth_mm=depth_mm, haze=haze, response=response
+        )
 
     def light(self, scene: Scene, lens: Lens | None = None) -> Light:
         """Let a scene fall on the sensor; that through the nominal lens is kept by its name."""
         if lens is None and scene.name in self._lights:
             return self._lights[scene.name]
-        extent = self.sensor.known_extent
-        origin = scene.origin_px((extent.width_px, extent.height_px))
-        window = scene_window(scene.linear, self.sensor, origin, scale=scene.scale)
-        options = LightOptions(scale=scene.scale)
-        made = light_of(scene.linear, self.sensor, lens or self.lens, window, options)
+        made = self._fall(scene, scene.linear, lens or self.lens)
         if lens is None:
             self._lights[scene.name] = made
         return made
+
+    def light_amid(self, scene: Scene, around: FloatArray) -> Light:
+        """Let a scene fall on the sensor with what surrounds it, through the nominal lens.
+
+        Args:
+            scene: What is in the picture.
+            around: (3, h', w') linear Rec.709: the scene with as much on every side of it.
+        """
+        return self._fall(scene, around, self.lens)
+
+    def _fall(self, scene: Scene, seen: FloatArray, lens: Lens) -> Light:
+        extent, scale = self.sensor.known_extent, scene.scale
+        ring_px = (seen.shape[1] - scene.linear.shape[1]) // (2 * scale)
+        origin = scene.origin_px((extent.width_px, extent.height_px))
+        window = scene_window(seen, self.sensor, origin, scale=scale, surround_px=ring_px)
+        options = LightOptions(scale=scale, surround_px=ring_px)
+        return light_of(seen, self.sensor, lens, window, options)
 
     def shoot(self, scene: Scene, lens: Lens | None = None, setting: Setting | None = None) -> Shot:
         """Record a scene through a lens (None: the nominal one) with a setting of the camera."""
@@ -290,7 +313,10 @@ def _method(bundle: Bundle, name: str, chosen: Mapping[str, Any]) -> Method:
 
 def _same(a: Capture, b: Capture) -> bool:
     """Tell whether two captures are restored alike."""
-    facts = [(c.iso, c.white_balance, c.white_level, c.origin_px, c.noise) for c in (a, b)]
+    facts = [
+        (c.iso, c.white_balance, c.black_level.tolist(), c.white_level, c.origin_px, c.noise)
+        for c in (a, b)
+    ]
     return facts[0] == facts[1] and np.array_equal(
         a.samples, b.samples, equal_nan=a.samples.dtype == np.float32
     )

@@ -53,6 +53,14 @@ def varies_over_field(bundle: Bundle) -> str | None:
     return photographs(bundle)
 
 
+def has_haze(bundle: Bundle) -> str | None:
+    """Say why a bundle cannot take scenarios of what lies beside its peaks; None if it can."""
+    reason = photographs(bundle)
+    if reason is None and not bundle.manifest.has_haze:
+        return "its optics have no haze beside their kernels"
+    return reason
+
+
 def has_room(bundle: Bundle) -> str | None:
     """Say why a bundle cannot take scenarios that look at what surrounds things; None if it can."""
     sensor = bundle.manifest.sensor

@@ -160,7 +160,7 @@ def _digest(shot: Shot) -> bytes:
     parts: list[object] = [capture.iso, capture.white_balance, capture.white_level, shot.noise]
     parts += [capture.origin_px, shot.exposure, shot.border_px, shot.away_from_clipped]
     parts += [shot.scene.name, shot.spoiled is None, capture.noise]
-    arrays = (capture.samples, light.clean)
+    arrays = (capture.samples, capture.black_level, light.clean)
     digest = hashlib.sha256(repr(parts).encode())
     for array in arrays:
         digest.update(np.ascontiguousarray(array).data)

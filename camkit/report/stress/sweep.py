@@ -11,7 +11,7 @@ from camkit.report.journal import append_journal, read_journal
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.verdict import Examiner, Outcome, SweptScene, Verdict
 
-JOURNAL_VERSION: Final = 2
+JOURNAL_VERSION: Final = 3
 """Raised when the same bundle and methods give other points than before."""
 
 

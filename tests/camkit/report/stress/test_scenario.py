@@ -14,6 +14,7 @@ from camkit.runtime.envelope import QUANTITIES
 from tests.psf_factory import gaussian_kernel
 
 ALL = all_scenarios()
+HAZY = {"energy_split", "lost_dark_frame"}
 
 
 def test_every_row_of_the_failure_table_has_its_scenario() -> None:
@@ -22,6 +23,7 @@ def test_every_row_of_the_failure_table_has_its_scenario() -> None:
     wanted = {"noise", "exposure", "saturated_area", "blob_size", "psf_scale", "psf_rotation"}
     wanted |= {"decentre", "defocus", "illuminant", "wrong_bundle", "dead_pixels", "bit_depth"}
     wanted |= {"invalid_pixels", "picture_size", "fp16_range", "tile_seams", "resolution"}
+    wanted |= {"light_colour", "dynamic_range", "surroundings", "black_level", *HAZY}
     assert wanted <= set(names)
 
 
@@ -34,7 +36,7 @@ def test_its_last_value_is_survived_by_every_method(
     scenario: Scenario, judge: Judge, scene: Scene
 ) -> None:
     if scenario.applies(judge.rig.bundle) is not None:
-        assert scenario.name in {"defocus", "depth", "known_depth"}
+        assert scenario.name in {"defocus", "depth", "known_depth", *HAZY}
         return
     value = [v for v in scenario.quick if v != scenario.nominal][-1]
     verdict = scenario.take(judge, scene, value)

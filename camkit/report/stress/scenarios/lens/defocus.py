@@ -23,6 +23,8 @@ def _applies(bundle: Bundle) -> str | None:
     psf = bundle.stress_psf()
     if psf is None:
         return "it holds no stress_psf.safetensors"
+    if bundle.manifest.has_haze:
+        return "its stress PSF knows nothing of its haze"
     if psf.symmetry != "radial":
         return "its stress PSF is not that of a lens of revolution"
     if psf.depths_mm.size < 2 or _off_focus_per_m(bundle, psf).min() > FOCUS_WITHIN_PER_M:

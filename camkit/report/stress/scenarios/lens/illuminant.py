@@ -12,7 +12,6 @@ from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
-from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.twin.light import Lens
 
 Spectrum = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -67,12 +66,10 @@ def lens_under(rig: Rig, spectrum: Spectrum) -> Lens:
     wavelengths_um, response = rig.sensor.response_arrays()
     fine = np.stack([np.interp(GRID_UM, wavelengths_um, r, 0, 0) for r in response])
     lit = fine * spectrum(GRID_UM)
-    kernels = color_kernels(rig.bundle.psf, GRID_UM, lit, depth_mm=rig.bundle.reference_depth_mm)
     gains = fine.sum(axis=1) / lit.sum(axis=1)
     middle = gains[gains.size // 2]
-    return replace(
-        rig.lens, kernels_at=kernels.at, gains=tuple(float(gain / middle) for gain in gains)
-    )
+    lens = rig.lens_under((GRID_UM, lit))
+    return replace(lens, gains=tuple(float(gain / middle) for gain in gains))
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:

@@ -2,21 +2,17 @@
 
 import numpy as np
 
-from camkit.report.stress.kernel_change import transform_kernels
+from camkit.report.stress.kernel_change import with_transformed
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
-from camkit.runtime.twin.light import with_kernels
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     angle_rad = float(np.deg2rad(value))
-    lens = None
-    if value:
-        lens = with_kernels(rig.lens, lambda k: transform_kernels(k, 1.0, angle_rad))
-    return rig.shoot(scene, lens)
+    return rig.shoot(scene, with_transformed(rig.lens, 1.0, angle_rad) if value else None)
 
 
 SCENARIO = Scenario(

@@ -1,20 +1,16 @@
 """A lens copy, refocusing or heat: all kernels a little smaller or larger than frozen."""
 
-from camkit.report.stress.kernel_change import transform_kernels
+from camkit.report.stress.kernel_change import with_transformed
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
-from camkit.runtime.twin.light import with_kernels
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     ratio = 1 + value / 100
-    lens = None
-    if value:
-        lens = with_kernels(rig.lens, lambda k: transform_kernels(k, ratio, 0.0))
-    return rig.shoot(scene, lens)
+    return rig.shoot(scene, with_transformed(rig.lens, ratio, 0.0) if value else None)
 
 
 SCENARIO = Scenario(
@@ -26,5 +22,5 @@ SCENARIO = Scenario(
     nominal=0.0,
     quick=(-5.0, 0.0, 5.0),
     shoot=_shoot,
-    note="The lens's kernels against the bundle's.",
+    note="The lens's kernels against the bundle's, its haze too where it has one.",
 )

@@ -17,11 +17,12 @@ SCENARIO = Scenario(
     title="Noise: sensitivity",
     knob="iso",
     unit="ISO",
-    values=(100.0, 400.0, 1600.0, 3200.0, 6400.0, 12800.0, 25600.0),
+    values=(50.0, 100.0, 400.0, 1600.0, 3200.0, 6400.0, 12800.0, 25600.0),
     nominal=100.0,
     quick=(100.0, 12800.0),
     shoot=_shoot,
     log=True,
     bounds={"grey_noise": "both"},
-    note="The picture is equally bright at every ISO; the file states the ISO.",
+    note="The picture is equally bright at every ISO; the file states the ISO. Below the lowest "
+    "ISO of a sensor its noise stays: such a camera only exposes longer.",
 )

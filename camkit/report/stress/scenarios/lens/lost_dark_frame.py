@@ -1,0 +1,53 @@
+"""A haze that was measured without its dark frame: black that the bundle takes for light."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from camkit.contracts import FloatArray
+from camkit.report.stress.scenario import Scenario, has_haze
+from camkit.report.stress.scene import Scene
+from camkit.report.stress.score import Judge
+from camkit.report.stress.shot import Shot
+from camkit.runtime.twin.haze import HazeLens
+
+
+def without_pedestal(haze: HazeLens, share: float) -> HazeLens:
+    """Give the haze that optics really have where a bundle's stands on a pedestal.
+
+    Args:
+        haze: As the bundle has it.
+        share: Of a point's light, core and haze, that is black, even over the cells of a kernel;
+            a cell with less was dark.
+    """
+
+    def haze_at(x_mm: float, y_mm: float) -> FloatArray:
+        kernels = haze.haze_at(x_mm, y_mm)
+        light = kernels.sum(axis=(1, 2)) + haze.share_at(x_mm, y_mm)
+        pedestal = share * light / kernels[0].size
+        return np.asarray(np.maximum(kernels - pedestal[:, None, None], 0), dtype=np.float32)
+
+    return replace(haze, haze_at=haze_at)
+
+
+def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
+    rig = judge.rig
+    haze = rig.lens.haze
+    assert haze is not None
+    lens = replace(rig.lens, haze=without_pedestal(haze, value / 100)) if value else None
+    return rig.shoot(scene, lens)
+
+
+SCENARIO = Scenario(
+    name="lost_dark_frame",
+    title="Haze measured without its dark frame",
+    knob="pedestal_percent",
+    unit="%",
+    values=(0.0, 1.0, 3.0, 6.0, 12.0, 30.0, 60.0),
+    nominal=0.0,
+    quick=(0.0, 12.0),
+    shoot=_shoot,
+    applies=has_haze,
+    note="So much of a point's light in the bundle is black level, even over the cells of its "
+    "haze; the optics do not have it. 0.1 DN are 12 to 60 % of a point below white.",
+)
