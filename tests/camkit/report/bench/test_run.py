@@ -110,7 +110,10 @@ def test_seconds_stand_where_the_accuracy_cannot_be_measured(tmp_path: Path) -> 
 
 def test_networks_that_were_not_trained_are_timed_and_not_judged(tmp_path: Path) -> None:
     bundle = write_wide_bundle(tmp_path)
-    idle = tmp_path / "random.camkit"
+    idle, sharp = tmp_path / "random.camkit", tmp_path / "sharp"
+    sharp.mkdir()
+    values = np.rint(texture(100, 120) * 255).astype(np.uint8)
+    cv2.imwrite(str(sharp / "a.png"), values[::-1].transpose(1, 2, 0))
     members = {name: bundle.member(name) for name in bundle.names}
     said = {"training_data": NOT_TRAINED}
     write_bundle(idle, bundle.manifest.model_copy(update=said), members)
@@ -120,6 +123,7 @@ def test_networks_that_were_not_trained_are_timed_and_not_judged(tmp_path: Path)
             references=(str(idle),),
             axes=Axes(methods=("net",), modes=("exact",), threads=(1,)),
             repeat=1,
+            data=sharp,
             work_dir=tmp_path / "work",
             gemm_s=0.01,
         )
