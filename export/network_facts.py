@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from torch import nn
 
+from camkit.bundle.container import MAX_BUNDLE_BYTES
 from camkit.bundle.facts import HaloError, NetworkFacts
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, UnsupportedError
@@ -18,12 +19,19 @@ from camkit.models_def.networks.instance_norm import live_norms
 from camkit.models_def.training.sample import SampleLayout
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.graph import inspect_graph
+from camkit.runtime.network.graph_walk import GraphFacts
 from camkit.runtime.network.probe import halo_error_curve, perturbation_reach
 from camkit.runtime.network.ranges import node_activations
 
 PROBE_SEED: Final = 5
 FP16_HEADROOM: Final = 4.0
 HALO_STEP_PX: Final = 16
+DEEP_STRIDE_PX: Final = 32
+DEEP_ARENA: Final = 1.5
+"""What onnxruntime's arena takes over the live tensors of a network whose stride is at least that
+(measured, decision 28): its tensors are of many sizes, whose holes stay empty."""
+MOST_HALF_BYTES: Final = MAX_BUNDLE_BYTES // 2
+"""Of both precisions of a network; a larger one has fp32 alone, or no bundle could hold it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +72,7 @@ def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> Export
         max_activation=0.0,
         fp16_safe=False,
         mac_per_pixel=graph.mac_per_pixel,
-        bytes_per_pixel=graph.bytes_per_pixel,
+        bytes_per_pixel=_arena_bytes(graph),
         parity_max_abs=0.0,
         parameters=graph.parameters,
     )
@@ -100,11 +108,10 @@ def measure_network(
     )
     reach_px = max(reach.halo_px, facts.receptive_field_radius_px)
     members = dict(draft.members)
-    fp16_member: str | None = facts.member.replace(".onnx", "_fp16.onnx")
-    try:
-        members[str(fp16_member)] = to_fp16(model, activations, headroom=FP16_HEADROOM)
-    except UnsupportedError:
-        fp16_member = None
+    half = _half(model, activations)
+    fp16_member = None if half is None else facts.member.replace(".onnx", "_fp16.onnx")
+    if fp16_member is not None and half is not None:
+        members[fp16_member] = half
     measured = {
         "fp16_member": fp16_member,
         "receptive_field_probe_px": reach.halo_px,
@@ -118,6 +125,22 @@ def measure_network(
     return ExportedNetwork(
         facts=NetworkFacts.model_validate({**dict(facts), **measured}), members=members
     )
+
+
+def _arena_bytes(graph: GraphFacts) -> float:
+    """Give the memory of a window per pixel."""
+    share = DEEP_ARENA if graph.stride_px >= DEEP_STRIDE_PX else 1.0
+    return graph.bytes_per_pixel * share
+
+
+def _half(model: bytes, activations: dict[str, float]) -> bytes | None:
+    """Give a network in half precision where its range is proven and a bundle holds both."""
+    if 3 * len(model) > 2 * MOST_HALF_BYTES:
+        return None
+    try:
+        return to_fp16(model, activations, headroom=FP16_HEADROOM)
+    except UnsupportedError:
+        return None
 
 
 def _probe_size(radius_px: int, stride_px: int) -> int:

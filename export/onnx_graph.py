@@ -15,6 +15,7 @@ from torch import nn
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError, UnsupportedError
+from camkit.export.folding import fold_nodes
 from camkit.runtime.network.engine import NetworkEngine
 
 if TYPE_CHECKING:
@@ -201,6 +202,7 @@ def _given(network: nn.Module, channels: int, scale: int) -> int:
 def _stripped(traced: onnx.ModelProto, outputs: int, scale: int) -> bytes:
     """Rebuild the model from its arithmetic alone: names counted, no paths, no stack traces."""
     graph = traced.graph
+    fold_nodes(graph)
     renamed = {"input": "input", "output": "output"}
     weights = []
     for i, weight in enumerate(graph.initializer):

@@ -43,6 +43,9 @@ PROFILE_VERSION: Final = (2, 6)
 """From here on optics may be a lens profile, and distortion have even powers."""
 HAZE_VERSION: Final = (2, 7)
 """From here on optics may have a haze beside core kernels."""
+NOT_TRAINED: Final = "not trained"
+"""As `training_data`: weights are random, so that time and memory mean something and pictures do
+not."""
 _OLDEST: Final = 1
 _S = TypeVar("_S", bound=Entry)
 NetworkSize = Annotated[str, Field(pattern=r"^[A-Za-z0-9]{1,16}$")]
@@ -110,7 +113,8 @@ class Manifest(Entry):
         name: Name of the camera, as `--bundle` takes it.
         version: Semantic version of this bundle.
         licence: Licence of the weights (SPDX where there is one).
-        training_data: What the networks were trained on, for people.
+        training_data: What the networks were trained on, for people; `NOT_TRAINED` of random
+            weights, which reports time and do not judge.
         sensor: What the camera sees with.
         optics: What it sees through; None where no stage needs to know.
         border: How a picture is continued to a multiple of the network's stride.
@@ -182,6 +186,11 @@ class Manifest(Entry):
     def has_haze(self) -> bool:
         """Tell whether a haze lies beside these kernels."""
         return self.optics is not None and self.optics.type == "hazy_psf"
+
+    @property
+    def is_trained(self) -> bool:
+        """Tell whether what its networks make is a picture to be judged."""
+        return self.training_data != NOT_TRAINED
 
     @property
     def all_planes(self) -> dict[str, Plane]:

@@ -154,6 +154,11 @@ class Bundle:
         return float(min(max(focus_mm, depths_mm[0]), depths_mm[-1]))
 
     @property
+    def stored_bytes(self) -> int:
+        """Memory of the file, which is held as it is."""
+        return len(self._container.data)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The members, without the manifest."""
         return tuple(self.manifest.members)

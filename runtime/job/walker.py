@@ -26,6 +26,8 @@ from camkit.runtime.stage_finder import stage_keys, stage_module
 
 FIXED_BYTES: Final = 240_000_000
 """Interpreter and libraries, and what they keep (measured, see docs/performance.md)."""
+USUAL_BYTES: Final = 16_000_000
+"""Of a bundle, and of the weights of a network: so much is part of that."""
 
 
 class Walk:
@@ -100,7 +102,8 @@ class Walk:
     def _fixed_bytes(self, running: list[StageWork]) -> int:
         held = sum(work.held_bytes for work in running)
         job = self._job
-        return FIXED_BYTES + job.capture.resident_bytes + job.reserved_bytes + held
+        stored = 0 if job.bundle is None else max(job.bundle.stored_bytes - USUAL_BYTES, 0)
+        return FIXED_BYTES + stored + job.capture.resident_bytes + job.reserved_bytes + held
 
     def warnings(self) -> tuple[str, ...]:
         """Give what the stages have to say once the last row is out."""

@@ -23,6 +23,7 @@ from camkit.runtime.network.operators import (
     check_broadcast,
     convolution_windows,
     is_corner_aligned,
+    place_run,
     reduces_space,
     resize_windows,
     shuffle_window,
@@ -219,6 +220,7 @@ def _reach(
         samples: n, and how many samples of the output a pixel has.
     """
     (source, target), (kept, scale) = ends, samples
+    woven = _interleavings(nodes, walk, target)
     reach = 0
     for axis in range(2):
         runs = {target: (0, kept * scale - 1)}
@@ -229,12 +231,38 @@ def _reach(
                 run = runs[output]
                 if output in walk.windows:
                     run = walk.windows[output][axis].reads(*run)
-                for name in _names(walk.extents, node.inputs):
-                    old = runs.get(name, run)
-                    runs[name] = min(old[0], run[0]), max(old[1], run[1])
+                for index, name in enumerate(_names(walk.extents, node.inputs)):
+                    own = run
+                    if output in woven:
+                        fine, block = woven[output]
+                        own = place_run(runs[fine], block, divmod(index, block)[axis])
+                    old = runs.get(name, own)
+                    runs[name] = min(old[0], own[0]), max(old[1], own[1])
         first, last = runs.get(source, (0, kept - 1))
         reach = max(reach, -first, last - kept + 1)
     return reach
+
+
+def _interleavings(nodes: Sequence[Node], walk: _Walk, target: str) -> dict[str, tuple[str, int]]:
+    """Find pictures of a tensor each, put together as the pixels of blocks.
+
+    A pixel of the fine picture reads one of them, not all: DepthToSpace reads places of a block
+    from channels that lie apart, here from what a Concat before it took from one tensor.
+
+    Returns:
+        Output of the Concat -> output of the DepthToSpace, side of a block.
+    """
+    found = {}
+    for node in nodes:
+        if node.op != "DepthToSpace" or node.text("mode", "DCR") != "DCR":
+            continue
+        source, block = node.inputs[0], node.integer("blocksize", 0)
+        readers = [other for other in nodes if source in other.inputs]
+        parts = next((n.inputs for n in nodes if n.op == "Concat" and source in n.outputs), ())
+        alike = len({walk.extents[name].channels for name in parts}) == 1
+        if len(readers) == 1 and source != target and alike and len(parts) == block * block:
+            found[source] = node.outputs[0], block
+    return found
 
 
 def _check_inputs(walk: _Walk, node: Node) -> None:

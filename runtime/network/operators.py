@@ -187,6 +187,17 @@ def shuffle_window(block: int) -> Window:
     )
 
 
+def place_run(run: tuple[int, int], block: int, place: int) -> tuple[int, int]:
+    """Give the samples that DepthToSpace puts on one place of every block of a run of its output.
+
+    Args:
+        run: First and last sample of the output along an axis.
+        block: Its side.
+        place: Along that axis, from 0.
+    """
+    return -((place - run[0]) // block), (run[1] - place) // block
+
+
 def unshuffle_window(block: int) -> Window:
     """Give the window of SpaceToDepth."""
     return Window(

@@ -14,6 +14,7 @@ from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.job.walker import USUAL_BYTES
 from camkit.runtime.machine.memory import trim_heap
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
@@ -34,6 +35,8 @@ from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, unstabi
 METHODS: Final = ("net",)
 TRIM_SHARE: Final = 0.7
 """Of the cap; above it freed memory is given back before every window."""
+WEIGHT_BYTES: Final = 8.8
+"""Memory of a session for each weight: the number, and its place in a block (measured)."""
 OPTIONS: Final = (
     *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
     *("dtype", "provider"),
@@ -102,15 +105,19 @@ class _NetworkStage:
         self._entry = entry
         self._job = job
         self._windows: NetworkWindows | None = None
+        self._weight_bytes = 0
         self._guard: TileGuard | None = None
 
     def fit(self, max_bytes: int, spent_bytes: int) -> None:
         """Plan the windows: `max_bytes` in all, of which others take `spent_bytes`."""
         job, entry, work = self._job, self._entry, self._job.work
         bundle = job.known_bundle
+        facts = [bundle.network_facts(entry.role, size) for size in work.sizes()]
+        weights = int(WEIGHT_BYTES * sum(one.parameters for one in facts))
+        self._weight_bytes = max(weights - USUAL_BYTES, 0)
         limits = WindowLimits(
             cap_bytes=max_bytes,
-            spent_bytes=spent_bytes,
+            spent_bytes=spent_bytes + self._weight_bytes,
             mode=work.mode,
             cell_px=CELL_PX,
             tile_px=job.options.tile_px,
@@ -119,9 +126,9 @@ class _NetworkStage:
             SizedNetwork(
                 size=size,
                 run=self._trimmed(job.setup.networks(entry.role, size), max_bytes),
-                facts=bundle.network_facts(entry.role, size),
+                facts=one,
             )
-            for size in work.sizes()
+            for size, one in zip(work.sizes(), facts, strict=True)
         ]
         taken = bundle.manifest.planes[entry.takes[0]]
         self._windows = lay_network(job.grid_px(taken), networks, limits, work.network_labels())
@@ -144,8 +151,8 @@ class _NetworkStage:
         return run
 
     def planned_bytes(self) -> int:
-        """Give the memory of the windows."""
-        return 0 if self._windows is None else self._windows.needed_bytes()
+        """Give the memory of weights and windows."""
+        return 0 if self._windows is None else self._weight_bytes + self._windows.needed_bytes()
 
     def warnings(self) -> tuple[str, ...]:
         """Name the tiles that were not believed."""

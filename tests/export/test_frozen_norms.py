@@ -8,13 +8,14 @@ import torch
 
 from camkit.errors import ContractError
 from camkit.export.frozen_norms import FreezeOptions, freeze_checkpoint
-from camkit.export.network_facts import draft_network
+from camkit.export.network_facts import DEEP_ARENA, draft_network
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.instance_norm import freeze_norms
 from camkit.models_def.networks.normed_unet import NormedConfig, NormedUnet
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
 from camkit.models_def.training.trainer import TrainOptions, train
 from camkit.runtime.network.engine import NetworkEngine
+from camkit.runtime.network.graph import inspect_graph
 from camkit.runtime.network.tiling import TileLimits, infer_bands, lay_windows
 from camkit.runtime.rows import ArrayRows
 from tests.bayer_recipe import bank, material, one_picture_to_validate_on, recipe  # noqa: F401
@@ -44,15 +45,18 @@ def test_live_norms_are_refused_at_export_and_frozen_ones_tile_exactly():
     draft = draft_network("network_M", frozen, LAYOUT)
     assert (draft.facts.receptive_field_radius_px, draft.facts.stride_px) == (REACH_PX, 64)
     assert draft.facts.global_operators == ()
+    graph = inspect_graph(draft.members["network_M.onnx"])
+    assert draft.facts.bytes_per_pixel == DEEP_ARENA * graph.bytes_per_pixel
+    assert graph.unblocked_convolutions == ()
     picture = np.random.default_rng(1).random((6, 60, 700), dtype=np.float32)
     engine = NetworkEngine(draft.members["network_M.onnx"], threads=1)
     results = []
-    for tile_px in (64, None):
+    for tile_px in (None, 64, 128, 192):
         limits = TileLimits(stride_px=64, halo_px=REACH_PX, max_bytes=2**40, tile_px=tile_px)
         layout = lay_windows(60, 700, limits)
         assert (layout.window_count > 1) == (tile_px is not None)
         results.append(np.concatenate([*infer_bands(engine.run, ArrayRows(picture), layout)], 1))
-    assert np.array_equal(*results)
+    assert all(np.array_equal(result, results[0]) for result in results)
 
 
 def test_reach_is_the_one_counted_by_hand():

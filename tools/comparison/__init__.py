@@ -13,5 +13,6 @@
 - `bank_gain`: what a bank that restores colours together is worth by itself (a command)
 - `classical`: classical methods on training samples
 - `loss_table`: what a loss is worth where it was trained, and elsewhere (a command)
+- `random_generator`: a camera with the generator of chapter 3, not trained (a command)
 - `compact_json`: results as they are kept, those of `lens_table` too
 """

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.bundle.manifest import NOT_TRAINED
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.accuracy import Key, Restorers, Scores, measure_accuracy, score_key
@@ -111,7 +112,11 @@ def run_bench(settings: Settings, tell: Tell = lambda _text: None) -> Result:
     peaks = {n: gemm_peak_gmac_per_s(n, settings.gemm_s) for n in {t.threads for t in trials}}
     machine["gemm_gmac_per_s"] = {str(n): round(peak, 2) for n, peak in sorted(peaks.items())}
     runs = time_trials(trials, cameras, settings.repeat, tell)
-    judged = {c.entrant.label: _judge(c, trials, settings, folder, tell) for c in cameras.values()}
+    random = {e.label for e in entrants if not e.bundle.manifest.is_trained}
+    idle = [trial for trial in trials if trial.bundle in random and trial.size is not None]
+    skips += [Skip(what=f"accuracy of {t.camera} {t.label}", reason=NOT_TRAINED) for t in idle]
+    shown = [trial for trial in trials if trial not in idle]
+    judged = {c.entrant.label: _judge(c, shown, settings, folder, tell) for c in cameras.values()}
     skips += [
         Skip(what=f"accuracy of {label}", reason=found.error)
         for label, found in judged.items()

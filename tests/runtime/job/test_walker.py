@@ -14,6 +14,7 @@ from camkit.bundle.stages import Color, Linearise, Network, Repair, Wiener
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
+from camkit.runtime.job import walker
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.job.stage_work import StageWork
@@ -27,6 +28,7 @@ from camkit.runtime.rows import Rows
 from camkit.runtime.signal.demosaic import apply_gains, demosaic
 from camkit.runtime.signal.noise import repair_mosaic, repair_planes
 from camkit.runtime.stage_finder import stage_module
+from camkit.runtime.stages import network as network_stage
 from tests.bundle_factory import PITCH_UM
 from tests.job_factory import OWN_BALANCE, SHAPE, made_mosaic, made_planes, read_all, start
 from tests.plan_factory import half_textured_mosaic, write_planned_bundle
@@ -590,3 +592,23 @@ def test_memory_of_the_walk_is_that_of_its_running_stages(bundle: Bundle) -> Non
     walk.settle()
     assert walk.needed_bytes() < with_network
     assert walk.needed_bytes() >= FIXED_BYTES + job.capture.resident_bytes
+
+
+def test_memory_holds_what_weights_and_bundle_take_beyond_the_usual(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = start(bundle, _broken()).job
+
+    def needed() -> int:
+        walk = Walk(job)
+        walk.settle()
+        return walk.needed_bytes()
+
+    small = needed()
+    assert bundle.stored_bytes == bundle.path.stat().st_size
+    monkeypatch.setattr(walker, "USUAL_BYTES", 0)
+    assert needed() == small + bundle.stored_bytes
+    monkeypatch.setattr(network_stage, "USUAL_BYTES", 0)
+    (facts,) = (bundle.network_facts("restore", size) for size in job.work.sizes())
+    weights = int(network_stage.WEIGHT_BYTES * facts.parameters)
+    assert needed() == small + bundle.stored_bytes + weights > small + bundle.stored_bytes

@@ -1,6 +1,6 @@
 """Time against PSNR: all cameras on common axes, each with its Pareto front and its input."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.report.bench.pareto import pareto_front
@@ -29,6 +29,17 @@ def plottable(rows: Sequence[Row], camera: str) -> list[Row]:
     ]
 
 
+def timed_alone(rows: Sequence[Row], cameras: Container[str]) -> list[Row]:
+    """Give the rows of some cameras that have a time and no PSNR."""
+    return [
+        row
+        for row in rows
+        if row["camera"] in cameras
+        and row["seconds_median"] is not None
+        and row.get("psnr_db") is None
+    ]
+
+
 def draw_front_panel(panel: "Panel", report: dict[str, Any], rows: list[Row], looks: Looks) -> None:
     """Draw everything but the labels, which need the final layout.
 
@@ -38,7 +49,8 @@ def draw_front_panel(panel: "Panel", report: dict[str, Any], rows: list[Row], lo
         rows: Those that are drawn.
         looks: Of their cameras and methods.
     """
-    seconds = [seconds_per_mp(row) for row in rows]
+    alone = timed_alone(report["rows"], looks.colors)
+    seconds = [seconds_per_mp(row) for row in (*rows, *alone)]
     panel.set_xscale("log")
     panel.set_xlim(min(seconds) / 1.5, max(seconds) * 1.8)
     for camera, color in looks.colors.items():
@@ -49,6 +61,8 @@ def draw_front_panel(panel: "Panel", report: dict[str, Any], rows: list[Row], lo
         _draw_front(panel, own, color)
     for row in rows:
         _draw_point(panel, row, looks)
+    for row in alone:
+        _draw_time(panel, row, looks)
     low, high = panel.get_ylim()
     panel.set_ylim(low - 0.06 * (high - low), high + 0.08 * (high - low))
     _tidy_axis(panel)
@@ -125,6 +139,24 @@ def _draw_point(panel: "Panel", row: Row, looks: Looks) -> None:
         linewidths=1.2,
         alpha=0.9,
         zorder=3 if row["variant"] else 4,
+    )
+
+
+def _draw_time(panel: "Panel", row: Row, looks: Looks) -> None:
+    """Draw a row that was not judged: where it stands in time, at no height."""
+    x, color = seconds_per_mp(row), looks.color(row)
+    panel.axvline(x, color=color, linestyle=":", linewidth=1.2, alpha=0.8, zorder=1)
+    panel.annotate(
+        f"{row['label']}: not judged",
+        (x, 0.98),
+        xycoords=("data", "axes fraction"),
+        xytext=(-3, 0),
+        textcoords="offset points",
+        rotation=90,
+        ha="right",
+        va="top",
+        fontsize=7.5,
+        color=color,
     )
 
 

@@ -10,7 +10,9 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from camkit.bundle.manifest import NOT_TRAINED
 from camkit.bundle.reader import Bundle
+from camkit.bundle.writer import write_bundle
 from camkit.cli.judge.bench import _lines
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import BundleError, ContractError, DecodeError
@@ -104,6 +106,36 @@ def test_seconds_stand_where_the_accuracy_cannot_be_measured(tmp_path: Path) -> 
     assert "20x20" in skip["reason"]
     write_bench(result, tmp_path / "out")
     assert "not measured" in (tmp_path / "out" / "bench.html").read_text(encoding="utf-8")
+
+
+def test_networks_that_were_not_trained_are_timed_and_not_judged(tmp_path: Path) -> None:
+    bundle = write_wide_bundle(tmp_path)
+    idle, sharp = tmp_path / "random.camkit", tmp_path / "sharp"
+    sharp.mkdir()
+    values = np.rint(texture(100, 120) * 255).astype(np.uint8)
+    cv2.imwrite(str(sharp / "a.png"), values[::-1].transpose(1, 2, 0))
+    members = {name: bundle.member(name) for name in bundle.names}
+    said = {"training_data": NOT_TRAINED}
+    write_bundle(idle, bundle.manifest.model_copy(update=said), members)
+    result = run_bench(
+        Settings(
+            bundles=(str(bundle.path),),
+            references=(str(idle),),
+            axes=Axes(methods=("net",), modes=("exact",), threads=(1,)),
+            repeat=1,
+            data=sharp,
+            work_dir=tmp_path / "work",
+            gemm_s=0.01,
+        )
+    )
+    own, random = result.report["rows"]
+    assert own["psnr_db"] is not None
+    assert random["seconds_median"] > 0
+    assert random["error"] is random["psnr_db"] is random["mtf_025"] is None
+    assert random["images"] == 0
+    skip = {"what": "accuracy of tiny random M", "reason": NOT_TRAINED}
+    assert skip in result.report["skipped"]
+    assert NOT_TRAINED in {entry["captures"] for entry in result.report["tuning"]}
 
 
 def test_a_folder_without_pictures_is_an_error_before_the_timing(tmp_path: Path) -> None:

@@ -198,3 +198,13 @@ def test_labels_say_whose_input_a_line_is(report: dict[str, Any]) -> None:
     texts = [text.get_text() for text in panel.texts]
     assert texts[:2] == ["duet input 20.00 dB", "trio input 21.00 dB"]
     assert texts.count("M") == 2
+
+
+def test_a_row_without_psnr_stands_at_its_time_and_widens_the_axis(report: dict[str, Any]) -> None:
+    rows = list(report["rows"])
+    slow = dict(rows[0], label="G64", psnr_db=None, seconds_median=3000.0)
+    report["rows"] = [*rows, slow, dict(slow, seconds_median=None)]
+    panel = Figure(dpi=100).add_subplot()
+    draw_front_panel(panel, report, rows, looks_of(CAMERAS, rows))
+    assert [t.get_text() for t in panel.texts] == ["G64: not judged"]
+    assert panel.get_xlim()[1] > seconds_per_mp(slow)
