@@ -9,7 +9,7 @@ training (`camkit.models_def.kinds.bayer.frames` takes tiles through the bank).
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +21,7 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import PRESCRIPTION, Bundle
 from camkit.bundle.stages import Network
 from camkit.bundle.writer import write_physics
+from camkit.colorimetry import apply_matrix, camera_from_rec709
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.tiles import (
@@ -198,6 +199,7 @@ class _Studio:
         recipe, seed = self._recipe, self._sources.seed
         rng = np.random.default_rng((seed, int(self._choosing), number))
         scene = draw_scene(rng, self._scenes, recipe, even=self._choosing)
+        scene, truth = recipe.data.lit(rng, scene)
         optics = self._sources.copies[copy]
         light = light_of(
             scene,
@@ -206,6 +208,9 @@ class _Studio:
             scene_window(scene, recipe.sensor, None),
             LightOptions(distort=False),
         )
+        if truth is not scene:
+            matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+            light = replace(light, clean=np.maximum(apply_matrix(matrix, truth), 0))
         for shot in range(recipe.frames.shots):
             iso = self._iso(rng, shot)
             first = (number * recipe.frames.shots + shot) * self._tiles

@@ -8,5 +8,7 @@ blocks            the grid of overlapping windowed blocks, and the sum of them
 spectrum          Fourier transforms of blocks
 wiener            the Wiener filter of one block
 richardson_lucy   the Richardson-Lucy rounds of one block
+total_variation   least squares with total variation of one block, by ADMM
+cross_channel     the same with edges of all colours in the same places
 baselines         the classical methods on the same blocks
 """

@@ -1,6 +1,6 @@
 """Classical restorations of training samples, in place of the bank, for tables beside networks.
 
-developed sample -> one block of the runtime, tapered -> Richardson-Lucy or ADMM-TV -> its planes
+developed sample -> one block of the runtime, tapered -> RL, ADMM-TV, cross-channel -> its planes
 
 They see what the bank sees: planes with surroundings, the kernels of their block, noise, clipped
 pixels. Their numbers are those of `camkit process --method`, tuned on pictures of another camera
@@ -29,7 +29,7 @@ Method = Callable[[Developed, BayerRecipe], Tensor]
 
 
 def by_block(method: str) -> Method:
-    """Give a method of the runtime (wiener, rl, admm-tv) on a sample as one block."""
+    """Give a method of the runtime (see `block_filter`) on a sample as one block."""
 
     def restore(developed: Developed, recipe: BayerRecipe) -> Tensor:
         given, settings = developed.given, recipe.wiener
@@ -57,12 +57,14 @@ METHODS: Final[dict[str, Method]] = {
     "wiener-alone": wiener_alone,
     "rl": by_block("rl"),
     "admm-tv": by_block("admm-tv"),
+    "cross-channel": by_block("cross-channel"),
 }
 
 
 def numbers() -> Mapping[str, Mapping[str, float]]:
     """Give the numbers by which the methods work, by name."""
-    return {name: dict(method_numbers(name)) for name in ("rl", "admm-tv")}
+    names = ("rl", "admm-tv", "cross-channel")
+    return {name: dict(method_numbers(name)) for name in names}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

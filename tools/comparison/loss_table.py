@@ -1,22 +1,26 @@
 """What a loss is worth where it was trained, and elsewhere: table 3.1 re-done.
 
-    python -m tools.comparison.loss_table LAB.toml --wild WILD.toml \
+    python -m tools.comparison.loss_table RECIPE.toml \
         --rows supervised adversarial perceptual --data PICTURES --fresh OTHERS --minutes 60
 
-LAB is the recipe whose samples are trained on: what a display shows, say (pictures alone, one
-distance, one exposure). WILD is a recipe of the same camera in other circumstances: lamps, other
-exposures and depths. Rows are sizes of LAB's network; `SIZE=LAB.toml,WILD.toml` is one of other
-recipes, of another lens say. Every row is trained for so many CPU minutes and judged on samples of
-both recipes, cut from pictures that it never saw. Rows that need no training are `capture`, the
-input, `wiener`, the bank alone, and of cameras behind a mosaic `wiener-alone` (each colour for
-itself), `rl` and `admm-tv` (`tools.comparison.classical`). PSNR and SSIM are those of sRGB;
-`perceptual` is the 1-norm of Gram matrices (eq. 3.7), by random features unless `--vgg FILE` gives
-those of VGG-19. What is finished is in the journal of the folder and not done again; a row that was
-interrupted goes on.
+Trained is before a display, judged there and outside: `tools.comparison.twins` writes both recipes
+into OUT_DIR, RECIPE_display.toml and RECIPE_wild.toml (`--depths-mm` gives distances of scenes
+outside). With `--wild WILD.toml` the first recipe is LAB itself, whose samples are trained on, and
+WILD one of the same camera in other circumstances. Rows are sizes of LAB's network;
+`SIZE=LAB.toml,WILD.toml` is one of other recipes, of another lens say. Every row is trained for so
+many CPU minutes and judged on samples of both recipes, cut from pictures that it never saw. Rows
+that need no training are `capture`, the input, `wiener`, the bank alone, and of cameras behind a
+mosaic `wiener-alone` (each colour for itself), `rl`, `admm-tv` and `cross-channel`
+(`tools.comparison.classical`). PSNR and SSIM are those of sRGB; `perceptual` is the 1-norm of Gram
+matrices (eq. 3.7), by random features unless `--vgg FILE` gives those of VGG-19.
 
-A lens with a haze has its frames made before: with `--data PICTURES` in OUT_DIR/LAB to train on,
-with `--data OTHERS` in OUT_DIR/LAB_judged and OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the
-names of the recipes without .toml).
+What is finished is in the journal of the folder and not done again; a row that was interrupted goes
+on, and the table is written after every row. Beside it stands a verdict on "supervised overfits",
+from paired samples (`tools.comparison.overfitting` has the rule).
+
+A lens with a haze has its frames made before (`--only-recipes` writes the recipes and ends): with
+`--data PICTURES` in OUT_DIR/LAB to train on, with `--data OTHERS` in OUT_DIR/LAB_judged and
+OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the names of the recipes without .toml).
 """
 
 import argparse
@@ -31,6 +35,7 @@ import torch
 from torch import Tensor
 
 from camkit.colorimetry import rec709_from_camera
+from camkit.errors import CamkitError
 from camkit.models_def.training.adversarial.content import Features, Relu32, gram_loss
 from camkit.models_def.training.adversarial.views import make_views
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
@@ -40,12 +45,16 @@ from camkit.models_def.training.similarity import ssim
 from camkit.models_def.training.trainer import TrainOptions, train
 from tools.comparison.classical import METHODS, numbers, with_method
 from tools.comparison.compact_json import to_compact_json
+from tools.comparison.overfitting import overfitting, sentences
+from tools.comparison.twins import write_twins
 from tools.lens_table import kept
 
 METRICS: Final = ("psnr_db", "ssim", "perceptual")
 DOMAINS: Final = ("lab", "wild")
 JUDGE_SEED: Final = 909
 DIGITS: Final = 5
+JUDGED: Final = 2
+"""Counts how rows are judged; what was judged before is judged again."""
 LEAST_ERROR: Final = 1e-12
 
 Entry = dict[str, Any]
@@ -76,7 +85,7 @@ class Conditions:
     def digest(self, row: "Row") -> str:
         """Give a hash of all that decides a row."""
         files = [path.read_text(encoding="utf-8") for path in (row.lab, row.wild)]
-        given = [self.data, self.fresh, self.sharp, self.vgg, self.minutes, self.samples]
+        given = [JUDGED, self.data, self.fresh, self.sharp, self.vgg, self.minutes, self.samples]
         return hashlib.sha256("\n".join([row.size, *files, *map(str, given)]).encode()).hexdigest()
 
 
@@ -112,7 +121,7 @@ class Domain:
     designed: Mapping[str, bytes]
 
     def score(self, restore: Restorer, features: Features) -> Entry:
-        """Judge a restoration by `METRICS`, means over the samples."""
+        """Judge a restoration by `METRICS`: means over the samples, and `each` of them."""
         found: list[tuple[float, float, float]] = []
         for sample in self.samples:
             output = restore(sample.stacked(self.layout)[None])
@@ -122,7 +131,8 @@ class Domain:
             found.append(
                 (-10 * float(np.log10(error)), float(ssim(views.seen, views.real)), float(look))
             )
-        return dict(zip(METRICS, np.mean(found, axis=0).tolist(), strict=True))
+        each = dict(zip(METRICS, np.transpose(found).tolist(), strict=True))
+        return {**{name: float(np.mean(values)) for name, values in each.items()}, "each": each}
 
 
 def main() -> int:
@@ -139,28 +149,49 @@ def main() -> int:
     )
     conditions.out_dir.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
+    lab, wild = arguments.lab, arguments.wild
+    try:
+        if wild is None:
+            lab, wild = write_twins(lab, conditions.out_dir, arguments.depths_mm)
+        if not arguments.only_recipes:
+            fill(arguments.rows, lab, wild, conditions)
+    except CamkitError as error:
+        raise SystemExit(f"error: {error}") from error
+    return 0
+
+
+def fill(names: Sequence[str], lab: Path, wild: Path, conditions: Conditions) -> None:
+    """Make row after row, and write the table after each."""
     rows: dict[str, Entry] = {}
-    for name in (*UNTRAINED, *arguments.rows):
-        row = row_of(name, arguments.lab, arguments.wild)
+    for name in (*UNTRAINED, *names):
+        row = row_of(name, lab, wild)
         rows[name] = kept(
             conditions.out_dir, conditions.digest(row), lambda row=row: measure(row, conditions)
         )
         print(line(name, rows[name]), flush=True)
+        if set(UNTRAINED) <= set(rows):
+            write(rows, lab, wild, conditions)
+    print("\n".join(sentences(overfitting(rows))))
+
+
+def write(rows: dict[str, Entry], lab: Path, wild: Path, conditions: Conditions) -> None:
+    """Write table, verdict and all numbers."""
     best = max(CLASSICAL, key=lambda name: float(rows[name]["lab"]["psnr_db"]))
+    verdict = overfitting(rows)
     report = {
-        "lab": arguments.lab.stem,
-        "wild": arguments.wild.stem,
+        "lab": lab.stem,
+        "wild": wild.stem,
         "minutes": conditions.minutes,
         "samples": conditions.samples,
         "features": "random" if conditions.vgg is None else conditions.vgg.name,
         "classical": {"best": best, **numbers()},
+        "overfitting": verdict,
         "rows": rows,
     }
     written = conditions.out_dir / "loss_table.json"
     written.write_text(to_compact_json(report, DIGITS) + "\n", encoding="utf-8")
-    written.with_suffix(".md").write_text(table(rows), encoding="utf-8")
-    print(f"{written}, .md")
-    return 0
+    said = "\n".join(f"- {sentence}" for sentence in sentences(verdict))
+    written.with_suffix(".md").write_text(f"{table(rows)}\n{said}\n", encoding="utf-8")
 
 
 def parse() -> argparse.Namespace:
@@ -168,8 +199,12 @@ def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("lab", type=Path)
-    parser.add_argument("--wild", type=Path, required=True)
+    parser.add_argument("lab", type=Path, metavar="RECIPE")
+    parser.add_argument("--wild", type=Path, help="RECIPE is LAB, and this the other")
+    parser.add_argument(
+        "--depths-mm", type=distances, default=(), help="of scenes outside, such as 2000,5000,inf"
+    )
+    parser.add_argument("--only-recipes", action="store_true", help="write the twins and end")
     parser.add_argument("--rows", nargs="+", required=True, help="SIZE or SIZE=LAB.toml,WILD.toml")
     parser.add_argument("--data", type=Path, help="pictures to train on")
     parser.add_argument("--fresh", type=Path, help="pictures to judge on")
@@ -182,11 +217,16 @@ def parse() -> argparse.Namespace:
 
 
 def count(text: str) -> int:
-    """Read a number of samples."""
+    """Read a number of samples: two at least, to tell an error of their mean."""
     number = int(text)
-    if number < 1:
+    if number < 2:
         raise ValueError(text)
     return number
+
+
+def distances(text: str) -> tuple[float, ...]:
+    """Read distances."""
+    return tuple(float(word) for word in text.split(","))
 
 
 def row_of(name: str, lab: Path, wild: Path) -> Row:
@@ -242,7 +282,8 @@ def domain(recipe_path: Path, conditions: Conditions, method: str | None = None)
 
 def restorer(size: str, recipe: Path, conditions: Conditions) -> tuple[Restorer, Entry]:
     """Train a network, or go on with it; give it, and what was spent."""
-    schedule = read_recipe(recipe).network(size).schedule
+    entry = read_recipe(recipe).network(size)
+    schedule = entry.schedule
     folder = conditions.out_dir / recipe.stem
     options = TrainOptions(
         out_dir=folder,
@@ -261,7 +302,8 @@ def restorer(size: str, recipe: Path, conditions: Conditions) -> tuple[Restorer,
             return torch.as_tensor(network(planes))
 
     spent = {"steps": result.steps, "cpu_s": result.cpu_s, "valid_db": result.valid_db}
-    return restore, {"loss": schedule.loss, "trained": spent}
+    form = [str(recipe), entry.network, sorted(map(str, entry.config.items()))]
+    return restore, {"loss": schedule.loss, "network": form, "trained": spent}
 
 
 def _capture(planes: Tensor) -> Tensor:

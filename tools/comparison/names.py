@@ -8,6 +8,7 @@ TITLES: Final = {
     "skimage_wiener": "scikit-image Wiener",
     "skimage_rl": "scikit-image Richardson-Lucy",
     "admm_tv": "ADMM-TV",
+    "cross_channel": "cross-channel",
     "bank": "our Wiener bank",
     "bank_rl": "our blocks, Richardson-Lucy",
     "bank_admm_tv": "our blocks, ADMM-TV",

@@ -1,11 +1,11 @@
-"""Classical restorations to be compared with: scikit-image's Wiener and Richardson-Lucy, ADMM-TV.
+"""Classical restorations: scikit-image's Wiener and Richardson-Lucy, ADMM-TV, cross-channel.
 
     developed planes -> overlapping parts, mirrored and tapered -> method, each part with the PSF of
     its own place -> windowed sum
 
 All of them see the white-balanced, demosaicked, linear planes and the bundle's PSF per colour;
-nothing is clipped. Their parameters are tuned, see `tools.comparison.tuning`. scikit-image has no
-ADMM with total variation, so that one is camkit's own.
+nothing is clipped. Their parameters are tuned, see `tools.comparison.tuning`. scikit-image has
+neither ADMM with total variation nor the cross-channel prior, so these are camkit's own.
 """
 
 from collections.abc import Callable
@@ -22,9 +22,10 @@ from skimage.restoration import uft
 
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
-from camkit.runtime.bank.baselines import admm_tv_filter
 from camkit.runtime.bank.blocks import Block, BlockBank, BlockFilter, LocalPsf
+from camkit.runtime.bank.cross_channel import cross_channel_filter
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
+from camkit.runtime.bank.total_variation import admm_tv_filter
 
 PART_STEP_PX: Final = 128
 """Parts overlap by the least multiple of this that is as wide as the kernel but one pixel."""
@@ -189,6 +190,17 @@ def admm_tv_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
     return admm_tv_filter(noise, weight=weight, iterations=int(iterations))
 
 
+def cross_channel_part(noise: NoiseModel, setting: Setting) -> BlockFilter:
+    """Give camkit's cross-channel deconvolution.
+
+    Args:
+        noise: Sets the unit of the weights and the steps.
+        setting: Weights of total variation and prior, see `cross_channel_filter`.
+    """
+    tv_weight, cross_weight = setting
+    return cross_channel_filter(noise, tv_weight=tv_weight, cross_weight=cross_weight)
+
+
 PEERS: Final[dict[str, Peer]] = {
     "skimage_wiener": Peer(
         make_filter=wiener_part,
@@ -204,6 +216,11 @@ PEERS: Final[dict[str, Peer]] = {
         make_filter=admm_tv_part,
         parameters=("weight", "iterations"),
         candidates=((2.5, 5, 10, 20, 40), (6, 12, 24)),
+    ),
+    "cross_channel": Peer(
+        make_filter=cross_channel_part,
+        parameters=("tv_weight", "cross_weight"),
+        candidates=((0.3, 0.6, 1.25, 2.5, 5), (10, 20, 40, 80)),
     ),
 }
 

@@ -14,7 +14,7 @@ from camkit.errors import ContractError
 from camkit.report.quality import BORDER_PX, FABRICATION_SEEDS, FIELD_SHARES
 from tools.capture.simulated import color_sensor
 from tools.comparison.measurement import Row, identity_of
-from tools.comparison.names import BEFORE
+from tools.comparison.names import BEFORE, CLASSICAL
 from tools.comparison.peers import PEERS, Setting, part_sides
 from tools.comparison.photograph import (
     PROTOCOL_VERSION,
@@ -28,8 +28,8 @@ from tools.comparison.tuning import Tuned, tuned_to_json
 BANK_METHODS: Final = {"bank": "wiener", "bank_rl": "rl", "bank_admm_tv": "admm-tv"}
 PEER_VERSION: Final = 2
 """Part of the identity of the peers' rows; 2: cut into parts, the PSF no longer mirrored twice."""
-DEFAULT_METHODS: Final = ("input", *PEERS, "bank")
-"""Rows of every comparison; the sizes of the networks follow them."""
+DEFAULT_METHODS: Final = ("input", *CLASSICAL, "bank")
+"""Rows of every comparison; the sizes of the networks follow them. Other peers are asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

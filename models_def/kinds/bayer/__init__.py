@@ -1,5 +1,6 @@
 """A colour camera behind a mosaic: its lens photographed through, its Wiener bank in front.
 
+scene_light            a display that shows scenes; daylight and lights beyond white
 recipe                 what a person edits beside the common tables
 psf_bank, lens_bank    kernels of the frozen PSF and of fabricated copies
 material               both, as samples need them

@@ -57,11 +57,12 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
     heights = np.linspace(0.0, corner_height_mm(recipe), choices.fields)
     response = _response(recipe)
     depths_mm = choices.depths_mm or (lens.object_distance_mm,)
+    copies = focused_copies(lens, 1 + choices.copies + choices.validation_copies, choices.seed)
+    places = list(product(copies, depths_mm))
+    if choices.bank_in_focus:
+        places.append((copies[0], lens.object_distance_mm))
     kernels = []
-    for copy, depth_mm in product(
-        focused_copies(lens, 1 + choices.copies + choices.validation_copies, choices.seed),
-        depths_mm,
-    ):
+    for copy, depth_mm in places:
         traced, kept = colour_kernels(
             with_object_distance(copy, depth_mm),
             response,
@@ -78,6 +79,8 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
         kernels.append(traced)
     depths = len(depths_mm)
     nominal = kernels[0] if depths == 1 else np.mean(kernels[:depths], axis=0)
+    if choices.bank_in_focus:
+        nominal = kernels.pop()
     return PsfBank(
         copies=np.stack(kernels[depths:]),
         copy_heights_mm=heights,

@@ -8,10 +8,14 @@ from dataclasses import asdict, astuple, dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Final
 
+import numpy as np
+
 from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
 from camkit.models_def.toml_table import section, typed
 from camkit.models_def.training.recipe import (
     DataRecipe,
@@ -49,6 +53,8 @@ class LensRecipe:
         depths_mm: Object distances, increasing, with the sensor where the prescription has it; a
             sample is taken at one of them by chance, the Wiener filter has their mean kernel.
             Empty for the distance of the prescription.
+        bank_in_focus: Whether the Wiener filter has the kernel of the prescription's distance,
+            whatever `depths_mm` are, in place of their mean.
     """
 
     prescription: str
@@ -59,6 +65,7 @@ class LensRecipe:
     seed: int = 101
     depths_mm: tuple[float, ...] = ()
     validation_copies: int = 1
+    bank_in_focus: bool = False
 
     def __post_init__(self) -> None:
         if min(self.copies, self.validation_copies) < 1:
@@ -71,7 +78,7 @@ class LensRecipe:
 
     def to_json(self) -> dict[str, Any]:
         """Give what decides the kernels, to name files by; what is as usual is left out."""
-        usual = {"depths_mm": (), "validation_copies": 1}
+        usual = {"depths_mm": (), "validation_copies": 1, "bank_in_focus": False}
         return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
 
@@ -99,6 +106,8 @@ class BayerDataRecipe(DataRecipe):
         lamp_share: Share of all samples into which lamps far beyond white are put.
         known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
             `camkit process --depth-m` gives it; the others' has the mean kernel.
+        display: A display that shows the scenes; None for none.
+        wild: Daylight and range of scenes; None for pictures as they are.
     """
 
     margin_px: int = 72
@@ -117,6 +126,8 @@ class BayerDataRecipe(DataRecipe):
     edge_share: float = 0.0
     night_share: float = 0.0
     lamp_share: float = 0.0
+    display: DisplayRecipe | None = None
+    wild: WildRecipe | None = None
 
     def __post_init__(self) -> None:
         DataRecipe.__post_init__(self)
@@ -137,6 +148,23 @@ class BayerDataRecipe(DataRecipe):
             raise ContractError(
                 f"data.depth_shares must be positive and finite; got {self.depth_shares}"
             )
+        if self.display is not None and self.wild is not None:
+            raise ContractError("scenes are shown by data.display or lit by data.wild, not both")
+
+    def to_json(self) -> dict[str, Any]:
+        """Give what decides samples, to name files by; tables that are not there are left out."""
+        absent = {name for name in ("display", "wild") if getattr(self, name) is None}
+        return {name: value for name, value in asdict(self).items() if name not in absent}
+
+    def lit(self, rng: np.random.Generator, scene: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Give the light of a (3, h, w) scene, and what it should become.
+
+        Draws only where a recipe asks for it: others keep their samples.
+        """
+        if self.display is not None:
+            return self.display.shown(scene)
+        light = scene if self.wild is None else self.wild.lit(rng, scene)
+        return light, light
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -277,11 +305,19 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
         scale=typed("scale", table.get("scale", 64.0), float),
         wiener=model("wiener", Wiener, table),
         lens=section("lens", LensRecipe, table.get("lens", {})),
-        data=section("data", BayerDataRecipe, table.get("data", {})),
+        data=_data(table.get("data", {})),
         fine_tuning=_fine_tuning(table.get("fine_tuning", {})),
         haze=model("haze", Dehaze, table) if "haze" in table else None,
         frames=section("frames", FramesRecipe, table.get("frames", {})),
     )
+
+
+def _data(table: Any) -> BayerDataRecipe:
+    if not isinstance(table, Mapping):
+        raise ContractError(f"data must be a table; got {table!r}")
+    kinds = {"display": DisplayRecipe, "wild": WildRecipe}
+    own = {k: section(f"data.{k}", kinds[k], table[k]) for k in kinds if k in table}
+    return section("data", BayerDataRecipe, {**table, **own})
 
 
 def _fine_tuning(table: Any) -> FineTuningRecipe:
@@ -297,7 +333,7 @@ def samples_digest(recipe: BayerRecipe, seed: int) -> str:
         "sensor": recipe.sensor.model_dump(mode="json"),
         "wiener": recipe.wiener.model_dump(mode="json"),
         "lens": recipe.lens.to_json(),
-        "data": asdict(recipe.data),
+        "data": recipe.data.to_json(),
         "scale": recipe.scale,
         "object_distance_mm": str(recipe.object_distance_mm),
         "seed": seed,

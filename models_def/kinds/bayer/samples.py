@@ -195,14 +195,24 @@ def tint_crop(rng: Generator, crop: FloatArray) -> FloatArray:
 
 
 def make_shot(
-    crop: FloatArray, exposure: Exposure, recipe: BayerRecipe, bank: PsfBank, rng: Generator
+    crop: FloatArray,
+    exposure: Exposure,
+    recipe: BayerRecipe,
+    bank: PsfBank,
+    rng: Generator,
+    truth: FloatArray | None = None,
 ) -> Shot:
     """Photograph a sharp crop and run the front end of the runtime on it; see `photograph`."""
-    return finish_shot(photograph(crop, exposure, recipe, bank, rng), recipe)
+    return finish_shot(photograph(crop, exposure, recipe, bank, rng, truth), recipe)
 
 
 def photograph(
-    crop: FloatArray, exposure: Exposure, recipe: BayerRecipe, bank: PsfBank, rng: Generator
+    crop: FloatArray,
+    exposure: Exposure,
+    recipe: BayerRecipe,
+    bank: PsfBank,
+    rng: Generator,
+    truth: FloatArray | None = None,
 ) -> Developed:
     """Photograph a sharp crop and develop it.
 
@@ -212,19 +222,23 @@ def photograph(
         recipe: Camera and sample sizes.
         bank: PSFs of the copies and the frozen one.
         rng: Source of the noise.
+        truth: What the crop should become, likewise; None for itself.
 
     Raises:
         ContractError: If the crop has another size.
     """
     side = scene_side_px(recipe, bank)
-    if crop.shape != (3, side, side):
+    truth = crop if truth is None else truth
+    if not crop.shape == truth.shape == (3, side, side):
         raise ContractError(f"a crop must be (3, {side}, {side}); got {crop.shape}")
     sensor, data = recipe.sensor, recipe.data
     matrix, gains = camera_from_rec709(np.array(sensor.color_matrix))
     illumination = bank.illumination_at(float(np.hypot(exposure.x_mm, exposure.y_mm)))
     to_camera = torch.from_numpy(matrix * exposure.factor).float()
-    flat = to_camera @ torch.from_numpy(crop).reshape(3, -1)
-    sharp = flat.reshape(1, 3, side, side).clamp_(min=0)
+    sharp, true = (
+        (to_camera @ torch.from_numpy(light).reshape(3, -1)).reshape(1, 3, side, side).clamp_(min=0)
+        for light in (crop, truth)
+    )
     kernels = _drifted(
         bank.blur_kernels(exposure.copy, exposure.x_mm, exposure.y_mm), *exposure.drift
     )
@@ -240,7 +254,7 @@ def photograph(
     return Developed(
         planes=planes,
         unknown=unknown,
-        true=cut_middle(sharp, data.sample_px) * illumination,
+        true=cut_middle(true, data.sample_px) * illumination,
         given=Circumstances(
             noise=noise,
             gains=gains,

@@ -76,7 +76,8 @@ class BayerMaker:
         rng = np.random.default_rng((self._seed, index))
         exposure = draw_exposure(rng, self._recipe, self._bank)
         crop = self._source.draw_crop(rng, scene_side_px(self._recipe, self._bank))
-        return photograph(tint_crop(rng, crop), exposure, self._recipe, self._bank, rng)
+        light, truth = self._recipe.data.lit(rng, tint_crop(rng, crop))
+        return photograph(light, exposure, self._recipe, self._bank, rng, truth)
 
     def make(self, index: int) -> Sample:
         """Photograph a crop of a scene."""

@@ -85,9 +85,10 @@ def make_validation_captures(
             for iso in ISOS:
                 rng = np.random.default_rng((SEED, number, spot, int(iso)))
                 exposure = _exposure(recipe, bank, share, iso, number * len(FIELD_SHARES) + spot)
-                shot = make_shot(crop, exposure, recipe, bank, rng)
+                light, truth = recipe.data.lit(rng, crop)
+                shot = make_shot(light, exposure, recipe, bank, rng, truth)
                 inner = (side - recipe.data.sample_px) // 2
-                sharp = encode_srgb(crop[:, inner : side - inner, inner : side - inner])
+                sharp = encode_srgb(truth[:, inner : side - inner, inner : side - inner])
                 captures.append(
                     ValidationCapture(
                         shot=shot,

@@ -24,7 +24,7 @@ from tests.psf_factory import (
 )
 
 SETTINGS = Wiener(block_px=64, overlap_px=24, prior_scale=3e-4, prior_exponent=2.5)
-METHODS = ("wiener", "rl", "admm-tv")
+METHODS = ("wiener", "rl", "admm-tv", "cross-channel")
 KERNEL = gaussian_kernel(1.8)
 
 
@@ -134,7 +134,7 @@ def test_admm_reaches_the_minimum_that_plain_descent_reaches():
     assert objective(admm) <= objective(descended) * 1.01
 
 
-@pytest.mark.parametrize("method", ["rl", "admm-tv"])
+@pytest.mark.parametrize("method", ["rl", "admm-tv", "cross-channel"])
 def test_clipped_samples_are_not_taken_as_data(method):
     scene = 0.3 * texture(96, 96)
     scene[:, 44:50, 44:50] = 30.0

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -51,9 +52,54 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
     best = report["classical"]["best"]
     assert rows[best]["lab"]["psnr_db"] == max(rows[name]["lab"]["psnr_db"] for name in FREE[1:])
     assert report["classical"]["rl"]["least_rounds"] == 10
-    assert "| adversarial |" in (out / "loss_table.md").read_text(encoding="utf-8")
+    (pair,) = report["overfitting"]
+    assert (pair["supervised"], pair["other"]) == ("l1", "adversarial")
+    each = [rows[name]["wild"]["each"]["psnr_db"] for name in ("l1", "adversarial")]
+    assert pair["psnr_db"]["wild"][0] == pytest.approx(np.subtract(*each).mean(), abs=1e-3)
+    said = (out / "loss_table.md").read_text(encoding="utf-8")
+    assert "| adversarial |" in said
+    assert "l1 against adversarial, psnr_db" in said
     monkeypatch.setattr(loss_table, "measure", lambda *_: pytest.fail("measured again"))
     assert run_tool(monkeypatch, "comparison.loss_table", *options) == 0
+
+
+def test_one_recipe_is_trained_before_a_display_and_judged_outside(
+    recipes: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    options = [recipes[0], "--rows", "l1", "--samples", 2, "--minutes", 10, "--out-dir", out]
+    assert run_tool(monkeypatch, "comparison.loss_table", *options, "--only-recipes") == 0
+    assert sorted(path.name for path in out.iterdir()) == ["lab_display.toml", "lab_wild.toml"]
+    made = []
+
+    def killed(row: loss_table.Row, given: loss_table.Conditions) -> loss_table.Entry:
+        if row.size == "l1" and not made:
+            made.append(row)
+            raise KeyboardInterrupt
+        return measure(row, given)
+
+    measure = loss_table.measure
+    monkeypatch.setattr(loss_table, "measure", killed)
+    with pytest.raises(KeyboardInterrupt):
+        run_tool(monkeypatch, "comparison.loss_table", *options)
+    rest = (out / "loss_table.md").read_text(encoding="utf-8")
+    assert "| cross-channel |" in rest
+    assert "| l1 |" not in rest
+    # what was finished is not done again
+    monkeypatch.setattr(loss_table, "UNTRAINED", dict.fromkeys(loss_table.UNTRAINED))
+    assert run_tool(monkeypatch, "comparison.loss_table", *options) == 0
+    report = json.loads((out / "loss_table.json").read_text(encoding="utf-8"))
+    assert (report["lab"], report["wild"]) == ("lab_display", "lab_wild")
+    assert report["rows"]["l1"]["trained"]["steps"] == 3
+    assert "no verdict" in (out / "loss_table.md").read_text(encoding="utf-8")
+
+
+def test_what_is_wrong_with_a_recipe_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    options = [tmp_path / "none.toml", "--rows", "l1", "--out-dir", tmp_path / "out"]
+    with pytest.raises(SystemExit, match="error: cannot read recipe"):
+        run_tool(monkeypatch, "comparison.loss_table", *options)
 
 
 def test_a_row_of_another_lens_has_two_recipes_of_its_own(

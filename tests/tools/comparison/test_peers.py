@@ -15,6 +15,7 @@ GOOD: dict[str, Setting] = {
     "skimage_wiener": (1e-3,),
     "skimage_rl": (16.0,),
     "admm_tv": (1.0, 10.0),
+    "cross_channel": (1.0, 2.0),
 }
 
 

@@ -22,8 +22,12 @@ TUNED: Tuned = {
     "skimage_wiener": {100.0: (0.01,)},
     "skimage_rl": {100.0: (4.0,)},
     "admm_tv": {100.0: (1.0, 4.0)},
+    "cross_channel": {100.0: (1.0, 2.0)},
 }
-METHODS = ("input", "skimage_wiener", "skimage_rl", "admm_tv", "bank", "bank_rl", "M")
+METHODS = (
+    *("input", "skimage_wiener", "skimage_rl", "admm_tv", "cross_channel"),
+    *("bank", "bank_rl", "M"),
+)
 
 
 @pytest.fixture(scope="module")

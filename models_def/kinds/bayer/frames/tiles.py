@@ -246,7 +246,7 @@ def camera_digest(recipe: BayerRecipe) -> str:
         "haze": None if recipe.haze is None else recipe.haze.model_dump(mode="json"),
         "lens": recipe.lens.to_json(),
         "frames": asdict(recipe.frames),
-        "data": {k: v for k, v in asdict(recipe.data).items() if k not in _OF_THE_POOL},
+        "data": {k: v for k, v in recipe.data.to_json().items() if k not in _OF_THE_POOL},
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

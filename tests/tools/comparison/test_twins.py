@@ -1,0 +1,46 @@
+"""A recipe before a display and outside."""
+
+import math
+import tomllib
+
+import pytest
+
+from camkit.errors import ContractError
+from camkit.models_def.training.kind import read_recipe
+from tests.bayer_recipe import RECIPE
+from tools.comparison.twins import with_keys, write_twins
+
+
+def test_twins_are_the_camera_in_two_circumstances(tmp_path):
+    recipe = tmp_path / "tiny.toml"
+    recipe.write_text(RECIPE, encoding="utf-8")
+    shown, wild = (read_recipe(path) for path in write_twins(recipe, tmp_path, (500.0, math.inf)))
+    assert (shown.data.display.bits, shown.data.display.calibrated) == (8, False)
+    assert shown.data.exposure_min_ev == shown.data.exposure_max_ev == 0
+    assert shown.lens.depths_mm == ()
+    assert (wild.data.wild.range_least, wild.data.wild.range_most) == (4, 64)
+    assert wild.data.display is None
+    assert wild.lens.depths_mm == (500, math.inf)
+    assert wild.lens.bank_in_focus
+    assert shown.networks == wild.networks
+    assert (shown.name, shown.sensor, shown.wiener) == (wild.name, wild.sensor, wild.wiener)
+
+
+def test_keys_of_one_table_are_changed():
+    text = "a = 1\n[lens]\na = 2 # old\nb = 3\n[lens.more]\na = 4\n"
+    changed = tomllib.loads(with_keys(text, "lens", {"a": 5, "c": [1.0, math.inf]}))
+    assert changed == {"a": 1, "lens": {"a": 5, "c": [1, math.inf], "b": 3, "more": {"a": 4}}}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("[data]\n", r"no table \[lens\]"), ("[lens]\na = [\n1,\n]\n", "on many lines")],
+)
+def test_what_cannot_be_changed_is_said(text, message):
+    with pytest.raises(ContractError, match=message):
+        with_keys(text, "lens", {"a": 1.0})
+
+
+def test_a_missing_recipe_is_one_line(tmp_path):
+    with pytest.raises(ContractError, match="cannot read recipe"):
+        write_twins(tmp_path / "none.toml", tmp_path)

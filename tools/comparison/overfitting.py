@@ -1,0 +1,118 @@
+"""Does a supervised network overfit to where it was trained? A verdict from paired samples.
+
+Both networks of a pair are the same but for their losses, and are judged on the same samples. Its
+lead is the mean over samples of (supervised - other), its error their standard deviation over the
+root of their number; a lead is sure where it exceeds `SURE` errors. What it loses is its lead at
+home less its lead abroad, with the errors of both added in squares.
+
+    holds    it leads at home, surely, and trails abroad, surely
+    partly   it loses surely, and leads at home surely, but does not surely trail abroad
+    fails    it surely leads abroad and does not surely lose; or its lead surely grows abroad
+    untold   all else: the samples are too few to tell
+
+One number of a network says nothing of a loss: other seeds may give another verdict.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+SURE: Final = 2.0
+HIGHER_IS_BETTER: Final = {"psnr_db": 1.0, "ssim": 1.0, "perceptual": -1.0}
+SUPERVISED: Final = ("log_mse", "mse", "l1")
+
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lead:
+    """How far one network is ahead of another.
+
+    Attributes:
+        mean: Over samples.
+        error: Standard error of the mean; infinite for one sample.
+    """
+
+    mean: float
+    error: float
+
+    @property
+    def sure(self) -> int:
+        """Give 1 where it is ahead, -1 where it is behind, 0 where nobody can tell."""
+        return int(np.sign(self.mean)) if abs(self.mean) > SURE * self.error else 0
+
+    def less(self, other: "Lead") -> "Lead":
+        """Give what is left when another lead is taken away."""
+        return Lead(mean=self.mean - other.mean, error=float(np.hypot(self.error, other.error)))
+
+
+def lead_of(one: Sequence[float], other: Sequence[float]) -> Lead:
+    """Give the lead of one over the other, sample by sample."""
+    gaps = np.subtract(one, other)
+    error = gaps.std(ddof=1) / np.sqrt(gaps.size) if gaps.size > 1 else np.inf
+    return Lead(mean=float(gaps.mean()), error=float(error))
+
+
+def verdict_of(home: Lead, abroad: Lead) -> str:
+    """Give holds, partly, fails or untold."""
+    lost = home.less(abroad).sure
+    if home.sure > 0 and abroad.sure < 0:
+        return "holds"
+    if home.sure > 0 and lost > 0:
+        return "partly"
+    if (abroad.sure > 0 and lost <= 0) or lost < 0:
+        return "fails"
+    return "untold"
+
+
+def overfitting(rows: Mapping[str, Entry]) -> list[Entry]:
+    """Compare every supervised row with every other of the same recipes and network.
+
+    Args:
+        rows: Name -> `trained`, `loss`, `network` (alike where only losses differ), and of `lab`
+            and `wild` for every metric the values of all samples (`each`).
+    """
+    found = []
+    for name, row in rows.items():
+        if row.get("loss") not in SUPERVISED:
+            continue
+        for rival, other in rows.items():
+            if other.get("loss") in (None, *SUPERVISED) or other["network"] != row["network"]:
+                continue
+            found.append({"supervised": name, "other": rival, **_compared(row, other)})
+    return found
+
+
+def _compared(row: Entry, other: Entry) -> Entry:
+    told: Entry = {}
+    for metric, sign in HIGHER_IS_BETTER.items():
+        home, abroad = (
+            lead_of(
+                np.multiply(sign, row[where]["each"][metric]).tolist(),
+                np.multiply(sign, other[where]["each"][metric]).tolist(),
+            )
+            for where in ("lab", "wild")
+        )
+        told[metric] = {
+            "lab": [home.mean, home.error],
+            "wild": [abroad.mean, abroad.error],
+            "verdict": verdict_of(home, abroad),
+        }
+    return told
+
+
+def sentences(found: Sequence[Entry]) -> list[str]:
+    """Say it, a line for each pair and metric."""
+    lines = []
+    for pair in found:
+        for metric in HIGHER_IS_BETTER:
+            one = pair[metric]
+            (home, home_error), (abroad, abroad_error) = one["lab"], one["wild"]
+            lines.append(
+                f"{pair['supervised']} against {pair['other']}, {metric}: ahead by {home:.3f} +- "
+                f"{home_error:.3f} at home, {abroad:.3f} +- {abroad_error:.3f} abroad: "
+                f'"supervised overfits" {one["verdict"]}'
+            )
+    return lines or ["no supervised row beside another loss of the same network: no verdict"]
