@@ -200,7 +200,7 @@ def _fine(source: str, output: str) -> Any:
 
 def _gives_few(node: Any, weights: Weights) -> bool:
     outputs, inputs = weights[node.input[1]].shape[:2]
-    return 4 * outputs <= inputs
+    return bool(4 * outputs <= inputs)
 
 
 def _is_doubling(node: Any, weights: Weights) -> bool:

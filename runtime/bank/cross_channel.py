@@ -47,7 +47,7 @@ from camkit.runtime.bank.total_variation import (
 
 CROSS_TV_WEIGHT: Final = 2.5
 """This and the next were tuned behind `duet` (docs/losses.md)."""
-CROSS_WEIGHT: Final = 20.0
+CROSS_WEIGHT: Final = 10.0
 CROSS_ROUNDS: Final = 30
 LEAST_BRIGHTNESS: Final = np.float32(0.05)
 """Of the level; darker places count as this bright."""
@@ -146,7 +146,9 @@ def compared_with(light: FloatArray) -> Other:
     bright = np.maximum(np.abs(light), LEAST_BRIGHTNESS)
     down, across = (np.roll(bright, -1, axis=axis) for axis in (0, 1))
     most = np.maximum(bright, np.maximum(down, across))
-    return Other(light=light / most, steps=np.stack(differences(light)) / most)
+    steps = np.stack(differences(light))
+    light, steps = (np.asarray(part / most, dtype=np.float32) for part in (light, steps))
+    return Other(light=light, steps=steps)
 
 
 def solved(colour: Colour, rounds: int) -> FloatArray:

@@ -316,7 +316,7 @@ def _data(table: Any) -> BayerDataRecipe:
     if not isinstance(table, Mapping):
         raise ContractError(f"data must be a table; got {table!r}")
     kinds = {"display": DisplayRecipe, "wild": WildRecipe}
-    own = {k: section(f"data.{k}", kinds[k], table[k]) for k in kinds if k in table}
+    own: dict[str, Any] = {k: section(f"data.{k}", kinds[k], table[k]) for k in kinds if k in table}
     return section("data", BayerDataRecipe, {**table, **own})
 
 

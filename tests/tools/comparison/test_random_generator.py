@@ -51,11 +51,6 @@ def test_a_picture_in_tiles_has_the_bits_of_the_whole(camera):
         assert np.array_equal(work.fill(), whole)
 
 
-def test_a_cap_that_is_too_small_is_refused_in_a_line(camera):
-    with pytest.raises(ContractError, match=r"(?s)the cap .*raise --max-mem"):
-        _start(camera, max_mem_bytes=245_000_000)
-
-
 def test_a_camera_of_other_planes_is_refused(tmp_path):
     bundle = write_bankless_bundle(tmp_path)
     with pytest.raises(ContractError, match="no network of 6 planes"):
