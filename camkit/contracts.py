@@ -93,6 +93,13 @@ class NoiseModel:
             read_variance=tuple(v * f for v, f in zip(self.read_variance, factors, strict=True)),
         )
 
+    def at_least(self, other: "NoiseModel") -> "NoiseModel":
+        """Give the noise that is nowhere below another one of as many channels."""
+        return NoiseModel(
+            shot=tuple(map(max, self.shot, other.shot)),
+            read_variance=tuple(map(max, self.read_variance, other.read_variance)),
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RadialDistortion:

@@ -20,6 +20,8 @@ import onnx
 from numpy.typing import NDArray
 from onnx import helper, numpy_helper
 
+from camkit.models_def.training.first_weights import PRELU
+
 Weights = dict[str, NDArray[Any]]
 _TAPS: Final = (((0,), (1, 2)), ((0, 1), (2,)))
 """Of a 3x3 kernel on a doubled picture, by the parity of a pixel: the taps that see one sample."""
@@ -91,7 +93,11 @@ def _one_slope(nodes: list[Any], weights: Weights, _last: str) -> list[Any]:
         if slope is None or slope.size != 1:
             return node
         return helper.make_node(
-            "LeakyRelu", [node.input[0]], [node.output[0]], alpha=float(slope.item())
+            "LeakyRelu",
+            [node.input[0]],
+            [node.output[0]],
+            node.output[0] + PRELU,
+            alpha=float(slope.item()),
         )
 
     return [changed(node) for node in nodes]

@@ -16,6 +16,7 @@ from torch import nn
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError, UnsupportedError
 from camkit.export.folding import fold_nodes
+from camkit.models_def.training.first_weights import PRELU
 from camkit.runtime.network.engine import NetworkEngine
 
 if TYPE_CHECKING:
@@ -210,7 +211,8 @@ def _stripped(traced: onnx.ModelProto, outputs: int, scale: int) -> bytes:
         weights.append(numpy_helper.from_array(numpy_helper.to_array(weight), renamed[weight.name]))
     nodes = []
     for i, node in enumerate(graph.node):
-        name = f"{i:03d}_{node.op_type.lower()}"
+        sloped = node.name.endswith(PRELU)
+        name = f"{i:03d}{PRELU if sloped else '_' + node.op_type.lower()}"
         renamed.update({value: renamed.get(value, name) for value in node.output})
         inputs = [renamed.get(value, value) for value in node.input]
         clean = helper.make_node(

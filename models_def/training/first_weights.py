@@ -22,6 +22,8 @@ from camkit.models_def.networks.full_unet import FullUnet, start_from_trimmed
 from camkit.models_def.training.checkpoint import State, read_table, recipe_of, to_checkpoint
 from camkit.models_def.training.credits import FIRST_WEIGHTS
 
+PRELU: Final = "_prelu"
+"""End of the name of a node whose slope was a weight, which has no name of its own."""
 # what an export computed beforehand; no weight
 _CONSTANT: Final = re.compile(r"c\d+")
 
@@ -143,7 +145,7 @@ def state_of_onnx(model: bytes) -> State:
             outside the model.
     """
     graph = onnx.load_from_string(model).graph
-    if any(node.op_type == "PRelu" for node in graph.node):
+    if any(node.name.endswith(PRELU) or node.op_type == "PRelu" for node in graph.node):
         raise ContractError(
             "the slopes of PReLUs lose their names on export; begin at the checkpoint of this "
             "network instead of its bundle"

@@ -156,6 +156,10 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     )
     method = job.work.method if job.work.method in METHODS else METHODS[0]
     noise = job.noise.with_gains(planes.gains)
+    if entry.together is not None and method == METHODS[0]:
+        # its numbers were fitted to noise of this sensor; with less it would trust its kernels more
+        least = sensor.noise_at(min(known.iso for known in sensor.noise))
+        noise = noise.at_least(least.with_gains(planes.gains))
     if planes.noise_rise is not None:
         noise = noise.raised(planes.noise_rise())
     side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)

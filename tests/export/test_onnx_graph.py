@@ -17,7 +17,7 @@ from camkit.runtime.network.engine import NetworkEngine, largest_activations
 from camkit.runtime.network.graph import inspect_graph, with_node_outputs
 
 LEAN_OPERATORS = {"Conv", "LeakyRelu", "Add", "DepthToSpace", "Slice"}
-TRIMMED_OPERATORS = {"Conv", "PRelu", "MaxPool", "ConvTranspose", "Concat", "Add"}
+TRIMMED_OPERATORS = {"Conv", "LeakyRelu", "MaxPool", "ConvTranspose", "Concat", "Add"}
 
 
 def _network(name: str, seed: int = 0, **config: object) -> nn.Module:

@@ -9,8 +9,8 @@ import pytest
 from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent, PlanesSensor
-from camkit.bundle.stages import Linearise, Network, Wiener
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.bundle.stages import Linearise, Network, Together, Wiener
+from camkit.contracts import FloatArray, FrozenPsf, NoiseModel
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.psf import color_kernels
@@ -29,6 +29,7 @@ from tests.job_factory import (
 )
 from tests.planes_bundle import facts_of, finer_network, planes_sensor, write_planes_bundle
 from tests.psf_factory import grid_psf, psnr_db, streak_kernel, texture, uniform_psf
+from tests.together_factory import TOGETHER
 
 BANK = {"block_px": 64, "overlap_px": 24, "prior_scale": 3e-4, "prior_exponent": 2.5}
 METHODS = ("wiener", "rl", "admm-tv")
@@ -54,6 +55,28 @@ def test_bands_are_those_of_the_bank_with_the_noise_behind_the_gains(
     np.testing.assert_array_equal(
         read_all(sharp.rows(), 10), bank.restore_array(light, light > 0.7)
     )
+
+
+@pytest.mark.parametrize("together", [TOGETHER, None], ids=["together", "alone"])
+def test_colours_together_take_no_less_noise_than_the_sensor_has(
+    bundle: Bundle, together: Together | None
+) -> None:
+    entry = bundle.manifest.stage(Wiener)
+    assert entry is not None
+    entry = entry.model_copy(update={"together": together})
+    sensor, light = bundle.manifest.sensor, texture(64, 96)
+    least = sensor.noise_at(sensor.noise[0].iso)  # type: ignore[union-attr]
+
+    def sharp(noise: NoiseModel) -> FloatArray:
+        job = start(bundle, made_mosaic(noise=noise)).job
+        taken = stream_of(light, gains=OWN_BALANCE), stream_of(light > 2, "mask")
+        (found,) = run_stage(entry, job, *taken)
+        return read_all(found.rows(), 10)
+
+    averaged, louder = sharp(least.raised((1 / 256,) * 3)), sharp(least.raised((4.0,) * 3))
+    usual = sharp(least)
+    assert np.array_equal(averaged, usual) == (together is not None)
+    assert not np.array_equal(louder, usual)
 
 
 @pytest.mark.parametrize(
