@@ -23,7 +23,7 @@ def table(recipe_path, **changes):
 
 def test_shipped_recipe_has_its_networks_and_the_stated_sensor():
     recipe = read_recipe(SHIPPED)
-    assert set(recipe.networks["restore"]) == {"S", "M", "L", "trimmed"}
+    assert set(recipe.networks["restore"]) == {"S", "M", "trimmed"}
     sensor = recipe.sensor
     assert (sensor.width_px, sensor.height_px, sensor.pixel_pitch_um) == (6000, 4000, 5.96)
     levels = sensor.white_level - sensor.black_level
