@@ -38,6 +38,11 @@ def rgb_to_xyz(primaries: tuple[Chromaticity, ...], white: Chromaticity) -> Matr
     return np.asarray(columns * scale)
 
 
+def rec709_of_light(light: Chromaticity) -> Matrix:
+    """Give the (3,) linear Rec.709 values of a light of luminance 1; D65 has (1, 1, 1)."""
+    return np.asarray(np.linalg.solve(rgb_to_xyz(REC709_PRIMARIES, D65), white_xyz(light)))
+
+
 def adapt_white(source: Chromaticity, target: Chromaticity) -> Matrix:
     """Give the Bradford (3, 3) XYZ matrix that maps the source white on the target white."""
     gains = (BRADFORD @ white_xyz(target)) / (BRADFORD @ white_xyz(source))

@@ -19,8 +19,8 @@ from camkit.colorimetry import (
     apply_matrix,
     decode_srgb,
     encode_srgb,
+    rec709_of_light,
     rgb_to_xyz,
-    white_xyz,
 )
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
@@ -167,7 +167,7 @@ def daylight(kelvin: float) -> Matrix:
     else:
         x = 0.237040 + 0.24748 * t + 1.9018 * t**2 - 2.0064 * t**3
     y = -3 * x**2 + 2.870 * x - 0.275
-    return np.asarray(np.linalg.solve(rgb_to_xyz(REC709_PRIMARIES, D65), white_xyz((x, y))))
+    return rec709_of_light((x, y))
 
 
 def with_range(scene: FloatArray, times: float) -> FloatArray:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.colorimetry import D65, REC709_PRIMARIES, rgb_to_xyz, white_xyz
+from camkit.colorimetry import rec709_of_light
 from camkit.report.stress.scenario import Scenario
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
@@ -34,8 +34,7 @@ def planckian(kelvin: float) -> tuple[float, float]:
 
 def tint(kelvin: float) -> NDArray[np.float64]:
     """Give the factors on linear Rec.709 of a light against daylight, the largest 1."""
-    to_rgb = np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65))
-    light, daylight = (to_rgb @ white_xyz(planckian(k)) for k in (kelvin, DAYLIGHT_K))
+    light, daylight = (rec709_of_light(planckian(k)) for k in (kelvin, DAYLIGHT_K))
     factors = np.maximum(light / daylight, 0)
     return np.asarray(factors / factors.max())
 
