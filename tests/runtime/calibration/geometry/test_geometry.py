@@ -161,7 +161,8 @@ def test_a_picture_without_a_board_is_left_out_and_named(
     blank = np.random.default_rng(0).integers(0, 255, (300, 400, 3), np.uint8)
     found = calibrate_geometry(_with(photographs, blank, tmp_path), BOARD)
     assert found.notes[0] == "odd.png: no board found"
-    assert found.to_record()["pictures"][-1] == {"file": "odd.png", "found": False}
+    odd = {"file": "odd.png", "found": False, "rms_px": None}
+    assert found.to_record()["pictures"][-1] == odd
 
 
 def test_another_size_is_named(photographs: list[Path], tmp_path: Path) -> None:
