@@ -17,7 +17,10 @@ def lensfun_out(
         ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The entry (.xml).")],
-    focal_mm: Annotated[float, typer.Option(help="Focal length.")],
+    focal_mm: Annotated[
+        float | None,
+        typer.Option(help="Focal length; default: that of a geometry. A bundle needs it."),
+    ] = None,
     lens_name: Annotated[
         str | None, typer.Option(help="Model of the lens; default: the name of the source.")
     ] = None,
@@ -61,7 +64,7 @@ def lensfun_out(
         part.write_text(made.to_xml(), encoding="utf-8")
     fit = made.fit
     line = (
-        f"  {made.name.model}, {fit.distortion.model} at {focal_mm:g} mm, misses by "
+        f"  {made.name.model}, {fit.distortion.model} at {fit.distortion.focal_mm:g} mm, misses by "
         f"{fit.residual_px:.3f} px"
     )
     tell({**made.to_record(), "out": str(out)}, [line], as_json=json_)
