@@ -117,17 +117,33 @@ class Entry:
 
     Attributes:
         name: What lensfun knows the lens by.
-        size_px: Width and height of the pictures.
+        source: What it stands for.
         fit: Its distortion.
         vignetting: And the most that it misses, as a share of the light; None for none.
         notes: What is lost.
     """
 
     name: Name
-    size_px: tuple[int, int]
+    source: Source
     fit: Fit
     vignetting: tuple[Vignetting, float] | None
     notes: tuple[str, ...]
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Give width and height of the pictures."""
+        return self.source.size_px
+
+    def straight_px(self, placed_px: FloatGrid) -> FloatGrid:
+        """Give the radii of the source's straight picture that fall on radii of the capture."""
+        assert self.source.distortion is not None  # without, there is no fit
+        return _ideal_px(placed_px, self.source.distortion)
+
+    def missed_px(self, placed_px: FloatGrid) -> FloatGrid:
+        """Give by how much the entry puts light farther out than the source, at such radii."""
+        unit_px = min(self.size_px) / 2
+        ideal = self.fit.scale * self.straight_px(placed_px) / unit_px
+        return self.fit.distortion.placed(ideal) * unit_px - placed_px
 
     def to_xml(self) -> str:
         """Give the file that lensfun reads."""
@@ -189,7 +205,7 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
         notes = (*notes, "vignetting is left out: it needs --aperture")
     model = source.name if options.lens_name is None else options.lens_name
     named = Name(maker=options.maker, model=model, mount=options.mount, crop_factor=crop)
-    return Entry(name=named, size_px=source.size_px, fit=fit, vignetting=light, notes=notes)
+    return Entry(name=named, source=source, fit=fit, vignetting=light, notes=notes)
 
 
 def fit_distortion(source: Source, focal_mm: float) -> Fit:

@@ -245,6 +245,26 @@ def test_a_traced_lens_goes_out_and_comes_in_but_for_its_scale(
     assert told["vignetting"] is None
 
 
+def test_pages_show_what_the_models_miss(camkit_command, asked: list[Any], tmp_path: Path) -> None:
+    inside, outside = tmp_path / "pages" / "in.html", tmp_path / "pages" / "out.html"
+    words = (*asked, "--lens", ZOOM, "--focal-mm", 24, "--crop-factor", 1, "--page", inside)
+    done = camkit_command(*words, "--json")
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["page"] == str(inside)
+    path = tmp_path / "camera.toml"
+    path.write_text(to_toml(GEOMETRY), encoding="utf-8")
+    out = ("--focal-mm", 10, "--crop-factor", 2, "--page", outside, "-o", tmp_path / "own.xml")
+    done = camkit_command("calibrate", "lensfun-out", path, *out, "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["page"] == str(outside)
+    for page in (inside, outside):
+        assert page.read_text(encoding="utf-8").count("<img") == 1
+    kept = camkit_command("calibrate", "lensfun-out", path, *out[:-1], tmp_path / "other.xml")
+    assert kept.code == ExitCode.USAGE
+    assert not (tmp_path / "other.xml").exists()
+
+
 def test_a_geometry_tells_its_focal_length_and_a_bundle_does_not(
     camkit_command, tmp_path: Path
 ) -> None:
