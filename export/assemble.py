@@ -36,6 +36,7 @@ from camkit.errors import ContractError, ParityError
 from camkit.export.card import card_text, preview_png
 from camkit.export.designed_optics import designed_members
 from camkit.export.golden_cases import (
+    HAZE_SCENE,
     CaseRecipe,
     Cases,
     add_outputs,
@@ -65,8 +66,6 @@ WHITE: Final = "white"
 """In the recipe of a case whose pictures have another white than 1."""
 PROBE: Final = "probe"
 PROBE_RECIPE: Final = CaseRecipe(scene_seed=30, exposure=0.9, iso=400.0, field=0.6, size_px=512)
-HAZE_SCENE: Final = "procedural:23"
-"""Taken for a capture of the whole sensor in cells."""
 SIZES: Final = ("S", "M", "L")
 DEFAULT_SIZE: Final = "M"
 

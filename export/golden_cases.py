@@ -22,6 +22,9 @@ from camkit.scenes import procedural_scene
 SIDE_STEP_PX: Final = 64
 """Every network takes sides that are multiples of it."""
 
+HAZE_SCENE: Final = "procedural:23"
+"""Taken for a capture of the whole sensor in cells."""
+
 Cases = dict[str, tuple[GoldenCase, GoldenArrays]]
 
 

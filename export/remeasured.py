@@ -19,12 +19,14 @@ from camkit.bundle.chain import rewired
 from camkit.bundle.facts import Card
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.golden import golden_to_bytes
+from camkit.bundle.haze_golden import haze_golden_to_bytes
 from camkit.bundle.manifest import Manifest, format_of, planes_of
-from camkit.bundle.optics import FrozenPsfOptics, LensProfile, RadialEntry
+from camkit.bundle.optics import FrozenPsfOptics, HazyPsfOptics, LensProfile, RadialEntry
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import (
     CARD,
     GOLDEN,
+    HAZE_GOLDEN,
     PLATE,
     PLATE_HEIGHTS,
     PRESCRIPTION,
@@ -38,11 +40,13 @@ from camkit.bundle.writer import write_bundle
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, DecodeError, ParityError
 from camkit.export.activations import with_activations
-from camkit.export.golden_cases import add_outputs, photograph_all
+from camkit.export.golden_cases import HAZE_SCENE, add_outputs, photograph_all
+from camkit.haze import Haze
 from camkit.runtime.calibration.measured_files import FlatFile, GeometryFile, NoiseFile
 from camkit.runtime.geometry.distortion import RANGE_MARGIN, check_distortion
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
+from camkit.runtime.proof.haze import make_haze_golden
 from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
@@ -75,6 +79,7 @@ class _Draft:
     manifest: Manifest
     members: dict[str, bytes]
     psf: FrozenPsf | None
+    haze: Haze | None = None
     notes: list[str] = field(default_factory=list)
 
     def change(self, **fields: Any) -> None:
@@ -113,11 +118,13 @@ def remeasured(
         raise DecodeError(f"{name} states no optics or no size of its sensor, so no camera of it")
     if optics.type == "streaks" and measured != Measured(noise=measured.noise):
         raise DecodeError(f"the optics of {name} write streaks; only --noise can be put into it")
-    if optics.type == "hazy_psf" and measured != Measured(noise=measured.noise):
-        raise DecodeError(f"the optics of {name} have a haze; only --noise can be put into it")
+    hazy = optics.type == "hazy_psf"
+    if hazy and measured.psf is not None:
+        raise DecodeError(f"the haze of {name} belongs to its kernels; leave --psf out")
     own = {name: bundle.member(name) for name in bundle.names if name not in OWN_NAMES}
-    psf = bundle.psf if optics.type == "frozen_psf" else None
-    draft = _Draft(manifest=bundle.manifest, members=own, psf=psf)
+    psf = bundle.psf if hazy or optics.type == "frozen_psf" else None
+    haze = bundle.haze if hazy else None
+    draft = _Draft(manifest=bundle.manifest, members=own, psf=psf, haze=haze)
     draft.change(golden=(), envelope=None, plan=None, card=Card())
     if measured.noise is not None:
         _put_noise(draft, measured.noise)
@@ -280,12 +287,13 @@ def _put_geometry(draft: _Draft, found: GeometryFile) -> None:
 def _finish(draft: _Draft) -> None:
     """Bring planes, products, optics and version up to the parts."""
     manifest, optics = draft.manifest, draft.manifest.optics
-    if draft.psf is not None and isinstance(optics, FrozenPsfOptics):
+    if draft.psf is not None and isinstance(optics, FrozenPsfOptics | HazyPsfOptics):
         draft.members[optics.member] = psf_to_bytes(draft.psf)
         focus_mm = optics.object_distance_mm
-        made = FrozenOptics(psf=draft.psf).entry(np.inf if focus_mm is None else focus_mm)
+        frozen = FrozenOptics(psf=draft.psf, haze=draft.haze)
+        made = frozen.entry(np.inf if focus_mm is None else focus_mm)
         stated = tuple(map(int, manifest.format_version.split(".")))
-        needed = tuple(map(int, format_of(draft.psf).split(".")))
+        needed = tuple(map(int, format_of(draft.psf, hazy=draft.haze is not None).split(".")))
         newest = ".".join(map(str, max(stated, needed)))
         draft.change(optics=made, format_version=newest)
     parts = Parts(
@@ -301,13 +309,16 @@ def _finish(draft: _Draft) -> None:
 
 
 def _proved(draft: _Draft, out: Path) -> Bundle:
-    """Make golden cases, check the bundle, and write it."""
+    """Make golden cases, that of a haze too, check the bundle, and write it."""
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / out.name
         made = write_bundle(trial, draft.manifest, draft.members)
         if made.manifest.has_kernels:
             cases = photograph_all(made)
             draft.members[GOLDEN] = golden_to_bytes(add_outputs(made, cases))
+            if made.manifest.has_haze:
+                band = make_haze_golden(made, HAZE_SCENE)
+                draft.members[HAZE_GOLDEN] = haze_golden_to_bytes(band)
             draft.change(
                 golden=tuple(case for case, _ in cases.values()),
                 networks=with_activations(made, cases),

@@ -11,7 +11,7 @@ from typing import Final
 import torch
 from torch import Tensor
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.tracing.profile import sag
 from camkit.units import UM_PER_MM, to_mm
 
@@ -126,11 +126,12 @@ def check_grooves(profile: Profile, grooves: Grooves) -> None:
     """Refuse grooves that cannot be cut.
 
     Raises:
-        ContractError: If the profile has no rim, or a groove is narrower than 1 um or the tool.
+        ContractError: If the profile has no rim, or a groove is narrower than 1 um.
+        UnsupportedError: If a groove is narrower than the tool.
     """
     narrowest_um = narrowest_mm(profile, grooves) * UM_PER_MM
     if narrowest_um < 2 * grooves.tool_radius_um:
-        raise ContractError(
+        raise UnsupportedError(
             f"a groove of {narrowest_um:.1f} um is narrower than the tool, whose nose is "
             f"{2 * grooves.tool_radius_um:g} um wide; make groove_depth_um larger or "
             "tool_radius_um smaller"

@@ -13,7 +13,7 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.glass.agf import read_agf
 from camkit.models_def.optics.glass.catalogue import GlassCatalogue, find_glass, own_glass
 from camkit.models_def.optics.glass.material import Glass
@@ -422,8 +422,8 @@ def _parse_surface(
     )
     try:
         return replace(made, grooves=_parse_grooves(table))
-    except ContractError as error:
-        raise ContractError(f"{where}: {error}") from error
+    except (ContractError, UnsupportedError) as error:
+        raise type(error)(f"{where}: {error}") from error
 
 
 def _parse_grooves(table: Mapping[str, Any]) -> Grooves | None:

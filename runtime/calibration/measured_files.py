@@ -31,6 +31,7 @@ class GeometryFile(Entry, extra="ignore"):
     width_px: Side
     height_px: Side
     model: str
+    focal_px: Positive | None = None
     centre_px: tuple[Place, Place]
     covered_radius_px: Positive
     radial: RadialRecord

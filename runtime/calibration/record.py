@@ -13,15 +13,15 @@ _ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t"}
 
 
 def to_toml(record: Mapping[str, Any]) -> str:
-    """Give the TOML text of a record: `tomllib.loads` gives the record back.
+    """Give the TOML text of a record: `tomllib.loads` gives it back but for what is not known.
 
     Args:
         record: Texts as keys; values are bool, int, float, str, lists (or tuples) of those and of
-            such lists, mappings, and lists of mappings. A tuple reads back as a list.
+            such lists, mappings, and lists of mappings. A tuple reads back as a list. A key whose
+            value is None is left out: TOML has no null.
 
     Raises:
-        ContractError: If a number is not finite, or a value is of another kind; TOML has no null,
-            so what is not known is left out.
+        ContractError: If a number is not finite, or a value is of another kind.
     """
     lines: list[str] = []
     _add_table(lines, record, ())
@@ -34,6 +34,8 @@ def _add_table(lines: list[str], table: Mapping[str, Any], path: tuple[str, ...]
     for key, value in table.items():
         if not isinstance(key, str):
             raise ContractError(f"keys of a record are texts; got {key!r}")
+        if value is None:
+            continue
         if isinstance(value, Mapping) or _is_tables(value):
             nested.append((key, value))
         else:

@@ -99,18 +99,16 @@ class ToneFacts:
         return np.where(self.seen, self.luminance / self.curve.at(self.levels) - 1, 0.0)
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values; what is not known is left out."""
-        record: dict[str, Any] = {
+        """Give plain values; None where no curve was fitted."""
+        rest, curve = self.residuals, self.curve
+        left = None if rest is None else 100 * np.sqrt(np.mean(rest[self.seen] ** 2))
+        return {
             "levels": [float(level) for level in self.levels],
             "luminance": [float(f"{light:.6g}") for light in self.luminance],
+            "residual_percent": None if left is None else float(f"{left:.3g}"),
+            "gamma": None if curve is None else round(curve.gamma, 4),
+            "notes": list(self.notes),
         }
-        rest = self.residuals
-        if rest is not None and self.curve is not None:
-            record["residual_percent"] = float(
-                f"{100 * np.sqrt(np.mean(rest[self.seen] ** 2)):.3g}"
-            )
-            record["gamma"] = round(self.curve.gamma, 4)
-        return record | {"notes": list(self.notes)}
 
 
 def levels_of(text: str, count: int) -> tuple[float, ...]:

@@ -8,4 +8,5 @@ noise_page       photon transfer of every ISO
 flat_page        relative illumination, the display, what both leave
 tone_page        luminance over level
 pairs_page       how well shown pictures lie on their captures
+lensfun_page     where a lens of lensfun's puts light, what a model misses of it
 """

@@ -90,6 +90,6 @@ def _row(facts: IsoFacts) -> tuple[str, ...]:
         f"{facts.white_level:g}",
         f"{100 * facts.prnu:.2g}",
         f"{record['dsnu_e']:.2g}",
-        f"{record['linearity_percent']:.2g}" if "linearity_percent" in record else "-",
+        "-" if facts.linearity is None else f"{100 * facts.linearity:.2g}",
         f"{facts.pairs}",
     )

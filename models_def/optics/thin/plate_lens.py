@@ -16,7 +16,7 @@ def plate_lens(recipe: ThinRecipe, solved: SolvedPlate) -> Lens:
     """Give the lens: a stop, the two faces of the plate, the sensor.
 
     Raises:
-        ContractError: If a groove is narrower than the tool.
+        UnsupportedError: If a groove is narrower than the tool.
     """
     plate, stop = recipe.plate, recipe.stop
     grooves = Grooves(depth_um=plate.groove_depth_um, tool_radius_um=plate.tool_radius_um)

@@ -75,7 +75,7 @@ def with_tool(lens: Lens, radius_um: float) -> Lens:
     """Give the lens whose grooves are cut by a tool with a nose of this radius.
 
     Raises:
-        ContractError: If a groove is narrower than the tool.
+        UnsupportedError: If a groove is narrower than the tool.
     """
     surfaces = (
         s if s.grooves is None else replace(s, grooves=replace(s.grooves, tool_radius_um=radius_um))

@@ -114,7 +114,11 @@ class Geometry:
         records: list[dict[str, Any]] = []
         fit, seen = self.chosen.fit, 0
         for view in self.views:
-            record: dict[str, Any] = {"file": view.path.name, "found": view.corners is not None}
+            record: dict[str, Any] = {
+                "file": view.path.name,
+                "found": view.corners is not None,
+                "rms_px": None,
+            }
             if view.corners is not None:
                 record["rms_px"] = round(rms(fit.residuals[seen]), 5)
                 if self.board.square_mm is not None:

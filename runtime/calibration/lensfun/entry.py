@@ -46,7 +46,7 @@ class EntryOptions:
     """What an entry is for.
 
     Attributes:
-        focal_mm: Focal length.
+        focal_mm: Focal length; None for that of the source, which a bundle does not know.
         lens_name: Model of the lens; None for the name of the source.
         maker: Of the lens.
         mount: Of the camera, as lensfun's database names it.
@@ -55,7 +55,7 @@ class EntryOptions:
         most_residual_px: By which the model may miss the distortion.
     """
 
-    focal_mm: float
+    focal_mm: float | None = None
     lens_name: str | None = None
     maker: str = ANY
     mount: str = ANY
@@ -117,17 +117,33 @@ class Entry:
 
     Attributes:
         name: What lensfun knows the lens by.
-        size_px: Width and height of the pictures.
+        source: What it stands for.
         fit: Its distortion.
         vignetting: And the most that it misses, as a share of the light; None for none.
         notes: What is lost.
     """
 
     name: Name
-    size_px: tuple[int, int]
+    source: Source
     fit: Fit
     vignetting: tuple[Vignetting, float] | None
     notes: tuple[str, ...]
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Give width and height of the pictures."""
+        return self.source.size_px
+
+    def straight_px(self, placed_px: FloatGrid) -> FloatGrid:
+        """Give the radii of the source's straight picture that fall on radii of the capture."""
+        assert self.source.distortion is not None  # without, there is no fit
+        return _ideal_px(placed_px, self.source.distortion)
+
+    def missed_px(self, placed_px: FloatGrid) -> FloatGrid:
+        """Give by how much the entry puts light farther out than the source, at such radii."""
+        unit_px = min(self.size_px) / 2
+        ideal = self.fit.scale * self.straight_px(placed_px) / unit_px
+        return self.fit.distortion.placed(ideal) * unit_px - placed_px
 
     def to_xml(self) -> str:
         """Give the file that lensfun reads."""
@@ -165,13 +181,16 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
         DecodeError: If the file is neither, states no distortion, or one that no model of lensfun's
             fits as well as asked.
         BundleError: If the bundle is refused.
-        ContractError: If nothing says how large the sensor is.
+        ContractError: If nothing says how large the sensor is, or how long the lens.
     """
     source = read_source(path)
     crop = source.crop_factor if options.crop_factor is None else options.crop_factor
     if crop is None:
         raise ContractError(f"{path} does not tell how large the sensor is: say --crop-factor")
-    fit = fit_distortion(source, options.focal_mm)
+    focal_mm = source.focal_mm(crop) if options.focal_mm is None else options.focal_mm
+    if focal_mm is None:
+        raise ContractError(f"{path} does not tell the focal length: say --focal-mm")
+    fit = fit_distortion(source, focal_mm)
     if fit.residual_px > options.most_residual_px:
         raise DecodeError(
             f"{fit.distortion.model}, the nearest of lensfun's models, misses the distortion of "
@@ -181,12 +200,12 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
     notes, light = source.notes, None
     if source.light is not None and options.aperture is not None:
         half_px = math.hypot(*source.size_px) / 2
-        light = fit_vignetting(source.light, half_px, options.focal_mm, options.aperture)
+        light = fit_vignetting(source.light, half_px, focal_mm, options.aperture)
     elif source.light is not None:
         notes = (*notes, "vignetting is left out: it needs --aperture")
     model = source.name if options.lens_name is None else options.lens_name
     named = Name(maker=options.maker, model=model, mount=options.mount, crop_factor=crop)
-    return Entry(name=named, size_px=source.size_px, fit=fit, vignetting=light, notes=notes)
+    return Entry(name=named, source=source, fit=fit, vignetting=light, notes=notes)
 
 
 def fit_distortion(source: Source, focal_mm: float) -> Fit:

@@ -28,6 +28,7 @@ class Source:
         crop_factor: By size and pitch of the sensor; None where the pitch is not known.
         distortion: Of the reference colour, one row; None where none is known.
         light: Relative illumination; None where none is known over the radius alone.
+        focal_px: Focal length; None where it is not stated.
         notes: What is lost.
     """
 
@@ -36,6 +37,7 @@ class Source:
     crop_factor: float | None
     distortion: RadialDistortion | None
     light: RadialIllumination | None
+    focal_px: float | None = None
     notes: tuple[str, ...]
 
     @property
@@ -47,6 +49,11 @@ class Source:
     def corner_px(self) -> float:
         """Give the distance of the outermost pixel from the middle."""
         return float(np.hypot(self.size_px[0] - 1, self.size_px[1] - 1)) / 2
+
+    def focal_mm(self, crop_factor: float) -> float | None:
+        """Give the focal length on a sensor of a crop factor; None where it is not stated."""
+        diagonal_mm = FULL_FRAME_MM / crop_factor
+        return self.focal_px and self.focal_px * diagonal_mm / float(np.hypot(*self.size_px))
 
 
 def read_source(path: Path) -> Source:
@@ -105,6 +112,7 @@ def _of_geometry(found: GeometryFile, path: Path) -> Source:
             radius_mm=found.radial.radius_px,
         ),
         light=None,
+        focal_px=found.focal_px,
         notes=_off_middle(found.centre_px, size),
     )
     if found.covered_radius_px < made.corner_px:

@@ -68,8 +68,9 @@ class IsoFacts:
         return self.read.value * self.gain_e_per_dn
 
     def to_record(self) -> dict[str, Any]:
-        """Give plain values; what is not known is left out."""
-        record = {
+        """Give plain values; None where exposure times do not tell of linearity."""
+        linearity = self.linearity
+        return {
             "iso": _short(self.iso),
             "gain_e_per_dn": _short(self.gain_e_per_dn),
             "gain_error_percent": _short(100 * self.gain_error, 3),
@@ -80,11 +81,9 @@ class IsoFacts:
             "white_level": float(self.white_level),
             "prnu_percent": _short(100 * self.prnu, 4),
             "dsnu_e": _short(self.dsnu_dn * self.gain_e_per_dn, 4),
+            "linearity_percent": None if linearity is None else _short(100 * linearity, 3),
             "pairs": self.pairs,
         }
-        if self.linearity is not None:
-            record["linearity_percent"] = _short(100 * self.linearity, 3)
-        return record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,8 +124,9 @@ def measure_sensor(
         iso: For files that state none.
 
     Raises:
-        ContractError: If files do not come in pairs.
-        DecodeError: If a frame cannot be read or used, or an ISO lacks its darks or flats.
+        ContractError: If a file is given twice.
+        DecodeError: If files do not come in pairs, a frame cannot be read or used, or an ISO lacks
+            its darks or flats.
     """
     dark_paths, flat_paths = in_pairs(darks, "--dark"), in_pairs(flats, "--flat")
     reader = PairReader(mosaic, iso)

@@ -75,10 +75,11 @@ def in_pairs(files: Sequence[Path], option: str) -> list[tuple[Path, Path]]:
     """Give files two by two in their order.
 
     Raises:
-        ContractError: If there is none, one is left over, or one is given twice.
+        DecodeError: If there is none, or one is left over.
+        ContractError: If one is given twice.
     """
     if not files or len(files) % 2:
-        raise ContractError(
+        raise DecodeError(
             f"{option} takes pairs, two frames of one light and setting; got {len(files)} files"
         )
     seen: set[Path] = set()

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import Manifest, planes_of
-from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Dehaze
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.stages import Dehaze, Wiener
+from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.bank.cell_means import cell_means
@@ -17,12 +19,14 @@ from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.plan.decision import Subject, Work
+from camkit.runtime.plan.decision import PLAIN, Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import ArrayRows
 from camkit.runtime.stages import haze
 from tests.haze_bundle import hazy_manifest, hazy_stages, write_hazy_bundle
-from tests.job_factory import made_mosaic, made_planes, start
+from tests.haze_factory import tiny_haze
+from tests.job_factory import made_mosaic, made_planes, read_all, start
+from tests.plan_factory import half_textured_mosaic, write_planned_bundle
 
 FLOAT32 = 1e-5
 
@@ -147,6 +151,41 @@ def test_an_even_capture_stays_even(bundle: Bundle) -> None:
     flat = made_planes(samples=np.full((3, 64, 96), 0.3, np.float32))
     hazed = _filled(bundle, flat, method="haze")
     np.testing.assert_allclose(hazed, _filled(bundle, flat, method="develop"), atol=5e-3)
+
+
+def test_the_plan_leaves_plain_cells_at_the_coarse_picture(tmp_path: Path) -> None:
+    """Cleared of haze as every cell is, and filtered by no block."""
+    planned = write_planned_bundle(tmp_path)
+    optics = FrozenOptics(psf=planned.psf, haze=tiny_haze(planned.psf))
+    stages = tuple(
+        stage.model_copy(update={"block_px": 128, "overlap_px": 32})
+        if isinstance(stage, Wiener)
+        else stage
+        for stage in hazy_stages(network=True)
+    )
+    stated = planned.manifest
+    manifest = hazy_manifest(
+        sensor=stated.sensor,
+        stages=stages,
+        networks=stated.networks,
+        plan=stated.plan,
+        optics=optics.entry(np.inf),
+    )
+    members = {name: planned.member(name) for name in planned.names} | optics.members
+    write_bundle(tmp_path / "hazy.camkit", manifest, members)
+    camera = open_bundle(tmp_path / "hazy.camkit")
+    capture = Pipeline(camera, Options()).capture_of(
+        half_textured_mosaic(), iso=100, white_balance=(1.5, 1.0, 1.3), origin_px=None
+    )
+    made = start(camera, capture, quality="adaptive")
+    assert made.labels is not None
+    assert (made.labels[:, 0] == PLAIN).all()
+    planes = {stage.type: stage.gives[0] for stage in stages}
+    clear, filtered, hazy = (
+        read_all(made.rows_of(planes[name]))[:, :, :128] for name in ("haze", "wiener", "demosaic")
+    )
+    np.testing.assert_allclose(filtered, clear, rtol=0, atol=FLOAT32)
+    assert np.abs(clear - hazy).max() > 0.01
 
 
 def test_the_noise_of_the_bank_is_raised(bundle: Bundle, monkeypatch: pytest.MonkeyPatch) -> None:

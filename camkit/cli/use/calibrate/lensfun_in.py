@@ -1,12 +1,13 @@
 """`camkit calibrate lensfun-in`: a lens of lensfun's database to a bundle of an ordinary camera."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import check_out, tell
+from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
 from camkit.cli.use.merge import BlackLevel, MosaicCfa, WhiteLevel
 
 if TYPE_CHECKING:
@@ -44,15 +45,18 @@ def lensfun_in(
     mosaic: MosaicCfa = None,
     black_level: BlackLevel = None,
     white_level: WhiteLevel = None,
+    page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
     """Make a bundle that undistorts and evens the light of a lens that lensfun knows."""
     check_out(out, ".camkit", "a bundle", overwrite=overwrite)
+    check_page(page, overwrite=overwrite)
     from camkit.bundle.writer import write_bundle
     from camkit.cli.use.mosaic import mosaic_options
     from camkit.runtime.calibration.lensfun.ordinary import CameraOptions, lensfun_bundle
+    from camkit.runtime.output.part_file import atomic_output
 
     options = CameraOptions(
         focal_mm=focal_mm,
@@ -64,8 +68,17 @@ def lensfun_in(
     )
     made = lensfun_bundle(database, lens, capture, options, name=out.stem)
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_bundle(out, made.manifest, {})
-    tell({**made.to_record(), "out": str(out)}, [_line(made.found)], as_json=json_)
+    shown = {}
+    with ExitStack() as stack:
+        if page is not None:
+            from camkit.report.calibration.lensfun_page import bundle_html
+
+            page.parent.mkdir(parents=True, exist_ok=True)
+            part = stack.enter_context(atomic_output(page))
+            part.write_text(bundle_html(made), encoding="utf-8")
+            shown["page"] = str(page)
+        write_bundle(out, made.manifest, {})
+    tell({**made.to_record(), "out": str(out), **shown}, [_line(made.found)], as_json=json_)
 
 
 def _line(found: "Found") -> str:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import check_out, tell
+from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
 
 
 def lensfun_out(
@@ -17,7 +17,10 @@ def lensfun_out(
         ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The entry (.xml).")],
-    focal_mm: Annotated[float, typer.Option(help="Focal length.")],
+    focal_mm: Annotated[
+        float | None,
+        typer.Option(help="Focal length; default: that of a geometry. A bundle needs it."),
+    ] = None,
     lens_name: Annotated[
         str | None, typer.Option(help="Model of the lens; default: the name of the source.")
     ] = None,
@@ -37,14 +40,16 @@ def lensfun_out(
     most_residual_px: Annotated[
         float, typer.Option(help="By which the model may miss the distortion.")
     ] = 0.5,
+    page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
     """Write distortion and vignetting of a bundle or a measured geometry for lensfun."""
     check_out(out, ".xml", "an entry of lensfun", overwrite=overwrite)
+    check_page(page, overwrite=overwrite)
     from camkit.runtime.calibration.lensfun.entry import EntryOptions, lensfun_entry
-    from camkit.runtime.output.part_file import atomic_output
+    from camkit.runtime.output.part_file import atomic_outputs
 
     options = EntryOptions(
         focal_mm=focal_mm,
@@ -56,12 +61,20 @@ def lensfun_out(
         most_residual_px=most_residual_px,
     )
     made = lensfun_entry(source, options)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_output(out) as part:
-        part.write_text(made.to_xml(), encoding="utf-8")
+    texts = {out: made.to_xml()}
+    if page is not None:
+        from camkit.report.calibration.lensfun_page import entry_html
+
+        texts[page] = entry_html(made)
+    for path in texts:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_outputs(*texts) as parts:
+        for part, text in zip(parts, texts.values(), strict=True):
+            part.write_text(text, encoding="utf-8")
     fit = made.fit
     line = (
-        f"  {made.name.model}, {fit.distortion.model} at {focal_mm:g} mm, misses by "
+        f"  {made.name.model}, {fit.distortion.model} at {fit.distortion.focal_mm:g} mm, misses by "
         f"{fit.residual_px:.3f} px"
     )
-    tell({**made.to_record(), "out": str(out)}, [line], as_json=json_)
+    shown = {} if page is None else {"page": str(page)}
+    tell({**made.to_record(), "out": str(out), **shown}, [line], as_json=json_)

@@ -10,6 +10,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.folder import Folder
 from camkit.cli.use.calibrate.outputs import Page, check_page
+from camkit.errors import ContractError
 
 if TYPE_CHECKING:
     from camkit.runtime.calibration.display.pairs import Pairs
@@ -20,13 +21,22 @@ REGISTRATION = "registration.toml"
 
 def pairs(
     captures: Annotated[
-        list[Path], typer.Argument(help="Captures of the screen, in any order, linear.")
+        list[Path],
+        typer.Argument(
+            help="Captures of the screen, in any order, linear, or folders of them; the last may "
+            "be what was shown, see --targets.",
+        ),
     ],
-    targets: Annotated[Path, typer.Option(help="Folder that camkit calibrate targets wrote.")],
     geometry: Annotated[
         Path, typer.Option(help="The camera: a TOML of camkit calibrate geometry.")
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for train --pairs.")],
+    targets: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder that camkit calibrate targets wrote; default: the last one named."
+        ),
+    ] = None,
     tone: Annotated[
         Path | None,
         typer.Option(help="The display: a TOML of camkit calibrate tone. Default: sRGB."),
@@ -46,6 +56,7 @@ def pairs(
     check_page(page, overwrite=overwrite)
     within = (".", "capture", "reference")
     folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
+    shots, shown_in = _apart(captures, targets)
     from camkit.runtime.calibration.display.camera_file import Lens, Tone
     from camkit.runtime.calibration.display.pairs import Given, draw_pairs, find_pairs
     from camkit.runtime.calibration.display.targets import Targets
@@ -53,14 +64,14 @@ def pairs(
     from camkit.runtime.output.pixels import png_bytes, tiff_bytes
 
     given = Given(
-        folder=targets,
-        targets=Targets.read(targets),
+        folder=shown_in,
+        targets=Targets.read(shown_in),
         lens=Lens.read(geometry),
         tone=Tone.read(tone),
         flat=flat,
         most_residual_px=most_residual_px,
     )
-    found = find_pairs(captures, given)
+    found = find_pairs(shots, given)
     names = [pair.target.name for pair in found.pairs]
     files = [f"{kind}/{n}{end}" for n in names for kind, end in (("capture", ".tiff"), ("reference", ".png"))]  # noqa: E501 # fmt: skip
     shown = [] if page is None else [str(page.absolute())]
@@ -73,6 +84,25 @@ def pairs(
         parts[-2].write_text(to_toml(found.to_record()), encoding="utf-8")
         parts[-1].write_text(to_toml(found.settings()), encoding="utf-8")
     _tell(found, out, page, as_json=json_)
+
+
+def _apart(named: list[Path], targets: Path | None) -> tuple[list[Path], Path]:
+    """Give the captures, those of folders too, and the folder of what was shown.
+
+    Raises:
+        ContractError: If nothing says what was shown.
+    """
+    from camkit.runtime.batch.sources import expand
+
+    if targets is None:
+        *named, targets = named
+        if not targets.is_dir():
+            raise ContractError("say what was shown: --targets DIR, or its folder after the files")
+    inside = [expand([path]) if path.is_dir() else [path] for path in named]
+    shots = [path for paths in inside for path in paths]
+    if not shots:
+        raise ContractError(f"no capture is named beside {targets}")
+    return shots, targets
 
 
 def _tell(found: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> None:

@@ -42,6 +42,6 @@ def tone(
 
     record = found.to_record()
     line = f"  {len(files)} steps, black {found.luminance[0]:.3g} of the brightest"
-    if "gamma" in record:
+    if record["gamma"] is not None:
         line += f", gamma {record['gamma']:.3g} to {record['residual_percent']:.2g} %"
     outputs.write(record, [line], shown)

@@ -245,6 +245,45 @@ def test_a_traced_lens_goes_out_and_comes_in_but_for_its_scale(
     assert told["vignetting"] is None
 
 
+def test_pages_show_what_the_models_miss(camkit_command, asked: list[Any], tmp_path: Path) -> None:
+    inside, outside = tmp_path / "pages" / "in.html", tmp_path / "pages" / "out.html"
+    words = (*asked, "--lens", ZOOM, "--focal-mm", 24, "--crop-factor", 1, "--page", inside)
+    done = camkit_command(*words, "--json")
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["page"] == str(inside)
+    path = tmp_path / "camera.toml"
+    path.write_text(to_toml(GEOMETRY), encoding="utf-8")
+    out = ("--focal-mm", 10, "--crop-factor", 2, "--page", outside, "-o", tmp_path / "own.xml")
+    done = camkit_command("calibrate", "lensfun-out", path, *out, "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["page"] == str(outside)
+    for page in (inside, outside):
+        assert page.read_text(encoding="utf-8").count("<img") == 1
+    kept = camkit_command("calibrate", "lensfun-out", path, *out[:-1], tmp_path / "other.xml")
+    assert kept.code == ExitCode.USAGE
+    assert not (tmp_path / "other.xml").exists()
+
+
+def test_a_geometry_tells_its_focal_length_and_a_bundle_does_not(
+    camkit_command, tmp_path: Path
+) -> None:
+    path, out = tmp_path / "camera.toml", tmp_path / "own.xml"
+    width, height = GEOMETRY["width_px"], GEOMETRY["height_px"]
+    path.write_text(to_toml(GEOMETRY | {"focal_px": 500.0}), encoding="utf-8")
+    words = ("calibrate", "lensfun-out", path, "-o", out, "--crop-factor", 2, "--json")
+    done = camkit_command(*words)
+    assert done.code == 0, done.err
+    pitch_mm = np.hypot(36, 24) / 2 / np.hypot(width, height)
+    assert json.loads(done.out)["focal_mm"] == pytest.approx(500 * pitch_mm, rel=1e-3)
+    assert camkit_command(*words, "--overwrite", "--focal-mm", 9).code == 0
+    assert 'focal="9"' in out.read_text(encoding="utf-8")
+    bundle = write_tiny_bundle(tmp_path)
+    done = camkit_command("calibrate", "lensfun-out", bundle, "-o", tmp_path / "b.xml")
+    assert done.code == ExitCode.USAGE
+    assert "say --focal-mm" in done.err
+
+
 def test_a_geometry_needs_its_crop_factor_and_obeys_the_limit(
     camkit_command, tmp_path: Path
 ) -> None:

@@ -61,7 +61,7 @@ def test_bad_input_is_one_line_and_no_file(camkit_command, frames: list, tmp_pat
     out = tmp_path / "noise.toml"
     for asked, code, told in (
         ([*frames, "--flat", jpegs[0], "--flat", jpegs[1]], ExitCode.INPUT_FAILED, "is a picture"),
-        ([*frames, "--flat", jpegs[0]], ExitCode.USAGE, "--flat takes pairs"),
+        ([*frames, "--flat", jpegs[0]], ExitCode.INPUT_FAILED, "--flat takes pairs"),
         ([*frames, "--dark", tmp_path / "x", "--dark", "y"], ExitCode.INPUT_FAILED, "cannot read"),
         ([*frames, "--iso", -1], ExitCode.USAGE, "--iso must be > 0"),
     ):

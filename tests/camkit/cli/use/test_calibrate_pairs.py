@@ -133,6 +133,21 @@ def test_bad_captures_are_one_line_and_no_file(camkit_command, set_up, tmp_path,
     assert not (tmp_path / "pairs").exists()
 
 
+def test_captures_and_what_was_shown_may_be_two_folders(camkit_command, set_up, tmp_path):
+    shots, out = tmp_path / "shots", tmp_path / "pairs"
+    shots.mkdir()
+    for number in (0, 1):
+        shutil.copy(set_up / f"{number}.dng", shots)
+    end = ("--geometry", set_up / "geometry.toml", "-o", out)
+    done = camkit_command("calibrate", "pairs", shots, set_up / "targets", *end)
+    assert done.code == 0, done.err
+    assert "2 pairs" in done.out
+    for named, told in (([shots / "0.dng"], "say what was shown"), ([shots], "no capture is")):
+        done = camkit_command("calibrate", "pairs", *named, *end[:3], tmp_path / "none")
+        assert done.code == ExitCode.USAGE
+        assert told in done.err
+
+
 def test_another_geometry_is_refused_by_what_it_leaves(camkit_command, set_up, tmp_path):
     text = (set_up / "geometry.toml").read_text().replace("-0.12", "0.05")
     (tmp_path / "geometry.toml").write_text(text)

@@ -41,6 +41,20 @@ def test_toml_page_and_json_say_the_same(camkit_command, steps: list, tmp_path: 
     assert "note: no picture states its exposure time" in again.err
 
 
+def test_three_steps_tell_no_residual(camkit_command, steps: list, tmp_path: Path) -> None:
+    out = tmp_path / "tone.toml"
+    asked = ("--levels", "0,128,255", "-o", out)
+    done = camkit_command("calibrate", "tone", *steps[::2], *asked, "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["residual_percent"] is None
+    assert "residual_percent" not in tomllib.loads(out.read_text())
+    done = camkit_command("calibrate", "tone", *steps[::2], *asked, "--overwrite")
+    assert done.code == 0, done.err
+    assert "3 steps" in done.out
+    assert "gamma" not in done.out
+
+
 def test_bad_input_is_one_line_and_no_file(camkit_command, steps: list, tmp_path: Path) -> None:
     out = tmp_path / "tone.toml"
     for files, levels, code, told in (

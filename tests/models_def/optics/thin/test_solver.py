@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from camkit.errors import ContractError
+from camkit.errors import UnsupportedError
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.pupil import half_disc, launch
@@ -107,5 +107,5 @@ def test_a_groove_narrower_than_the_tool_is_refused(
 ) -> None:
     recipe, found = solved["both"]
     blunt = replace(recipe, plate=replace(recipe.plate, tool_radius_um=200.0))
-    with pytest.raises(ContractError, match="narrower than the tool"):
+    with pytest.raises(UnsupportedError, match="narrower than the tool"):
         plate_lens(blunt, found)

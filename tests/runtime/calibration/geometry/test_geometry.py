@@ -118,14 +118,14 @@ def test_checkerboards_are_calibrated() -> None:
     found = calibrate_geometry(files, NINE_BY_SIX)
     assert all(view.corners is not None for view in found.views)
     assert found.chosen.rms_px <= 0.25
-    assert found.chosen.worst_px <= 0.30
+    assert found.chosen.worst_px <= 0.25
 
 
 def test_a_fisheye_is_calibrated() -> None:
     files = sorted(data_path("lens/fisheye_left").glob("*.jpg"))
     found = calibrate_geometry(files, NINE_BY_SIX)
     assert found.chosen.rms_px <= 0.35
-    assert found.chosen.worst_px <= 0.40
+    assert found.chosen.worst_px <= 0.35
 
 
 def _with(photographs: list[Path], extra: FloatGrid | np.ndarray, folder: Path) -> list[Path]:
@@ -161,7 +161,8 @@ def test_a_picture_without_a_board_is_left_out_and_named(
     blank = np.random.default_rng(0).integers(0, 255, (300, 400, 3), np.uint8)
     found = calibrate_geometry(_with(photographs, blank, tmp_path), BOARD)
     assert found.notes[0] == "odd.png: no board found"
-    assert found.to_record()["pictures"][-1] == {"file": "odd.png", "found": False}
+    odd = {"file": "odd.png", "found": False, "rms_px": None}
+    assert found.to_record()["pictures"][-1] == odd
 
 
 def test_another_size_is_named(photographs: list[Path], tmp_path: Path) -> None:

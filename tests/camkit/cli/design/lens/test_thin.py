@@ -41,7 +41,7 @@ def test_a_plate_is_solved_written_and_reported(camkit_command, tmp_path: Path, 
     assert camkit_command("lens", "thin", quick, "-o", out, "--overwrite", *tool).code == 0
     assert "tool_radius_um = 16.0" in out.read_text()
     blunt = camkit_command("lens", "peak", out, "--tool-radius-um", 900)
-    assert blunt.code == ExitCode.USAGE
+    assert blunt.code == ExitCode.INPUT_FAILED
     assert "narrower than the tool" in blunt.err
     peaks = camkit_command("lens", "peak", out)
     assert peaks.code == 0, peaks.err
@@ -53,7 +53,7 @@ def test_a_groove_narrower_than_the_tool_is_one_line(camkit_command, tmp_path: P
     blunt, out = tmp_path / "blunt.toml", tmp_path / "p.toml"
     blunt.write_text(quick.read_text().replace("terms = 6", "terms = 6\ntool_radius_um = 500.0"))
     outcome = camkit_command("lens", "thin", blunt, "-o", out)
-    assert outcome.code == ExitCode.USAGE
+    assert outcome.code == ExitCode.INPUT_FAILED
     assert "narrower than the tool" in outcome.err
     assert outcome.err.count("\n") == 1
     assert not out.exists()

@@ -1,0 +1,124 @@
+"""The page of a lens of lensfun's: where light comes from, what a model misses, how light falls."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.figure import GRID_COLOR, new_figure, to_png
+from camkit.runtime.calibration.lensfun.entry import Entry
+from camkit.runtime.calibration.lensfun.ordinary import LensBundle
+from camkit.runtime.geometry.distortion import distort_points
+from camkit.units import to_mm
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FloatGrid = NDArray[np.float64]
+_POINTS: Final = 257
+_BLUE: Final = "#1f6fb4"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curves:
+    """A lens along a radius.
+
+    Attributes:
+        radius_px: (n,) in the straight picture.
+        moved_px: (n,) how much farther out light lies in the capture.
+        missed_px: (n,) how much of that a model makes too large.
+        light: (n,) relative illumination; None where there is none.
+    """
+
+    radius_px: FloatGrid
+    moved_px: FloatGrid
+    missed_px: FloatGrid
+    light: FloatGrid | None
+
+
+def entry_html(made: Entry) -> str:
+    """Give the page of an entry for lensfun."""
+    return _html(f"camkit calibrate lensfun-out: {made.name.model}", curves_of_entry(made), made)
+
+
+def bundle_html(made: LensBundle) -> str:
+    """Give the page of a bundle of a lens that lensfun knows."""
+    title = f"camkit calibrate lensfun-in: {made.found.lens.name}"
+    return _html(title, curves_of_bundle(made), made)
+
+
+def curves_of_entry(made: Entry) -> Curves:
+    """Give what an entry says and what it misses of its source."""
+    placed = np.linspace(0, made.source.corner_px, _POINTS)
+    straight = made.straight_px(placed)
+    half_px = float(np.hypot(*made.size_px)) / 2
+    return Curves(
+        radius_px=straight,
+        moved_px=placed - straight,
+        missed_px=made.missed_px(placed),
+        light=made.vignetting and made.vignetting[0].light(placed / half_px),
+    )
+
+
+def curves_of_bundle(made: LensBundle) -> Curves:
+    """Give what a bundle does and what it misses of lensfun's formula; green, else all colours."""
+    found, extent = made.found, made.manifest.sensor.known_extent
+    pitch_mm = to_mm(extent.pixel_pitch_um)
+    ideal_mm = np.linspace(0, np.hypot(extent.width_px, extent.height_px) / 2 * pitch_mm, _POINTS)
+    profile = found.profile
+    assert profile.distortion is not None  # lensfun-in makes none without
+    rows = profile.distortion.to_distortion()
+    points = np.stack([ideal_mm, np.zeros(_POINTS)], axis=-1)
+    placed = distort_points(points, rows, channel=0)[:, 0]
+    unit_mm = rows.radius_mm
+    formula = found.distortion.placed(found.scale * ideal_mm / unit_mm) * unit_mm
+    light = None
+    if profile.illumination is not None:
+        known = profile.illumination.to_illumination()
+        light = np.interp(placed**2, known.heights_mm**2, known.light)
+    return Curves(
+        radius_px=ideal_mm / pitch_mm,
+        moved_px=(placed - ideal_mm) / pitch_mm,
+        missed_px=(placed - formula) / pitch_mm,
+        light=light,
+    )
+
+
+def _html(title: str, curves: Curves, made: Entry | LensBundle) -> str:
+    record = made.to_record()
+    notes = " ".join(record.pop("notes")) or None
+    rows = tuple((name, _told(value)) for name, value in record.items())
+    pictures = {
+        "How much farther out light lies in the capture than in the straight picture, and how much "
+        "of it the model makes too large; below, how light falls off.": to_png(draw(curves))
+    }
+    table = Table(rows=rows)
+    return to_html(title, [Section(title="Lens", paragraph=notes, table=table, pictures=pictures)])
+
+
+def _told(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_told(part)}" for name, part in value.items())
+    if isinstance(value, list):
+        return " ".join(map(_told, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def draw(curves: Curves) -> "Figure":
+    """Draw shift, what is missed of it, and light, over the radius."""
+    figure = new_figure(7.0, 6.0)
+    drawn = [(curves.moved_px, "moved, px"), (curves.missed_px, "missed, px")]
+    if curves.light is not None:
+        drawn.append((curves.light, "relative illumination"))
+    for number, (values, label) in enumerate(drawn, start=1):
+        panel = figure.add_subplot(len(drawn), 1, number)
+        panel.plot(curves.radius_px, values, color=_BLUE, linewidth=1)
+        panel.set_ylabel(label, fontsize=8)
+        panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
+        panel.tick_params(labelsize=7)
+    panel.set_xlabel("radius in the straight picture, px", fontsize=8)
+    return figure
