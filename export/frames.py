@@ -199,17 +199,19 @@ class _Studio:
         recipe, seed = self._recipe, self._sources.seed
         rng = np.random.default_rng((seed, int(self._choosing), number))
         scene = draw_scene(rng, self._scenes, recipe, even=self._choosing)
+        window = scene_window(scene, recipe.sensor, None)
         scene, truth = recipe.data.lit(rng, scene)
+        matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+        lit = scene if scene.min() >= 0 else _seen(scene, matrix)
         optics = self._sources.copies[copy]
         light = light_of(
-            scene,
+            lit,
             recipe.sensor,
             lens_of(optics.psf, recipe.sensor, haze=optics.haze),
-            scene_window(scene, recipe.sensor, None),
+            window,
             LightOptions(distort=False),
         )
-        if truth is not scene:
-            matrix, _ = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+        if truth is not lit:
             light = replace(light, clean=np.maximum(apply_matrix(matrix, truth), 0))
         for shot in range(recipe.frames.shots):
             iso = self._iso(rng, shot)
@@ -275,6 +277,13 @@ class _Studio:
         assert kept.noise_rise is not None
         red, green, blue = kept.noise_rise()
         return np.asarray(rows.read(0, rows.shape[1]), np.float32), (red, green, blue)
+
+
+def _seen(scene: FloatArray, matrix: NDArray[np.float64]) -> FloatArray:
+    """Give a scene (3, h, w) of colours outside Rec.709 without what no channel sees."""
+    camera = np.maximum(apply_matrix(matrix, scene), 0)
+    back = np.asarray(np.linalg.inv(matrix), np.float64)
+    return np.asarray(apply_matrix(back, camera), np.float32)
 
 
 def draw_scene(

@@ -3,6 +3,7 @@
 psf               frozen PSF -> one kernel per colour, field height and azimuth
 cell_means        a capture in coarse cells
 place_blur        blur that varies from cell to cell, as few convolutions
+place_undo        filters that nearly undo it, each for its place
 haze              the coarse band: the scene in cells, and the capture cleared by it
 blocks            the grid of overlapping windowed blocks, and the sum of them
 spectrum          Fourier transforms of blocks

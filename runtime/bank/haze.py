@@ -32,6 +32,7 @@ from camkit.runtime.bank.place_blur import (
     few_kernels,
     lay_nodes,
 )
+from camkit.runtime.bank.place_undo import cores_differ, filter_side, undoing_kernels
 from camkit.runtime.bank.psf import FieldKernels, color_kernels, wavelength_weights
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
@@ -61,6 +62,7 @@ class HazyKernels:
         haze: What lies beside it in cells, with its light.
         coarse: Core and haze in cells, with their light.
         cell_px: Side of a cell.
+        differ: Whether cores hold so different shares that every place needs a filter of its own.
     """
 
     core: FieldKernels
@@ -68,6 +70,7 @@ class HazyKernels:
     haze: "Lit"
     coarse: "Lit"
     cell_px: int
+    differ: bool = False
 
     def scaled(self, ratio: float) -> "HazyKernels":
         """Give the kernels scaled about their centres; see `FieldKernels.scaled`."""
@@ -77,6 +80,7 @@ class HazyKernels:
             haze=self.haze.scaled(ratio),
             coarse=self.coarse.scaled(ratio),
             cell_px=self.cell_px,
+            differ=self.differ,
         )
 
 
@@ -212,6 +216,7 @@ def hazy_kernels(
         haze=_lit(wide, core),
         coarse=_lit(_added(wide, narrow), core),
         cell_px=haze.cell_px,
+        differ=cores_differ(haze),
     )
 
 
@@ -288,7 +293,8 @@ def solve_coarse(
         kernels: Of the camera.
         window: Of the capture in pixels.
         terms: See `PlaceBlur`.
-        rounds: Of adding what the mean kernel makes of what is left unexplained.
+        rounds: Of adding what a filter makes of what is left unexplained: that of the mean kernel,
+            or where cores differ much, of the kernel of every place (`place_undo`).
         between: Called between the rounds; may raise to stop.
     """
     laid = cell_window(window, kernels.cell_px, MARGIN_CELLS)
@@ -296,12 +302,13 @@ def solve_coarse(
     nodes = lay_nodes(kernels.core, laid)
     wide = few_of(kernels.coarse, terms)
     narrow = few_of(kernels.coarse_core, CORE_TERMS)
+    filters = filters_of(kernels.coarse, terms) if kernels.differ else None
     gain, veil, picture = (np.empty(cells.shape, np.float32) for _ in range(3))
     for channel, (seen, over) in enumerate(zip(cells, clipped, strict=True)):
         blur = PlaceBlur(wide[channel], nodes)
         ones = np.ones(laid.size_px[::-1], np.float32)
         even = np.maximum(blur(ones)[inner], np.float32(LEAST_RESPONSE))
-        undo = blur.solver(DAMPING)
+        undo = blur.solver(DAMPING) if filters is None else PlaceBlur(filters[channel], nodes)
         scene = _mirrored(seen)
         for _ in range(rounds):
             between()
@@ -323,6 +330,14 @@ def few_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
     return tuple(few_kernels(nodes.of(c), terms) for c in range(lit.light.shape[1]))
 
 
+@lru_cache(maxsize=KEPT_CAMERAS)
+def filters_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
+    """Give few kernels of the filters of every channel, see `place_undo`; kept as `few_of`."""
+    nodes = NodeKernels(lit.kernels, lit.light)
+    channels = range(lit.light.shape[1])
+    return tuple(few_kernels(undoing_kernels(nodes.of(c)), terms) for c in channels)
+
+
 def _mirrored(cells: FloatArray) -> FloatArray:
     """Give the cells with a mirrored margin; a single row or column goes on as it is."""
     if min(cells.shape) < 2:
@@ -331,7 +346,10 @@ def _mirrored(cells: FloatArray) -> FloatArray:
 
 
 def coarse_work(entry: Dehaze, channels: int) -> float:
-    """Give how often a pixel is transformed, the margins of the cells left aside."""
+    """Give how often a pixel is transformed, the margins of the cells left aside.
+
+    Filters for every place add less than as much again.
+    """
     return channels * (entry.terms + CORE_TERMS) * (entry.rounds + 2) / entry.shrink**2
 
 
@@ -339,7 +357,10 @@ def kept_bytes(entry: Dehaze, haze: Haze, channels: int, kernel_scale: float = 1
     """Give the memory of what is kept of optics, see `few_of`; arguments as of `solving_bytes`."""
     side = int(haze.kernels.shape[-1] * kernel_scale) + 3
     fields = 2 * haze.kernels.shape[0]
-    return int(4 * side**2 * channels * (entry.terms + fields))
+    kept = side**2 * (entry.terms + fields)
+    if cores_differ(haze):
+        kept += filter_side(side) ** 2 * entry.terms
+    return int(4 * kept * channels)
 
 
 def solving_bytes(
@@ -361,4 +382,9 @@ def solving_bytes(
     nodes = AZIMUTHS * haze.kernels.shape[0]
     places = 4 * nodes * side**2 * (3 + channels / 4)
     places += kept_bytes(entry, haze, channels, kernel_scale)
-    return int(entry.terms * (4 * spectrum + 16 * cells) + places + BYTES_PER_CELL * cells)
+    laid = entry.terms * (4 * spectrum + 16 * cells)
+    if cores_differ(haze):
+        wide = filter_side(side)
+        laid += entry.terms * (4 * (sides[0] + wide) * (sides[1] + wide) + 16 * cells)
+        places += 12 * nodes * wide**2
+    return int(laid + places + BYTES_PER_CELL * cells)

@@ -23,6 +23,7 @@ from camkit.models_def.kinds.bayer.frames.samples import developed
 from camkit.models_def.kinds.bayer.frames.tiles import Tile, Tiles, read_frames
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import finish_shot
+from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.training.bank_fitting import BankFitOptions
 from camkit.models_def.training.checkpoint import read_checkpoint
@@ -258,6 +259,22 @@ def test_tiles_that_were_cut_short_or_are_gone_are_one_line(runs: Path, tmp_path
     planes.unlink()
     with pytest.raises(ContractError, match="are damaged"):
         frames.tiles("train", None)
+
+
+@pytest.mark.parametrize("calibrated", [False, True])
+def test_colours_outside_rec709_are_photographed(
+    recipe: BayerRecipe, tmp_path: Path, calibrated: bool
+) -> None:
+    wide = ((0.708, 0.292), (0.17, 0.797), (0.131, 0.046))
+    display = DisplayRecipe(primaries=wide, calibrated=calibrated)
+    few = replace(recipe.frames, count=1, validation_count=1, shots=1, tiles=4, validation_tiles=1)
+    shown = replace(recipe, frames=few, data=replace(recipe.data, display=display))
+    prepare_frames(shown, _sources(), tmp_path, _silent)
+    tiles = _tiles(tmp_path, "train")
+    for index in range(len(tiles)):
+        tile = tiles.read(index)
+        assert np.isfinite(tile.planes).all()
+        assert tile.sharp.min() >= 0
 
 
 def test_a_camera_without_a_haze_needs_no_frames(recipe: BayerRecipe, tmp_path: Path) -> None:

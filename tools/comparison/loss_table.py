@@ -20,7 +20,10 @@ from paired samples (`tools.comparison.overfitting` has the rule).
 
 A lens with a haze has its frames made before (`--only-recipes` writes the recipes and ends): with
 `--data PICTURES` in OUT_DIR/LAB to train on, with `--data OTHERS` in OUT_DIR/LAB_judged and
-OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the names of the recipes without .toml).
+OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the names of the recipes without .toml). With
+`--frames 6,2` there are recipes of these names: 6 frames to train on and 2 to judge on, the latter
+through other copies of the lens. `--camera CAMERA.toml` puts another camera before the sizes and
+losses of RECIPE.
 """
 
 import argparse
@@ -46,7 +49,7 @@ from camkit.models_def.training.trainer import TrainOptions, train
 from tools.comparison.classical import METHODS, numbers, with_method
 from tools.comparison.compact_json import to_compact_json
 from tools.comparison.overfitting import overfitting, sentences
-from tools.comparison.twins import write_twins
+from tools.comparison.twins import Counts, judged_by, write_twins
 from tools.lens_table import kept
 
 METRICS: Final = ("psnr_db", "ssim", "perceptual")
@@ -84,7 +87,8 @@ class Conditions:
 
     def digest(self, row: "Row") -> str:
         """Give a hash of all that decides a row."""
-        files = [path.read_text(encoding="utf-8") for path in (row.lab, row.wild)]
+        paths = [path for recipe in (row.lab, row.wild) for path in (recipe, judged_by(recipe))]
+        files = [path.read_text(encoding="utf-8") for path in paths if path.exists()]
         given = [JUDGED, self.data, self.fresh, self.sharp, self.vgg, self.minutes, self.samples]
         return hashlib.sha256("\n".join([row.size, *files, *map(str, given)]).encode()).hexdigest()
 
@@ -152,7 +156,13 @@ def main() -> int:
     lab, wild = arguments.lab, arguments.wild
     try:
         if wild is None:
-            lab, wild = write_twins(lab, conditions.out_dir, arguments.depths_mm)
+            lab, wild = write_twins(
+                lab,
+                conditions.out_dir,
+                arguments.depths_mm,
+                camera=arguments.camera,
+                counts=arguments.frames and Counts(**arguments.frames),
+            )
         if not arguments.only_recipes:
             fill(arguments.rows, lab, wild, conditions)
     except CamkitError as error:
@@ -204,6 +214,13 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--depths-mm", type=distances, default=(), help="of scenes outside, such as 2000,5000,inf"
     )
+    parser.add_argument("--camera", type=Path, help="its recipe; sizes and losses are RECIPE's")
+    parser.add_argument(
+        "--frames",
+        type=frame_counts,
+        metavar="TRAIN,JUDGED[,COPIES]",
+        help="of a lens with a haze, and fabricated copies of it; default: the recipe's",
+    )
     parser.add_argument("--only-recipes", action="store_true", help="write the twins and end")
     parser.add_argument("--rows", nargs="+", required=True, help="SIZE or SIZE=LAB.toml,WILD.toml")
     parser.add_argument("--data", type=Path, help="pictures to train on")
@@ -227,6 +244,14 @@ def count(text: str) -> int:
 def distances(text: str) -> tuple[float, ...]:
     """Read distances."""
     return tuple(float(word) for word in text.split(","))
+
+
+def frame_counts(text: str) -> dict[str, int]:
+    """Read counts of frames."""
+    numbers = [int(word) for word in text.split(",")]
+    if not 2 <= len(numbers) <= 3 or min(numbers) < 1:
+        raise ValueError(text)
+    return dict(zip(("frames", "judged", "copies"), numbers, strict=False))
 
 
 def row_of(name: str, lab: Path, wild: Path) -> Row:
@@ -262,7 +287,8 @@ def domain(recipe_path: Path, conditions: Conditions, method: str | None = None)
         conditions: Pictures and number.
         method: One of `METHODS` in place of the bank.
     """
-    recipe = read_recipe(recipe_path)
+    few = judged_by(recipe_path)
+    recipe = read_recipe(few if few.exists() else recipe_path)
     kind, role = training_kind(recipe.kind), recipe.role(None)
     matrix = getattr(recipe.sensor, "color_matrix", None)
     if matrix is None:

@@ -4,11 +4,14 @@
               elsewhere than Rec.709 has them; one distance, one exposure, no lamps
     wild      daylight of 4000 to 12000 K, white 4 to 64 times as bright, other distances if asked
 
-Both are texts with a comment: a recipe as a person would have edited it.
+Both are texts with a comment: a recipe as a person would have edited it. Where lenses have a haze
+there is a third and a fourth, NAME_display_judged.toml and NAME_wild_judged.toml: few frames, and
+copies of the lens that no network was trained on.
 """
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -34,25 +37,56 @@ range_least = 4.0
 range_most = 64.0
 """
 LABORATORY: Final = {"exposure_min_ev": 0.0, "exposure_max_ev": 0.0, "lamp_share": 0.0}
+JUDGED: Final = "_judged"
+OTHER_COPIES: Final = 907
+"""Seed of copies of the lens to judge on."""
+LOSSES: Final = "[schedule]"
+"""With this table begins what sizes and losses a recipe has."""
 
 Value = str | float | bool | Sequence[str | float]
 
 
-def write_twins(recipe: Path, folder: Path, depths_mm: Sequence[float] = ()) -> tuple[Path, Path]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counts:
+    """Of a lens with a haze, how much is photographed.
+
+    Attributes:
+        frames: To train on.
+        judged: To judge on.
+        copies: Of the lens, for each; one more to choose by.
+    """
+
+    frames: int
+    judged: int
+    copies: int = 1
+
+
+def write_twins(
+    recipe: Path,
+    folder: Path,
+    depths_mm: Sequence[float] = (),
+    *,
+    camera: Path | None = None,
+    counts: Counts | None = None,
+) -> tuple[Path, Path]:
     """Write both recipes; a text that is there and the same stays.
 
     Args:
         recipe: Of the camera, its lens by name.
         folder: For NAME_display.toml and NAME_wild.toml.
         depths_mm: Distances of scenes outside, increasing; empty for the one of the lens.
+        camera: Recipe of another camera, NAME; of the first one sizes and losses are taken.
+        counts: Of a lens with a haze; None for those of the recipe, which are judged on too.
 
     Raises:
-        ContractError: If the recipe cannot be read, or has no table that must be changed.
+        ContractError: If a recipe cannot be read, or has no table that must be changed.
     """
-    try:
-        text = recipe.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ContractError(f"cannot read recipe {recipe}: {error.strerror}") from error
+    text = _read(recipe)
+    if camera is not None:
+        text = with_losses(_read(camera), text)
+    if counts is not None:
+        text = with_keys(text, "frames", {"count": counts.frames, "validation_count": 1})
+        text = with_keys(text, "lens", {"copies": counts.copies})
     outside = text
     if depths_mm:
         outside = with_keys(text, "lens", {"depths_mm": list(depths_mm), "bank_in_focus": True})
@@ -61,10 +95,47 @@ def write_twins(recipe: Path, folder: Path, depths_mm: Sequence[float] = ()) -> 
         ("display", with_keys(text, "data", LABORATORY) + DISPLAY),
         ("wild", outside + WILD),
     ):
-        path = folder / f"{recipe.stem}_{name}.toml"
+        path = folder / f"{(camera or recipe).stem}_{name}.toml"
         path.write_text(content, encoding="utf-8")
         written.append(path)
+        if counts is not None:
+            few = with_keys(content, "frames", {"count": counts.judged})
+            few = with_keys(few, "lens", {"seed": OTHER_COPIES})
+            judged_by(path).write_text(few, encoding="utf-8")
     return written[0], written[1]
+
+
+def judged_by(recipe: Path) -> Path:
+    """Give where the recipe of samples to judge on would lie, beside that of a network."""
+    return recipe.with_name(f"{recipe.stem}{JUDGED}{recipe.suffix}")
+
+
+def with_losses(camera: str, losses: str) -> str:
+    """Give the text of a camera's recipe with schedule, sizes and losses of another recipe.
+
+    Raises:
+        ContractError: If one of them has no table `[schedule]`.
+    """
+    (before, _), (_, after) = _parted(camera), _parted(losses)
+    return f"{before}\n{after}"
+
+
+def _parted(text: str) -> tuple[str, str]:
+    """Give what lies before the schedule of a recipe, and the rest with the comment above it."""
+    lines = text.splitlines()
+    if LOSSES not in lines:
+        raise ContractError(f"the recipe has no table {LOSSES}")
+    at = lines.index(LOSSES)
+    while at > 0 and lines[at - 1].startswith("#"):
+        at -= 1
+    return "\n".join(lines[:at]).rstrip() + "\n", "\n".join(lines[at:]) + "\n"
+
+
+def _read(recipe: Path) -> str:
+    try:
+        return recipe.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ContractError(f"cannot read recipe {recipe}: {error.strerror}") from error
 
 
 def with_keys(text: str, table: str, keys: Mapping[str, Value]) -> str:

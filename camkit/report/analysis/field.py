@@ -22,7 +22,7 @@ from camkit.report.analysis.point_image import (
     band_of,
     likeness,
 )
-from camkit.report.analysis.recovery import Recovered, recover
+from camkit.report.analysis.recovery import Recovered, Watch, recover
 from camkit.report.analysis.subject import Subject
 from camkit.runtime.twin.exposure import Setting
 from camkit.units import to_degrees
@@ -115,13 +115,19 @@ class LensField:
     note: str | None = None
 
 
-def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = None) -> LensField:
+def measure_field(
+    subject: Subject,
+    options: FieldOptions,
+    tell: Tell | None = None,
+    watch: Watch | None = None,
+) -> LensField:
     """Measure a lens over the field.
 
     Args:
         subject: The lens.
         options: What is measured.
         tell: Takes lines about what is being done.
+        watch: Is shown every frame that is photographed, see `recover`.
 
     Raises:
         ContractError: If no light arrives.
@@ -135,7 +141,7 @@ def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = N
         told(f"{subject.name}: pictures")
         # a lens that no kernels hold is still measured
         try:
-            recovered = _recover(subject, images, options)
+            recovered = _recover(subject, images, options, watch)
         except ContractError as error:
             note = f"not photographed: {error}"
     zones: Sequence[tuple[float, float, float] | None] = (
@@ -148,7 +154,12 @@ def measure_field(subject: Subject, options: FieldOptions, tell: Tell | None = N
     return LensField(subject=subject, points=points, recovered=recovered, note=note)
 
 
-def _recover(subject: Subject, images: Sequence[PointImage], options: FieldOptions) -> Recovered:
+def _recover(
+    subject: Subject,
+    images: Sequence[PointImage],
+    options: FieldOptions,
+    watch: Watch | None,
+) -> Recovered:
     with TemporaryDirectory() as folder:
         return recover(
             subject.camera(Path(folder)),
@@ -156,6 +167,7 @@ def _recover(subject: Subject, images: Sequence[PointImage], options: FieldOptio
             np.maximum.accumulate([image.height_mm for image in images]),
             iso=options.iso,
             frame_px=options.frame_px,
+            watch=watch,
         )
 
 

@@ -6,7 +6,7 @@ Frames are whole since haze reaches across them. Pictures are compared in the ge
 sensor as sRGB values, each zone the ring of the frame that lies nearest to a field.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,7 +24,11 @@ from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
 
 BEST_DB: Final = 120.0
 FILTER: Final = "filter"
+TRUTH: Final = "truth"
 Array = NDArray[np.float64]
+Watch = Callable[[str, FloatArray], None]
+"""Takes whole frames as they are made: `TRUTH` or the name of a method, (3, h, w) of sRGB, which
+is changed afterwards: what shall stay is copied."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +54,7 @@ def recover(
     *,
     iso: float,
     frame_px: tuple[int, int] | None = None,
+    watch: Watch | None = None,
 ) -> Recovered:
     """Photograph frames and restore them.
 
@@ -59,6 +64,7 @@ def recover(
         heights_mm: (field,) from the axis, not decreasing.
         iso: Sensitivity.
         frame_px: (width, height) about the middle of the sensor; None for all of it.
+        watch: Is shown every frame: the truth, then what each method makes of it.
 
     Raises:
         ContractError: If the bundle states no optics.
@@ -82,6 +88,8 @@ def recover(
         )
         made = photograph(filled(picture, scale * width, scale * height), bundle, options)
         truth = encode_srgb(true_picture(made.clean, sensor))
+        if watch is not None:
+            watch(TRUTH, truth)
         zone = zones_of(made.window, scale, heights_mm)
         inside = np.s_[
             BORDER_PX : truth.shape[1] - BORDER_PX, BORDER_PX : truth.shape[2] - BORDER_PX
@@ -89,7 +97,11 @@ def recover(
         near = zone[inside].ravel()
         count += np.bincount(near, minlength=heights_mm.size)
         for row, method in enumerate(methods):
-            error = _error(method, made, truth)[inside].ravel()
+            seen = _restored(method, made)
+            if watch is not None:
+                watch(method.name, seen)
+            seen -= truth
+            error = np.square(seen, out=seen).mean(axis=0)[inside].ravel()
             square[row] += np.bincount(near, error, minlength=heights_mm.size)
     whole = square.sum(axis=1) / count.sum()
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -136,16 +148,15 @@ def _chosen(rig: Rig) -> Sequence[Method]:
     return (capture, simple[-1]) if network is None else (capture, simple[-1], network)
 
 
-def _error(method: Method, made: Simulation, truth: FloatArray) -> FloatArray:
-    """Give the squared error (h, w) of sRGB values, the mean over colours."""
+def _restored(method: Method, made: Simulation) -> FloatArray:
+    """Give what a method makes of a capture, sRGB values (3, h, w)."""
     capture = method.pipeline.capture_of(
         made.samples,
         iso=made.iso,
         white_balance=made.white_balance,  # type: ignore[arg-type]
         origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
     )
-    picture = method.pipeline.start(capture).fill()
-    return np.asarray(np.square(encode_srgb(picture) - truth).mean(axis=0))
+    return encode_srgb(method.pipeline.start(capture).fill())
 
 
 def _decibels(square: float) -> float:

@@ -29,6 +29,7 @@ from camkit.bundle.reader import (
     open_bundle,
 )
 from camkit.bundle.sensor import BayerSensor, ColorSensor
+from camkit.contracts import RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
 from camkit.report.analysis.frozen_image import frozen_images, sensor_heights_mm
 from camkit.report.analysis.physical import write_camera
@@ -110,7 +111,7 @@ def _of_bundle(name: str) -> Subject:
     efl_mm = _efl_mm(bundle)
 
     def angle_at(height_mm: float) -> float | None:
-        return None if efl_mm is None else _angle_rad(optics, height_mm, efl_mm)
+        return None if efl_mm is None else ideal_angle_rad(optics.psf.distortion, height_mm, efl_mm)
 
     return Subject(
         name=name,
@@ -241,8 +242,14 @@ def _efl_mm(bundle: Bundle) -> float | None:
     return paraxial_data(parse_prescription(bundle.member(PRESCRIPTION).decode())).efl_mm
 
 
-def _angle_rad(optics: FrozenOptics, height_mm: float, efl_mm: float) -> float:
-    distortion = optics.psf.distortion
+def ideal_angle_rad(distortion: RadialDistortion, height_mm: float, efl_mm: float) -> float:
+    """Give the field angle whose light comes to a height, by the distortion of a lens.
+
+    Args:
+        distortion: As its frozen PSF has it.
+        height_mm: From the axis.
+        efl_mm: Its focal length.
+    """
     ideal = undistort_points(
         np.array([0.0, height_mm]), distortion, channel=reference_channel(distortion)
     )

@@ -9,6 +9,7 @@ In the order in which data flows:
 - `solver`: profiles, distance of the sensor and virtual apertures that make these spots small
 - `plate_lens`: the plate as a lens file
 - `peak`: how much light lies near the peak of a field, and how far the haze reaches
+- `middle`: what the light of a field is gathered about: its peak, or its chief ray
 - `waves`: the same peak as a sum of waves
 - `report`: both of a lens, for people and programs
 - `freezing`: both of a lens over the field, as core kernels and a haze in cells

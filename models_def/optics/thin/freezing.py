@@ -2,6 +2,8 @@
 
     angles -> peaks -> rays of every wavelength about them -> core (pixels) + haze (cells)
 
+Chief rays take the place of peaks where a lens has none (`middle`).
+
 The core is what falls near the peak, faded out by a raised cosine, so that the haze is smooth and
 lies in cells without loss. Light is counted as it arrives on the sensor: what enters from a solid
 angle, through walls and off the frame, over the area that its peaks cover.
@@ -23,7 +25,8 @@ from camkit.haze import MOST_CELLS, Haze
 from camkit.models_def.optics.frozen import corner_height_mm, rounded, wavelength_bands
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.thin.peak import LandedLight, land_light, peak_height_px
+from camkit.models_def.optics.thin.middle import Middle, corner_angle_rad, find_middles
+from camkit.models_def.optics.thin.peak import LandedLight, land_light
 from camkit.units import to_mm
 
 Array = NDArray[np.float64]
@@ -38,9 +41,10 @@ CELL_PX: Final = 16
 RAYS: Final = 20_000
 """In half the stop, for each of some thirty wavelengths."""
 ENERGY: Final = 0.995
+LEAST_HAZE: Final = 1e-6
+"""Of the light: less beside a core is none."""
 _ANGLES: Final = 120
 _RINGS: Final = 24
-_CORNER_STEPS: Final = 12
 _TERMS: Final = 4
 _MOST_RAD: Final = math.radians(80.0)
 
@@ -50,7 +54,8 @@ class HazyReport:
     """What was frozen.
 
     Attributes:
-        fields: Peaks from the axis to the corner.
+        about: What light is gathered about.
+        fields: Places from the axis to the corner.
         wavelengths: Samples of the response.
         core_px: Reach of the core.
         cell_px: Side of a cell.
@@ -60,6 +65,7 @@ class HazyReport:
         corner_illumination: Relative illumination at the corner.
     """
 
+    about: Middle
     fields: int
     wavelengths: int
     core_px: int
@@ -94,7 +100,7 @@ def freeze_hazy(
     Args:
         lens: With its grooves as they are.
         sensor: Size, pitch and response.
-        fields: Peaks from the axis to the corner.
+        fields: Places from the axis to the corner.
         wavelengths: Evenly spaced over the response of the sensor.
         core_px: Reach of the core kernels.
         cell_px: Side of a cell of the haze.
@@ -102,15 +108,14 @@ def freeze_hazy(
         tell: Takes a line for every field.
 
     Raises:
-        ContractError: If no peak reaches the corner, or the haze is wider than a file holds.
+        ContractError: If neither a peak nor a chief ray reaches the corner, or the haze is wider
+            than a file holds.
     """
     pitch_um = sensor.pixel_pitch_um
     corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
-    wave_um = lens.reference_wavelength_um
-    last = corner_angle_rad(lens, corner_px, pitch_um, rays)
-    angles = np.linspace(0.0, last, fields)
-    heights = np.array([_height_px(lens, a, wave_um, pitch_um, rays) for a in angles])
-    heights[0] = 0.0
+    middles = find_middles(lens, corner_px, pitch_um, rays)
+    angles = np.linspace(0.0, middles.corner_rad, fields)
+    heights = middles.heights_px(lens, angles, pitch_um, rays)
     response_um, _ = sensor.response_arrays()
     waves_um = np.linspace(response_um[0], response_um[-1], wavelengths)
     fine_um, bands = wavelength_bands(waves_um)
@@ -127,7 +132,7 @@ def freeze_hazy(
                 core[field, sample] += of_sample[sample] * parts.core
                 haze[field, sample] += of_sample[sample] * parts.haze
                 wanted[field, sample] += of_sample[sample] * parts.within
-        tell(f"field {field + 1} of {fields}: peak at {height:.0f} px")
+        tell(f"field {field + 1} of {fields}: {middles.about} at {height:.0f} px")
     cells = _side_holding(haze, wanted, ENERGY)
     cut = slice(reach - cells // 2, reach + cells // 2 + 1)
     haze = haze[..., cut, cut]
@@ -136,7 +141,7 @@ def freeze_hazy(
     share = core.sum(axis=(-2, -1))
     most = float((share + haze.sum(axis=(-2, -1))).max())
     field_mm = heights * to_mm(pitch_um)
-    illumination = flat_light(lens, heights, pitch_um, rays=rays)
+    illumination = flat_light(lens, heights, pitch_um, rays=rays, corner_rad=middles.corner_rad)
     psf = FrozenPsf(
         kernels=rounded((core / share[..., None, None])[:, None].astype(np.float32)),
         field_heights_mm=field_mm,
@@ -157,6 +162,7 @@ def freeze_hazy(
     )
     near = share / (share + haze.sum(axis=(-2, -1)))
     report = HazyReport(
+        about=middles.about,
         fields=fields,
         wavelengths=wavelengths,
         core_px=core_px,
@@ -167,33 +173,6 @@ def freeze_hazy(
         corner_illumination=float(illumination[-1]),
     )
     return FrozenOptics(psf=psf, haze=found), report
-
-
-def corner_angle_rad(lens: Lens, corner_px: float, pitch_um: float, rays: int) -> float:
-    """Give the field angle whose peak lies at the corner, by bisection.
-
-    Raises:
-        ContractError: If none does.
-    """
-    low, high = 0.0, _MOST_RAD
-    wave_um = lens.reference_wavelength_um
-    for _ in range(_CORNER_STEPS):
-        middle = (low + high) / 2
-        try:
-            beyond = _height_px(lens, middle, wave_um, pitch_um, rays) > corner_px
-        except ContractError:
-            beyond = True  # no light arrives from so far
-        low, high = (low, middle) if beyond else (middle, high)
-    if abs(_height_px(lens, low, wave_um, pitch_um, rays) / corner_px - 1) > 0.01:
-        raise ContractError(
-            f"no peak of {lens.name} reaches the corner, {corner_px:.0f} px from the axis: its "
-            f"largest field is {math.degrees(low):.1f} degrees; use a smaller sensor"
-        )
-    return high
-
-
-def _height_px(lens: Lens, angle_rad: float, wave_um: float, pitch_um: float, rays: int) -> float:
-    return peak_height_px(land_light(lens, float(angle_rad), wave_um, pitch_um, rays))
 
 
 def arriving(angles_rad: Array, heights_px: Array) -> Array:
@@ -213,7 +192,7 @@ def arriving(angles_rad: Array, heights_px: Array) -> Array:
 
 
 def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
-    """Give how far the peaks of a lens lie from where a frozen PSF has them, at most.
+    """Give how far the peaks (or chief rays) of a lens lie from where a PSF has them, at most.
 
     Args:
         lens: The lens.
@@ -227,14 +206,20 @@ def peaks_off_px(lens: Lens, psf: FrozenPsf, *, rays: int = RAYS) -> float:
     rising = slice(0, int(np.argmax(landed_mm)) + 1)
     ideal_mm = np.interp(psf.field_heights_mm, landed_mm[rising], dense_mm[rising])
     pitch_um = psf.pixel_pitch_um
-    found = [
-        _height_px(lens, math.atan(ideal / efl_mm), lens.reference_wavelength_um, pitch_um, rays)
-        for ideal in ideal_mm[1:]
-    ]
-    return float(np.abs(found - psf.field_heights_mm[1:] / to_mm(pitch_um)).max())
+    frozen_px = psf.field_heights_mm[1:] / to_mm(pitch_um)
+    middles = find_middles(lens, float(frozen_px[-1]), pitch_um, rays)
+    found = middles.heights_px(lens, np.arctan(ideal_mm[1:] / efl_mm), pitch_um, rays)
+    return float(np.abs(found - frozen_px).max())
 
 
-def flat_light(lens: Lens, heights_px: Array, pitch_um: float, *, rays: int) -> Array:
+def flat_light(
+    lens: Lens,
+    heights_px: Array,
+    pitch_um: float,
+    *,
+    rays: int,
+    corner_rad: float | None = None,
+) -> Array:
     """Give how an even scene lights the sensor, haze and walls counted, 1 on the axis.
 
     Args:
@@ -242,9 +227,15 @@ def flat_light(lens: Lens, heights_px: Array, pitch_um: float, *, rays: int) -> 
         heights_px: (field,), from the axis to the corner.
         pitch_um: Of the pixels.
         rays: In half the stop, of all angles together.
+        corner_rad: Field angle of the last height; None for that whose peak lies there.
+
+    Raises:
+        ContractError: If that is wanted, and there is none.
     """
     corner = float(heights_px[-1])
-    last = min(1.1 * corner_angle_rad(lens, corner, pitch_um, rays), _MOST_RAD)
+    if corner_rad is None:
+        corner_rad = corner_angle_rad(lens, corner, pitch_um, rays)
+    last = min(1.1 * corner_rad, _MOST_RAD)
     step = last / _ANGLES
     edges = np.linspace(0.0, corner, _RINGS + 1)
     light = np.zeros(_RINGS)
@@ -322,8 +313,11 @@ def _side_holding(haze: Array, wanted: Array, energy: float) -> int:
 
 
 def _kept(haze: Array, wanted: Array) -> Array:
+    """Give the share that is held of what is wanted; of next to nothing all is."""
     held = haze.sum(axis=(-2, -1))
-    return np.asarray(np.minimum(held / np.maximum(wanted, 1e-12), 1.0))
+    there = wanted > LEAST_HAZE
+    share = np.divide(held, wanted, out=np.ones_like(held), where=there)
+    return np.asarray(np.minimum(share, 1.0))
 
 
 def _distortion(lens: Lens, angles_rad: Array, field_mm: Array, channels: int) -> RadialDistortion:

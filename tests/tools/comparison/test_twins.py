@@ -8,7 +8,8 @@ import pytest
 from camkit.errors import ContractError
 from camkit.models_def.training.kind import read_recipe
 from tests.bayer_recipe import RECIPE
-from tools.comparison.twins import with_keys, write_twins
+from tests.hazy_recipe import RECIPE as HAZY
+from tools.comparison.twins import Counts, judged_by, with_keys, with_losses, write_twins
 
 
 def test_twins_are_the_camera_in_two_circumstances(tmp_path):
@@ -44,3 +45,32 @@ def test_what_cannot_be_changed_is_said(text, message):
 def test_a_missing_recipe_is_one_line(tmp_path):
     with pytest.raises(ContractError, match="cannot read recipe"):
         write_twins(tmp_path / "none.toml", tmp_path)
+
+
+def test_another_camera_takes_sizes_and_losses(tmp_path):
+    losses, camera = tmp_path / "losses.toml", tmp_path / "plate.toml"
+    losses.write_text(RECIPE.replace("[schedule]", "# how\n[schedule]"), encoding="utf-8")
+    other = HAZY.replace('name = "tiny"', 'name = "plate"').replace("steps = ", "steps = 1")
+    camera.write_text(other, encoding="utf-8")
+    shown, _ = write_twins(losses, tmp_path, camera=camera)
+    assert shown.name == "plate_display.toml"
+    text = shown.read_text(encoding="utf-8")
+    assert text.count("[schedule]") == 1
+    assert "# how\n[schedule]" in text
+    made, wanted, before = (read_recipe(path) for path in (shown, losses, camera))
+    assert made.networks == wanted.networks
+    assert (made.name, made.haze, made.lens) == (before.name, before.haze, before.lens)
+    with pytest.raises(ContractError, match=r"no table \[schedule\]"):
+        with_losses("[data]\n", RECIPE)
+
+
+def test_few_frames_are_judged_through_other_copies(tmp_path):
+    recipe = tmp_path / "plate.toml"
+    recipe.write_text(HAZY, encoding="utf-8")
+    made = write_twins(recipe, tmp_path, counts=Counts(frames=6, judged=2))
+    for path in made:
+        trained, judged = read_recipe(path), read_recipe(judged_by(path))
+        assert (trained.frames.count, judged.frames.count) == (6, 2)
+        assert trained.lens.copies == judged.lens.copies == 1
+        assert trained.lens.seed != judged.lens.seed
+        assert (trained.data, trained.networks) == (judged.data, judged.networks)

@@ -11,11 +11,11 @@ from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.models_def.optics.thin.freezing import (
     arriving,
-    corner_angle_rad,
     flat_light,
     freeze_hazy,
     peaks_off_px,
 )
+from camkit.models_def.optics.thin.middle import corner_angle_rad
 from camkit.models_def.optics.thin.peak import land_light, peak_height_px
 from tests.bundle_factory import tiny_sensor
 from tests.thin_factory import perfect_lens
@@ -105,3 +105,24 @@ def test_peaks_tell_a_lens_from_another(frozen: tuple) -> None:  # type: ignore[
     known = psf.distortion
     stretched = replace(known, coefficients=1.1 * known.coefficients)
     assert peaks_off_px(LENS, replace(psf, distortion=stretched), rays=RAYS) > 3
+
+
+def test_a_blur_without_a_peak_is_frozen_about_its_chief_rays() -> None:
+    extent = Extent(width_px=96, height_px=64, pixel_pitch_um=5.0)
+    sensor = tiny_sensor().model_copy(update={"extent": extent})
+    blurred = perfect_lens(40.0, 4.0, defocus_mm=6.4)  # a disc of 128 px
+    few = {"fields": 3, "wavelengths": 1, "core_px": 40, "cell_px": 8, "rays": RAYS}
+    optics, report = freeze_hazy(blurred, sensor, **few)
+    assert report.to_json()["about"] == "chief ray"
+    half_mm = math.hypot(96, 64) / 2 * 5e-3
+    assert optics.psf.field_heights_mm[-1] == pytest.approx(half_mm, rel=1e-3)
+    assert peaks_off_px(blurred, optics.psf, rays=RAYS) < 1
+
+
+def test_a_sharp_lens_has_a_haze_of_nothing() -> None:
+    optics, report = freeze_hazy(
+        perfect_lens(40.0, 3.0), _sensor(), fields=3, wavelengths=1, core_px=40, rays=RAYS
+    )
+    assert optics.haze is not None
+    assert not optics.haze.kernels.any()
+    assert (report.cells, report.haze_kept) == (1, 1.0)
