@@ -42,6 +42,8 @@ _ANGLES: Final = 120
 _RINGS: Final = 24
 _CORNER_STEPS: Final = 12
 _TERMS: Final = 4
+_NONE: Final = 1e-12
+"""Of the light: no more than this is none."""
 _MOST_RAD: Final = math.radians(80.0)
 
 
@@ -322,8 +324,10 @@ def _side_holding(haze: Array, wanted: Array, energy: float) -> int:
 
 
 def _kept(haze: Array, wanted: Array) -> Array:
+    """Give the share of the wanted light that is held; all of it where there is none."""
     held = haze.sum(axis=(-2, -1))
-    return np.asarray(np.minimum(held / np.maximum(wanted, 1e-12), 1.0))
+    shares = np.minimum(held / np.maximum(wanted, _NONE), 1.0)
+    return np.asarray(np.where(wanted > _NONE, shares, 1.0))
 
 
 def _distortion(lens: Lens, angles_rad: Array, field_mm: Array, channels: int) -> RadialDistortion:

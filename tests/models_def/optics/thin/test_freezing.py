@@ -105,3 +105,15 @@ def test_peaks_tell_a_lens_from_another(frozen: tuple) -> None:  # type: ignore[
     known = psf.distortion
     stretched = replace(known, coefficients=1.1 * known.coefficients)
     assert peaks_off_px(LENS, replace(psf, distortion=stretched), rays=RAYS) > 3
+
+
+def test_a_field_without_haze_is_all_core() -> None:
+    sharp = perfect_lens(40.0, 3.0)
+    optics, report = freeze_hazy(
+        sharp, _sensor(), fields=3, wavelengths=2, core_px=6, cell_px=4, rays=RAYS
+    )
+    haze = optics.haze
+    assert haze is not None
+    assert haze.kernels[0].max() == 0
+    assert haze.core_share[0] == pytest.approx(haze.core_share.max())
+    assert report.haze_kept >= 0.995
