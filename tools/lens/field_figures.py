@@ -32,7 +32,7 @@ from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.report.analysis.field import FieldOptions, LensField, measure_field, to_json
 from camkit.report.analysis.frozen_image import sensor_heights_mm
 from camkit.report.analysis.point_image import Band, PointImage, band_of
-from camkit.report.analysis.recovery import zones_of
+from camkit.report.analysis.recovery import restored, zones_of
 from camkit.report.analysis.subject import Subject, find_subject, ideal_angle_rad
 from camkit.report.quality import list_set, read_picture
 from camkit.report.stress.rig import INPUT, Rig, usual_sizes
@@ -193,13 +193,7 @@ def photographed_board(bundle: Bundle, options: FieldOptions, side_px: int) -> F
         for method in Rig(bundle, usual_sizes(bundle.manifest)).methods
         if method.name == INPUT
     )
-    capture = method.pipeline.capture_of(
-        made.samples,
-        iso=made.iso,
-        white_balance=made.white_balance,  # type: ignore[arg-type]
-        origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
-    )
-    return encode_srgb(method.pipeline.start(capture).fill())
+    return encode_srgb(restored(method.pipeline, made))
 
 
 def write(shown: Sequence[Shown], options: FieldOptions, folder: Path) -> None:

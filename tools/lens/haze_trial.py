@@ -25,16 +25,16 @@ from camkit.bundle.psf_file import read_psf
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Dehaze
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray
 from camkit.export.frames import physics_bundle
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.kind import read_recipe
-from camkit.report.analysis.recovery import filled
+from camkit.report.analysis.recovery import filled, restored
 from camkit.report.quality import read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph, write_capture
 from camkit.runtime.twin.truth import light_sensor, true_picture
+from tools.lens.cameras import decibels
 
 RECIPE: Final = Path(__file__).parents[2] / "models_def" / "recipes" / "thin_plate.toml"
 METHODS: Final = ("develop", "haze", "wiener")
@@ -79,7 +79,7 @@ def main() -> None:
         print("| method | dB | by zones of the half diagonal | s |")
         print("|---|---|---|---|")
         for method in METHODS:
-            print(measured(bundle, made, method, chosen.iso), flush=True)
+            print(measured(bundle, made, method), flush=True)
 
 
 def build(
@@ -91,18 +91,12 @@ def build(
     return physics_bundle(replace(recipe, haze=stage), optics, out)
 
 
-def measured(bundle: Bundle, made: Simulation, method: str, iso: float) -> str:
+def measured(bundle: Bundle, made: Simulation, method: str) -> str:
     """Restore a capture by a method; give the line of a table."""
     pipeline = Pipeline(
         bundle, Options(method=method, undistort=False, vignetting=False, threads=1)
     )
-    capture = pipeline.capture_of(
-        made.samples,
-        iso=iso,
-        white_balance=made.white_balance,  # type: ignore[arg-type]
-        origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
-    )
-    picture, seconds = timed(lambda: pipeline.start(capture).fill())
+    picture, seconds = timed(lambda: restored(pipeline, made))
     truth = true_picture(made.clean, light_sensor(bundle.manifest))
     square = np.square(encode_srgb(picture) - encode_srgb(truth)).mean(axis=0)
     y, x = np.indices(square.shape)
@@ -113,11 +107,6 @@ def measured(bundle: Bundle, made: Simulation, method: str, iso: float) -> str:
     ]
     line = " ".join(f"{zone:.1f}" for zone in zones)
     return f"| {method} | {decibels(square):.2f} | {line} | {seconds:.1f} |"
-
-
-def decibels(square: FloatArray) -> float:
-    """Give -10 log10 of the mean."""
-    return float(-10 * np.log10(square.mean(dtype=np.float64)))
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:

@@ -37,7 +37,7 @@ from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.prescription import parse_prescription
 from camkit.models_def.optics.thin.freezing import freeze_hazy
 from camkit.models_def.training.pictures import list_pictures
-from camkit.report.analysis.recovery import filled
+from camkit.report.analysis.recovery import filled, restored
 from camkit.report.fabricated_psf import lens_text
 from camkit.report.quality import read_picture
 from camkit.runtime.options import Options
@@ -45,6 +45,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
 from camkit.runtime.twin.truth import light_sensor, true_picture
 from tools.comparison.compact_json import to_compact_json
+from tools.lens.cameras import decibels
 from tools.lens_table import kept
 
 BLOCK_PX: Final = 64
@@ -178,14 +179,7 @@ def shoot(
 def judge(way: Way, made: Simulation, chosen: argparse.Namespace) -> Entry:
     """Restore a capture and compare it with the truth; see the head of this file."""
     pipeline = Pipeline(way.bundle, way.options)
-    capture = pipeline.capture_of(
-        made.samples,
-        iso=made.iso,
-        white_balance=made.white_balance,  # type: ignore[arg-type]
-        origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
-    )
-    picture = pipeline.start(capture).fill()
-    apart = encode_srgb(picture)
+    apart = encode_srgb(restored(pipeline, made))
     apart -= encode_srgb(true_picture(made.clean, light_sensor(way.bundle.manifest)))
     return measures(apart, chosen.rim_px)
 
@@ -201,9 +195,9 @@ def measures(apart: FloatArray, rim_px: int) -> Entry:
     radius = 2 * np.hypot(y - (height - 1) / 2, x - (width - 1) / 2) / np.hypot(height, width)
     zone = np.minimum((radius * ZONES).astype(np.intp), ZONES - 1)
     return {
-        "db": decibels(whole),
-        "level": decibels(level),
-        "detail": decibels(max(whole - level, 0.0)),
+        "db": decibels(np.array(whole)),
+        "level": decibels(np.array(level)),
+        "detail": decibels(np.array(whole - level)),
         "inside": part(square, reach >= rim_px),
         "rim": part(square, reach < rim_px),
         "zones": [part(square, zone == number) for number in range(ZONES)],
@@ -226,12 +220,7 @@ def level_square(apart: FloatArray) -> float:
 def part(square: FloatArray, where: Any) -> float | None:
     """Give the dB of a part of a frame; None where there is none."""
     held = square[where]
-    return decibels(float(held.mean(dtype=np.float64))) if held.size else None
-
-
-def decibels(square: float) -> float:
-    """Give dB of a mean square."""
-    return -10 * float(np.log10(max(square, 1e-12)))
+    return decibels(held) if held.size else None
 
 
 def table(rows: Mapping[str, Sequence[Entry]], isos: Sequence[float]) -> str:

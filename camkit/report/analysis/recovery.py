@@ -19,6 +19,7 @@ from camkit.contracts import FloatArray
 from camkit.report.quality import BORDER_PX
 from camkit.report.stress.rig import INPUT, Method, Rig, usual_sizes
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph
 from camkit.runtime.twin.truth import light_sensor, picture_scale, true_picture
 
@@ -97,7 +98,7 @@ def recover(
         near = zone[inside].ravel()
         count += np.bincount(near, minlength=heights_mm.size)
         for row, method in enumerate(methods):
-            seen = _restored(method, made)
+            seen = encode_srgb(restored(method.pipeline, made))
             if watch is not None:
                 watch(method.name, seen)
             seen -= truth
@@ -148,15 +149,15 @@ def _chosen(rig: Rig) -> Sequence[Method]:
     return (capture, simple[-1]) if network is None else (capture, simple[-1], network)
 
 
-def _restored(method: Method, made: Simulation) -> FloatArray:
-    """Give what a method makes of a capture, sRGB values (3, h, w)."""
-    capture = method.pipeline.capture_of(
+def restored(pipeline: Pipeline, made: Simulation) -> FloatArray:
+    """Give what a pipeline makes of a simulated capture, (3, h, w) linear Rec.709."""
+    capture = pipeline.capture_of(
         made.samples,
         iso=made.iso,
         white_balance=made.white_balance,  # type: ignore[arg-type]
         origin_px=tuple(int(v) for v in made.window.origin_px),  # type: ignore[arg-type]
     )
-    return encode_srgb(method.pipeline.start(capture).fill())
+    return pipeline.start(capture).fill()
 
 
 def _decibels(square: float) -> float:
