@@ -25,7 +25,7 @@ from camkit.haze import MOST_CELLS, Haze
 from camkit.models_def.optics.frozen import corner_height_mm, rounded, wavelength_bands
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.thin.middle import Middle, corner_angle_rad, find_middles
+from camkit.models_def.optics.thin.middle import MOST_RAD, Middle, corner_angle_rad, find_middles
 from camkit.models_def.optics.thin.peak import LandedLight, land_light
 from camkit.units import to_mm
 
@@ -46,7 +46,6 @@ LEAST_HAZE: Final = 1e-6
 _ANGLES: Final = 120
 _RINGS: Final = 24
 _TERMS: Final = 4
-_MOST_RAD: Final = math.radians(80.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,7 +234,7 @@ def flat_light(
     corner = float(heights_px[-1])
     if corner_rad is None:
         corner_rad = corner_angle_rad(lens, corner, pitch_um, rays)
-    last = min(1.1 * corner_rad, _MOST_RAD)
+    last = min(1.1 * corner_rad, MOST_RAD)
     step = last / _ANGLES
     edges = np.linspace(0.0, corner, _RINGS + 1)
     light = np.zeros(_RINGS)

@@ -27,7 +27,8 @@ NEAR_PX: Final = 10.0
 LEAST_NEAR: Final = 0.01
 """Of a field's light, within that distance: less is no peak."""
 _CORNER_STEPS: Final = 12
-_MOST_RAD: Final = math.radians(80.0)
+MOST_RAD: Final = math.radians(80.0)
+"""No field angle is sought beyond."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +91,7 @@ def corner_angle_rad(lens: Lens, corner_px: float, pitch_um: float, rays: int) -
     Raises:
         ContractError: If none does.
     """
-    low, high = 0.0, _MOST_RAD
+    low, high = 0.0, MOST_RAD
     wave_um = lens.reference_wavelength_um
     for _ in range(_CORNER_STEPS):
         middle = (low + high) / 2
