@@ -26,14 +26,14 @@ def cell_means(
     """Read a capture from top to bottom.
 
     Args:
-        samples: (1, h, w) of a mosaic, at least 2 x 2, or (c, h, w).
+        samples: (1, h, w) of a mosaic or (c, h, w).
         clipped: (1 or c, h, w) bool; None where nothing is known of that.
         cfa: Of the mosaic; None for planes.
         cell_px: Side of a cell, even.
 
     Returns:
-        (c, rows, columns) float32 means, what is no number counted as dark; the same shape, true
-        where a sample of the colour clipped.
+        (c, rows, columns) float32 means, what is no number counted as dark and 0 where a colour has
+        no sample; the same shape, true where a sample of the colour clipped.
     """
     count, height, width = samples.shape
     channels = count if cfa is None else COLOURS
@@ -78,5 +78,7 @@ def _gathered(
     line: NDArray[np.float64] | NDArray[np.bool_], columns: int, cell_px: int, across: slice
 ) -> NDArray[np.float64]:
     """Give the sums over cells of samples along a row; the last cell takes the rest."""
+    if not line.size:  # a colour without a column in a capture one pixel wide
+        return np.zeros(columns)
     first = np.arange(columns) * cell_px // (across.step or 1)
     return np.asarray(np.add.reduceat(line.astype(np.float64), first))

@@ -270,6 +270,14 @@ def test_larger_captures_take_longer(bundle: Bundle) -> None:
     assert 0 < taken[0] < taken[1]
 
 
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (1, 40), (40, 1), (2, 2), (3, 65)])
+def test_captures_of_any_size_are_cleared(bundle: Bundle, height: int, width: int) -> None:
+    samples = np.random.default_rng(5).integers(100, 900, (height, width), dtype=np.uint16)
+    found = _filled(bundle, made_mosaic(samples=samples), assume="centre")
+    assert found.shape[1:] == (height, width)
+    assert np.isfinite(found).all()
+
+
 def test_cells_of_rows_are_those_of_the_whole() -> None:
     planes = np.random.default_rng(0).random((1, 40, 40), dtype=np.float32)
     wanted, _ = cell_means(ArrayRows(planes), None, "GRBG", 8)
