@@ -26,6 +26,7 @@ from camkit.haze import Haze
 from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.bank.place_blur import (
     AZIMUTHS,
+    TERMS_AT_ONCE,
     FewKernels,
     NodeKernels,
     PlaceBlur,
@@ -283,6 +284,7 @@ def solve_coarse(
     *,
     terms: int,
     rounds: int,
+    threads: int = 1,
     between: Callable[[], None] = lambda: None,
 ) -> CoarseBand:
     """Find the scene in cells behind a capture in cells, and how the capture is cleared by it.
@@ -295,6 +297,7 @@ def solve_coarse(
         terms: See `PlaceBlur`.
         rounds: Of adding what a filter makes of what is left unexplained: that of the mean kernel,
             or where cores differ much, of the kernel of every place (`place_undo`).
+        threads: Threads to compute with; no influence on the bits.
         between: Called between the rounds; may raise to stop.
     """
     laid = cell_window(window, kernels.cell_px, MARGIN_CELLS)
@@ -305,17 +308,21 @@ def solve_coarse(
     filters = filters_of(kernels.coarse, terms) if kernels.differ else None
     gain, veil, picture = (np.empty(cells.shape, np.float32) for _ in range(3))
     for channel, (seen, over) in enumerate(zip(cells, clipped, strict=True)):
-        blur = PlaceBlur(wide[channel], nodes)
+        blur = PlaceBlur(wide[channel], nodes, threads=threads)
         ones = np.ones(laid.size_px[::-1], np.float32)
         even = np.maximum(blur(ones)[inner], np.float32(LEAST_RESPONSE))
-        undo = blur.solver(DAMPING) if filters is None else PlaceBlur(filters[channel], nodes)
+        undo: Callable[[FloatArray], FloatArray]
+        if filters is None:
+            undo = blur.solver(DAMPING)
+        else:
+            undo = PlaceBlur(filters[channel], nodes, threads=threads)
         scene = _mirrored(seen)
         for _ in range(rounds):
             between()
             left = seen - blur(scene)[inner] / even
             np.maximum(left, 0, out=left, where=over)
             scene += undo(_mirrored(left))
-        core = PlaceBlur(narrow[channel], nodes)
+        core = PlaceBlur(narrow[channel], nodes, threads=threads)
         own = np.maximum(core(ones)[inner], np.float32(LEAST_RESPONSE))
         gain[channel] = even / own
         veil[channel] = core(scene)[inner] / own - gain[channel] * seen
@@ -383,6 +390,7 @@ def solving_bytes(
     places = 4 * nodes * side**2 * (3 + channels / 4)
     places += kept_bytes(entry, haze, channels, kernel_scale)
     laid = entry.terms * (4 * spectrum + 16 * cells)
+    laid += 4 * spectrum * -(-entry.terms // TERMS_AT_ONCE)
     if cores_differ(haze):
         wide = filter_side(side)
         laid += entry.terms * (4 * (sides[0] + wide) * (sides[1] + wide) + 16 * cells)

@@ -19,6 +19,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.geometry.sensor_window import SensorWindow
+from camkit.runtime.machine.slices import run_parts
 
 AZIMUTHS: Final = 32
 """Nodes on a ring; more changed nothing (docs/decisions: the haze is undone in cells)."""
@@ -27,6 +28,9 @@ DOUBLINGS: Final = 5
 
 EQUAL: Final = 1e-4
 """Directions whose lengths differ less, relatively, are equally long."""
+
+TERMS_AT_ONCE: Final = 4
+"""Terms that one thread adds up; the sums are added in their order, whatever the threads."""
 
 FloatGrid = NDArray[np.float64]
 
@@ -180,12 +184,13 @@ class FewKernels:
 class PlaceBlur:
     """The blur of one colour of a coarse picture; immutable."""
 
-    def __init__(self, few: FewKernels, nodes: Nodes) -> None:
+    def __init__(self, few: FewKernels, nodes: Nodes, *, threads: int = 1) -> None:
         """Lay the weights of the few kernels over the picture.
 
         Args:
             few: By `few_kernels`.
             nodes: For whose kernels they stand.
+            threads: Threads to compute with; no influence on the bits.
 
         Raises:
             ContractError: If they do not stand for one kernel of each node.
@@ -208,15 +213,25 @@ class PlaceBlur:
         half = kernels.shape[-1] // 2
         # what comes round from the other side falls beside the picture
         self._full = tuple(scipy.fft.next_fast_len(side + half, real=True) for side in self._size)
-        self._spectra = np.stack([self._spectrum(kernel) for kernel in kernels])
+        self._threads = threads
+        self._spectra = np.stack(run_parts(self._spectrum, list(kernels), threads=threads))
 
     def __call__(self, light: FloatArray) -> FloatArray:
         """Give the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
-        total = np.zeros(self._spectra.shape[1:], np.complex64)
-        for weight, spectrum in zip(self._weights, self._spectra, strict=True):
-            lit = self._transform(weight * light)
-            lit *= spectrum
-            total += lit
+
+        def some(first: int) -> NDArray[np.complex64]:
+            total = np.zeros(self._spectra.shape[1:], np.complex64)
+            those = slice(first, first + TERMS_AT_ONCE)
+            for weight, spectrum in zip(self._weights[those], self._spectra[those], strict=True):
+                lit = self._transform(weight * light)
+                lit *= spectrum
+                total += lit
+            return total
+
+        firsts = range(0, len(self._weights), TERMS_AT_ONCE)
+        total, *others = run_parts(some, firsts, threads=self._threads)
+        for other in others:
+            total += other
         return self._inverse(total)
 
     def solver(self, damping: float) -> Callable[[FloatArray], FloatArray]:

@@ -1,10 +1,13 @@
-"""Rows of one band shared among threads, so that no stage of the picture leaves a core idle."""
+"""Rows of one band, or parts of a sum, shared among threads, so that no core is left idle."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final
+from typing import Final, TypeVar
 
 from camkit.errors import ContractError
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 LEAST_ROWS: Final = 8
 """A thread is not worth its start for fewer rows."""
@@ -65,3 +68,17 @@ def run_slices(
         work(*slices[0])
         for other in others:
             other.result()
+
+
+def run_parts(work: Callable[[T], R], parts: Sequence[T], *, threads: int) -> list[R]:
+    """Give what `work` makes of every part, in their order; the threads end with the call.
+
+    Args:
+        work: Called at the same time from several threads.
+        parts: What is worked on.
+        threads: Parts at a time.
+    """
+    if min(threads, len(parts)) < 2:
+        return [work(part) for part in parts]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))

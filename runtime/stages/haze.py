@@ -27,7 +27,7 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.machine.limits import BANK_WORK
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.rows import Rows
+from camkit.runtime.rows import Rows, changed_bands
 
 METHODS: Final = ("haze",)
 OPTIONS: Final = ("depth_m",)
@@ -64,7 +64,7 @@ def prepare(entry: Dehaze, job: Job) -> StageWork:
             with job.clock.stage(entry.type):
                 return coarse_band(entry, picture, job)
 
-        cleared = picture.with_bands(_cleared(picture, band))
+        cleared = picture.with_bands(_cleared(picture, band, job.threads))
         return (replace(cleared, noise_rise=lambda: band().noise_rise),)
 
     capture = job.capture
@@ -102,6 +102,7 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
         job.window_of(picture.plane),
         terms=entry.terms,
         rounds=entry.rounds,
+        threads=job.threads,
         between=lambda: check_cancelled(job.cancel),
     )
 
@@ -123,10 +124,7 @@ def _summed(entry: Dehaze, job: Job) -> str:
     return giver.takes[0] if giver is not None and mosaic else entry.takes[0]
 
 
-def _cleared(picture: Stream, band: Callable[[], CoarseBand]) -> Iterator[Rows]:
+def _cleared(picture: Stream, band: Callable[[], CoarseBand], threads: int) -> Iterator[Rows]:
     """Yield the bands of a picture without its haze; finds it when the first is asked for."""
-    found, top = band(), 0
-    for rows in picture.bands():
-        found.clear(rows, top)
-        top += rows.shape[1]
-        yield rows
+    found = band()
+    yield from changed_bands(picture.bands(), found.clear, threads=threads)

@@ -86,6 +86,15 @@ def test_the_blur_is_the_sum_over_all_cells(kernels: FieldKernels) -> None:
     np.testing.assert_allclose(blur(picture), _slowly(picture, nodes, made), atol=FLOAT32)
 
 
+@pytest.mark.parametrize("threads", [2, 3])
+def test_threads_do_not_change_a_bit(threads: int) -> None:
+    nodes, made = _laid(CASES["radial"])
+    few = few_kernels(made, 9)  # three sums, of which the last has one term
+    picture = np.random.default_rng(0).random((9, 12), dtype=np.float32)
+    alone = PlaceBlur(few, nodes)(picture)
+    np.testing.assert_array_equal(PlaceBlur(few, nodes, threads=threads)(picture), alone)
+
+
 def test_a_cell_on_a_node_has_its_kernel() -> None:
     kernels = _kernels("radial", 3)
     nodes, _ = _laid(kernels)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import ContractError
-from camkit.runtime.machine.slices import LEAST_ROWS, run_slices
+from camkit.runtime.machine.slices import LEAST_ROWS, run_parts, run_slices
 
 
 @given(rows=st.integers(1, 200), threads=st.integers(1, 5), lattice=st.sampled_from([1, 2, 8]))
@@ -50,3 +50,20 @@ def test_counts_below_one_are_refused(counts: tuple[int, int, int]) -> None:
     rows, threads, lattice = counts
     with pytest.raises(ContractError, match="counts >= 1"):
         run_slices(lambda *_: None, rows, threads=threads, lattice=lattice)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_parts_come_back_in_their_order(threads: int) -> None:
+    before = threading.active_count()
+    assert run_parts(lambda part: part * part, range(7), threads=threads) == [
+        part * part for part in range(7)
+    ]
+    assert run_parts(lambda part: part, [], threads=threads) == []
+    assert threading.active_count() == before
+
+
+def test_parts_run_at_the_same_time_and_their_errors_reach_the_caller() -> None:
+    met = threading.Barrier(2)
+    run_parts(lambda _: met.wait(timeout=20), range(2), threads=2)
+    with pytest.raises(ZeroDivisionError):
+        run_parts(lambda part: 1 // part, [1, 0], threads=2)
