@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
-from camkit.cli.use.calibrate.outputs import check_out, tell
+from camkit.cli.use.calibrate.outputs import Page, check_out, check_page, tell
 from camkit.errors import BundleError, ContractError, DecodeError
 
 
@@ -28,12 +28,14 @@ def bundle(
     keep_networks: Annotated[
         bool, typer.Option("--keep-networks", help="Keep networks with other kernels.")
     ] = False,
+    page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
     """Put what was measured of a camera into a copy of a bundle, and prove it."""
     check_out(out, ".camkit", "a bundle", overwrite=overwrite)
+    check_page(page, overwrite=overwrite)
     if keep_networks and psf is None:
         raise ContractError("--keep-networks belongs to --psf; without it they stay")
     if (geometry, flat, noise, psf) == (None, None, None, None):
@@ -54,7 +56,8 @@ def bundle(
         noise=None if noise is None else read_noise(noise),
         psf=kernels,
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
+    for path in (out, page or out):
+        path.parent.mkdir(parents=True, exist_ok=True)
     made, notes = remeasured(before, measured, out, keep_networks=keep_networks)
     files = {"geometry": geometry, "flat": flat, "noise": noise, "psf": psf}
     given = {name: str(path) for name, path in files.items() if path is not None}
@@ -70,5 +73,12 @@ def bundle(
         "notes": list(notes),
         "out": str(out),
     }
+    if page is not None:
+        from camkit.report.calibration.bundle_page import bundle_html
+        from camkit.runtime.output.part_file import atomic_output
+
+        with atomic_output(page) as part:
+            part.write_text(bundle_html(before, made, record), encoding="utf-8")
+        record["page"] = str(page)
     line = f"  {before.manifest.name} with {', '.join(given)} as measured"
     tell(record, [line], as_json=json_)

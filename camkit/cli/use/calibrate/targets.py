@@ -9,6 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.folder import Folder
+from camkit.cli.use.calibrate.outputs import Page, check_page
 
 LEVELS = "0,16,32,48,64,96,128,160,192,224,255"
 
@@ -23,11 +24,14 @@ def targets(
         str, typer.Option(help="COLUMNSxROWS of the checkerboard's inner corners.")
     ] = "9x6",
     levels: Annotated[str, typer.Option(help="Of the grey steps, 0..255.")] = LEVELS,
+    page: Page = None,
     overwrite: Overwrite = False,
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
     """Write what a display shows: checkerboard, grey steps, colours, pictures with marks."""
+    check_page(page, overwrite=overwrite)
+    from camkit.report.calibration.targets_page import shrunk, targets_html
     from camkit.runtime.calibration.display.screen import Screen
     from camkit.runtime.calibration.display.targets import (
         LIST,
@@ -44,12 +48,19 @@ def targets(
     folder = Folder.asked(out, (LIST,), (".",), overwrite=overwrite)
     planned = plan_targets(given, *asked)
     names = [*(target.file for target in planned.targets), LIST]
-    with folder.writing(names) as parts:
-        for part, codes in zip(parts, draw_targets(planned, given), strict=False):
+    shown = [] if page is None else [str(page.absolute())]
+    with folder.writing([*shown, *names]) as parts:
+        small = []
+        for part, codes in zip(parts[len(shown) :], draw_targets(planned, given), strict=False):
             part.write_bytes(png_bytes(codes))
+            if shown:
+                small.append(shrunk(codes))
         parts[-1].write_text(to_toml(planned.to_record()), encoding="utf-8")
+        if shown:
+            parts[0].write_text(targets_html(planned, small), encoding="utf-8")
     if json_:
-        say(json.dumps({**planned.to_record(), "out": str(out)}))
+        files = {"out": str(out), **({} if page is None else {"page": str(page)})}
+        say(json.dumps({**planned.to_record(), **files}))
         return
     kinds = [target.kind for target in planned.targets]
     say(f"{out}: {len(kinds)} targets of {planned.screen} px")

@@ -51,7 +51,7 @@ NOISE: dict[str, Any] = {
 }
 
 
-def _measured_point() -> FrozenPsf:
+def measured_point() -> FrozenPsf:
     """Give kernels as `camkit calibrate psf` writes them: one place, three colours."""
     x = np.arange(-3, 4)
     kernels = np.stack([np.exp(-(x**2 + x[:, None] ** 2) / s) for s in (1.0, 1.3, 1.6)])
@@ -68,7 +68,7 @@ def _measured_point() -> FrozenPsf:
     )
 
 
-def _write(folder: Path, name: str, record: dict[str, Any]) -> Path:
+def write_part(folder: Path, name: str, record: dict[str, Any]) -> Path:
     path = folder / f"{name}.toml"
     path.write_text(to_toml(record), encoding="utf-8")
     return path
@@ -82,11 +82,16 @@ def _proves_itself(path: Path) -> Bundle:
 
 def test_geometry_flat_and_noise_are_put_into_a_copy(camkit_command, tmp_path: Path) -> None:
     source, out = write_tiny_bundle(tmp_path), tmp_path / "mine.camkit"
+    page = tmp_path / "pages" / "mine.html"
     parts = {"geometry": GEOMETRY, "flat": FLAT, "noise": NOISE}
-    words = [w for n, record in parts.items() for w in (f"--{n}", _write(tmp_path, n, record))]
-    done = camkit_command("calibrate", "bundle", source, *words, "-o", out, "--json")
+    words = [w for n, record in parts.items() for w in (f"--{n}", write_part(tmp_path, n, record))]
+    done = camkit_command(
+        "calibrate", "bundle", source, *words, "-o", out, "--page", page, "--json"
+    )
     assert done.code == 0, done.err
     told = json.loads(done.out)
+    assert told["page"] == str(page)
+    assert "<h2>Noise</h2>" in page.read_text(encoding="utf-8")
     assert (told["model"], told["residual_px"], told["out"]) == ("radial_2", 0.02, str(out))
     assert told["networks"] == ["M"]
     assert told["golden"] == ["typical", "saturated", "very_dark"]
@@ -106,7 +111,7 @@ def test_geometry_flat_and_noise_are_put_into_a_copy(camkit_command, tmp_path: P
 def test_without_geometry_the_centre_is_that_of_the_flat(camkit_command, tmp_path: Path) -> None:
     source, out = write_tiny_bundle(tmp_path), tmp_path / "mine.camkit"
     done = camkit_command(
-        "calibrate", "bundle", source, "--flat", _write(tmp_path, "flat", FLAT), "-o", out
+        "calibrate", "bundle", source, "--flat", write_part(tmp_path, "flat", FLAT), "-o", out
     )
     assert done.code == 0, done.err
     assert "tiny with flat as measured" in done.out
@@ -117,7 +122,7 @@ def test_without_geometry_the_centre_is_that_of_the_flat(camkit_command, tmp_pat
 def test_other_kernels_leave_networks_out_unless_they_are_kept(
     camkit_command, tmp_path: Path, keep: bool
 ) -> None:
-    psf = _measured_point()
+    psf = measured_point()
     path, out = tmp_path / "point.safetensors", tmp_path / "mine.camkit"
     write_psf(path, psf)
     more = ("--keep-networks",) if keep else ()
@@ -138,7 +143,7 @@ def test_other_kernels_leave_networks_out_unless_they_are_kept(
     assert ("network" in types) == keep
     # the distortion is that of before
     np.testing.assert_allclose(made.distortion.row(1), [1.0, -0.01, 0, 0])
-    flat = _write(tmp_path, "flat", FLAT)
+    flat = write_part(tmp_path, "flat", FLAT)
     done = camkit_command(*words, "--flat", flat, "--overwrite")
     assert done.code == 1
     assert "kernels of one place hold no vignetting" in done.err
@@ -146,7 +151,7 @@ def test_other_kernels_leave_networks_out_unless_they_are_kept(
 
 def test_a_bundle_without_networks_gets_golden_cases(camkit_command, tmp_path: Path) -> None:
     source, out = write_networkless_bundle(tmp_path).path, tmp_path / "mine.camkit"
-    words = ("--noise", _write(tmp_path, "noise", NOISE))
+    words = ("--noise", write_part(tmp_path, "noise", NOISE))
     done = camkit_command("calibrate", "bundle", source, *words, "-o", out)
     assert done.code == 0, done.err
     report = check_bundle(out, run=case_work)
@@ -158,7 +163,7 @@ def test_a_lens_profile_takes_what_was_measured(camkit_command, tmp_path: Path) 
     source, out = tmp_path / "plain.camkit", tmp_path / "mine.camkit"
     write_bundle(source, profile_manifest(), {})
     parts = {"geometry": GEOMETRY, "flat": FLAT}
-    words = [w for n, record in parts.items() for w in (f"--{n}", _write(tmp_path, n, record))]
+    words = [w for n, record in parts.items() for w in (f"--{n}", write_part(tmp_path, n, record))]
     done = camkit_command("calibrate", "bundle", source, *words, "-o", out)
     assert done.code == 0, done.err
     made = _proves_itself(out)
@@ -189,7 +194,7 @@ def test_what_does_not_fit_is_refused_in_one_line(
     camkit_command, tmp_path: Path, name: str, record: dict[str, Any], message: str
 ) -> None:
     source, out = write_tiny_bundle(tmp_path), tmp_path / "mine.camkit"
-    words = (f"--{name}", _write(tmp_path, name, record), "-o", out)
+    words = (f"--{name}", write_part(tmp_path, name, record), "-o", out)
     done = camkit_command("calibrate", "bundle", source, *words)
     assert done.code == 1
     assert message in done.err
@@ -202,7 +207,7 @@ def test_wrong_options_are_usage_and_damaged_kernels_an_input(
 ) -> None:
     words = ("calibrate", "bundle", write_tiny_bundle(tmp_path), "-o", tmp_path / "mine.camkit")
     assert camkit_command(*words).code == ExitCode.USAGE
-    noise = _write(tmp_path, "noise", NOISE)
+    noise = write_part(tmp_path, "noise", NOISE)
     assert camkit_command(*words, "--noise", noise, "--keep-networks").code == ExitCode.USAGE
     path = tmp_path / "point.safetensors"
     path.write_bytes(b"no tensors")

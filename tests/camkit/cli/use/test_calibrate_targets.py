@@ -47,6 +47,20 @@ def test_the_list_says_what_every_png_is(camkit_command, picture, tmp_path):
     assert "a board of 7x5 corners, 2 grey steps, 7 colours, 1 pictures" in again.out
 
 
+def test_a_page_shows_what_was_written(camkit_command, picture, tmp_path):
+    page = tmp_path / "pages" / "targets.html"
+    asked = (picture, "-o", tmp_path / "t", "--screen", "640x400", "--levels", "0", "--page", page)
+    done = camkit_command("calibrate", "targets", *asked, "--json")
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["page"] == str(page)
+    assert "sea side.png, sRGB" in page.read_text(encoding="utf-8")
+    assert camkit_command("calibrate", "targets", *asked, "--overwrite").code == 0
+    again = camkit_command(
+        "calibrate", "targets", "-o", tmp_path / "u", "--screen", "640x400", "--page", page
+    )
+    assert (again.code, (tmp_path / "u").exists()) == (ExitCode.USAGE, False)
+
+
 def test_the_board_shown_is_found_as_a_board_of_its_corners(camkit_command, tmp_path):
     asked = ("-o", tmp_path / "t", "--screen", "640x400", "--levels", "0")
     assert camkit_command("calibrate", "targets", *asked).code == 0
