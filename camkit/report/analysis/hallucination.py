@@ -3,11 +3,11 @@
     pictures -> captures -> every method -> patches: against the truth, and against the capture
                                          -> the same with detail planted: the control
 
-Measures against the truth say how wrong a patch is, chi^2 how far it is from its capture. No
-picture is without residual at edges, where demosaicking and regularisation leave some; so what
-counts is the excess: chi^2 less that of the filter alone. Below 0 the capture confirms what a
-method added, above 0 it denies it. Detail that the optics pass nothing of is denied by no capture;
-only the truth knows it.
+Measures against the truth say how wrong a patch is, chi^2 how far it is from its capture, in all
+and in its detail. No picture is without residual at edges, where demosaicking and regularisation
+leave some; so what counts is the excess: chi^2 of detail less that of the filter alone. Below 0 the
+capture confirms what a method added, above 0 it denies it. Detail that the optics pass nothing of
+is denied by no capture; only the truth knows it.
 """
 
 from collections.abc import Callable, Sequence
@@ -87,19 +87,29 @@ class Method:
 
     Attributes:
         name: As reports have it.
-        patches: Of all pictures.
-        maps: Picture -> chi^2 of its patches, by row and column.
+        patches: Of all pictures, each row by row.
         worst: Of the largest excess, the first the worst; none of the truth.
     """
 
     name: str
     patches: tuple[Patch, ...]
-    maps: dict[str, Array]
     worst: tuple[Crop, ...] = ()
 
     def values(self, measure: str) -> Array:
         """Give a measure of every patch."""
         return np.array([patch.values[measure] for patch in self.patches])
+
+    def maps(self, measure: str) -> dict[str, Array]:
+        """Give a measure of the patches of every picture, by row and column."""
+        found: dict[str, list[Patch]] = {}
+        for patch in self.patches:
+            found.setdefault(patch.scene, []).append(patch)
+        return {
+            scene: np.array([patch.values[measure] for patch in patches]).reshape(
+                -1, len({patch.place[1] for patch in patches})
+            )
+            for scene, patches in found.items()
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +121,7 @@ class Control:
         planted: How many patches.
         found: How many of them have a larger excess than 99 of 100 patches of the method itself.
         first: How many of as many patches of the largest excess are among them.
-        rise: Least chi^2 of a planted patch less that of the same patch without.
+        rise: Least `detail` of a planted patch less that of the same patch without.
     """
 
     method: str
@@ -123,7 +133,7 @@ class Control:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _View:
-    """A capture and what it is compared with: truth and capture as sRGB, chi^2 of the filter."""
+    """A capture and what it is compared with: truth and capture as sRGB, the filter's detail."""
 
     shot: Shot
     truth: FloatArray
@@ -137,7 +147,6 @@ class _Gathered:
     """What is gathered of a method, picture by picture."""
 
     patches: list[Patch] = field(default_factory=list)
-    maps: dict[str, Array] = field(default_factory=dict)
     crops: list[Crop] = field(default_factory=list)
 
 
@@ -198,7 +207,7 @@ def analyse(
             shot=shot,
             truth=truth,
             capture=encode_srgb(pictures[INPUT]),
-            filtered=unexplained(pictures[filtered], shot, rig.lens),
+            filtered=unexplained(pictures[filtered], shot, rig.lens).detail,
             lens=rig.lens,
         )
         for name, picture in ({TRUTH: clean} | pictures).items():
@@ -207,7 +216,6 @@ def analyse(
         Method(
             name=name,
             patches=tuple(held.patches),
-            maps=held.maps,
             worst=() if name == TRUTH else tuple(_worst(held.crops)),
         )
         for name, held in gathered.items()
@@ -218,18 +226,17 @@ def analyse(
 def _take(held: _Gathered, picture: FloatArray, view: _View, options: Options) -> None:
     """Measure a picture and keep its worst patches."""
     shot, side = view.shot, options.side_px
-    chi2 = unexplained(picture, shot, view.lens)
+    left = unexplained(picture, shot, view.lens)
     cell = np.ones((shot.scene.scale, shot.scene.scale))
+    excess = left.detail - view.filtered
     denied = {
         name: np.asarray(np.kron(plane, cell), np.float64)
-        for name, plane in (("chi2", chi2), ("excess", chi2 - view.filtered))
+        for name, plane in (("chi2", left.chi2), ("detail", left.detail), ("excess", excess))
     }
     patches = measure_patches(
         shot.scene.name, picture, view.truth, denied, side, options.perceptual
     )
     held.patches += patches
-    columns = len({patch.place[1] for patch in patches})
-    held.maps[shot.scene.name] = np.array([p.values["chi2"] for p in patches]).reshape(-1, columns)
     restored = encode_srgb(picture)
     for patch in sorted(patches, key=_rank)[:WORST]:
         y, x = patch.place
@@ -263,7 +270,7 @@ def _judge(
     limit = float(np.percentile(known, 99)) if known.size else np.inf
     before, after = ({(p.scene, p.place): p.values for p in m.patches} for m in (plain, planted))
     ranked = [(p.scene, p.place) for p in sorted(planted.patches, key=_rank)]
-    rises = [after[key]["chi2"] - before[key]["chi2"] for key in places]
+    rises = [after[key]["detail"] - before[key]["detail"] for key in places]
     return Control(
         method=primary,
         planted=len(places),
@@ -299,12 +306,13 @@ def to_json(report: Report, crops: Sequence[str] = ()) -> dict[str, Any]:
 
 def _method(method: Method, report: Report, crops: Sequence[str]) -> dict[str, Any]:
     told: dict[str, Any] = {name: summary(method.values(name)) for name in MEASURES}
-    told["chi2"] |= {
-        "map": {
-            scene: [[_known(v) for v in row] for row in values]
-            for scene, values in method.maps.items()
+    for measure in ("chi2", "detail"):
+        told[measure] |= {
+            "map": {
+                scene: [[_known(v) for v in row] for row in values]
+                for scene, values in method.maps(measure).items()
+            }
         }
-    }
     named = crops if method.name == report.control.method else ()
     told["worst"] = [
         {
@@ -334,7 +342,7 @@ def to_text(told: dict[str, Any]) -> str:
     control = told["control"]
     lines.append(
         f"control: {control['found']} of {control['planted']} patches with planted detail found in "
-        f"{control['method']}, {control['first']} of them first; chi2 rose by "
+        f"{control['method']}, {control['first']} of them first; detail rose by "
         f"{control['least_rise']:.2f} at least"
     )
     return "\n".join(lines)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from camkit.report.analysis.hallucination import PLANTED, TRUTH, Crop, Method, Report
 from camkit.report.analysis.patches import MEASURES, summary
 from camkit.report.analysis.point_image import Array
+from camkit.report.analysis.unexplained import LEVEL_PX
 from camkit.report.calibration.page import Section, Table, to_html
 from camkit.report.figure import FIELD_COLORS, GRID_COLOR, new_figure, to_png
 from camkit.report.stress.rig import INPUT
@@ -38,8 +39,9 @@ def hallucination_html(report: Report) -> str:
             paragraph=f"{len(primary.patches)} patches of {report.options.side_px} px at ISO "
             f"{report.options.iso:g}. l1, l2 and overshoot in sRGB values against the truth; "
             f"perceptual: {report.options.perceptual_name}. chi2: mean square of |PSF * x - y| / "
-            "sigma, 1 for the truth. excess: chi2 less that of the filter alone; above 0 the "
-            "capture denies what a method added.",
+            "sigma, 1 for the truth; detail: the same less the mean over "
+            f"{LEVEL_PX} px; excess: detail less that of the filter alone; above 0 the capture "
+            "denies what a method added.",
             table=_table(report),
             pictures={"Patches by measure.": to_png(draw_histograms(shown))},
         ),
@@ -47,10 +49,10 @@ def hallucination_html(report: Report) -> str:
             title="Control",
             paragraph=f"Bars planted into {control.planted} patches of {control.method}: "
             f"{control.found} have a larger excess than 99 of 100 patches without, {control.first} "
-            f"of the {control.planted} largest are theirs. chi2 rose by {control.rise:.2f} at "
+            f"of the {control.planted} largest are theirs. detail rose by {control.rise:.2f} at "
             "least.",
             pictures={
-                f"chi2 of patches: {control.method}, below with what was planted.": to_png(
+                f"detail of patches: {control.method}, below with what was planted.": to_png(
                     draw_maps(primary, planted)
                 )
             },
@@ -74,7 +76,7 @@ def draw_histograms(methods: Sequence[Method]) -> "Figure":
     Values below 1e-5 are drawn as that. The excess has a sign and keeps it: its logarithm is that
     of 1 + |excess|. The filter has none.
     """
-    figure = new_figure(10.0, 2.6)
+    figure = new_figure(11.5, 2.6)
     panels = figure.subplots(1, len(MEASURES))
     for panel, measure in zip(panels, MEASURES, strict=True):
         for number, method in enumerate(methods):
@@ -107,20 +109,21 @@ def _label(measure: str) -> str:
 
 
 def draw_maps(plain: Method, planted: Method) -> "Figure":
-    """Draw chi^2 of the patches of some pictures, logarithm, without and with what was planted."""
-    names = list(plain.maps)[:_MOST_MAPS]
+    """Draw `detail` of the patches of some pictures, logarithm, without and with bars planted."""
+    maps = [method.maps("detail") for method in (plain, planted)]
+    names = list(maps[0])[:_MOST_MAPS]
     figure = new_figure(1.9 * len(names) + 0.6, 3.6)
     panels = figure.subplots(2, len(names), squeeze=False)
     image = None
-    for row, method in zip(panels, (plain, planted), strict=True):
+    for row, found in zip(panels, maps, strict=True):
         for panel, name in zip(row, names, strict=True):
-            light = np.log10(np.maximum(method.maps[name], 1e-2))
+            light = np.log10(np.maximum(found[name], 1e-2))
             image = panel.imshow(light, cmap="magma", vmin=-0.3, vmax=1.5)
             panel.set_title(name[:24], fontsize=6)
             panel.set_xticks([])
             panel.set_yticks([])
     if image is not None:
-        figure.colorbar(image, ax=panels.ravel().tolist(), fraction=0.03, label="log10 chi2")
+        figure.colorbar(image, ax=panels.ravel().tolist(), fraction=0.03, label="log10 detail")
     return figure
 
 

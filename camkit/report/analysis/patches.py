@@ -15,7 +15,7 @@ from camkit.report.quality import BORDER_PX
 
 REACH_PX: Final = 5
 """A picture overshoots where it leaves the range of the truth within so many pixels."""
-MEASURES: Final = ("l1", "l2", "perceptual", "overshoot", "chi2", "excess")
+MEASURES: Final = ("l1", "l2", "perceptual", "overshoot", "chi2", "detail", "excess")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,8 +56,8 @@ def measure_patches(
         scene: Name of the picture.
         picture: (3, h, w) linear Rec.709.
         truth: (3, h, w) sRGB values.
-        denied: `chi2` and `excess`, (h, w): what `unexplained` gives, and how much more than of
-            the filter alone that is.
+        denied: `chi2`, `detail` and `excess`, (h, w): what `unexplained` gives, and how much more
+            than of the filter alone the second is.
         side_px: Of a patch.
         perceptual: Gives (h, w) of two pictures of sRGB values.
     """
