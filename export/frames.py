@@ -37,7 +37,7 @@ from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import tint_crop
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.prescription import Lens, format_prescription
-from camkit.models_def.optics.thin.freezing import freeze_hazy
+from camkit.models_def.optics.thin.freezing import COPY_RAYS, freeze_hazy
 from camkit.models_def.training.kind import training_kind
 from camkit.models_def.training.pictures import SceneSource, list_pictures, open_source
 from camkit.runtime.bank.haze import hazy_kernels
@@ -50,8 +50,6 @@ from camkit.runtime.twin.light import Light, LightOptions, lens_of, light_of, sc
 Tell = Callable[[str], None]
 Generator = np.random.Generator
 
-COPY_RAYS: Final = 8000
-"""In half the stop: a copy is one draw of errors, not what a bundle holds."""
 SPREAD_EV: Final = 0.7
 """How much crops of a frame differ in their exposure."""
 VALIDATION_ISOS: Final = (100.0, 1600.0)

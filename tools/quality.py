@@ -24,11 +24,11 @@ from typing import Any
 
 import cv2
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
-from camkit.contracts import FrozenPsf
 from camkit.errors import CamkitError, ContractError
 from camkit.report.bench.machine import processor_name
-from camkit.report.fabricated_psf import fabricated_psf, lens_text
+from camkit.report.fabricated_optics import fabricated_optics, lens_text
 from camkit.report.quality import FABRICATION_SEEDS, FIELD_SHARES, Shot, list_set, read_picture
 from camkit.runtime.network.engine import available_threads
 from tools.capture.simulated import color_sensor
@@ -104,29 +104,29 @@ def photographer(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[Sho
     lens = lenses(arguments, bundle)
 
     def take(shot: Shot) -> Photograph:
-        psf = bundle.psf
+        optics = bundle.frozen_optics
         if shot.psf == "fresh":
-            psf = lens(TUNING_SEED if arguments.tune else shot.fabrication_seed)
+            optics = lens(TUNING_SEED if arguments.tune else shot.fabrication_seed)
         most_px = TUNING_SIDE_PX if arguments.tune else None
-        return photograph(shot, read_picture(shot.picture, most_px), bundle, psf)
+        return photograph(shot, read_picture(shot.picture, most_px), bundle, optics)
 
     return take
 
 
-def lenses(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], FrozenPsf]:
+def lenses(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], FrozenOptics]:
     """Give the function that traces the copy of a seed, once for all threads."""
     tracing = threading.Lock()
 
     @lru_cache(maxsize=len(FABRICATION_SEEDS))
-    def traced(seed: int) -> FrozenPsf:
-        return fabricated_psf(
+    def traced(seed: int) -> FrozenOptics:
+        return fabricated_optics(
             bundle,
             seed,
             cache_folder=arguments.work_dir / "psf",
             prescription=arguments.prescription,
         )
 
-    def lens(seed: int) -> FrozenPsf:
+    def lens(seed: int) -> FrozenOptics:
         with tracing:
             return traced(seed)
 
@@ -241,7 +241,8 @@ def errors_of_copies(
     sensor = color_sensor(bundle)
     seeds = sorted({m.seed for m in measurements if m.seed is not None})
     lens = lenses(arguments, bundle)
-    return {str(seed): round(transfer_error(bundle.psf, lens(seed), sensor), 3) for seed in seeds}
+    errors = {seed: transfer_error(bundle.psf, lens(seed).psf, sensor) for seed in seeds}
+    return {str(seed): round(error, 3) for seed, error in errors.items()}
 
 
 def measure_missing(

@@ -83,15 +83,24 @@ class Bundle:
         return self._container.sha256
 
     @property
-    def psf(self) -> FrozenPsf:
-        """The frozen PSF.
+    def frozen_optics(self) -> FrozenOptics:
+        """The optics with all that light does in them.
 
         Raises:
             BundleError: If this bundle has none (its stages need none).
         """
         if self._optics is None:
             raise BundleError(f"{self.path.name} has no {PSF}")
-        return self._optics.psf
+        return self._optics
+
+    @property
+    def psf(self) -> FrozenPsf:
+        """The frozen PSF.
+
+        Raises:
+            BundleError: If this bundle has none (its stages need none).
+        """
+        return self.frozen_optics.psf
 
     @property
     def distortion(self) -> RadialDistortion:

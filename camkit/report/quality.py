@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.geometry.sensor_window import centred_origin
@@ -148,14 +149,14 @@ def crop_origin(
     return origin[0], origin[1]
 
 
-def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Exposed:
+def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics) -> Exposed:
     """Photograph a picture.
 
     Args:
         shot: Place, ISO and noise.
         scene: (3, h, w) float32 linear Rec.709, as fine as the pictures of the bundle.
-        bundle: The camera; its PSF is what methods may know.
-        lens: The PSF that the light really takes, at the bundle's reference depth.
+        bundle: The camera; its optics are what methods may know.
+        lens: What the light really goes through, at the bundle's reference depth.
     """
     sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
     quadrant = QUADRANTS[shot.number % len(QUADRANTS)]
@@ -168,8 +169,7 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Ex
         scale=scale,
         depth_mm=bundle.reference_depth_mm,
     )
-    haze = bundle.haze if bundle.manifest.has_haze else None
-    simulation = simulate(scene, sensor, lens, options, haze=haze)
+    simulation = simulate(scene, sensor, lens.psf, options, haze=lens.haze)
     sharp = encode_srgb(true_picture(simulation.clean, sensor))
     return Exposed(simulation=simulation, truths={IMAGE: sharp})
 

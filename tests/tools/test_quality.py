@@ -20,7 +20,9 @@ PEER = "skimage_wiener"
 def bundle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bundle:
     """Give a bundle without a prescription: its own PSF stands for the fabricated ones."""
     made = write_wide_bundle(tmp_path)
-    monkeypatch.setattr("tools.quality.fabricated_psf", lambda bundle, *_, **__: bundle.psf)
+    monkeypatch.setattr(
+        "tools.quality.fabricated_optics", lambda bundle, *_, **__: bundle.frozen_optics
+    )
     monkeypatch.setattr("tools.quality.lens_text", lambda *_: "lens")
     folder = tmp_path / "pictures" / "set"
     folder.mkdir(parents=True)

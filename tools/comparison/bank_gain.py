@@ -18,12 +18,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.stages import Together, Wiener
-from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.report.bench.machine import describe_machine
-from camkit.report.fabricated_psf import fabricated_psf
+from camkit.report.fabricated_optics import fabricated_optics
 from camkit.report.quality import (
     FIELD_SHARES,
     Shot,
@@ -85,8 +85,8 @@ def main(words: Sequence[str] | None = None) -> None:
     ways = restorers(bundle, together_of(arguments.recipe))
 
     @lru_cache
-    def lens(copy: int) -> FrozenPsf:
-        return fabricated_psf(bundle, copy, cache_folder=arguments.work_dir / "psf")
+    def lens(copy: int) -> FrozenOptics:
+        return fabricated_optics(bundle, copy, cache_folder=arguments.work_dir / "psf")
 
     found = []
     for number, picture in enumerate(list_set(arguments.data, arguments.pictures)):

@@ -19,11 +19,12 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.report.fabricated_psf import fabricated_psf
+from camkit.report.fabricated_optics import fabricated_optics
 from camkit.report.quality import FABRICATION_SEEDS, FIELD_SHARES, Shot, list_set, read_picture
 from camkit.scenes.clean import night
 from tools.comparison.photograph import bundle_restorer, photograph
@@ -70,8 +71,8 @@ def make(arguments: argparse.Namespace) -> None:
     rng = np.random.default_rng(arguments.seed)
 
     @lru_cache
-    def lens(copy: int) -> FrozenPsf:
-        return fabricated_psf(bundles[1], copy, cache_folder=arguments.work_dir / "psf")
+    def lens(copy: int) -> FrozenOptics:
+        return fabricated_optics(bundles[1], copy, cache_folder=arguments.work_dir / "psf")
 
     arguments.output.mkdir(parents=True, exist_ok=True)
     key: dict[str, Any] = {}

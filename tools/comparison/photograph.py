@@ -11,10 +11,11 @@ from typing import Final
 
 import numpy as np
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
 from camkit.colorimetry import apply_matrix
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.quality import Shot, expose
 from camkit.runtime.bank.blocks import LocalPsf
@@ -56,7 +57,7 @@ class Photograph:
 Restorer = Callable[[Photograph], FloatArray]
 
 
-def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Photograph:
+def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics) -> Photograph:
     """Photograph a picture and develop it; see `camkit.report.quality.expose`."""
     exposed = expose(shot, scene, bundle, lens)
     return Photograph(

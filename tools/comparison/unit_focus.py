@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import format_of
 from camkit.bundle.optics import PSF
 from camkit.bundle.psf_file import psf_to_bytes
@@ -33,7 +34,7 @@ from camkit.models_def.optics.frozen import with_focus
 from camkit.models_def.optics.lens_optics import LensOptics
 from camkit.models_def.optics.prescription import parse_prescription
 from camkit.report.bench.machine import describe_machine
-from camkit.report.fabricated_psf import fabricated_psf
+from camkit.report.fabricated_optics import fabricated_optics
 from camkit.report.quality import (
     FABRICATION_SEEDS,
     FIELD_SHARES,
@@ -120,7 +121,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parts: dict[str, list[Judged]] = {"copies": [], "outliers": []}
     for part, judged in parts.items():
         for copy in getattr(arguments, part):
-            lens = fabricated_psf(bundle, copy, cache_folder=arguments.work_dir / "psf")
+            lens = fabricated_optics(bundle, copy, cache_folder=arguments.work_dir / "psf")
             judged.append(judge(copy, lens, banks, pictures))
             print(json.dumps(judged[-1].to_json()), flush=True)
     record: dict[str, Any] = {
@@ -158,13 +159,13 @@ def _lens_of(bundle: Bundle) -> LensOptics:
 
 
 def judge(
-    copy: int, lens: FrozenPsf, banks: Mapping[str, Bundle], pictures: Sequence[Path]
+    copy: int, lens: FrozenOptics, banks: Mapping[str, Bundle], pictures: Sequence[Path]
 ) -> Judged:
     """Measure the focus of a copy, and what it is worth to every bank."""
     found, why, bundle = None, "", banks[ALONE]
     try:
         found = measure_focus(
-            target_captures(lens, bundle),
+            target_captures(lens.psf, bundle),
             EdgeCamera(
                 psf=bundle.psf, sensor=color_sensor(bundle), depth_mm=bundle.reference_depth_mm
             ),
@@ -174,8 +175,8 @@ def judge(
     focus_um = 0.0 if found is None else found.focus_um
     sensor = color_sensor(bundle)
     error = (
-        transfer_error(bundle.psf, lens, sensor),
-        transfer_error(bundle.psf, lens, sensor, focus_um=focus_um),
+        transfer_error(bundle.psf, lens.psf, sensor),
+        transfer_error(bundle.psf, lens.psf, sensor, focus_um=focus_um),
     )
     # who needs no file gains nothing
     gains = {bank: (0.0,) * (len(pictures) * len(ISOS)) for bank in banks}
@@ -201,7 +202,7 @@ def target_captures(lens: FrozenPsf, bundle: Bundle) -> list[tuple[str, Capture]
 
 
 def gains_db(
-    lens: FrozenPsf, banks: Mapping[str, Bundle], pictures: Sequence[Path], focus_um: float
+    lens: FrozenOptics, banks: Mapping[str, Bundle], pictures: Sequence[Path], focus_um: float
 ) -> dict[str, tuple[float, ...]]:
     """Give what the focus gains each bank, capture by capture."""
     bundle = banks[ALONE]

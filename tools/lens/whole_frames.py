@@ -32,13 +32,9 @@ from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
-from camkit.export.frames import COPY_RAYS
-from camkit.models_def.optics.kernel_bank import focused_copies
-from camkit.models_def.optics.prescription import parse_prescription
-from camkit.models_def.optics.thin.freezing import freeze_hazy
 from camkit.models_def.training.pictures import list_pictures
 from camkit.report.analysis.recovery import filled, restored
-from camkit.report.fabricated_psf import lens_text
+from camkit.report.fabricated_optics import fabricated_optics
 from camkit.report.quality import read_picture
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
@@ -85,7 +81,7 @@ def main() -> None:
         frame = tuple(chosen.frame) if chosen.frame else None
         sources = {"copy": chosen.copy, "frame": frame, "rim": chosen.rim_px}
         rows: dict[str, list[Entry]] = {}
-        through = cache(lambda: copy_of(first, chosen.copy))
+        through = cache(lambda: copy_of(first, chosen.copy, chosen.out_dir / "copies"))
         for path in pictures:
             for iso in chosen.iso:
                 made = cache(lambda p=path, i=iso: shoot(p, first, through(), i, frame))
@@ -144,8 +140,8 @@ def options(**chosen: str) -> Options:
     return Options(**chosen, undistort=False, vignetting=False, threads=1)  # type: ignore[arg-type]
 
 
-def copy_of(bundle: Bundle, seed: int) -> FrozenOptics:
-    """Freeze a fabricated copy of the lens of a bundle, haze included.
+def copy_of(bundle: Bundle, seed: int, folder: Path) -> FrozenOptics:
+    """Freeze a fabricated copy of the lens of a bundle, haze included, or find it in a folder.
 
     Raises:
         ContractError: If the bundle is of another kind, or holds no prescription.
@@ -153,8 +149,7 @@ def copy_of(bundle: Bundle, seed: int) -> FrozenOptics:
     sensor = light_sensor(bundle.manifest)
     if not bundle.manifest.has_haze or not isinstance(sensor, BayerSensor):
         raise ContractError(f"{bundle.path.name} is no camera with a mosaic and a haze")
-    lens = parse_prescription(lens_text(bundle, None))
-    return freeze_hazy(focused_copies(lens, 2, seed)[1], sensor, rays=COPY_RAYS)[0]
+    return fabricated_optics(bundle, seed, cache_folder=folder)
 
 
 def shoot(

@@ -120,7 +120,7 @@ def _photographed(bundle: Bundle, scene: NDArray[np.float32]) -> KnownCapture:
         iso=part.isos[0],
         psf="bundle",
     )
-    return known_capture(shot, part.photograph(shot, scene, bundle, bundle.psf))
+    return known_capture(shot, part.photograph(shot, scene, bundle, bundle.frozen_optics))
 
 
 def _of_capture(known: KnownCapture, manifest: Manifest, scale: int) -> dict[str, float]:

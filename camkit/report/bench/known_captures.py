@@ -18,15 +18,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_from_bytes
 from camkit.bundle.manifest import GoldenCase
 from camkit.bundle.reader import GOLDEN, PRESCRIPTION, Bundle
 from camkit.bundle.sensor import ColorSensor
 from camkit.colorimetry import encode_srgb
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.report.bench.part import BenchPart
-from camkit.report.fabricated_psf import fabricated_psf
+from camkit.report.fabricated_optics import fabricated_optics
 from camkit.report.kind_finder import find_part
 from camkit.report.quality import (
     FIELD_SHARES,
@@ -156,7 +157,7 @@ def picture_captures(
         bundle: The camera.
         folder: Sharp pictures.
         count: How many of them; None for all.
-        cache_folder: Where traced PSFs are kept.
+        cache_folder: Where traced optics are kept.
         saturate: As of `bench_scene`.
 
     Raises:
@@ -184,8 +185,8 @@ def _photographed(
     part = find_part(bundle.manifest.kind, "bench", BenchPart)
 
     @lru_cache(maxsize=4)
-    def lens(seed: int) -> FrozenPsf:
-        return fabricated_psf(bundle, seed, cache_folder=cache_folder)
+    def lens(seed: int) -> FrozenOptics:
+        return fabricated_optics(bundle, seed, cache_folder=cache_folder)
 
     for number, (path, scene) in enumerate(shown):
         if min(scene.shape[1:]) < LEAST_PX:
@@ -203,8 +204,8 @@ def _photographed(
                     iso=iso,
                     psf=psf,
                 )
-                kernels = lens(shot.fabrication_seed) if psf == "fresh" else bundle.psf
-                yield known_capture(shot, part.photograph(shot, scene, bundle, kernels))
+                taken = lens(shot.fabrication_seed) if psf == "fresh" else bundle.frozen_optics
+                yield known_capture(shot, part.photograph(shot, scene, bundle, taken))
 
 
 def bench_scene(path: Path, bundle: Bundle, saturate: float | None = None) -> FloatArray:

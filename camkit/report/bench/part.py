@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import UnsupportedError
 from camkit.report.bench.metric import Metric
 from camkit.report.bench.row_maker import RowMaker
@@ -76,7 +77,7 @@ class BenchPart:
         measure: Measures a bundle in place of all that; None for photographs.
     """
 
-    photograph: Callable[[Shot, FloatArray, Bundle, FrozenPsf], Exposed] = _no_photograph
+    photograph: Callable[[Shot, FloatArray, Bundle, FrozenOptics], Exposed] = _no_photograph
     positions: tuple[int, ...] = tuple(range(len(FIELD_SHARES)))
     isos: tuple[float, ...] = (100.0, 1600.0)
     rows: tuple[RowMaker, ...] = ()

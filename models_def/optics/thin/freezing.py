@@ -38,8 +38,12 @@ CORE_PX: Final = 64
 FADE_PX: Final = 40
 """From here on the core fades out, to nothing at its rim."""
 CELL_PX: Final = 16
+LEAST_FIELDS: Final = 3
+"""Between which light is spread by slopes."""
 RAYS: Final = 20_000
 """In half the stop, for each of some thirty wavelengths."""
+COPY_RAYS: Final = 8000
+"""Of a fabricated copy: one draw of errors, not what a bundle holds."""
 ENERGY: Final = 0.995
 LEAST_HAZE: Final = 1e-6
 """Of the light: less beside a core is none."""
@@ -54,7 +58,7 @@ class HazyReport:
 
     Attributes:
         about: What light is gathered about.
-        fields: Places from the axis to the corner.
+        fields: Places from the axis to the corner, `LEAST_FIELDS` at least.
         wavelengths: Samples of the response.
         core_px: Reach of the core.
         cell_px: Side of a cell.
@@ -108,8 +112,10 @@ def freeze_hazy(
 
     Raises:
         ContractError: If neither a peak nor a chief ray reaches the corner, or the haze is wider
-            than a file holds.
+            than a file holds, or there are too few fields.
     """
+    if fields < LEAST_FIELDS:
+        raise ContractError(f"a haze is frozen at {LEAST_FIELDS} fields at least; got {fields}")
     pitch_um = sensor.pixel_pitch_um
     corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
     middles = find_middles(lens, corner_px, pitch_um, rays)

@@ -19,7 +19,9 @@ def test_gains_are_told_with_their_error_by_iso_copy_and_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bundle = write_wide_bundle(tmp_path)
-    monkeypatch.setattr(bank_gain, "fabricated_psf", lambda bundle, *_, **__: bundle.psf)
+    monkeypatch.setattr(
+        bank_gain, "fabricated_optics", lambda bundle, *_, **__: bundle.frozen_optics
+    )
     (tmp_path / "in").mkdir()
     for name in "ab":
         picture = np.rint(texture(80, 96, seed=ord(name)) * 255).astype(np.uint8)

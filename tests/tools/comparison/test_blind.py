@@ -17,7 +17,7 @@ def test_parts_stand_beside_the_truth_in_an_order_of_the_seed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bundle = write_wide_bundle(tmp_path)
-    monkeypatch.setattr(blind, "fabricated_psf", lambda bundle, *_, **__: bundle.psf)
+    monkeypatch.setattr(blind, "fabricated_optics", lambda bundle, *_, **__: bundle.frozen_optics)
     monkeypatch.setattr(blind, "SIDE_PX", 48)
     (tmp_path / "in").mkdir()
     picture = np.rint(texture(96, 96, seed=3) * 255).astype(np.uint8)

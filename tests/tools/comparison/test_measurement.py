@@ -67,7 +67,7 @@ def make_shots(count: int) -> list[Shot]:
 
 def photographer(bundle: Bundle) -> Callable[[Shot], Photograph]:
     scene = decode_srgb(texture(96, 100))
-    return lambda shot: photograph(shot, scene, bundle, bundle.psf)
+    return lambda shot: photograph(shot, scene, bundle, bundle.frozen_optics)
 
 
 def developer(bundle: Bundle) -> Callable[[Photograph], FloatArray]:

@@ -28,7 +28,7 @@ def test_tuning_has_a_lens_copy_of_its_own() -> None:
 
 def test_the_clean_picture_in_sensor_geometry_is_the_truth(bundle: Bundle) -> None:
     scene = decode_srgb(texture(150, 170))
-    taken = photograph(SHOT, scene, bundle, bundle.psf)
+    taken = photograph(SHOT, scene, bundle, bundle.frozen_optics)
     planes = taken.simulation.clean
     shaded = planes * illumination_band(bundle.psf, taken.simulation.window, 0, 150)
     assert judge(finish_planes(shaded, taken, bundle), taken.sharp).psnr_db > 80
@@ -36,21 +36,21 @@ def test_the_clean_picture_in_sensor_geometry_is_the_truth(bundle: Bundle) -> No
 
 def test_developing_only_matches_the_brightness_of_the_sharp_picture(bundle: Bundle) -> None:
     scene = np.full((3, 120, 160), 0.3, np.float32)
-    taken = photograph(replace(SHOT, position=4), scene, bundle, bundle.psf)
+    taken = photograph(replace(SHOT, position=4), scene, bundle, bundle.frozen_optics)
     developed = finish_planes(taken.local.planes, taken, bundle)
     np.testing.assert_allclose(developed.mean(axis=(1, 2)), 0.3, rtol=0.01)
 
 
 def test_the_wiener_bank_beats_the_capture_through_its_own_lens(bundle: Bundle) -> None:
     scene = decode_srgb(texture(150, 170))
-    taken = photograph(SHOT, scene, bundle, bundle.psf)
+    taken = photograph(SHOT, scene, bundle, bundle.frozen_optics)
     developed = judge(finish_planes(taken.local.planes, taken, bundle), taken.sharp)
     restored = judge(bundle_restorer(bundle, method="wiener")(taken), taken.sharp)
     assert restored.psnr_db > developed.psnr_db + 0.5
 
 
 def test_a_network_answers_in_sensor_geometry(bundle: Bundle) -> None:
-    taken = photograph(SHOT, decode_srgb(texture(100, 140)), bundle, bundle.psf)
+    taken = photograph(SHOT, decode_srgb(texture(100, 140)), bundle, bundle.frozen_optics)
     assert bundle_restorer(bundle, size="M")(taken).shape == (3, 100, 140)
 
 
@@ -62,7 +62,7 @@ def test_a_size_that_the_bundle_lacks_is_refused(bundle: Bundle) -> None:
 def test_a_camera_of_several_depths_is_judged_at_its_focus(tmp_path: Path) -> None:
     deep = write_deep_bundle(tmp_path)
     scene = decode_srgb(texture(150, 170))
-    taken = photograph(SHOT, scene, deep, deep.psf)
+    taken = photograph(SHOT, scene, deep, deep.frozen_optics)
     assert taken.simulation.depth_mm == 1000.0
     expected = deep.psf.kernels.mean(axis=1)[0, 0]
     np.testing.assert_allclose(taken.local.psf.kernels.kernels[0, 1], expected, atol=1e-6)

@@ -37,7 +37,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 def test_every_row_restores_a_capture_and_no_two_alike(bundle: Bundle) -> None:
     shot = Shot(set_name="s", picture=Path("a"), number=0, position=1, iso=100.0, psf="bundle")
-    taken = photograph(shot, decode_srgb(texture(90, 96)), bundle, bundle.psf)
+    taken = photograph(shot, decode_srgb(texture(90, 96)), bundle, bundle.frozen_optics)
     rows = make_rows(bundle, METHODS, [], TUNED, [100.0], "lens")
     pictures = [row.restore(taken) for row in rows]
     assert {p.shape for p in pictures} == {(3, 90, 96)}

@@ -69,7 +69,7 @@ def test_parameters_of_another_protocol_are_refused(table: dict[str, dict[str, o
 
 def test_every_setting_is_tried_on_a_capture(bundle: Bundle) -> None:
     shot = Shot(set_name="s", picture=Path("a"), number=0, position=0, iso=100.0, psf="bundle")
-    taken = photograph(shot, decode_srgb(texture(96, 96)), bundle, bundle.psf)
+    taken = photograph(shot, decode_srgb(texture(96, 96)), bundle, bundle.frozen_optics)
     trials = try_peers(taken, bundle, ["skimage_wiener"])
     assert tuple(t.setting for t in trials) == PEERS["skimage_wiener"].settings
     assert len({t.psnr_db for t in trials}) == len(trials)

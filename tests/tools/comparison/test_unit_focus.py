@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FrozenPsf
 from camkit.models_def.training.bank_fitting import bank_table
 from camkit.runtime.bank.psf import _in_focus
 from tests.focus_bundle import write_focus_bundle
@@ -23,17 +23,18 @@ from tools.comparison.copies import transfer_error
 FOCUS_UM = {1: 30.0, 2: 0.0, 3: -25.0}
 
 
-def _copy(bundle: Bundle, copy: int, **_: Any) -> FrozenPsf:
+def _copy(bundle: Bundle, copy: int, **_: Any) -> FrozenOptics:
     """A copy of the camera with a focus of its own."""
     kernels = np.asarray(_in_focus(bundle.psf, FOCUS_UM[copy]), np.float32)
-    return replace(bundle.psf, kernels=kernels, focus_um=None, focus_kernels=None)
+    psf = replace(bundle.psf, kernels=kernels, focus_um=None, focus_kernels=None)
+    return FrozenOptics(psf=psf)
 
 
 def test_copies_are_measured_and_what_they_gain_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bundle = write_focus_bundle(tmp_path)
-    monkeypatch.setattr(unit_focus, "fabricated_psf", _copy)
+    monkeypatch.setattr(unit_focus, "fabricated_optics", _copy)
     monkeypatch.setattr(unit_focus, "refocusable", lambda bundle, _: (bundle, 40.0))
     monkeypatch.setattr(unit_focus, "blend_errors", lambda *_: {})
     monkeypatch.setattr(unit_focus, "TARGET_SHARES", (0.0, 0.9))

@@ -67,7 +67,7 @@ def test_a_table_of_a_small_camera_is_made_once(
     cv2.imwrite(str(pictures / "p.png"), cv2.resize(blocks, (48, 48), interpolation=0))
     frozen: list[int] = []
 
-    def copy(_: Bundle, seed: int) -> FrozenOptics:
+    def copy(_: Bundle, seed: int, _folder: Path) -> FrozenOptics:
         frozen.append(seed)
         return optics
 
@@ -84,6 +84,6 @@ def test_a_table_of_a_small_camera_is_made_once(
     assert "| wiener |" in capsys.readouterr().out
 
 
-def test_a_camera_without_a_haze_is_refused() -> None:
+def test_a_camera_without_a_haze_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ContractError, match="no camera with a mosaic and a haze"):
-        whole_frames.copy_of(open_bundle(find_bundle("duet")), 1)
+        whole_frames.copy_of(open_bundle(find_bundle("duet")), 1, tmp_path)

@@ -135,7 +135,7 @@ class Bench:
 
     def _exposed(self, scene: Scene, plate: str) -> Exposed:
         bundle = self._camera(plate).bundle
-        return photograph(scene.shot(), scene.light(bundle), bundle, bundle.psf)
+        return photograph(scene.shot(), scene.light(bundle), bundle, bundle.frozen_optics)
 
     def _camera(self, plate: str) -> Camera:
         if plate not in self._cameras:

@@ -11,8 +11,9 @@ import numpy as np
 import scipy.ndimage
 from numpy.typing import NDArray
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
-from camkit.contracts import CfaPattern, FloatArray, FrozenPsf, cfa_channels
+from camkit.contracts import CfaPattern, FloatArray, cfa_channels
 from camkit.report.quality import Exposed, Shot, expose
 from camkit.report.sensor_geometry import in_sensor_geometry
 from camkit.runtime.capture import Capture
@@ -29,7 +30,7 @@ REACH_PX: Final = 1
 """A pixel is made of samples of its colour at most so far away."""
 
 
-def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Exposed:
+def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics) -> Exposed:
     """Photograph a scene, and beside it what the bare lens gives.
 
     Args:
@@ -43,7 +44,8 @@ def photograph(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -
         bare lens as it is developed; `clipped`, what clipped in either of the two captures.
     """
     ended = np.minimum(scene, np.float32(CEILING))
-    coded, bare = (expose(shot, ended, bundle, psf) for psf in (lens, bare_psf(bundle)))
+    without = FrozenOptics(psf=bare_psf(bundle))
+    coded, bare = (expose(shot, ended, bundle, optics) for optics in (lens, without))
     pipeline = developer(bundle, available_threads(None))
     captures = [capture_of(pipeline, exposed.simulation) for exposed in (coded, bare)]
     extras = {

@@ -80,7 +80,7 @@ def test_scores_are_those_of_the_protocol(bundle: Bundle, pictures: Path, tmp_pa
         psf="bundle",
     )
     scene = cv2.imread(str(shot.picture))[..., ::-1].transpose(2, 0, 1) / np.float32(255)
-    taken = photograph(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.psf)
+    taken = photograph(shot, decode_srgb(np.ascontiguousarray(scene)), bundle, bundle.frozen_optics)
     wanted = {
         INPUT: finish_planes(taken.local.planes, taken, bundle),
         trials[0].accuracy_key: bundle_restorer(bundle, method="wiener")(taken),

@@ -10,11 +10,12 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import NOT_TRAINED
 from camkit.bundle.reader import Bundle
 from camkit.bundle.writer import write_bundle
 from camkit.cli.judge.bench import _lines
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, DecodeError
 from camkit.kinds import find_kind
 from camkit.report.bench import known_captures, line_up, run
@@ -186,7 +187,7 @@ def test_scenes_are_exposed_for_a_share_and_captures_clip_there(tmp_path: Path) 
     assert dim.capture.max() < 0.2 * sensor.white_level
 
 
-def _expose_hdr(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenPsf) -> Exposed:
+def _expose_hdr(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics) -> Exposed:
     """Photograph a scene as a kind does that is judged by high dynamic range."""
     exposed = expose(shot, scene, bundle, lens)
     sensor = light_sensor(bundle.manifest)

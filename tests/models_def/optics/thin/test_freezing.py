@@ -126,3 +126,8 @@ def test_a_sharp_lens_has_a_haze_of_nothing() -> None:
     assert optics.haze is not None
     assert not optics.haze.kernels.any()
     assert (report.cells, report.haze_kept) == (1, 1.0)
+
+
+def test_two_fields_are_too_few() -> None:
+    with pytest.raises(ContractError, match="3 fields at least; got 2"):
+        freeze_hazy(LENS, _sensor(), fields=2, rays=RAYS)

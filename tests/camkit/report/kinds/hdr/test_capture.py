@@ -39,7 +39,7 @@ def scene() -> FloatArray:
 @pytest.fixture(scope="module")
 def exposed(bundle: Bundle, scene: FloatArray) -> Exposed:
     shot = Shot(set_name="set", picture=Path("lamp"), number=0, position=0, iso=100.0, psf="bundle")
-    return photograph(shot, scene, bundle, bundle.psf)
+    return photograph(shot, scene, bundle, bundle.frozen_optics)
 
 
 def test_the_truth_ends_at_the_ceiling(exposed: Exposed) -> None:

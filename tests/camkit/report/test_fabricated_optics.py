@@ -9,9 +9,10 @@ from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
-from camkit.report import fabricated_psf as fabricated
-from camkit.report.fabricated_psf import fabricated_psf, lens_text
+from camkit.report import fabricated_optics as fabricated
+from camkit.report.fabricated_optics import fabricated_optics, lens_text
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_psf, tiny_sensor
+from tests.haze_bundle import hazy_manifest, hazy_optics
 
 LENS = (Path(__file__).resolve().parents[3] / "models_def/prescriptions/duet.toml").read_text()
 
@@ -29,7 +30,9 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 
 def traced(bundle: Bundle, seed: int, folder: Path) -> FrozenPsf:
-    return fabricated_psf(bundle, seed, cache_folder=folder)
+    optics = fabricated_optics(bundle, seed, cache_folder=folder)
+    assert optics.haze is None
+    return optics.psf
 
 
 def test_the_grid_is_twice_and_three_times_as_dense(bundle: Bundle, tmp_path: Path) -> None:
@@ -72,3 +75,20 @@ def test_a_bundle_without_a_lens_asks_for_one(bundle: Bundle, tmp_path: Path) ->
     with pytest.raises(ContractError, match="--prescription"):
         lens_text(bare, None)
     assert lens_text(bare, path) == LENS == lens_text(bundle, None)
+
+
+def test_the_haze_of_a_copy_comes_along_and_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "plate.camkit"
+    members = hazy_optics().members | {"prescription.toml": LENS.encode()}
+    hazy = write_bundle(path, hazy_manifest(), members)
+    folder = tmp_path / "kept"
+    first = fabricated_optics(hazy, 1, cache_folder=folder)
+    assert first.haze is not None
+    assert first.haze.cell_px == hazy.haze.cell_px
+    assert first.psf.kernels.shape[0] == 3  # the least, the bundle has two
+    kept = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    assert sorted(name.split("-")[0] for name in kept) == ["haze", "psf"]
+    again = fabricated_optics(hazy, 1, cache_folder=folder)
+    assert again.haze is not None
+    np.testing.assert_array_equal(first.haze.kernels, again.haze.kernels)
+    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == kept
