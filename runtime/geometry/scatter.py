@@ -7,7 +7,7 @@ would not be what light does.)
 Optics that are the same everywhere need no blocks: one kernel, in tiles that overlap by it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -94,11 +94,9 @@ def scatter_light(
             x_mm, y_mm = window.to_mm(x_px, y_px)
             kernels = kernels_at(float(x_mm), float(y_mm))
             down, across = (margin_px + side // 2 for side in kernels.shape[1:])
-            for total, block in (
-                (out, planes[:, top:bottom, left:right] * weight),
-                (light, weight[None]),
-            ):
-                spread = convolve_full(block, kernels, workers=workers)
+            blocks = (planes[:, top:bottom, left:right] * weight, weight[None])
+            spreads = convolve_full(blocks, kernels, workers=workers)
+            for total, spread in zip((out, light), spreads, strict=True):
                 _add_inside(total, spread, top - down, left - across)
     return out, light
 
@@ -165,22 +163,27 @@ def _add_inside(out: FloatArray, spread: FloatArray, top: int, left: int) -> Non
         out[:, first_row:bottom, first_column:right] += part
 
 
-def convolve_full(block: FloatArray, kernels: FloatArray, *, workers: int = 1) -> FloatArray:
-    """Give the full linear convolution (c, h + kh - 1, w + kw - 1) by FFT in float32.
+def convolve_full(
+    blocks: Sequence[FloatArray], kernels: FloatArray, *, workers: int = 1
+) -> Iterator[FloatArray]:
+    """Yield full linear convolutions (c, h + kh - 1, w + kw - 1) by FFT in float32.
 
     Args:
-        block: (c, h, w) float32, or (1, h, w) for all kernels.
-        kernels: (c, kh, kw) float32.
+        blocks: (c, h, w) float32 each, or (1, h, w) for all kernels; of one size.
+        kernels: (c, kh, kw) float32, transformed once.
         workers: Threads of the FFT.
     """
     import scipy.fft
 
-    full = tuple(b + k - 1 for b, k in zip(block.shape[1:], kernels.shape[1:], strict=True))
+    sides = blocks[0].shape[1:]
+    full = tuple(b + k - 1 for b, k in zip(sides, kernels.shape[1:], strict=True))
     size = [scipy.fft.next_fast_len(n, real=True) for n in full]
     spectrum = scipy.fft.rfft2(kernels, size, workers=workers)
-    spectrum *= scipy.fft.rfft2(block, size, workers=workers)
-    spread = scipy.fft.irfft2(spectrum, size, workers=workers)
-    return np.asarray(spread[:, : full[0], : full[1]], dtype=np.float32)
+    for block in blocks:
+        lit = spectrum.copy()
+        lit *= scipy.fft.rfft2(block, size, workers=workers)
+        spread = scipy.fft.irfft2(lit, size, workers=workers, overwrite_x=True)
+        yield np.asarray(spread[:, : full[0], : full[1]], dtype=np.float32)
 
 
 def _spans(length: int, step: int) -> list[tuple[int, int, FloatArray]]:

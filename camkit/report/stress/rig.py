@@ -7,6 +7,7 @@ What methods share (the planes in front of the first network) is computed once a
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -46,6 +47,8 @@ from camkit.runtime.twin.truth import light_sensor
 INPUT: Final = "input"
 BEFORE: Final = "before"
 """Marks the networks of the bundle that is compared with: "M before"."""
+KEPT_KERNELS: Final = 256
+"""Of a haze: those of the places around one scene, a few 100 MB at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,9 +178,14 @@ class Rig:
 
     def _lens(self, depth_mm: float, response: Response | None = None) -> Lens:
         haze = self.bundle.haze if self.bundle.manifest.has_haze else None
-        return lens_of(
+        lens = lens_of(
             self.bundle.psf, self.sensor, depth_mm=depth_mm, haze=haze, response=response
         )
+        if lens.haze is None:
+            return lens
+        # what every method made of a capture is spread by the same kernels
+        known = lru_cache(maxsize=KEPT_KERNELS)(lens.haze.haze_at)
+        return replace(lens, haze=replace(lens.haze, haze_at=known))
 
     def light(self, scene: Scene, lens: Lens | None = None) -> Light:
         """Let a scene fall on the sensor; that through the nominal lens is kept by its name."""

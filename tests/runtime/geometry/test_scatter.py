@@ -100,9 +100,10 @@ def test_threads_do_not_change_the_bits() -> None:
 
 def test_full_convolution_has_all_the_light() -> None:
     block = np.random.default_rng(5).random((3, 7, 11), dtype=np.float32)
-    full = convolve_full(block, kernel())
-    assert full.shape == (3, 15, 19)
+    full, ones = convolve_full([block, np.ones((1, 7, 11), np.float32)], kernel())
+    assert full.shape == ones.shape == (3, 15, 19)
     np.testing.assert_allclose(full.sum(axis=(1, 2)), block.sum(axis=(1, 2)), rtol=1e-5)
+    np.testing.assert_allclose(ones.sum(axis=(1, 2)), 77, rtol=1e-5)
 
 
 @pytest.mark.parametrize("channels", [1, 2, 6])
