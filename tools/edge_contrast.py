@@ -27,7 +27,7 @@ from camkit.contracts import depth_name
 from camkit.report.quality import FIELD_SHARES, crop_origin
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.twin.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, photograph
 from tools.capture.simulated import captured, color_sensor, rec709_of
 from tools.design.edge import (
     ACROSS,
@@ -162,7 +162,7 @@ def _edges(
             taken = SimulationOptions(
                 iso=ISO, seed=seed, origin_px=origin, depth_mm=depth_mm, distort=False
             )
-            simulation = simulate(scene, sensor, bundle.psf, taken)
+            simulation = photograph(scene, bundle, taken)
             truth = apply_matrix(matrix, simulation.clean)[1]
             for method, pipeline in pipelines.items():
                 restored = pipeline.start(captured(pipeline, simulation)).fill()

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
@@ -164,7 +165,7 @@ class _NetworkStage:
         if self._windows is None:
             raise ContractError("the windows of a network are planned before it runs")
         job, entry = self._job, self._entry
-        facts = self._windows.networks[0].facts
+        facts = self._facts()
         stand_in = self._stand_in(taken)
         noise = self._noise(taken[-1], len(facts.outputs))
         self._guard = TileGuard(
@@ -238,8 +239,11 @@ class _NetworkStage:
         )
 
     def _scale(self) -> int:
-        assert self._windows is not None
-        return self._windows.networks[0].facts.output_scale
+        return self._facts().output_scale
+
+    def _facts(self) -> NetworkFacts:
+        """Give what is known of the network; also where all cells of a picture go without it."""
+        return self._job.known_bundle.network_facts(self._entry.role, self._job.work.size)
 
 
 class _Channels:

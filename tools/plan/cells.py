@@ -3,7 +3,7 @@
     picture -> capture -> content, and per cell the squared sRGB error of exact, bank, development
                            and every other size of network
 
-The captures go through the bundle's own PSF; `tools/plan_report.py` fits the loss model to them.
+The captures go through the bundle's own optics; `tools/plan_report.py` fits the loss model to them.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,8 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import DEVELOP
 from camkit.runtime.plan.loss import EXACT
 from camkit.runtime.plan.rules.size import REFERENCE
-from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions
+from camkit.runtime.twin.simulate import photograph as photographed
 from tools.capture.simulated import captured, color_sensor, rec709_of
 
 PLAIN_TARGET: Final = "plain"
@@ -74,7 +75,7 @@ def photograph(
         exposure=exposure,
         depth_mm=float(rng.choice(depths_mm)),
     )
-    return simulate(scene, sensor, bundle.psf, options)
+    return photographed(scene, bundle, options)
 
 
 def sharp_of(simulation: Simulation, bundle: Bundle) -> FloatArray:
@@ -111,7 +112,9 @@ def pipelines(bundle: Bundle) -> Mapping[str, Pipeline]:
     for size in bundle.manifest.sizes:
         if size != REFERENCE:
             made[size] = Pipeline(bundle, Options(size=size, undistort=False, threads=1))
-    made[PLAIN_TARGET] = Pipeline(bundle, Options(method=DEVELOP, undistort=False, threads=1))
+    # where nothing else is done to a cell, the haze is taken out of it all the same
+    least = "haze" if bundle.manifest.has_haze else DEVELOP
+    made[PLAIN_TARGET] = Pipeline(bundle, Options(method=least, undistort=False, threads=1))
     return made
 
 

@@ -31,7 +31,7 @@ from camkit.runtime.geometry.warp import undistort_bands
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.rows import ArrayRows
-from camkit.runtime.twin.simulate import SimulationOptions, simulate
+from camkit.runtime.twin.simulate import SimulationOptions, photograph
 from camkit.runtime.twin.truth import ideal_picture
 from tools.capture.simulated import captured, color_sensor
 from tools.comparison.compact_json import to_compact_json
@@ -105,7 +105,7 @@ def loss_db(bundle: Bundle, path: Path, size: str) -> float:
     scene = picture[:, top : top + height, left : left + width]
     origin = crop_origin((width, height), (sensor.width_px, sensor.height_px), SHARE, (1, 1))
     options = SimulationOptions(iso=ISO, origin_px=origin)
-    taken = simulate(scene, sensor, bundle.psf, options)
+    taken = photograph(scene, bundle, options)
     truth = ideal_picture(taken, bundle)
     psnr = [_psnr_db(_made(_with(bundle, way), taken, size), truth) for way in WAYS]
     return psnr[0] - psnr[1]

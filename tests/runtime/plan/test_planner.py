@@ -15,7 +15,7 @@ from camkit.contracts import FloatArray
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.plan.decision import FULL, WIENER
+from camkit.runtime.plan.decision import FULL, PLAIN, WIENER
 from camkit.runtime.plan.estimate import estimate_seconds
 from camkit.runtime.plan.loss import plan_entries
 from camkit.runtime.plan.planner import Plan, default_size, make_plan, needs_content
@@ -168,6 +168,18 @@ def test_textured_half_has_the_bits_of_exact_and_the_flat_half_does_not(bundle: 
     exact = _picture(bundle, undistort=False)
     np.testing.assert_array_equal(adaptive[:, :, 544:], exact[:, :, 544:])
     assert (adaptive[:, :, :256] != exact[:, :, :256]).any()
+
+
+def test_a_picture_that_needs_no_network_anywhere_is_as_developed(tmp_path: Path) -> None:
+    generous = write_planned_bundle(tmp_path, model=replace(MODEL, adaptive_db=90.0))
+    work = _start(generous, quality="adaptive", undistort=False)
+    assert work.labels is not None
+    assert (work.labels == PLAIN).all()
+    assert work.explain() is not None
+    made, developed = work.fill(None), _picture(generous, method="develop", undistort=False)
+    # the way to equal noise and back rounds; on texture it ends what lies below black too
+    np.testing.assert_allclose(made[:, :, :480], developed[:, :, :480], atol=1e-5)
+    assert np.median(np.abs(made - developed)) < 1e-6
 
 
 def test_estimate_comes_with_the_decisions(bundle: Bundle) -> None:
