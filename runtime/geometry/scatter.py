@@ -93,12 +93,34 @@ def scatter_light(
             x_px, y_px = (left + right - 1) / 2 - margin_px, (top + bottom - 1) / 2 - margin_px
             x_mm, y_mm = window.to_mm(x_px, y_px)
             kernels = kernels_at(float(x_mm), float(y_mm))
-            down, across = (margin_px + side // 2 for side in kernels.shape[1:])
+            # of a kernel wider than the window, what throws light of this block into it
+            sides = kernels.shape[1:]
+            down, y = _reaching(sides[0], top - margin_px, bottom - margin_px, height)
+            across, x = _reaching(sides[1], left - margin_px, right - margin_px, width)
+            if min(down.stop - down.start, across.stop - across.start) < 1:
+                continue
             blocks = (planes[:, top:bottom, left:right] * weight, weight[None])
-            spreads = convolve_full(blocks, kernels, workers=workers)
+            spreads = convolve_full(blocks, kernels[:, down, across], workers=workers)
             for total, spread in zip((out, light), spreads, strict=True):
-                _add_inside(total, spread, top - down, left - across)
+                _add_inside(total, spread, y, x)
     return out, light
+
+
+def _reaching(side: int, first: int, last: int, inside: int) -> tuple[slice, int]:
+    """Give the part of a kernel along an axis that throws light of a block inside.
+
+    Args:
+        side: Of the kernel.
+        first: Pixel of the block, counted from the first one inside.
+        last: One past its last.
+        inside: Pixels inside.
+
+    Returns:
+        The part, and where the light of `first` through it begins.
+    """
+    begin = max(0, side // 2 - last + 1)
+    end = max(begin, min(side, inside + side // 2 - first))
+    return slice(begin, end), first + begin - side // 2
 
 
 def scatter_uniform(

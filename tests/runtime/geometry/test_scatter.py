@@ -5,7 +5,7 @@ import scipy.signal
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.geometry import scatter as scatter_module
-from camkit.runtime.geometry.scatter import convolve_full, scatter, scatter_uniform
+from camkit.runtime.geometry.scatter import convolve_full, scatter, scatter_light, scatter_uniform
 from camkit.runtime.geometry.sensor_window import SensorWindow
 
 FFT_ERROR = 2e-6
@@ -207,3 +207,22 @@ def test_planes_that_are_all_margin_are_refused(shape: tuple[int, int, int]) -> 
 def test_a_kernel_wider_than_its_margin_is_refused() -> None:
     with pytest.raises(ContractError, match="do not fit a margin"):
         scatter_uniform(planes(20, 20), kernel(side=2 * MARGIN + 3), margin_px=MARGIN)
+
+
+def test_of_a_kernel_wider_than_the_window_only_what_falls_inside_is_spread() -> None:
+    """Light from all of a wide margin, against the sum over every pixel."""
+    margin, side, size = 20, 41, 6
+    rng = np.random.default_rng(11)
+    wide = rng.random((1, side, side), dtype=np.float32)
+    picture = rng.random((1, size + 2 * margin, size + 2 * margin), dtype=np.float32)
+    place = window(size, size)
+    found, light = scatter_light(picture, lambda *_: wide, place, margin_px=margin, step_px=5)
+    for got, seen in ((found, picture[0]), (light, np.ones_like(picture[0]))):
+        wanted = [
+            [
+                float((seen[y : y + side, x : x + side] * wide[0, ::-1, ::-1]).sum())
+                for x in range(size)
+            ]
+            for y in range(size)
+        ]
+        np.testing.assert_allclose(got[0], wanted, rtol=2e-5)
