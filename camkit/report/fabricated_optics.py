@@ -52,6 +52,8 @@ def fabricated_optics(
     shape = bundle.psf.kernels.shape
     content = [text, bundle.manifest.sensor.model_dump_json(), repr((shape[:3], seed))]
     content.append(repr((_max_side_px(bundle.psf), ENERGY, [bundle.reference_depth_mm])))
+    if bundle.manifest.has_haze:
+        content.append(repr(bundle.haze.cell_px))
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"psf-{seed}-{name}.safetensors"
     beside = cached.with_stem(f"haze-{seed}-{name}") if bundle.manifest.has_haze else None
