@@ -80,6 +80,11 @@ class Extent(Entry):
     pixel_pitch_um: Positive
     optical_centre_px: tuple[float, float] | None = None
 
+    @property
+    def axis_px(self) -> tuple[float, float]:
+        """Give (x, y) of the optical axis, that of the middle where nothing else is stated."""
+        return self.optical_centre_px or ((self.width_px - 1) / 2, (self.height_px - 1) / 2)
+
 
 class PixelSensor(Entry):
     """What sensors have in common.

@@ -1,6 +1,6 @@
 """What is measured for people: the accuracy protocol, in the order of its work.
 
-    fabricated_optics   lenses with fabrication errors, traced afresh and densely
+    fabricated_optics  lenses with fabrication errors, traced afresh and densely
     quality          where a picture is placed, how it is captured and scored
     hdr_score        how well a picture of high dynamic range was recovered
     pu21, jod        what the eye sees of it, on a stated display

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.contracts import FloatArray
 from camkit.runtime.calibration.lattice import FloatGrid
 from camkit.runtime.capture import Capture
 from camkit.units import UM_PER_MM
@@ -74,3 +75,10 @@ def peak_share(
     noise = np.sqrt((1 - share) ** 2 * inner + share**2 * outer)
     black = level_error * abs(np.count_nonzero(near) - share * light.size)
     return share, float(np.hypot(noise, black)) / total
+
+
+def light_within(kernel: FloatArray) -> FloatGrid:
+    """Give the light of a kernel (n, n) within 0.5, 1.5, ... px of its middle."""
+    offset = np.arange(kernel.shape[-1]) - kernel.shape[-1] // 2
+    ring = np.rint(np.hypot(offset[:, None], offset)).astype(np.intp)
+    return np.asarray(np.cumsum(np.bincount(ring.ravel(), kernel.astype(np.float64).ravel())))

@@ -56,7 +56,7 @@ def place(capture: Capture, extent: Extent | None, assume: Assumption | None) ->
     if assume == "scale":
         return _scaled(size, extent)
     if assume == "centre":
-        axis_x, axis_y = _axis(extent)
+        axis_x, axis_y = extent.axis_px
         origin = (axis_x - (size[0] - 1) / 2, axis_y - (size[1] - 1) / 2)
         return Placement(
             window=_window(size, origin, extent),
@@ -72,11 +72,6 @@ def place(capture: Capture, extent: Extent | None, assume: Assumption | None) ->
         "for a crop say where it lies (origin_px), else use another bundle, or --assume centre "
         "(same pitch) or --assume scale"
     )
-
-
-def _axis(extent: Extent) -> tuple[float, float]:
-    middle = ((extent.width_px - 1) / 2, (extent.height_px - 1) / 2)
-    return extent.optical_centre_px or middle
 
 
 def _window(size: tuple[int, int], origin: tuple[float, float], extent: Extent) -> SensorWindow:

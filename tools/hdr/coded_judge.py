@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.report.hdr_score import Reference, hdr_scores
+from camkit.runtime.calibration.peak import light_within
 from camkit.scenes.saturation import CEILING
 from camkit.streaks.cells import cells_of, coarser, sample_sites
 from camkit.streaks.convolution import Convolution
@@ -142,9 +143,7 @@ def light_by_start(seen: Seen, psf: FloatArray) -> list[float | None]:
 
 def reach_px(psf: FloatArray) -> int:
     """Give the radius in which `REACH_SHARE` of every colour of a PSF lies."""
-    offset = np.arange(psf.shape[1]) - psf.shape[1] // 2
-    ring = np.rint(np.hypot(offset[:, None], offset[None, :])).astype(np.intp).ravel()
-    inside = [np.cumsum(np.bincount(ring, plane.ravel())) for plane in psf]
+    inside = [light_within(plane) for plane in psf]
     return max(int(np.searchsorted(light / light[-1], REACH_SHARE)) for light in inside)
 
 

@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, PlanesSensor
 from camkit.contracts import FrozenPsf
+from camkit.report.calibration.lensfun_page import POINTS, half_diagonal_mm, placed_along
 from camkit.report.calibration.page import Section, Table, to_html
 from camkit.report.figure import GRID_COLOR, field_color, new_figure, to_png
 from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.geometry.distortion import distort_points, reference_channel
+from camkit.runtime.calibration.peak import light_within
+from camkit.runtime.geometry.distortion import reference_channel
 from camkit.units import to_mm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatGrid = NDArray[np.float64]
-_POINTS: Final = 257
 _LEVELS: Final = {
     "black_level": "black level, DN",
     "white_level": "white level, DN",
@@ -75,38 +76,30 @@ def bundle_html(before: Bundle, made: Bundle, record: Mapping[str, Any]) -> str:
 def moved(before: Bundle, made: Bundle) -> Curve:
     """Give how much farther out light lies than without distortion, px; 0 where none is stated."""
     extent = made.manifest.sensor.known_extent
-    pitch_mm = to_mm(extent.pixel_pitch_um)
-    ideal_mm = np.linspace(0, np.hypot(extent.width_px, extent.height_px) / 2 * pitch_mm, _POINTS)
-    points = np.stack([ideal_mm, np.zeros(_POINTS)], axis=-1)
+    pitch_mm, ideal_mm = to_mm(extent.pixel_pitch_um), half_diagonal_mm(extent)
     found = []
     for bundle in (before, made):
         if not _states(bundle, "distortion"):
-            found.append(np.zeros(_POINTS))
+            found.append(np.zeros(ideal_mm.size))
             continue
         rows = bundle.distortion
-        placed = distort_points(points, rows, channel=reference_channel(rows))[:, 0]
-        found.append((placed - ideal_mm) / pitch_mm)
+        placed_mm = placed_along(ideal_mm, rows, reference_channel(rows))
+        found.append((placed_mm - ideal_mm) / pitch_mm)
     return Curve(radius=ideal_mm / pitch_mm, before=found[0], now=found[1])
 
 
 def light(before: Bundle, made: Bundle) -> Curve:
     """Give relative illumination over the height in mm; 1 where a bundle states none."""
     found = [_light_of(bundle) for bundle in (before, made)]
-    heights_mm = np.linspace(0, max(known[0][-1] for known in found), _POINTS)
+    heights_mm = np.linspace(0, max(known[0][-1] for known in found), POINTS)
     first, second = (np.interp(heights_mm**2, at**2, value) for at, value in found)
     return Curve(radius=heights_mm, before=first, now=second)
 
 
 def held(bundle: Bundle) -> list[FloatGrid]:
     """Give the share of every colour's light within 0, 1, ... px of the middle, on the axis."""
-    kernels = (
-        color_kernels(bundle.psf, *_sensor(bundle).response_arrays())
-        .at(0.0, 0.0)
-        .astype(np.float64)
-    )
-    offset = np.arange(kernels.shape[-1]) - kernels.shape[-1] // 2
-    ring = np.rint(np.hypot(offset[:, None], offset)).astype(np.intp).ravel()
-    return [np.cumsum(np.bincount(ring, kernel.ravel())) for kernel in kernels]
+    kernels = color_kernels(bundle.psf, *_sensor(bundle).response_arrays())
+    return [light_within(kernel) for kernel in kernels.at(0.0, 0.0)]
 
 
 def _sensor(bundle: Bundle) -> BayerSensor | PlanesSensor:
@@ -192,9 +185,7 @@ def draw(curves: Sequence[Curve], across: str, up: str) -> "Figure":
 
 
 def _centre(bundle: Bundle) -> str:
-    extent = bundle.manifest.sensor.known_extent
-    middle = (extent.width_px - 1) / 2, (extent.height_px - 1) / 2
-    x, y = extent.optical_centre_px or middle
+    x, y = bundle.manifest.sensor.known_extent.axis_px
     return f"{x:.2f}, {y:.2f}"
 
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.bundle.sensor import Extent
+from camkit.contracts import RadialDistortion
 from camkit.report.calibration.page import Section, Table, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.lensfun.entry import Entry
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatGrid = NDArray[np.float64]
-_POINTS: Final = 257
+POINTS: Final = 257
 _BLUE: Final = "#1f6fb4"
 
 
@@ -51,7 +53,7 @@ def bundle_html(made: LensBundle) -> str:
 
 def curves_of_entry(made: Entry) -> Curves:
     """Give what an entry says and what it misses of its source."""
-    placed = np.linspace(0, made.source.corner_px, _POINTS)
+    placed = np.linspace(0, made.source.corner_px, POINTS)
     straight = made.straight_px(placed)
     half_px = float(np.hypot(*made.size_px)) / 2
     return Curves(
@@ -65,13 +67,11 @@ def curves_of_entry(made: Entry) -> Curves:
 def curves_of_bundle(made: LensBundle) -> Curves:
     """Give what a bundle does and what it misses of lensfun's formula; green, else all colours."""
     found, extent = made.found, made.manifest.sensor.known_extent
-    pitch_mm = to_mm(extent.pixel_pitch_um)
-    ideal_mm = np.linspace(0, np.hypot(extent.width_px, extent.height_px) / 2 * pitch_mm, _POINTS)
+    pitch_mm, ideal_mm = to_mm(extent.pixel_pitch_um), half_diagonal_mm(extent)
     profile = found.profile
     assert profile.distortion is not None  # lensfun-in makes none without
     rows = profile.distortion.to_distortion()
-    points = np.stack([ideal_mm, np.zeros(_POINTS)], axis=-1)
-    placed = distort_points(points, rows, channel=0)[:, 0]
+    placed = placed_along(ideal_mm, rows, 0)
     unit_mm = rows.radius_mm
     formula = found.distortion.placed(found.scale * ideal_mm / unit_mm) * unit_mm
     light = None
@@ -84,6 +84,18 @@ def curves_of_bundle(made: LensBundle) -> Curves:
         missed_px=(placed - formula) / pitch_mm,
         light=light,
     )
+
+
+def half_diagonal_mm(extent: Extent) -> FloatGrid:
+    """Give `POINTS` radii from the middle of a sensor to its corner."""
+    half_px = np.hypot(extent.width_px, extent.height_px) / 2
+    return np.linspace(0, half_px * to_mm(extent.pixel_pitch_um), POINTS)
+
+
+def placed_along(ideal_mm: FloatGrid, rows: RadialDistortion, channel: int) -> FloatGrid:
+    """Give where light of ideal radii falls."""
+    points = np.stack([ideal_mm, np.zeros(ideal_mm.size)], axis=-1)
+    return distort_points(points, rows, channel=channel)[:, 0]
 
 
 def _html(title: str, curves: Curves, made: Entry | LensBundle) -> str:

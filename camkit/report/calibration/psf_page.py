@@ -7,7 +7,7 @@ import numpy as np
 from camkit.report.calibration.page import Section, Table, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.measured import ColourFacts, MeasuredPsf
-from camkit.runtime.calibration.peak import PEAK_PX
+from camkit.runtime.calibration.peak import PEAK_PX, light_within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,10 +77,8 @@ def draw_shares(found: MeasuredPsf) -> "Figure":
     """Draw how much light lies within a radius."""
     figure = new_figure(6.0, 3.2)
     panel = figure.subplots()
-    offset = np.arange(found.side_px) - found.side_px // 2
-    ring = np.rint(np.hypot(offset[:, None], offset[None])).astype(np.intp).ravel()
     for colour, kernel in zip(found.colours, found.psf.kernels[0, 0], strict=True):
-        inside = np.cumsum(np.bincount(ring, kernel.astype(np.float64).ravel()))
+        inside = light_within(kernel)
         panel.semilogx(
             np.arange(inside.size) + 0.5, inside, color=_COLORS[colour.colour], label=colour.colour
         )
