@@ -23,11 +23,19 @@ import numpy as np
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
-from camkit.bundle.haze_file import read_haze
+from camkit.bundle.haze_file import haze_to_bytes, read_haze
 from camkit.bundle.haze_golden import haze_golden_to_bytes
 from camkit.bundle.manifest import Manifest, Threshold, format_of, planes_of
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
-from camkit.bundle.reader import CARD, GOLDEN, HAZE_GOLDEN, PREVIEW, STRESS_PSF, Bundle
+from camkit.bundle.reader import (
+    CARD,
+    GOLDEN,
+    HAZE_GOLDEN,
+    PREVIEW,
+    STRESS_HAZE,
+    STRESS_PSF,
+    Bundle,
+)
 from camkit.bundle.stages import Dehaze, Stage, Wiener
 from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.writer import write_bundle
@@ -255,11 +263,29 @@ def _windows(bundle: Bundle, cases: Cases) -> dict[tuple[str, str], list[FloatAr
 
 
 def _members(parts: Parts, camera: _Camera) -> dict[str, bytes]:
-    members = camera.optics.members
-    if parts.stress_psf is not None:
-        members[STRESS_PSF] = psf_to_bytes(read_psf(parts.stress_psf))
+    members = camera.optics.members | _stress_members(parts, camera.optics)
     checkpoints = [c for sizes in camera.checkpoints.values() for c in sizes.values()]
     return members | designed_members(parts, checkpoints, camera.optics.psf)
+
+
+def _stress_members(parts: Parts, optics: FrozenOptics) -> dict[str, bytes]:
+    """Give kernels off the design point, with their haze where there is one.
+
+    Raises:
+        ContractError: If a haze is given without its kernels, of other samples, or for optics that
+            have none.
+    """
+    if parts.stress_haze is None:
+        found = parts.stress_psf
+        return {} if found is None else {STRESS_PSF: psf_to_bytes(read_psf(found))}
+    if parts.stress_psf is None or optics.haze is None:
+        raise ContractError(
+            f"{parts.stress_haze} is the haze of kernels off the design point, for optics with a "
+            "haze; say --stress-psf too, or keep it in a folder of its own"
+        )
+    stress = FrozenOptics(psf=read_psf(parts.stress_psf), haze=read_haze(parts.stress_haze))
+    assert stress.haze is not None
+    return {STRESS_PSF: psf_to_bytes(stress.psf), STRESS_HAZE: haze_to_bytes(stress.haze)}
 
 
 def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:

@@ -13,6 +13,7 @@ class Parts:
         psf: Frozen PSF of `camkit freeze`.
         haze: What `camkit freeze --haze` wrote beside it; None for optics without.
         stress_psf: Kernels off the design point.
+        stress_haze: The haze beside them; None for optics without.
         prescription: The lens as designed; None for that of the checkpoints.
         plate: The plate as designed, a file or a name; None for that of the checkpoints.
         without_plate: Leave that of the checkpoints out: the PSF is of none.
@@ -26,6 +27,7 @@ class Parts:
     psf: Path
     haze: Path | None = None
     stress_psf: Path | None = None
+    stress_haze: Path | None = None
     prescription: Path | None = None
     plate: Path | None = None
     without_plate: bool = False

@@ -50,6 +50,7 @@ from camkit.streaks.optics import StreakOptics
 SUFFIX: Final = ".camkit"
 MANIFEST: Final = "manifest.json"
 STRESS_PSF: Final = "stress_psf.safetensors"
+STRESS_HAZE: Final = "stress_haze.safetensors"
 GOLDEN: Final = "golden.safetensors"
 HAZE_GOLDEN: Final = "haze_golden.safetensors"
 PRESCRIPTION: Final = "prescription.toml"
@@ -217,6 +218,22 @@ class Bundle:
             return None
         return psf_from_bytes(self.member(STRESS_PSF), what=STRESS_PSF)
 
+    def stress_haze(self) -> Haze | None:
+        """Give the haze beside the kernels off the design point, None if the bundle has none.
+
+        Raises:
+            BundleError: If it is damaged, no haze, or not of the samples of those kernels.
+        """
+        psf = self.stress_psf()
+        if STRESS_HAZE not in self.manifest.members or psf is None:
+            return None
+        haze = haze_from_bytes(self.member(STRESS_HAZE), what=STRESS_HAZE)
+        try:
+            haze.check_beside(psf)
+        except ContractError as error:
+            raise BundleError(f"{STRESS_HAZE} is not of {STRESS_PSF}: {error}") from error
+        return haze
+
 
 def open_bundle(path: Path | str, *, max_bytes: int = MAX_BUNDLE_BYTES) -> Bundle:
     """Read a bundle in place and check it; nothing is written to disk.
@@ -341,7 +358,7 @@ def _check_names(manifest: Manifest, sizes: Mapping[str, int]) -> None:
 
 
 def _check_references(manifest: Manifest) -> None:
-    needed = {}
+    needed, members = {}, manifest.members
     for role, sizes in manifest.networks.items():
         for size, facts in sizes.items():
             needed[facts.member] = f"network {size} ({role})"
@@ -353,10 +370,10 @@ def _check_references(manifest: Manifest) -> None:
         needed[manifest.optics.haze_member] = "the haze of the optics"
     if manifest.golden:
         needed[GOLDEN] = "the golden cases"
-    if PLATE_HEIGHTS in manifest.members:
-        needed[PLATE] = f"what {PLATE_HEIGHTS} holds"
+    beside = {PLATE_HEIGHTS: PLATE, STRESS_HAZE: STRESS_PSF}
+    needed |= {name: f"what {what} holds" for what, name in beside.items() if what in members}
     for name, user in needed.items():
-        if name not in manifest.members:
+        if name not in members:
             raise BundleError(f"{user} needs the member {name}, which the bundle does not have")
 
 

@@ -31,6 +31,7 @@ from camkit.runtime.twin.haze import HazeLens, hazed, margin_px
 
 Gains = tuple[float, ...]
 KernelChange = Callable[[FloatArray], FloatArray]
+PlaceChange = Callable[[float, float], tuple[float, float]]
 Response = tuple[NDArray[np.float64], NDArray[np.float64]]
 WIDE_MARGIN_PX: Final = 65
 """From here on kernels that are the same everywhere are spread at once; smaller ones keep the bits
@@ -170,9 +171,14 @@ def with_kernels(lens: Lens, change: KernelChange) -> Lens:
 
 def with_axis_moved(lens: Lens, x_mm: float, y_mm: float) -> Lens:
     """Give a lens whose axis meets the sensor beside its middle."""
+    return with_places(lens, lambda x, y: (x - x_mm, y - y_mm))
+
+
+def with_places(lens: Lens, place: PlaceChange) -> Lens:
+    """Give a lens whose kernels at (x, y) mm are those that another has at `place(x, y)`."""
 
     def moved(lookup: KernelLookup) -> KernelLookup:
-        return lambda x, y: lookup(x - x_mm, y - y_mm)
+        return lambda x, y: lookup(*place(x, y))
 
     haze = lens.haze
     if haze is not None:

@@ -24,6 +24,7 @@ from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.checkpoint import Checkpoint, write_checkpoint
 from camkit.runtime.plan.loss import plan_entries
 from camkit.runtime.proof.golden_run import case_work
+from tests.deep_bundle import deep_psf
 from tests.haze_factory import CELL_PX, tiny_haze
 from tests.plan_factory import MODEL
 
@@ -255,6 +256,27 @@ def test_a_camera_with_a_haze_is_exported_with_its_case_of_cells(
     assert types[types.index("demosaic") + 1 :][:3] == ["haze", "wiener", "network"]
     assert HAZE_GOLDEN in bundle.names
     assert any("the haze of 80 x 70 cells" in str(line) for line in report.values())
+
+
+def test_what_it_is_at_other_distances_goes_with_its_haze(
+    parts: Parts, hazy_parts: Parts, tmp_path: Path
+) -> None:
+    stress = tmp_path / "stress_psf.safetensors"
+    beside = tmp_path / "stress_haze.safetensors"
+    write_psf(stress, _psf())
+    write_haze(beside, tiny_haze(_psf(), share=0.4))
+    both = replace(hazy_parts, stress_psf=stress, stress_haze=beside)
+    export_bundle(both, tmp_path / "hazy.camkit")
+    found = open_bundle(tmp_path / "hazy.camkit").stress_haze()
+    assert found is not None
+    np.testing.assert_array_equal(found.kernels, tiny_haze(_psf(), share=0.4).kernels)
+    for bad in (replace(both, stress_psf=None), replace(parts, stress_haze=beside)):
+        with pytest.raises(ContractError, match="haze of kernels off the design point"):
+            export_bundle(bad, tmp_path / "x.camkit")
+    write_haze(beside, tiny_haze(deep_psf()))
+    with pytest.raises(ContractError, match=r"different (depths|field_heights)_mm"):
+        export_bundle(both, tmp_path / "x.camkit")
+    assert not (tmp_path / "x.camkit").exists()
 
 
 def test_a_haze_and_the_stage_that_undoes_it_come_together(

@@ -5,8 +5,7 @@
 Every picture is repeated, every second one mirrored, until it fills the frame, and photographed
 through a fabricated copy of the lens that no training saw, haze included. The capture is developed
 only (`develop`), freed of its haze (`haze`), restored by the filter alone (`wiener`), and by every
-network. More bundles of
-the same camera, `SEED=FILE`, add their networks: of other seeds, say.
+network. More bundles of the same camera, `SEED=FILE`, add their networks: of other seeds, say.
 
 dB are of sRGB, mean over the pictures. `level` is the error of the means of blocks of 64 px and
 `detail` all that is left: together they are the whole error. `rim` is what lies within --rim-px of

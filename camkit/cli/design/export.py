@@ -10,6 +10,7 @@ from camkit.cli.choices import Debug, Json, Overwrite
 PSF_NAME = "psf.safetensors"
 HAZE_NAME = "haze.safetensors"
 STRESS_NAME = "stress_psf.safetensors"
+STRESS_HAZE_NAME = "stress_haze.safetensors"
 REPORT_NAME = "freeze.json"
 PLAN_NAME = "plan.json"
 NO_PLATE = "none"
@@ -31,6 +32,10 @@ def export(
     stress_psf: Annotated[
         Path | None,
         typer.Option(help=f"Kernels off the design point; default: {STRESS_NAME} there, if any."),
+    ] = None,
+    stress_haze: Annotated[
+        Path | None,
+        typer.Option(help=f"The haze beside them; default: {STRESS_HAZE_NAME} there, if any."),
     ] = None,
     freeze: Annotated[
         Path | None,
@@ -76,6 +81,7 @@ def export(
             psf=frozen,
             haze=haze or _beside(frozen.parent, HAZE_NAME),
             stress_psf=stress_psf or _beside(folder, STRESS_NAME),
+            stress_haze=stress_haze or _beside(folder, STRESS_HAZE_NAME),
             prescription=prescription,
             plate=None if plate in (None, NO_PLATE) else Path(plate),
             without_plate=plate == NO_PLATE,

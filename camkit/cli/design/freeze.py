@@ -16,6 +16,7 @@ from camkit.cli.say import say
 from camkit.errors import ContractError, UnsupportedError
 
 if TYPE_CHECKING:
+    from camkit.bundle.frozen_optics import FrozenOptics
     from camkit.bundle.sensor import ColorSensor
     from camkit.bundle.stages import Wiener
     from camkit.models_def.optics.diffraction.freezing import PlateReport
@@ -85,6 +86,10 @@ def freeze(
     stress_out: Annotated[
         Path | None, typer.Option(help="Also write kernels off the design point there.")
     ] = None,
+    stress_haze: Annotated[
+        Path | None,
+        typer.Option(help="With --haze and --stress-out: the haze at those distances."),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Also write the report there, as JSON for `export`.")
     ] = None,
@@ -95,7 +100,7 @@ def freeze(
     """Keep as few PSF samples of a lens or a plate as the stated loss allows (needs torch)."""
     from camkit.cli.design.design_time import print_report, refuse_existing, require_torch
 
-    refuse_existing([out, haze, stress_out, report], overwrite=overwrite)
+    refuse_existing([out, haze, stress_out, stress_haze, report], overwrite=overwrite)
     depths = _depths(depths_mm)
     if unit or captures:
         from camkit.bundle.reader import SUFFIX
@@ -103,6 +108,7 @@ def freeze(
         beside = {
             "--haze": haze,
             "--stress-out": stress_out,
+            "--stress-haze": stress_haze,
             "--report": report,
             "--limit-db": None if limit_db == LIMIT_DB else limit_db,
             "--energy": energy,
@@ -126,6 +132,8 @@ def freeze(
 
     sensor, bank = _camera_of(recipe)
     found = read_optics(optics)
+    if (stress_haze is None) != (haze is None or stress_out is None):
+        raise ContractError("of a lens with a haze, --stress-out and --stress-haze go together")
     if haze is not None:
         chosen = {
             "--depths-mm": depths_mm is not None,
@@ -133,11 +141,13 @@ def freeze(
             "--energy": energy is not None,
             "--max-side-px": max_side_px is not None,
             "--focus-um": focus_um is not None,
-            "--stress-out": stress_out is not None,
         }
         if named := [name for name, said in chosen.items() if said]:
             raise ContractError(f"with --haze nothing is chosen; leave {', '.join(named)} out")
-        _report(_freeze_hazy(found, out, haze, sensor), report, json_)
+        told = _freeze_hazy(found, out, haze, sensor)
+        if stress_out is not None and stress_haze is not None:
+            _freeze_distances(found, stress_out, stress_haze, sensor)
+        _report(told, report, json_)
         return
     moved_um = focus_range_um(found, focus_um)
     base = WINDOW if isinstance(found, PlateOptics) else FreezeGrid()
@@ -150,11 +160,11 @@ def freeze(
         least_energy=base.least_energy if energy is None else None,
     )
     out.parent.mkdir(parents=True, exist_ok=True)
-    told = _freeze(found, out, _Wanted(sensor, bank, grid, limit_db, moved_um))
+    facts = _freeze(found, out, _Wanted(sensor, bank, grid, limit_db, moved_um))
     if stress_out is not None:
         stress_out.parent.mkdir(parents=True, exist_ok=True)
         write_psf(stress_out, freeze_stress(found, sensor, grid).psf)
-    _report(told.to_json(), report, json_)
+    _report(facts.to_json(), report, json_)
 
 
 def _report(told: dict[str, int | float | str], report: Path | None, json_: bool) -> None:
@@ -171,20 +181,35 @@ def _freeze_hazy(
     optics: "Optics", out: Path, haze_out: Path, sensor: "ColorSensor"
 ) -> dict[str, int | float | str]:
     """Freeze the peaks of a lens and the haze beside them."""
-    from camkit.bundle.haze_file import write_haze
-    from camkit.bundle.psf_file import write_psf
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.thin.freezing import freeze_hazy
 
     if not isinstance(optics, LensOptics):
         raise UnsupportedError("only a lens is frozen as core and haze; leave --haze out")
     frozen, told = freeze_hazy(optics.lens, sensor, tell=_tell)
+    _write_optics(frozen, out, haze_out)
+    return told.to_json()
+
+
+def _freeze_distances(optics: "Optics", out: Path, haze_out: Path, sensor: "ColorSensor") -> None:
+    """Freeze what they are at other object distances."""
+    from camkit.models_def.optics.lens_optics import LensOptics
+    from camkit.models_def.optics.thin.nearer import freeze_distances
+
+    assert isinstance(optics, LensOptics)
+    _write_optics(freeze_distances(optics.lens, sensor, tell=_tell), out, haze_out)
+
+
+def _write_optics(frozen: "FrozenOptics", out: Path, haze_out: Path) -> None:
+    """Write kernels and haze to two files."""
+    from camkit.bundle.haze_file import write_haze
+    from camkit.bundle.psf_file import write_psf
+
     assert frozen.haze is not None
     for path in (out, haze_out):
         path.parent.mkdir(parents=True, exist_ok=True)
     write_psf(out, frozen.psf)
     write_haze(haze_out, frozen.haze)
-    return told.to_json()
 
 
 class _Wanted(NamedTuple):

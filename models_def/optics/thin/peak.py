@@ -25,6 +25,8 @@ RAYS: Final = 40_000
 _BIN_PX: Final = 1.0
 _CANDIDATES: Final = 12
 _FINE_PX: Final = (-0.25, 0.25)
+_TIE: Final = 1e-9
+"""Shares of light that differ by less are alike."""
 
 Array = NDArray[np.float64]
 
@@ -102,6 +104,9 @@ def land_light(
 def peak_height_px(light: LandedLight) -> float:
     """Give the place of the peak on the meridian.
 
+    It is the disc of most light; a point smaller than the disc fills many of them alike, and lies
+    in the middle of the one that is meant.
+
     Raises:
         ContractError: If no light arrives.
     """
@@ -113,9 +118,18 @@ def peak_height_px(light: LandedLight) -> float:
     edges = np.arange(low, float(y_px.max()) + PEAK_PX + _BIN_PX, _BIN_PX)
     count, _ = np.histogram(y_px, bins=edges, weights=share)
     wide = np.convolve(count, np.ones(int(2 * PEAK_PX / _BIN_PX)), "same")
-    middles = edges[np.argsort(wide)[-_CANDIDATES:]]
+    alike = edges[:-1][wide >= wide.max() * (1 - _TIE)]
+    middles = np.append(edges[np.argsort(wide)[-_CANDIDATES:]], alike.mean())
     places = (middles[:, None] + np.array(_FINE_PX)).ravel()
-    return float(max(places, key=lambda place: within(light, float(place), PEAK_PX)))
+    shares = np.array([within(light, float(place), PEAK_PX) for place in places])
+    best = places[shares >= shares.max() * (1 - _TIE)]
+    return float(min(best, key=lambda place: abs(_gravity_px(light, float(place)) - place)))
+
+
+def _gravity_px(light: LandedLight, height_px: float) -> float:
+    """Give the centre of gravity along the meridian of the light near a place."""
+    near = np.hypot(light.x_px, light.y_px - height_px) < PEAK_PX
+    return float((light.share[near] * light.y_px[near]).sum() / light.share[near].sum())
 
 
 def within(light: LandedLight, height_px: float, radius_px: float) -> float:

@@ -21,6 +21,7 @@ from safetensors.numpy import load, save
 
 from camkit.bundle import reader
 from camkit.bundle.container import MAX_MEMBERS, check_name
+from camkit.bundle.haze_file import haze_to_bytes
 from camkit.bundle.manifest import format_of
 from camkit.bundle.psf_file import psf_to_bytes
 from camkit.bundle.reader import Bundle, bundle_from_bytes, find_bundle, open_bundle
@@ -35,9 +36,10 @@ from tests.bundle_factory import (
     tiny_stages,
     write_tiny_bundle,
 )
-from tests.deep_bundle import write_deep_bundle
+from tests.deep_bundle import deep_psf, write_deep_bundle
 from tests.disk_watch import nothing_written
 from tests.focus_bundle import write_focus_bundle
+from tests.haze_factory import tiny_haze
 from tests.psf_factory import streak_kernel, uniform_psf
 
 GOOD = bundle_to_bytes(tiny_manifest(), tiny_members())
@@ -382,6 +384,25 @@ def test_stress_psf_is_read_as_a_psf() -> None:
     stress = bundle_from_bytes(data, path=Path("x.camkit")).stress_psf()
     assert stress is not None
     np.testing.assert_array_equal(stress.kernels, tiny_psf().kernels)
+
+
+def _with_stress(**members: bytes) -> bytes:
+    named = {f"{name}.safetensors": data for name, data in members.items()}
+    return bundle_to_bytes(tiny_manifest(), tiny_members() | named)
+
+
+def test_stress_haze_is_read_beside_its_kernels() -> None:
+    psf, haze = psf_to_bytes(tiny_psf()), haze_to_bytes(tiny_haze())
+    assert _bundle().stress_haze() is None
+    both = bundle_from_bytes(_with_stress(stress_psf=psf, stress_haze=haze), path=Path("x.camkit"))
+    found = both.stress_haze()
+    assert found is not None
+    np.testing.assert_array_equal(found.kernels, tiny_haze().kernels)
+    _refuse(_with_stress(stress_haze=haze), "what stress_haze.safetensors holds needs the member")
+    other = psf_to_bytes(deep_psf())
+    odd = bundle_from_bytes(_with_stress(stress_psf=other, stress_haze=haze), path=Path("x.camkit"))
+    with pytest.raises(BundleError, match=r"stress_haze\.safetensors is not of stress_psf"):
+        odd.stress_haze()
 
 
 def _bundle() -> Bundle:

@@ -219,7 +219,8 @@ def test_export_finds_what_lies_beside_the_checkpoint(
         optimizer={},
     )
     write_checkpoint(tmp_path / "one.pt", checkpoint)
-    for name in ("psf.safetensors", "haze.safetensors", "freeze.json", "plan.json"):
+    beside = ("psf.safetensors", "haze.safetensors", "stress_haze.safetensors")
+    for name in (*beside, "freeze.json", "plan.json"):
         (tmp_path / name).write_bytes(b"{}")
     elsewhere = tmp_path / "other"
     elsewhere.mkdir()
@@ -243,6 +244,7 @@ def test_export_finds_what_lies_beside_the_checkpoint(
     assert (parts.psf, parts.freeze) == (tmp_path / "psf.safetensors", tmp_path / "freeze.json")
     assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
     assert parts.stress_psf is None
+    assert parts.stress_haze == tmp_path / "stress_haze.safetensors"
     assert parts.prescription is None, "the lens of the checkpoint"
     assert (parts.plate, parts.without_plate) == (None, False), "its plate"
     assert (named.plate, named.without_plate) == (Path("streak-4"), False)

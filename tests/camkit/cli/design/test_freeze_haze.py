@@ -8,7 +8,7 @@ import pytest
 from camkit.bundle.haze_file import read_haze
 from camkit.bundle.psf_file import read_psf
 from camkit.cli.exit_code import ExitCode
-from camkit.models_def.optics.thin import freezing
+from camkit.models_def.optics.thin import freezing, nearer
 
 LENS = "thin-plate"
 
@@ -32,6 +32,30 @@ def test_a_lens_is_frozen_as_core_and_haze(
     again = camkit_command(*words)
     assert again.code == ExitCode.USAGE
     assert "--overwrite" in again.err
+
+
+def test_other_distances_are_frozen_beside_it(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for made, few in (
+        (freezing.freeze_hazy, {"fields": 3, "wavelengths": 2, "rays": 1000}),
+        (nearer.freeze_distances, {"distances_mm": (1000.0,), "wavelengths": 2, "rays": 500}),
+    ):
+        monkeypatch.setattr(made, "__kwdefaults__", dict(made.__kwdefaults__) | few)
+    out, haze, psf, beside = (tmp_path / name for name in ("p.st", "h.st", "sp.st", "sh.st"))
+    words = ("freeze", LENS, "-o", out, "--haze", haze, "--stress-out", psf)
+    outcome = camkit_command(*words)
+    assert outcome.code == ExitCode.USAGE
+    assert "--stress-out and --stress-haze go together" in outcome.err
+    assert not out.exists()
+    outcome = camkit_command(*words, "--stress-haze", beside)
+    assert outcome.code == 0, outcome.err
+    assert read_psf(psf).depths_mm.tolist() == [1000.0, float("inf")]
+    read_haze(beside).check_beside(read_psf(psf))
+    again = camkit_command("freeze", LENS, "-o", tmp_path / "x.st", "--stress-haze", beside)
+    assert "--overwrite" in again.err
+    alone = ("freeze", LENS, "-o", tmp_path / "x.st", "--stress-haze", tmp_path / "y.st")
+    assert "go together" in camkit_command(*alone).err
 
 
 def test_what_haze_does_not_choose_is_refused(camkit_command, tmp_path: Path) -> None:

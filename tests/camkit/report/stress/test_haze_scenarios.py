@@ -1,11 +1,15 @@
 """Cameras behind a haze: its light, size and black are as stated, and chi^2 knows of it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from camkit.bundle.reader import Bundle
+from camkit.bundle.haze_file import haze_to_bytes
+from camkit.bundle.psf_file import psf_to_bytes
+from camkit.bundle.reader import Bundle, open_bundle
+from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.report.stress.consistency import residual
 from camkit.report.stress.kernel_change import with_transformed
@@ -21,7 +25,9 @@ from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.twin.exposure import Setting
 from camkit.runtime.twin.haze import HazeLens
 from tests.bundle_factory import tiny_sensor
-from tests.haze_bundle import write_hazy_bundle
+from tests.deep_bundle import deep_psf
+from tests.haze_bundle import hazy_manifest, hazy_optics, write_hazy_bundle
+from tests.haze_factory import tiny_haze
 
 SPLIT, DARK, SCALE = choose("energy_split,lost_dark_frame,psf_scale")
 PLACE = (0.2, 0.1)
@@ -169,6 +175,34 @@ def test_a_stress_psf_says_nothing_of_a_haze(hazy: Bundle, monkeypatch: pytest.M
     (defocus,) = choose("defocus")
     monkeypatch.setattr(type(hazy), "stress_psf", lambda self: self.psf)
     assert "nothing of its haze" in (defocus.applies(hazy) or "")
+
+
+def test_nearer_objects_are_worse_behind_a_haze(tmp_path: Path, scene: Scene) -> None:
+    widening = deep_psf((1000.0, 2000.0, 4000.0))
+    sharp_far = replace(
+        widening,
+        kernels=widening.kernels[:, ::-1].copy(),
+        depths_mm=np.array([500.0, 1000.0, np.inf]),
+    )
+    wide = tiny_haze(sharp_far)
+    # an object far away has most light in its core
+    share = wide.core_share * np.array([0.5, 0.8, 1.0])[:, None]
+    members = hazy_optics().members | {
+        "stress_psf.safetensors": psf_to_bytes(sharp_far),
+        "stress_haze.safetensors": haze_to_bytes(replace(wide, core_share=share)),
+    }
+    path = tmp_path / "near.camkit"
+    write_bundle(path, hazy_manifest(sensor=tiny_sensor(320, 240)), members)
+    near = open_bundle(path)
+    (defocus,) = choose("defocus")
+    assert defocus.applies(near) is None
+    fitted = defocus.for_bundle(near)
+    assert fitted.values == (0.0, 1.0, 2.0)
+    judge = Judge(Rig(near, ()))
+    found = [fitted.take(judge, scene, value).outcomes for value in fitted.values]
+    for method in ("input", "haze"):  # the bank is that of another kernel
+        far, middle, close = (of[method].psnr_db or 0 for of in found)
+        assert far > middle > close, method
 
 
 def test_every_other_scenario_of_the_lens_is_survived(judge: Judge, scene: Scene) -> None:

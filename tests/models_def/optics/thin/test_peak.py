@@ -43,6 +43,15 @@ def test_the_peak_is_found_in_haze() -> None:
     assert within(light, peak_height_px(light), 10.0) == pytest.approx(3 / 33, rel=0.02)
 
 
+@pytest.mark.parametrize("wide_px", [0.0, 0.3, 3.0])
+def test_a_point_lies_in_the_middle_of_the_discs_that_hold_it(wide_px: float) -> None:
+    angle = np.linspace(0, 2 * np.pi, 1001)
+    radius = wide_px * np.sqrt(np.linspace(0, 1, 1001))
+    x, y = np.abs(radius * np.cos(7 * angle)), -42.4 + radius * np.sin(7 * angle)
+    light = LandedLight(x_px=x, y_px=y, share=np.full(x.size, 1 / x.size), lost={})
+    assert peak_height_px(light) == pytest.approx(-42.4, abs=0.76)
+
+
 def test_rays_that_rims_take_count_as_missing() -> None:
     lens = perfect_lens(50.0, 5.0)
     narrow = replace(lens.surfaces[2], semi_diameter_mm=2.5)

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
-from camkit.contracts import FloatArray, FrozenPsf
+from camkit.contracts import FrozenPsf
+from camkit.report.stress.rig import with_haze_kept
 from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
 from camkit.report.stress.shot import Shot
-from camkit.runtime.bank.psf import color_kernels
-from camkit.runtime.twin.light import Lens
+from camkit.runtime.twin.light import Lens, lens_of, with_places
 from camkit.runtime.twin.truth import light_sensor
 from camkit.units import MM_PER_M, to_mm
 
@@ -23,7 +23,7 @@ def _applies(bundle: Bundle) -> str | None:
     psf = bundle.stress_psf()
     if psf is None:
         return "it holds no stress_psf.safetensors"
-    if bundle.manifest.has_haze:
+    if bundle.manifest.has_haze and bundle.stress_haze() is None:
         return "its stress PSF knows nothing of its haze"
     if psf.symmetry != "radial":
         return "its stress PSF is not that of a lens of revolution"
@@ -72,17 +72,16 @@ def _lens_at(bundle: Bundle, inverse_m: float, height_mm: float) -> Lens:
     """Give the lens for one object distance, with the kernels of one field all around it."""
     psf = bundle.stress_psf()
     assert psf is not None
-    response = light_sensor(bundle.manifest).response_arrays()
     depth_mm = MM_PER_M / inverse_m if inverse_m else np.inf
     within_mm = float(np.clip(depth_mm, psf.depths_mm[0], psf.depths_mm[-1]))  # inverse was rounded
-    kernels = color_kernels(psf, *response, depth_mm=within_mm)
+    sensor, haze = light_sensor(bundle.manifest), bundle.stress_haze()
+    lens = with_haze_kept(lens_of(psf, sensor, depth_mm=within_mm, haze=haze))
 
-    def kernels_at(x_mm: float, y_mm: float) -> FloatArray:
+    def at_field(x_mm: float, y_mm: float) -> tuple[float, float]:
         scale = height_mm / max(np.hypot(x_mm, y_mm), 1e-9)
-        return kernels.at(scale * x_mm, scale * y_mm)
+        return scale * x_mm, scale * y_mm
 
-    margin_px = max(kernels.kernels.shape[-2:]) // 2
-    return Lens(psf=bundle.psf, kernels_at=kernels_at, margin_px=margin_px)
+    return replace(with_places(lens, at_field), psf=bundle.psf)
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:

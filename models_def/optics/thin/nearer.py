@@ -1,0 +1,109 @@
+"""Core and haze of a lens at other object distances than that of its focus, for stress tests.
+
+Every distance is frozen by itself, about its own peaks; few fields and wavelengths, since only what
+changes with distance matters.
+"""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from camkit.bundle.frozen_optics import FrozenOptics
+from camkit.bundle.sensor import ColorSensor
+from camkit.contracts import FloatArray, depth_name
+from camkit.errors import ContractError
+from camkit.models_def.optics.prescription import Lens
+from camkit.models_def.optics.thin.freezing import (
+    CELL_PX,
+    COPY_RAYS,
+    CORE_PX,
+    LEAST_FIELDS,
+    Tell,
+    freeze_hazy,
+)
+
+DISTANCES_MM: Final = (500.0, 1000.0, 2000.0, 4000.0, 10_000.0, math.inf)
+WAVELENGTHS: Final = 3
+
+
+def freeze_distances(
+    lens: Lens,
+    sensor: ColorSensor,
+    *,
+    distances_mm: tuple[float, ...] = DISTANCES_MM,
+    wavelengths: int = WAVELENGTHS,
+    core_px: int = CORE_PX,
+    cell_px: int = CELL_PX,
+    rays: int = COPY_RAYS,
+    tell: Tell = lambda _: None,
+) -> FrozenOptics:
+    """Freeze a lens, focused as it is, for an object at its own distance and at others.
+
+    Heights, distortion and illumination are those of its own distance; the middles of the other
+    distances lie a few pixels beside it.
+
+    Args:
+        lens: With its grooves as they are.
+        sensor: Size, pitch and response.
+        distances_mm: Of the object, besides that of the lens.
+        wavelengths: Evenly spaced over the response of the sensor.
+        core_px: Reach of the core kernels.
+        cell_px: Side of a cell of the haze.
+        rays: In half the stop, for every wavelength that is traced.
+        tell: Takes a line for every distance.
+
+    Returns:
+        Optics of all distances, near to far. A distance at which the lens has no peaks while it
+        has some at its own (or the other way round) is left out.
+
+    Raises:
+        ContractError: As `freeze_hazy`, or if no other distance is left.
+    """
+    own_mm = lens.object_distance_mm
+    found: dict[float, FrozenOptics] = {}
+    about = None
+    for distance_mm in (own_mm, *(d for d in distances_mm if d != own_mm)):
+        optics, report = freeze_hazy(
+            replace(lens, object_distance_mm=distance_mm),
+            sensor,
+            fields=LEAST_FIELDS,
+            wavelengths=wavelengths,
+            core_px=core_px,
+            cell_px=cell_px,
+            rays=rays,
+        )
+        about = about or report.about
+        if report.about == about:
+            found[distance_mm] = optics
+        kept = "kept" if report.about == about else f"left out, by its {report.about}"
+        tell(f"object at {depth_name(np.float64(distance_mm))}: {kept}")
+    if len(found) == 1:
+        raise ContractError(f"{lens.name} is known at no other distance than its own")
+    return _stacked({distance: found[distance] for distance in sorted(found)}, found[own_mm])
+
+
+def _stacked(found: dict[float, FrozenOptics], own: FrozenOptics) -> FrozenOptics:
+    """Lay distances side by side, with the places of one of them."""
+    hazes = [optics.haze for optics in found.values() if optics.haze is not None]
+    assert own.haze is not None
+    side = max(haze.kernels.shape[-1] for haze in hazes)
+    depths_mm = np.array(list(found))
+
+    def padded(kernels: FloatArray) -> FloatArray:
+        around = (side - kernels.shape[-1]) // 2
+        return np.pad(kernels, [(0, 0)] * 3 + [(around, around)] * 2)
+
+    psf = replace(
+        own.psf,
+        kernels=np.concatenate([optics.psf.kernels for optics in found.values()], axis=1),
+        depths_mm=depths_mm,
+    )
+    haze = replace(
+        own.haze,
+        kernels=np.concatenate([padded(haze.kernels) for haze in hazes], axis=1),
+        core_share=np.concatenate([haze.core_share for haze in hazes], axis=1),
+        depths_mm=depths_mm,
+    )
+    return FrozenOptics(psf=psf, haze=haze)
