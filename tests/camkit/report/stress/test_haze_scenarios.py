@@ -171,6 +171,12 @@ def test_without_a_haze_they_are_left_out_with_a_word(bundle: Bundle, hazy: Bund
     assert SCALE.applies(bundle) is None
 
 
+def test_sizes_go_farther_behind_a_haze(bundle: Bundle, hazy: Bundle) -> None:
+    assert SCALE.for_bundle(bundle).values == SCALE.values
+    far = SCALE.for_bundle(hazy).values
+    assert far == (-40.0, -30.0, *SCALE.values, 30.0, 40.0)
+
+
 def test_a_stress_psf_says_nothing_of_a_haze(hazy: Bundle, monkeypatch: pytest.MonkeyPatch) -> None:
     (defocus,) = choose("defocus")
     monkeypatch.setattr(type(hazy), "stress_psf", lambda self: self.psf)
