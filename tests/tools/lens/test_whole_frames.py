@@ -54,6 +54,18 @@ def test_rim_and_zones_lie_where_they_are() -> None:
     assert whole_frames.measures(apart, 100)["inside"] is None
 
 
+def test_black_is_taken_off_evenly() -> None:
+    optics = FrozenOptics(psf=tiny_psf(), haze=tiny_haze())
+    kernels = tiny_haze().kernels
+    light = kernels.sum(axis=(-2, -1)) + tiny_haze().core_share
+    even = (0.2 * light / kernels[0, 0, 0].size)[..., None, None]
+    found = whole_frames.without_black(optics, 0.2).haze
+    assert found is not None
+    np.testing.assert_allclose(found.kernels, np.maximum(kernels - even, 0), atol=1e-8)
+    assert (kernels < even).any()
+    np.testing.assert_array_equal(found.core_share, tiny_haze().core_share)
+
+
 def test_a_table_of_a_small_camera_is_made_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
