@@ -5,8 +5,8 @@
 Both photograph the same pictures, from the middle of the sensor to its corner, for equal times; the
 stop gets the share of the light that it passes. The ISO is what the exposure needs, up to 6400:
 where light lacks, noise grows; where pixels would overflow, the shutter closes earlier and more
-time is of no use. A camera is a bundle, or whatever else `camkit analyse
-field` knows by a name; one with a network has a curve of it besides.
+time is of no use. A camera is a bundle, or whatever else `camkit analyse field` knows by a name;
+one with a network has a curve of it besides.
 
 `--stops-mm` moves the stop nearer to the plate, which makes the camera shorter; every such camera
 is frozen afresh and restored, as the open plate beside it, by the filter of each colour for itself.
