@@ -31,6 +31,7 @@ from camkit.bundle.reader import (
     PLATE_HEIGHTS,
     PRESCRIPTION,
     PREVIEW,
+    STRESS_HAZE,
     STRESS_PSF,
     Bundle,
 )
@@ -51,7 +52,7 @@ from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
 PITCH_TOLERANCE: Final = 0.02
-OWN_NAMES: Final = (STRESS_PSF, CARD, PREVIEW, GOLDEN)
+OWN_NAMES: Final = (STRESS_PSF, STRESS_HAZE, CARD, PREVIEW, GOLDEN)
 DESIGN: Final = (PRESCRIPTION, PLATE, PLATE_HEIGHTS)
 
 

@@ -5,8 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camkit.bundle.haze_file import haze_to_bytes
 from camkit.bundle.haze_golden import haze_golden_from_bytes
-from camkit.bundle.reader import HAZE_GOLDEN, open_bundle
+from camkit.bundle.psf_file import psf_to_bytes
+from camkit.bundle.reader import HAZE_GOLDEN, STRESS_HAZE, STRESS_PSF, open_bundle
+from camkit.bundle.writer import write_bundle
 from camkit.errors import DecodeError
 from camkit.export.golden_cases import HAZE_SCENE
 from camkit.export.remeasured import Measured, remeasured
@@ -15,7 +18,8 @@ from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.haze import make_haze_golden
 from tests.bundle_factory import tiny_psf
-from tests.haze_bundle import write_hazy_bundle
+from tests.haze_bundle import hazy_manifest, hazy_optics, write_hazy_bundle
+from tests.haze_factory import tiny_haze
 
 CENTRE = (50.0, 30.0)
 
@@ -28,7 +32,10 @@ def test_kernels_of_another_lens_are_refused_beside_a_haze(tmp_path: Path) -> No
 
 
 def test_geometry_and_flat_move_the_haze_with_its_cores(tmp_path: Path) -> None:
-    bundle, out = write_hazy_bundle(tmp_path), tmp_path / "new.camkit"
+    camera, out = tmp_path / "near.camkit", tmp_path / "new.camkit"
+    nearer = {STRESS_PSF: psf_to_bytes(tiny_psf()), STRESS_HAZE: haze_to_bytes(tiny_haze())}
+    write_bundle(camera, hazy_manifest(), hazy_optics().members | nearer)
+    bundle = open_bundle(camera)
     geometry = GeometryFile.model_validate(
         {
             "width_px": 96,
@@ -55,6 +62,7 @@ def test_geometry_and_flat_move_the_haze_with_its_cores(tmp_path: Path) -> None:
     )
     remeasured(bundle, Measured(geometry=geometry, flat=flat), out)
     made = open_bundle(out)
+    assert not nearer.keys() & set(made.names), "they are of the camera as designed"
     assert made.manifest.format_version == bundle.manifest.format_version
     assert made.manifest.sensor.known_extent.optical_centre_px == CENTRE
     np.testing.assert_allclose(made.distortion.row(0), [1.0, -0.02, 0, 0])
