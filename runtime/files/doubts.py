@@ -105,8 +105,8 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
     found = [_above_white_doubt(samples, levels)]
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
         found.append(
-            f"nothing is darker than {low:.0%} of the range above black {black:g}: fog, or a "
-            "damaged black level (--black-level says it)"
+            f"nothing is darker than {low:.0%} of the range above black {black:g}: fog, "
+            "optics with a haze, or a damaged black level (--black-level says it)"
         )
     if low < -FAR_BELOW_BLACK:
         found.append(

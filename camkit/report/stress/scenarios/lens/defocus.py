@@ -49,7 +49,7 @@ def distances_of(bundle: Bundle) -> Scenario:
     assert psf is not None
     values = tuple(float(value) for value in _inverse_per_m(psf))
     nominal = values[int(_off_focus_per_m(bundle, psf).argmin())]
-    quick = tuple(sorted({values[0], nominal, values[-1]}))
+    quick = tuple(sorted({values[0], nominal, values[len(values) // 2], values[-1]}))
     return replace(SCENARIO, values=values, nominal=nominal, quick=quick)
 
 
