@@ -4,7 +4,7 @@ a point's light = core_share x core kernel (pixels, the frozen PSF) + haze (cell
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,20 @@ LEAST_SHARE: Final = 0.01
 """Of the light in a core: the capture is divided by it."""
 _AXES: Final = ("field_heights_mm", "depths_mm", "wavelengths_um")
 FloatGrid = NDArray[np.float64]
+
+
+def without_pedestal(kernels: FloatArray, core_share: NDArray[Any], share: float) -> FloatArray:
+    """Take an even pedestal off kernels of haze: black that was taken for light.
+
+    Args:
+        kernels: (..., n, n) share of a point's light in every cell.
+        core_share: (...) share of it in the core.
+        share: Of all its light, core and haze, that is black; a cell with less than its part was
+            dark.
+    """
+    light = kernels.sum(axis=(-2, -1), dtype=np.float64) + core_share
+    even = (share / kernels.shape[-1] ** 2) * light
+    return np.asarray(np.maximum(kernels - even[..., None, None], 0), np.float32)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

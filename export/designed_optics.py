@@ -31,7 +31,7 @@ from camkit.units import UM_PER_MM
 
 SAME_LENS_PX: Final = 0.01
 SAME_PEAKS_PX: Final = 4.0
-"""Of a lens with a haze, whose peaks are found to a quarter pixel and fitted to within one or two;
+"""Of a lens with a haze, whose peaks are found to a pixel or so and fitted to within one or two;
 those of other plates lie tens of pixels off."""
 SAME_PLATE_SHARE: Final = 0.015
 """Of the light of the middle wavelength. Built-in plates frozen for one sensor differ by 0.029 and

@@ -2,9 +2,9 @@
 
     FROM + what was measured -> sensor, optics, stages -> golden cases anew -> checked -> bundle
 
-What was shown of FROM holds no more: its envelope, its plan, its card and its stress kernels are
-left out; with other kernels also the design that they came from, and the networks that were trained
-behind them.
+What was shown of FROM holds no more: its envelope, its plan, its card and its stress kernels
+(and their haze) are left out; with other kernels also the design that they came from, and the
+networks that were trained behind them.
 """
 
 import tempfile

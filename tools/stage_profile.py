@@ -26,9 +26,10 @@ from typing import Any
 import numpy as np
 
 from camkit.bundle.facts import NetworkFacts
-from camkit.bundle.optics import PSF
+from camkit.bundle.haze_file import haze_from_bytes, haze_to_bytes
+from camkit.bundle.optics import HAZE, PSF
 from camkit.bundle.psf_file import psf_from_bytes, psf_to_bytes
-from camkit.bundle.reader import STRESS_PSF, Bundle, find_bundle, open_bundle
+from camkit.bundle.reader import STRESS_HAZE, STRESS_PSF, Bundle, find_bundle, open_bundle
 from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.writer import write_bundle
 from camkit.report.bench.gemm import gemm_peak_gmac_per_s
@@ -421,6 +422,9 @@ def write_stretched(bundle: Bundle, path: Path, width: int, height: int) -> None
     for name in members.keys() & {PSF, STRESS_PSF}:
         psf = psf_from_bytes(members[name])
         members[name] = psf_to_bytes(replace(psf, pixel_pitch_um=pitch_um))
+    for name in members.keys() & {HAZE, STRESS_HAZE}:
+        haze = haze_from_bytes(members[name])
+        members[name] = haze_to_bytes(replace(haze, pixel_pitch_um=pitch_um))
     write_bundle(path, manifest.model_copy(update=changes), members)
 
 

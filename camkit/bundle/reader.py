@@ -224,9 +224,10 @@ class Bundle:
         Raises:
             BundleError: If it is damaged, no haze, or not of the samples of those kernels.
         """
-        psf = self.stress_psf()
-        if STRESS_HAZE not in self.manifest.members or psf is None:
+        if STRESS_HAZE not in self.manifest.members:
             return None
+        psf = self.stress_psf()
+        assert psf is not None
         haze = haze_from_bytes(self.member(STRESS_HAZE), what=STRESS_HAZE)
         try:
             haze.check_beside(psf)
@@ -274,7 +275,9 @@ def _optics_of(container: Container, manifest: Manifest) -> FrozenOptics | None:
     """Read the optics; those of a bundle without any are refused."""
     stated = manifest.optics
     own = {getattr(stated, "member", None), getattr(stated, "haze_member", None)}
-    for name in (PSF, STREAKS, HAZE):
+    if isinstance(stated, HazyPsfOptics):
+        own.add(STRESS_HAZE)
+    for name in (PSF, STREAKS, HAZE, STRESS_HAZE):
         if name in manifest.members and name not in own:
             such = "no" if stated is None else "no such"
             raise BundleError(f"the bundle holds {name}, and its manifest states {such} optics")

@@ -11,8 +11,8 @@ dB are of sRGB, mean over the pictures. `level` is the error of the means of blo
 `detail` all that is left: together they are the whole error. `rim` is what lies within --rim-px of
 the border of the frame, one radius of the PSF, where light from outside comes in; `inside` the
 rest. Zones are fifths of the half diagonal. `--pedestal-percent P` asks what a lost dark frame
-costs: P % of the light that the bundle has in its haze, even over the cells, was black and falls on
-no capture. What is finished is in the journal of the folder and not done again.
+costs: P % of all light of a point in the bundle, laid evenly over the cells of its haze, was black
+and falls on no capture. What is finished is in the journal of the folder and not done again.
 """
 
 import argparse
@@ -32,6 +32,7 @@ from camkit.bundle.sensor import BayerSensor
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError
+from camkit.haze import without_pedestal
 from camkit.models_def.training.pictures import list_pictures
 from camkit.report.analysis.recovery import filled, restored
 from camkit.report.fabricated_optics import fabricated_optics
@@ -116,7 +117,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--pictures", type=int, help="only the first so many")
     parser.add_argument("--iso", type=float, nargs="+", default=(100.0, 1600.0))
     parser.add_argument("--copy", type=int, default=COPY_SEED, help="seed of its errors")
-    parser.add_argument("--pedestal-percent", type=float, default=0.0, help="0 to 100")
+    parser.add_argument("--pedestal-percent", type=percent, default=0.0, help="0 to 100")
     parser.add_argument("--frame", type=int, nargs=2, metavar=("W", "H"), help="about the middle")
     parser.add_argument("--rim-px", type=int, default=RIM_PX)
     parser.add_argument("--out-dir", type=Path, default=Path("out/whole-frames"))
@@ -159,18 +160,20 @@ def copy_of(bundle: Bundle, seed: int, folder: Path) -> FrozenOptics:
 
 
 def without_black(optics: FrozenOptics, share: float) -> FrozenOptics:
-    """Take an even pedestal off the haze of optics.
-
-    Args:
-        optics: With a haze.
-        share: Of all light of a point; a cell that holds less than its part is dark then.
-    """
+    """Take off the haze of optics what is black of it, a share of all light of a point."""
     haze = optics.haze
-    assert haze is not None
-    light = haze.core_share + haze.kernels.sum(axis=(-2, -1), dtype=np.float64)
-    even = share * light / haze.kernels[0, 0, 0].size
-    kernels = np.maximum(haze.kernels - even[..., None, None], 0).astype(np.float32)
+    if haze is None or not share:
+        return optics
+    kernels = without_pedestal(haze.kernels, haze.core_share, share)
     return replace(optics, haze=replace(haze, kernels=kernels))
+
+
+def percent(word: str) -> float:
+    """Read a number of the command line from 0 to 100."""
+    value = float(word)
+    if not 0 <= value <= 100:
+        raise argparse.ArgumentTypeError(f"0 to 100; got {word}")
+    return value
 
 
 def shoot(

@@ -72,6 +72,8 @@ def export(
         raise ContractError(
             f"there is no {folder / PSF_NAME}; make it with `camkit freeze`, or say --psf"
         )
+    stress = stress_psf or _beside(folder, STRESS_NAME)
+    beside = None if stress is None else _beside(stress.parent, STRESS_HAZE_NAME)
     from camkit.export.assemble import export_bundle
     from camkit.export.parts import Parts
 
@@ -80,8 +82,8 @@ def export(
             checkpoints=tuple(checkpoints),
             psf=frozen,
             haze=haze or _beside(frozen.parent, HAZE_NAME),
-            stress_psf=stress_psf or _beside(folder, STRESS_NAME),
-            stress_haze=stress_haze or _beside(folder, STRESS_HAZE_NAME),
+            stress_psf=stress,
+            stress_haze=stress_haze or beside,
             prescription=prescription,
             plate=None if plate in (None, NO_PLATE) else Path(plate),
             without_plate=plate == NO_PLATE,

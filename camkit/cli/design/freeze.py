@@ -144,9 +144,8 @@ def freeze(
         }
         if named := [name for name, said in chosen.items() if said]:
             raise ContractError(f"with --haze nothing is chosen; leave {', '.join(named)} out")
-        told = _freeze_hazy(found, out, haze, sensor)
-        if stress_out is not None and stress_haze is not None:
-            _freeze_distances(found, stress_out, stress_haze, sensor)
+        stress = None if stress_out is None or stress_haze is None else (stress_out, stress_haze)
+        told = _freeze_hazy(found, (out, haze), stress, sensor)
         _report(told, report, json_)
         return
     moved_um = focus_range_um(found, focus_um)
@@ -178,26 +177,30 @@ def _report(told: dict[str, int | float | str], report: Path | None, json_: bool
 
 
 def _freeze_hazy(
-    optics: "Optics", out: Path, haze_out: Path, sensor: "ColorSensor"
+    optics: "Optics",
+    paths: tuple[Path, Path],
+    stress: tuple[Path, Path] | None,
+    sensor: "ColorSensor",
 ) -> dict[str, int | float | str]:
-    """Freeze the peaks of a lens and the haze beside them."""
+    """Freeze the peaks of a lens and the haze beside them, at other distances too if wanted.
+
+    Nothing is written before all is known.
+    """
+    from camkit.contracts import depth_name
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.thin.freezing import freeze_hazy
+    from camkit.models_def.optics.thin.nearer import freeze_distances
 
     if not isinstance(optics, LensOptics):
         raise UnsupportedError("only a lens is frozen as core and haze; leave --haze out")
-    frozen, told = freeze_hazy(optics.lens, sensor, tell=_tell)
-    _write_optics(frozen, out, haze_out)
-    return told.to_json()
-
-
-def _freeze_distances(optics: "Optics", out: Path, haze_out: Path, sensor: "ColorSensor") -> None:
-    """Freeze what they are at other object distances."""
-    from camkit.models_def.optics.lens_optics import LensOptics
-    from camkit.models_def.optics.thin.nearer import freeze_distances
-
-    assert isinstance(optics, LensOptics)
-    _write_optics(freeze_distances(optics.lens, sensor, tell=_tell), out, haze_out)
+    frozen, report = freeze_hazy(optics.lens, sensor, tell=_tell)
+    told = report.to_json()
+    if stress is not None:
+        nearer = freeze_distances(optics.lens, sensor, tell=_tell)
+        _write_optics(nearer, *stress)
+        told["distances"] = ", ".join(map(depth_name, nearer.psf.depths_mm))
+    _write_optics(frozen, *paths)
+    return told
 
 
 def _write_optics(frozen: "FrozenOptics", out: Path, haze_out: Path) -> None:

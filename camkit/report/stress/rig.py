@@ -178,9 +178,14 @@ class Rig:
 
     def _lens(self, depth_mm: float, response: Response | None = None) -> Lens:
         haze = self.bundle.haze if self.bundle.manifest.has_haze else None
-        return with_haze_kept(
-            lens_of(self.bundle.psf, self.sensor, depth_mm=depth_mm, haze=haze, response=response)
+        lens = lens_of(
+            self.bundle.psf, self.sensor, depth_mm=depth_mm, haze=haze, response=response
         )
+        if lens.haze is None:
+            return lens
+        # what every method made of a capture is spread by the same kernels
+        known = lru_cache(maxsize=KEPT_KERNELS)(lens.haze.haze_at)
+        return replace(lens, haze=replace(lens.haze, haze_at=known))
 
     def light(self, scene: Scene, lens: Lens | None = None) -> Light:
         """Let a scene fall on the sensor; that through the nominal lens is kept by its name."""
@@ -270,14 +275,6 @@ class Rig:
         for plane in first.takes:
             known[plane] = method.pipeline.start(capture, known=known).keep(plane)
         return known
-
-
-def with_haze_kept(lens: Lens) -> Lens:
-    """Give a lens that keeps its kernels of haze: every method's result is spread by the same."""
-    if lens.haze is None:
-        return lens
-    known = lru_cache(maxsize=KEPT_KERNELS)(lens.haze.haze_at)
-    return replace(lens, haze=replace(lens.haze, haze_at=known))
 
 
 def usual_sizes(manifest: Manifest) -> tuple[str, ...]:

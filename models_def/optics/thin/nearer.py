@@ -20,6 +20,7 @@ from camkit.models_def.optics.thin.freezing import (
     COPY_RAYS,
     CORE_PX,
     LEAST_FIELDS,
+    HazyReport,
     Tell,
     freeze_hazy,
 )
@@ -56,16 +57,14 @@ def freeze_distances(
 
     Returns:
         Optics of all distances, near to far. A distance at which the lens has no peaks while it
-        has some at its own (or the other way round) is left out.
+        has some at its own (or the other way round), or cannot be frozen, is left out.
 
     Raises:
-        ContractError: As `freeze_hazy`, or if no other distance is left.
+        ContractError: As `freeze_hazy` of its own distance, or if no other is left.
     """
-    own_mm = lens.object_distance_mm
-    found: dict[float, FrozenOptics] = {}
-    about = None
-    for distance_mm in (own_mm, *(d for d in distances_mm if d != own_mm)):
-        optics, report = freeze_hazy(
+
+    def frozen(distance_mm: float) -> tuple[FrozenOptics, HazyReport]:
+        return freeze_hazy(
             replace(lens, object_distance_mm=distance_mm),
             sensor,
             fields=LEAST_FIELDS,
@@ -74,14 +73,23 @@ def freeze_distances(
             cell_px=cell_px,
             rays=rays,
         )
-        about = about or report.about
-        if report.about == about:
-            found[distance_mm] = optics
-        kept = "kept" if report.about == about else f"left out, by its {report.about}"
-        tell(f"object at {depth_name(np.float64(distance_mm))}: {kept}")
+
+    own_mm = lens.object_distance_mm
+    own, of_own = frozen(own_mm)
+    found = {own_mm: own}
+    for distance_mm in (d for d in distances_mm if d != own_mm):
+        try:
+            optics, report = frozen(distance_mm)
+        except ContractError as error:
+            said = f"left out, {error}"
+        else:
+            said = "kept" if report.about == of_own.about else f"left out, by its {report.about}"
+            if report.about == of_own.about:
+                found[distance_mm] = optics
+        tell(f"object at {depth_name(distance_mm)}: {said}")
     if len(found) == 1:
         raise ContractError(f"{lens.name} is known at no other distance than its own")
-    return _stacked({distance: found[distance] for distance in sorted(found)}, found[own_mm])
+    return _stacked({distance: found[distance] for distance in sorted(found)}, own)
 
 
 def _stacked(found: dict[float, FrozenOptics], own: FrozenOptics) -> FrozenOptics:

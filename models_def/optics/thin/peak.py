@@ -25,8 +25,10 @@ RAYS: Final = 40_000
 _BIN_PX: Final = 1.0
 _CANDIDATES: Final = 12
 _FINE_PX: Final = (-0.25, 0.25)
-_TIE: Final = 1e-9
-"""Shares of light that differ by less are alike."""
+_ROUNDS: Final = 3
+_INNER: Final = 0.8
+_POINT_SHARE: Final = 0.95
+"""Of the light of a disc, within its inner part: then the point ends inside the disc."""
 
 Array = NDArray[np.float64]
 
@@ -102,13 +104,13 @@ def land_light(
 
 
 def peak_height_px(light: LandedLight) -> float:
-    """Give the place of the peak on the meridian.
+    """Give the place of the peak on the meridian: the middle of the disc of most light.
 
-    It is the disc of most light; a point smaller than the disc fills many of them alike, and lies
-    in the middle of the one that is meant.
+    A point smaller than the disc fills many discs, and which of them holds most is chance: its
+    place is its centre of gravity.
 
     Raises:
-        ContractError: If no light arrives.
+        ContractError: If no light arrives near the meridian.
     """
     near = np.abs(light.x_px) < PEAK_PX
     if not near.any():
@@ -118,18 +120,24 @@ def peak_height_px(light: LandedLight) -> float:
     edges = np.arange(low, float(y_px.max()) + PEAK_PX + _BIN_PX, _BIN_PX)
     count, _ = np.histogram(y_px, bins=edges, weights=share)
     wide = np.convolve(count, np.ones(int(2 * PEAK_PX / _BIN_PX)), "same")
-    alike = edges[:-1][wide >= wide.max() * (1 - _TIE)]
-    middles = np.append(edges[np.argsort(wide)[-_CANDIDATES:]], alike.mean())
+    middles = edges[np.argsort(wide)[-_CANDIDATES:]]
     places = (middles[:, None] + np.array(_FINE_PX)).ravel()
-    shares = np.array([within(light, float(place), PEAK_PX) for place in places])
-    best = places[shares >= shares.max() * (1 - _TIE)]
-    return float(min(best, key=lambda place: abs(_gravity_px(light, float(place)) - place)))
+    best = float(max(places, key=lambda place: within(light, float(place), PEAK_PX)))
+    return _middle_of_point_px(light, best)
 
 
-def _gravity_px(light: LandedLight, height_px: float) -> float:
-    """Give the centre of gravity along the meridian of the light near a place."""
-    near = np.hypot(light.x_px, light.y_px - height_px) < PEAK_PX
-    return float((light.share[near] * light.y_px[near]).sum() / light.share[near].sum())
+def _middle_of_point_px(light: LandedLight, best_px: float) -> float:
+    """Give the centre of gravity of a point smaller than the disc at a place, else the place."""
+    middle_px = best_px
+    for _ in range(_ROUNDS):
+        near = np.hypot(light.x_px, light.y_px - middle_px) < PEAK_PX
+        total = float(light.share[near].sum())
+        if total <= 0:
+            return best_px
+        middle_px = float((light.share[near] * light.y_px[near]).sum()) / total
+    whole = within(light, middle_px, PEAK_PX)
+    smaller = within(light, middle_px, _INNER * PEAK_PX) >= _POINT_SHARE * whole > 0
+    return middle_px if smaller else best_px
 
 
 def within(light: LandedLight, height_px: float, radius_px: float) -> float:

@@ -39,6 +39,7 @@ from tests.bundle_factory import (
 from tests.deep_bundle import deep_psf, write_deep_bundle
 from tests.disk_watch import nothing_written
 from tests.focus_bundle import write_focus_bundle
+from tests.haze_bundle import hazy_manifest, hazy_optics
 from tests.haze_factory import tiny_haze
 from tests.psf_factory import streak_kernel, uniform_psf
 
@@ -388,7 +389,7 @@ def test_stress_psf_is_read_as_a_psf() -> None:
 
 def _with_stress(**members: bytes) -> bytes:
     named = {f"{name}.safetensors": data for name, data in members.items()}
-    return bundle_to_bytes(tiny_manifest(), tiny_members() | named)
+    return bundle_to_bytes(hazy_manifest(), hazy_optics().members | named)
 
 
 def test_stress_haze_is_read_beside_its_kernels() -> None:
@@ -399,6 +400,8 @@ def test_stress_haze_is_read_beside_its_kernels() -> None:
     assert found is not None
     np.testing.assert_array_equal(found.kernels, tiny_haze().kernels)
     _refuse(_with_stress(stress_haze=haze), "what stress_haze.safetensors holds needs the member")
+    plain = tiny_members() | {"stress_psf.safetensors": psf, "stress_haze.safetensors": haze}
+    _refuse(bundle_to_bytes(tiny_manifest(), plain), "states no such optics")
     other = psf_to_bytes(deep_psf())
     odd = bundle_from_bytes(_with_stress(stress_psf=other, stress_haze=haze), path=Path("x.camkit"))
     with pytest.raises(BundleError, match=r"stress_haze\.safetensors is not of stress_psf"):

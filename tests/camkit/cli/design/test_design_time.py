@@ -219,12 +219,14 @@ def test_export_finds_what_lies_beside_the_checkpoint(
         optimizer={},
     )
     write_checkpoint(tmp_path / "one.pt", checkpoint)
-    beside = ("psf.safetensors", "haze.safetensors", "stress_haze.safetensors")
+    stress = ("stress_psf.safetensors", "stress_haze.safetensors")
+    beside = ("psf.safetensors", "haze.safetensors", *stress)
     for name in (*beside, "freeze.json", "plan.json"):
         (tmp_path / name).write_bytes(b"{}")
     elsewhere = tmp_path / "other"
     elsewhere.mkdir()
-    (elsewhere / "psf.safetensors").write_bytes(b"{}")
+    for name in ("psf.safetensors", stress[0]):
+        (elsewhere / name).write_bytes(b"{}")
     seen = []
 
     def fake(parts: Parts, out: Path) -> dict[str, str]:
@@ -235,16 +237,17 @@ def test_export_finds_what_lies_beside_the_checkpoint(
     call = ("export", tmp_path / "one.pt", "-o", tmp_path / "one.camkit")
     plates = (("--plate", "streak-4"), ("--plate", "none"))
     optics = ("--psf", elsewhere / "psf.safetensors")
-    for chosen in ((), ("--plan", tmp_path / "other.json"), *plates, optics):
+    nearer = ("--stress-psf", elsewhere / stress[0])
+    for chosen in ((), ("--plan", tmp_path / "other.json"), *plates, optics, nearer):
         outcome = camkit_command(*call, *chosen)
         assert outcome.code == 0, outcome.err
-    parts, other, named, without, apart = seen
+    parts, other, named, without, apart, near = seen
     assert parts.haze == tmp_path / "haze.safetensors"
     assert apart.haze is None, "the haze of other optics lies beside them"
     assert (parts.psf, parts.freeze) == (tmp_path / "psf.safetensors", tmp_path / "freeze.json")
     assert (parts.plan, other.plan) == (tmp_path / "plan.json", tmp_path / "other.json")
-    assert parts.stress_psf is None
-    assert parts.stress_haze == tmp_path / "stress_haze.safetensors"
+    assert (parts.stress_psf, parts.stress_haze) == tuple(tmp_path / name for name in stress)
+    assert (near.stress_psf, near.stress_haze) == (elsewhere / stress[0], None)
     assert parts.prescription is None, "the lens of the checkpoint"
     assert (parts.plate, parts.without_plate) == (None, False), "its plate"
     assert (named.plate, named.without_plate) == (Path("streak-4"), False)

@@ -48,14 +48,32 @@ def test_other_distances_are_frozen_beside_it(
     assert outcome.code == ExitCode.USAGE
     assert "--stress-out and --stress-haze go together" in outcome.err
     assert not out.exists()
-    outcome = camkit_command(*words, "--stress-haze", beside)
+    outcome = camkit_command(*words, "--stress-haze", beside, "--json")
     assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out)["distances"] == "1 m, infinity"
     assert read_psf(psf).depths_mm.tolist() == [1000.0, float("inf")]
     read_haze(beside).check_beside(read_psf(psf))
     again = camkit_command("freeze", LENS, "-o", tmp_path / "x.st", "--stress-haze", beside)
     assert "--overwrite" in again.err
     alone = ("freeze", LENS, "-o", tmp_path / "x.st", "--stress-haze", tmp_path / "y.st")
     assert "go together" in camkit_command(*alone).err
+
+
+def test_nothing_is_written_where_no_other_distance_is_known(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for made, few in (
+        (freezing.freeze_hazy, {"fields": 3, "wavelengths": 2, "rays": 1000}),
+        (nearer.freeze_distances, {"distances_mm": (), "wavelengths": 2, "rays": 500}),
+    ):
+        monkeypatch.setattr(made, "__kwdefaults__", dict(made.__kwdefaults__) | few)
+    files = [tmp_path / name for name in ("p.st", "h.st", "sp.st", "sh.st")]
+    options = ("-o", "--haze", "--stress-out", "--stress-haze")
+    pairs = [word for pair in zip(options, files, strict=True) for word in pair]
+    outcome = camkit_command("freeze", LENS, *pairs)
+    assert outcome.code != 0
+    assert "known at no other distance than its own" in outcome.err
+    assert not any(file.exists() for file in files)
 
 
 def test_what_haze_does_not_choose_is_refused(camkit_command, tmp_path: Path) -> None:

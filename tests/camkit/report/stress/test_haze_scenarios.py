@@ -17,7 +17,7 @@ from camkit.report.stress.rig import Rig
 from camkit.report.stress.run import StressOptions, run_stress
 from camkit.report.stress.scenario import all_scenarios, choose
 from camkit.report.stress.scenarios.lens.energy_split import with_split
-from camkit.report.stress.scenarios.lens.lost_dark_frame import without_pedestal
+from camkit.report.stress.scenarios.lens.lost_dark_frame import black_taken_off
 from camkit.report.stress.scene import Scene, stress_scenes
 from camkit.report.stress.score import Judge
 from camkit.runtime.bank.haze import hazy_kernels
@@ -77,18 +77,18 @@ def test_a_pedestal_is_taken_off_every_cell_and_none_falls_below_dark(judge: Jud
     haze = _haze(judge)
     kernels, light = haze.haze_at(*PLACE), _light(haze) + haze.share_at(*PLACE)
     least = float((kernels.min(axis=(1, 2)) * kernels[0].size / light).min())
-    small = without_pedestal(haze, 0.9 * least).haze_at(*PLACE)
+    small = black_taken_off(haze, 0.9 * least).haze_at(*PLACE)
     np.testing.assert_allclose(
         small.sum(axis=(1, 2)), _light(haze) - 0.9 * least * light, rtol=1e-4
     )
     np.testing.assert_allclose(
         (kernels - small)[0], 0.9 * least * light[0] / kernels[0].size, rtol=1e-2
     )
-    large = without_pedestal(haze, 0.6).haze_at(*PLACE)
+    large = black_taken_off(haze, 0.6).haze_at(*PLACE)
     assert large.min() == 0
     assert (large.sum(axis=(1, 2)) < small.sum(axis=(1, 2))).all()
     np.testing.assert_array_equal(
-        without_pedestal(haze, 0.6).share_at(*PLACE), haze.share_at(*PLACE)
+        black_taken_off(haze, 0.6).share_at(*PLACE), haze.share_at(*PLACE)
     )
 
 
@@ -169,6 +169,19 @@ def test_without_a_haze_they_are_left_out_with_a_word(bundle: Bundle, hazy: Bund
         assert "no haze" in (scenario.applies(bundle) or "")
         assert scenario.applies(hazy) is None
     assert SCALE.applies(bundle) is None
+
+
+def test_peaks_take_no_more_than_the_least_haze_holds(tmp_path: Path, hazy: Bundle) -> None:
+    assert SPLIT.for_bundle(hazy).values == SPLIT.values
+    thin = tiny_haze()
+    thin = replace(thin, kernels=thin.kernels * np.float32(0.2))
+    path = tmp_path / "thin.camkit"
+    optics = replace(hazy_optics(), haze=thin)
+    write_bundle(path, hazy_manifest(sensor=tiny_sensor(320, 240)), optics.members)
+    values = SPLIT.for_bundle(open_bundle(path)).values
+    share = thin.kernels.sum(axis=(-2, -1)) / thin.core_share
+    assert values[0] >= -100 * share.min() > -40
+    assert values == SPLIT.values[-len(values) :]
 
 
 def test_sizes_go_farther_behind_a_haze(bundle: Bundle, hazy: Bundle) -> None:

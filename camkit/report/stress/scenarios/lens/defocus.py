@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FrozenPsf
-from camkit.report.stress.rig import with_haze_kept
 from camkit.report.stress.scenario import Scenario, photographs
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
@@ -75,7 +74,7 @@ def _lens_at(bundle: Bundle, inverse_m: float, height_mm: float) -> Lens:
     depth_mm = MM_PER_M / inverse_m if inverse_m else np.inf
     within_mm = float(np.clip(depth_mm, psf.depths_mm[0], psf.depths_mm[-1]))  # inverse was rounded
     sensor, haze = light_sensor(bundle.manifest), bundle.stress_haze()
-    lens = with_haze_kept(lens_of(psf, sensor, depth_mm=within_mm, haze=haze))
+    lens = lens_of(psf, sensor, depth_mm=within_mm, haze=haze)
 
     def at_field(x_mm: float, y_mm: float) -> tuple[float, float]:
         scale = height_mm / max(np.hypot(x_mm, y_mm), 1e-9)

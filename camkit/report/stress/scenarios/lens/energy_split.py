@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.report.stress.scenario import Scenario, has_haze
 from camkit.report.stress.scene import Scene
@@ -18,7 +19,7 @@ def with_split(haze: HazeLens, moved: float) -> HazeLens:
     Args:
         haze: What lies beside the kernels.
         moved: Share of the core's light; below 0 the core has it from the haze, as far as that
-            holds so much.
+            holds so much. A place without haze has no shape to lay light in, and gets none.
     """
 
     def share_at(x_mm: float, y_mm: float) -> FloatArray:
@@ -32,6 +33,16 @@ def with_split(haze: HazeLens, moved: float) -> HazeLens:
         return np.asarray(kernels * factor[:, None, None], dtype=np.float32)
 
     return replace(haze, haze_at=haze_at, share_at=share_at)
+
+
+def taking_what_there_is(bundle: Bundle) -> Scenario:
+    """Give the scenario of a bundle: peaks take no more than the place with the least haze has."""
+    haze = bundle.haze
+    light = haze.kernels.sum(axis=(-2, -1), dtype=np.float64)
+    least = -100 * float((light / haze.core_share).min())
+    values = tuple(value for value in SCENARIO.values if value >= min(least, 0.0))
+    quick = tuple(value for value in SCENARIO.quick if value in values)
+    return replace(SCENARIO, values=values, quick=quick)
 
 
 def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
@@ -53,6 +64,7 @@ SCENARIO = Scenario(
     quick=(-10.0, 0.0, 10.0),
     shoot=_shoot,
     applies=has_haze,
+    fit=taking_what_there_is,
     note="So much of the peaks' light lies in the haze: walls of grooves that lean, dust. Below 0 "
     "the peaks hold more than the bundle says. Kernels keep their shapes.",
 )

@@ -2,9 +2,8 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from camkit.contracts import FloatArray
+from camkit.haze import without_pedestal
 from camkit.report.stress.scenario import Scenario, has_haze
 from camkit.report.stress.scene import Scene
 from camkit.report.stress.score import Judge
@@ -12,20 +11,16 @@ from camkit.report.stress.shot import Shot
 from camkit.runtime.twin.haze import HazeLens
 
 
-def without_pedestal(haze: HazeLens, share: float) -> HazeLens:
+def black_taken_off(haze: HazeLens, share: float) -> HazeLens:
     """Give the haze that optics really have where a bundle's stands on a pedestal.
 
     Args:
         haze: As the bundle has it.
-        share: Of a point's light, core and haze, that is black, even over the cells of a kernel;
-            a cell with less was dark.
+        share: Of a point's light that is black, see `without_pedestal`.
     """
 
     def haze_at(x_mm: float, y_mm: float) -> FloatArray:
-        kernels = haze.haze_at(x_mm, y_mm)
-        light = kernels.sum(axis=(1, 2)) + haze.share_at(x_mm, y_mm)
-        pedestal = share * light / kernels[0].size
-        return np.asarray(np.maximum(kernels - pedestal[:, None, None], 0), dtype=np.float32)
+        return without_pedestal(haze.haze_at(x_mm, y_mm), haze.share_at(x_mm, y_mm), share)
 
     return replace(haze, haze_at=haze_at)
 
@@ -34,7 +29,7 @@ def _shoot(judge: Judge, scene: Scene, value: float) -> Shot:
     rig = judge.rig
     haze = rig.lens.haze
     assert haze is not None
-    lens = replace(rig.lens, haze=without_pedestal(haze, value / 100)) if value else None
+    lens = replace(rig.lens, haze=black_taken_off(haze, value / 100)) if value else None
     return rig.shoot(scene, lens)
 
 
