@@ -14,7 +14,7 @@ from camkit.models_def.kinds.bayer.samples import (
     make_shot,
     scene_side_px,
 )
-from camkit.models_def.sensors.stabilise import unstabilise
+from camkit.models_def.sensors.stabilise import stabilise, unstabilise
 from camkit.scenes import procedural_scene
 
 CENTRE = Exposure(x_mm=0.0, y_mm=0.0, block_x_mm=0.0, block_y_mm=0.0, copy=0, iso=100.0)
@@ -87,15 +87,25 @@ def test_vignetting_is_in_capture_and_target_alike(recipe, sharp_bank):
     assert abs(float(gap)) < 1e-3 * float(shot.sample.target.mean())
 
 
-def test_clipped_highlights_are_not_judged(recipe, sharp_bank):
+def test_clipped_highlights_stay_as_the_bank_has_them(recipe, sharp_bank):
     crop = grey(recipe, sharp_bank, 0.3)
     middle = crop.shape[-1] // 2
     crop[:, middle - 3 : middle + 3, middle - 3 : middle + 3] = 3.0
     shot = make_shot(crop, CENTRE, recipe, sharp_bank, np.random.default_rng(0))
-    lost = (shot.sample.target < 0).numpy()
     half = recipe.data.sample_px // 2
-    assert lost[:, half - 2 : half + 2, half - 2 : half + 2].all()
-    assert lost.mean() < 0.05
+    inner = np.s_[:, half - 2 : half + 2, half - 2 : half + 2]
+    kept = (shot.sample.target == shot.sample.inputs["wiener"]).numpy()
+    assert kept[inner].all()
+    assert kept.mean() < 0.05
+    # the truth was three times white, the sensor ended at white, and so did the bank
+    truth = stabilise(
+        torch.full((1, 3, 1, 1), 3.0),
+        torch.tensor(shot.noise.shot),
+        torch.tensor(shot.noise.read_variance),
+        scale=recipe.scale,
+    )
+    assert (shot.sample.target[inner] < truth[0]).all()
+    assert (shot.sample.target >= 0).all()
 
 
 def test_blurred_samples_are_blurred_and_wiener_brings_them_closer(recipe, bank):
