@@ -14,7 +14,7 @@ from camkit.models_def.kinds.bayer.samples import (
     make_shot,
     scene_side_px,
 )
-from camkit.models_def.sensors.stabilise import stabilise, unstabilise
+from camkit.models_def.sensors.stabilise import unstabilise
 from camkit.scenes import procedural_scene
 
 CENTRE = Exposure(x_mm=0.0, y_mm=0.0, block_x_mm=0.0, block_y_mm=0.0, copy=0, iso=100.0)
@@ -97,14 +97,6 @@ def test_clipped_highlights_stay_as_the_bank_has_them(recipe, sharp_bank):
     kept = (shot.sample.target == shot.sample.inputs["wiener"]).numpy()
     assert kept[inner].all()
     assert kept.mean() < 0.05
-    # the truth was three times white, the sensor ended at white, and so did the bank
-    truth = stabilise(
-        torch.full((1, 3, 1, 1), 3.0),
-        torch.tensor(shot.noise.shot),
-        torch.tensor(shot.noise.read_variance),
-        scale=recipe.scale,
-    )
-    assert (shot.sample.target[inner] < truth[0]).all()
     assert (shot.sample.target >= 0).all()
 
 
