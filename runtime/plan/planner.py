@@ -64,13 +64,14 @@ class Plan:
         if speed is None:
             return [decision for _, decision, _ in self.steps]
         return [
-            replace(decision, saving_s=self._saving_s(before, after, speed))
-            for before, decision, after in self.steps
+            replace(decision, saving_s=self._saving_s(number, speed))
+            for number, (_, decision, _) in enumerate(self.steps)
         ]
 
-    def _saving_s(self, before: Work, after: Work, speed: Speed) -> float:
-        """Give the seconds between two works; the size is compared with the reference."""
-        chosen = before is after is self.steps[0][2] and after.size != REFERENCE
+    def _saving_s(self, step: int, speed: Speed) -> float:
+        """Give the seconds that a step saves; the size, the first, against the reference."""
+        before, _, after = self.steps[step]
+        chosen = step == 0 and before is after and after.size != REFERENCE
         if chosen and any(size == REFERENCE for _, size in speed.network_s_per_mp):
             before = replace(before, size=REFERENCE)
         if before is after:

@@ -50,10 +50,17 @@ def planned(stages: Sequence[Stage], work: Work) -> Work:
     Raises:
         ContractError: If no stage has its method.
     """
+    return replace(work, networks=runs(stages, Network, work))
+
+
+def runs(stages: Sequence[Stage], kind: type[Stage], work: Work) -> bool:
+    """Tell whether any stage of a kind is run.
+
+    Raises:
+        ContractError: If no stage has the method.
+    """
     ways = zip(stages, ways_of(stages, work), strict=True)
-    return replace(
-        work, networks=any(isinstance(stage, Network) and way != LEFT_OUT for stage, way in ways)
-    )
+    return any(isinstance(stage, kind) and way != LEFT_OUT for stage, way in ways)
 
 
 def without_networks(manifest: Manifest, work: Work) -> Work | None:

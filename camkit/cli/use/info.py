@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -12,6 +12,9 @@ from camkit.errors import ContractError
 
 if TYPE_CHECKING:
     from camkit.bundle.reader import Bundle
+
+LONGEST: Final = 300
+"""Characters of a value of a part of a list that are printed."""
 
 
 def info(
@@ -139,8 +142,17 @@ def _lines(value: Any, indent: str) -> list[str]:
         elif isinstance(item, list) and item and isinstance(item[0], dict):
             lines.append(f"{indent}{key}:")
             lines += [
-                f"{indent}  - " + ", ".join(f"{k} {v}" for k, v in part.items()) for part in item
+                f"{indent}  - " + ", ".join(f"{k} {_shortened(v)}" for k, v in part.items())
+                for part in item
             ]
         elif item is not None:
             lines.append(f"{indent}{key}: {item}")
     return lines
+
+
+def _shortened(value: Any) -> str:
+    """Give a value as text; of one that fills lines the beginning, --json has it all."""
+    text = str(value)
+    if len(text) <= LONGEST:
+        return text
+    return f"{text[:LONGEST]} ... ({len(text) - LONGEST} characters more, see --json)"

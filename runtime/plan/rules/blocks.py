@@ -6,6 +6,7 @@ from camkit.bundle.stages import Wiener
 from camkit.runtime.bank.blocks import cut_block_px, lay_spans
 from camkit.runtime.plan.blocks import plain_share
 from camkit.runtime.plan.decision import Decision, Subject, Work
+from camkit.runtime.plan.ways import runs
 
 ORDER: Final = 30
 
@@ -13,7 +14,7 @@ ORDER: Final = 30
 def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Report the blocks that only plain cells read; their loss is counted with the cells."""
     stage = subject.bundle.manifest.stage(Wiener)
-    if stage is None:
+    if stage is None or not runs(subject.bundle.manifest.stages, Wiener, work):
         return work, None
     size_px = subject.height_px, subject.width_px
     block_px = cut_block_px(stage.block_px, stage.overlap_px, size_px)

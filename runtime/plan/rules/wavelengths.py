@@ -4,13 +4,14 @@ from typing import Final
 
 from camkit.bundle.stages import Wiener
 from camkit.runtime.plan.decision import Decision, Subject, Work
+from camkit.runtime.plan.ways import runs
 
 ORDER: Final = 40
 
 
 def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     """Keep all: they are folded into one kernel per colour once, so fewer would save nothing."""
-    if subject.bundle.manifest.stage(Wiener) is None:
+    if not runs(subject.bundle.manifest.stages, Wiener, work):
         return work, None
     count = subject.bundle.psf.wavelengths_um.size
     return work, Decision(

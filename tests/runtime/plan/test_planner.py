@@ -137,6 +137,7 @@ def test_draft_counts_what_the_smaller_size_saves(plan_with: Callable[..., Plan]
     assert decisions["size"].saving_s is not None
     assert decisions["size"].saving_s > 0
     assert decisions["size"].cost_db > 0
+    assert decisions["wavelengths"].saving_s == 0  # what the size saves is said once
 
 
 def test_without_calibration_nothing_is_skipped(tmp_path: Path) -> None:

@@ -38,6 +38,16 @@ def test_a_bundle_is_described_without_its_list_of_hashes(captures, camkit_comma
     assert "  pixel_pitch_um: 6.0" in text
 
 
+def test_numbers_that_fill_lines_are_cut_for_people_alone(camkit_command) -> None:
+    text = camkit_command("info", "duet").out
+    (bank,) = [line for line in text.splitlines() if "type wiener" in line]
+    assert len(bank) < 1000
+    assert "characters more, see --json)" in bank
+    whole = json.loads(camkit_command("info", "duet", "--json").out)
+    (stage,) = [stage for stage in whole["stages"] if stage["type"] == "wiener"]
+    assert len(str(stage)) > 3000
+
+
 def test_a_capture_is_described_with_its_place_on_the_sensor(captures, camkit_command) -> None:
     facts = json.loads(camkit_command("info", "a.dng", "--json").out)
     assert (facts["width"], facts["height"], facts["cfa"]) == (96, 64, "RGGB")
