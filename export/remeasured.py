@@ -151,6 +151,10 @@ def _put_noise(draft: _Draft, found: NoiseFile) -> None:
         "white_level": lowest.white_level,
     }
     sensor = draft.sensor
+    ends = {one.iso for one in sensor.noise}, {one.iso for one in found.iso}
+    if min(ends[0]) < min(ends[1]) or max(ends[0]) > max(ends[1]):
+        before, now = (f"{min(isos):g} to {max(isos):g}" for isos in ends)
+        draft.notes.append(f"noise is known at ISO {now} now, at {before} before")
     draft.change(sensor=type(sensor).model_validate({**sensor.model_dump(), **update}))
 
 

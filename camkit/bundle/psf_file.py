@@ -63,6 +63,8 @@ def read_tensors(data: bytes, *, what: str) -> dict[str, NDArray[Any]]:
 def _check_header(data: bytes, what: str) -> None:
     """Refuse a header that readers take differently; the rest is told by the library."""
     stated = int.from_bytes(data[:_LENGTH_BYTES], "little")
+    if data[_LENGTH_BYTES : _LENGTH_BYTES + 1] != b"{":
+        raise BundleError(f"{what} is no safetensors file; is it another kind of file?")
     if stated > min(len(data) - _LENGTH_BYTES, _MAX_HEADER_BYTES):
         raise BundleError(
             f"{what} is not a sound safetensors file (its header is said to have {stated} bytes); "

@@ -31,6 +31,9 @@ Watch = Callable[[str, FloatArray], None]
 """Takes whole frames as they are made: `TRUTH` or the name of a method, (3, h, w) of sRGB, which
 is changed afterwards: what shall stay is copied."""
 
+MOST_BYTES: Final = 2_000_000_000
+"""For a restoration: photographing takes more, and bits do not depend on it."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recovered:
@@ -72,7 +75,7 @@ def recover(
     """
     manifest = bundle.manifest
     scale, sensor = picture_scale(manifest), light_sensor(manifest)
-    rig = Rig(bundle, usual_sizes(manifest))
+    rig = Rig(bundle, usual_sizes(manifest), chosen={"max_mem_bytes": MOST_BYTES})
     methods = _chosen(rig)
     extent = sensor.known_extent
     width, height = frame_px or (extent.width_px, extent.height_px)

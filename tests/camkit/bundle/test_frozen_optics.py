@@ -52,7 +52,7 @@ def test_a_file_is_streaks_or_kernels_by_what_it_holds(tmp_path: Path) -> None:
 
 
 def test_what_is_neither_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BundleError, match="x is not a sound safetensors file"):
+    with pytest.raises(BundleError, match="x is no safetensors file"):
         optics_from_bytes(b"nothing", what="x", channels=3)
     with pytest.raises(BundleError, match=r"cannot read the PSF .*none"):
         read_optics_file(tmp_path / "none", channels=3)

@@ -108,6 +108,17 @@ def test_geometry_flat_and_noise_are_put_into_a_copy(camkit_command, tmp_path: P
     assert camkit_command("calibrate", "bundle", source, *words, "-o", out).code == ExitCode.USAGE
 
 
+def test_isos_that_nobody_measured_again_are_named(camkit_command, tmp_path: Path) -> None:
+    source, out = write_tiny_bundle(tmp_path), tmp_path / "mine.camkit"
+    before = [one.iso for one in open_bundle(source).manifest.sensor.noise]
+    record = {**NOISE, "iso": [one for one in NOISE["iso"] if one["iso"] == 400]}
+    noise = write_part(tmp_path, "noise", record)
+    done = camkit_command("calibrate", "bundle", source, "--noise", noise, "-o", out, "--json")
+    assert done.code == 0, done.err
+    known = f"noise is known at ISO 400 to 400 now, at {before[0]:g} to {before[-1]:g} before"
+    assert known in json.loads(done.out)["notes"]
+
+
 def test_without_geometry_the_centre_is_that_of_the_flat(camkit_command, tmp_path: Path) -> None:
     source, out = write_tiny_bundle(tmp_path), tmp_path / "mine.camkit"
     done = camkit_command(
