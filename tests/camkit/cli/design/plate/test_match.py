@@ -183,4 +183,4 @@ def test_other_files_are_refused_by_their_names(camkit_command, tmp_path: Path) 
     broken.write_bytes(b"no")
     done = camkit_command("plate", "match", broken, "-o", tmp_path / "plate")
     assert done.code == ExitCode.BUNDLE_REFUSED
-    assert "not a sound safetensors file" in done.err
+    assert "no safetensors file" in done.err
