@@ -30,10 +30,15 @@ def test_each_scene_is_taken_at_each_field_and_iso_by_the_unseen_copy(captures):
     assert places == {(f, i) for f in FIELD_SHARES for i in ISOS}
 
 
-def test_the_target_itself_scores_far_above_everything(captures, recipe):
-    capture = next(c for c in captures if bool((c.shot.sample.target >= 0).all()))
-    values = to_srgb(capture.shot.sample.target, capture, recipe)
-    assert np.abs(values - capture.sharp).max() < 2e-3
+def test_the_target_is_the_sharp_picture_where_it_is_not_the_banks(captures, recipe):
+    known = 0
+    for capture in captures:
+        sample = capture.shot.sample
+        asked = (sample.target != sample.inputs["wiener"]).all(0).numpy()
+        gap = np.abs(to_srgb(sample.target, capture, recipe) - capture.sharp)
+        assert gap[:, asked].max() < 2e-3
+        known += asked.mean()
+    assert known > 0.9 * len(captures)
 
 
 def test_wiener_scores_above_the_capture(judge):
