@@ -39,6 +39,7 @@ from torch import Tensor
 
 from camkit.colorimetry import rec709_from_camera
 from camkit.errors import CamkitError
+from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
 from camkit.models_def.training.adversarial.content import Features, Relu32, gram_loss
 from camkit.models_def.training.adversarial.views import make_views
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
@@ -56,7 +57,7 @@ METRICS: Final = ("psnr_db", "ssim", "perceptual")
 DOMAINS: Final = ("lab", "wild")
 JUDGE_SEED: Final = 909
 DIGITS: Final = 5
-JUDGED: Final = 2
+JUDGED: Final = 3
 """Counts how rows are judged; what was judged before is judged again."""
 LEAST_ERROR: Final = 1e-12
 
@@ -128,8 +129,9 @@ class Domain:
         """Judge a restoration by `METRICS`: means over the samples, and `each` of them."""
         found: list[tuple[float, float, float]] = []
         for sample in self.samples:
-            output = restore(sample.stacked(self.layout)[None])
-            views = make_views(output, sample.target[None], sample.weight[None], self.to_rec709)
+            planes = sample.stacked(self.layout)[None]
+            output, truth = restore(planes), known(sample.target[None], planes)
+            views = make_views(output, truth, sample.weight[None], self.to_rec709)
             error = max(float((views.seen - views.real).square().mean()), LEAST_ERROR)
             look = gram_loss(features(views.seen), features(views.real))
             found.append(
@@ -304,6 +306,11 @@ def domain(recipe_path: Path, conditions: Conditions, method: str | None = None)
         to_rec709=torch.from_numpy(rec709_from_camera(np.array(matrix))).float(),
         designed=material.designed,
     )
+
+
+def known(target: Tensor, planes: Tensor) -> Tensor:
+    """Give a target less what it has from the bank, which is asked for where light was clipped."""
+    return torch.where(target == _wiener(planes), torch.tensor(NOT_JUDGED), target)
 
 
 def restorer(size: str, recipe: Path, conditions: Conditions) -> tuple[Restorer, Entry]:

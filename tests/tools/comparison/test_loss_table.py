@@ -139,3 +139,13 @@ def test_a_perfect_restoration_is_seen_as_one(recipes: tuple[Path, Path], tmp_pa
     grey = home.score(lambda _: torch.full_like(truth, 0.1), loss_table.Relu32(None))
     assert grey["psnr_db"] < 40
     assert grey["perceptual"] > perfect["perceptual"]
+
+
+def test_what_was_asked_as_the_bank_has_it_is_not_judged() -> None:
+    planes = torch.rand(1, 6, 4, 4)
+    target = torch.rand(1, 3, 4, 4)
+    lost = torch.zeros(1, 1, 4, 4, dtype=torch.bool)
+    lost[..., 1, 2] = True
+    asked = torch.where(lost, planes[:, 3:], target)
+    assert torch.equal(loss_table.known(asked, planes) == -1, lost.expand_as(target))
+    assert torch.equal(loss_table.known(target, planes), target)
