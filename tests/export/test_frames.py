@@ -215,6 +215,9 @@ def test_samples_repeat_and_tiles_come_once_before_all_again(
     one, again = maker.make(3), maker.make(3)
     assert one.target.equal(again.target)
     firsts = {float(maker.make(index).target.sum()) for index in range(24)}
+    frames = [maker.frame_of(index) for index in range(24)]
+    per_frame = recipe.frames.shots * recipe.frames.tiles
+    assert np.bincount(frames).tolist() == [per_frame] * recipe.frames.count
     assert len(firsts) == 24
     assert float(maker.make(24).target.sum()) in firsts
 

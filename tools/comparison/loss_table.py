@@ -8,28 +8,31 @@ into OUT_DIR, RECIPE_display.toml and RECIPE_wild.toml (`--depths-mm` gives dist
 outside). With `--wild WILD.toml` the first recipe is LAB itself, whose samples are trained on, and
 WILD one of the same camera in other circumstances. Rows are sizes of LAB's network;
 `SIZE=LAB.toml,WILD.toml` is one of other recipes, of another lens say. Every row is trained for so
-many CPU minutes and judged on samples of both recipes, cut from pictures that it never saw. Rows
-that need no training are `capture`, the input, `wiener`, the bank alone, and of cameras behind a
-mosaic `wiener-alone` (each colour for itself), `rl`, `admm-tv` and `cross-channel`
-(`tools.comparison.classical`). PSNR and SSIM are those of sRGB; `perceptual` is the 1-norm of Gram
-matrices (eq. 3.7), by random features unless `--vgg FILE` gives those of VGG-19.
+many CPU minutes and judged on samples of both recipes, cut from OTHERS: LAB_judged.toml and
+WILD_judged.toml, which are written too, draw no scenes (with `--wild` that is up to them; where
+they are not, LAB and WILD serve). Rows that need no training are `capture`, the input, `wiener`,
+the bank alone, and of cameras behind a mosaic `wiener-alone` (each colour for itself), `rl`,
+`admm-tv` and `cross-channel` (`tools.comparison.classical`). PSNR and SSIM are those of sRGB;
+`perceptual` is the 1-norm of Gram matrices (eq. 3.7), by random features unless `--vgg FILE` gives
+those of VGG-19.
 
 What is finished is in the journal of the folder and not done again; a row that was interrupted goes
-on, and the table is written after every row. Beside it stands a verdict on "supervised overfits",
-from paired samples (`tools.comparison.overfitting` has the rule).
+on unless something that it was trained by has changed, and the table is written after every row.
+Beside it stands a verdict on "supervised overfits", from paired samples
+(`tools.comparison.overfitting` has the rule). All rows are judged by the last average of their
+weights, none by one that validated best before the display.
 
 A lens with a haze has its frames made before (`--only-recipes` writes the recipes and ends): with
 `--data PICTURES` in OUT_DIR/LAB to train on, with `--data OTHERS` in OUT_DIR/LAB_judged and
-OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the names of the recipes without .toml). With
-`--frames 6,2` there are recipes of these names: 6 frames to train on and 2 to judge on, the latter
-through other copies of the lens. `--camera CAMERA.toml` puts another camera before the sizes and
-losses of RECIPE.
+OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the names of the recipes without .toml). `--frames
+6,8` has 6 frames to train on and 8 to judge on, the latter through other copies of the lens.
+`--camera CAMERA.toml` puts another camera before the sizes and losses of RECIPE.
 """
 
 import argparse
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,6 +42,7 @@ from torch import Tensor
 
 from camkit.colorimetry import rec709_from_camera
 from camkit.errors import CamkitError
+from camkit.models_def.kinds.bayer.frames.samples import TileMaker
 from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
 from camkit.models_def.training.adversarial.content import Features, Relu32, gram_loss
 from camkit.models_def.training.adversarial.views import make_views
@@ -60,6 +64,9 @@ DIGITS: Final = 5
 JUDGED: Final = 3
 """Counts how rows are judged; what was judged before is judged again."""
 LEAST_ERROR: Final = 1e-12
+FRAMES: Final = "tiles.json"
+CONDITIONS: Final = "conditions.txt"
+"""Behind the name of a checkpoint: the hash of what it was trained by."""
 
 Entry = dict[str, Any]
 
@@ -88,10 +95,25 @@ class Conditions:
 
     def digest(self, row: "Row") -> str:
         """Give a hash of all that decides a row."""
-        paths = [path for recipe in (row.lab, row.wild) for path in (recipe, judged_by(recipe))]
-        files = [path.read_text(encoding="utf-8") for path in paths if path.exists()]
-        given = [JUDGED, self.data, self.fresh, self.sharp, self.vgg, self.minutes, self.samples]
-        return hashlib.sha256("\n".join([row.size, *files, *map(str, given)]).encode()).hexdigest()
+        recipes = [path for recipe in (row.lab, row.wild) for path in (recipe, judged_by(recipe))]
+        texts = [text for recipe in recipes for text in self._told(recipe)]
+        return _hash(JUDGED, row.size, *texts, self.fresh, self.samples, *self._trained_by())
+
+    def training_digest(self, row: "Row") -> str:
+        """Give a hash of all that decides the weights of a row."""
+        return _hash(row.size, *self._told(row.lab), *self._trained_by())
+
+    def _told(self, recipe: Path) -> list[str]:
+        """Give the texts of a recipe and of what says how its frames were made, where they are."""
+        frames = sorted((self.out_dir / recipe.stem).glob(f"*/{FRAMES}"))
+        return [path.read_text(encoding="utf-8") for path in (recipe, *frames) if path.exists()]
+
+    def _trained_by(self) -> tuple[object, ...]:
+        return self.data, self.sharp, self.vgg, self.minutes
+
+
+def _hash(*given: object) -> str:
+    return hashlib.sha256("\n".join(map(str, given)).encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,18 +137,20 @@ class Domain:
 
     Attributes:
         samples: Never trained on.
+        frames: Number of the frame that a sample is of; of its own where it is cut from none.
         layout: Of them.
         to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
         designed: The lens that they were taken with, as a bundle holds it.
     """
 
     samples: Sequence[Sample]
+    frames: Sequence[int]
     layout: SampleLayout
     to_rec709: Tensor
     designed: Mapping[str, bytes]
 
     def score(self, restore: Restorer, features: Features) -> Entry:
-        """Judge a restoration by `METRICS`: means over the samples, and `each` of them."""
+        """Judge a restoration by `METRICS`: means over the samples, and `each` by its frame."""
         found: list[tuple[float, float, float]] = []
         for sample in self.samples:
             planes = sample.stacked(self.layout)[None]
@@ -138,7 +162,8 @@ class Domain:
                 (-10 * float(np.log10(error)), float(ssim(views.seen, views.real)), float(look))
             )
         each = dict(zip(METRICS, np.transpose(found).tolist(), strict=True))
-        return {**{name: float(np.mean(values)) for name, values in each.items()}, "each": each}
+        means = {name: float(np.mean(values)) for name, values in each.items()}
+        return {**means, "each": each, "frames": list(self.frames)}
 
 
 def main() -> int:
@@ -275,7 +300,7 @@ def measure(row: Row, conditions: Conditions) -> Entry:
     if row.size in UNTRAINED:
         restore = UNTRAINED[row.size]
     else:
-        restore, trained = restorer(row.size, row.lab, conditions)
+        restore, trained = restorer(row, conditions)
     features = Relu32(conditions.vgg)
     pairs = zip(DOMAINS, (home, abroad), strict=True)
     return trained | {name: one.score(restore, features) for name, one in pairs}
@@ -299,9 +324,12 @@ def domain(recipe_path: Path, conditions: Conditions, method: str | None = None)
     folder.mkdir(parents=True, exist_ok=True)
     material = kind.prepare(recipe, recipe_path.parent, folder)
     maker = kind.maker(recipe, role, material, conditions.fresh, JUDGE_SEED)
+    numbers = range(conditions.samples)
+    frames = [maker.frame_of(n) if isinstance(maker, TileMaker) else n for n in numbers]
     maker = maker if method is None else with_method(method, maker, recipe)
     return Domain(
-        samples=[maker.make(number) for number in range(conditions.samples)],
+        samples=[maker.make(number) for number in numbers],
+        frames=frames,
         layout=kind.layout(recipe, role),
         to_rec709=torch.from_numpy(rec709_from_camera(np.array(matrix))).float(),
         designed=material.designed,
@@ -313,29 +341,36 @@ def known(target: Tensor, planes: Tensor) -> Tensor:
     return torch.where(target == _wiener(planes), torch.tensor(NOT_JUDGED), target)
 
 
-def restorer(size: str, recipe: Path, conditions: Conditions) -> tuple[Restorer, Entry]:
+def restorer(row: Row, conditions: Conditions) -> tuple[Restorer, Entry]:
     """Train a network, or go on with it; give it, and what was spent."""
-    entry = read_recipe(recipe).network(size)
+    entry = read_recipe(row.lab).network(row.size)
     schedule = entry.schedule
-    folder = conditions.out_dir / recipe.stem
+    folder = conditions.out_dir / row.lab.stem
+    folder.mkdir(parents=True, exist_ok=True)
+    begun, digest = folder / f"{row.size}.{CONDITIONS}", conditions.training_digest(row)
+    same = begun.exists() and begun.read_text(encoding="utf-8") == digest
+    there = any(folder.glob(f"*_{row.size}.pt"))
+    begun.write_text(digest, encoding="utf-8")
     options = TrainOptions(
         out_dir=folder,
-        size=size,
+        size=row.size,
         data_folder=conditions.data,
         max_cpu_minutes=conditions.minutes,
-        resume=any(folder.glob(f"*_{size}.pt")),
+        resume=there and same,
+        overwrite=there and not same,
         sharp_folder=conditions.sharp if schedule.loss == "adversarial" else None,
         vgg=conditions.vgg if schedule.content.looks else None,
     )
-    result = train(recipe, options)
-    network = load_network(read_checkpoint(result.checkpoint))
+    result = train(row.lab, options)
+    # the last average of all: some losses are not chosen by decibels
+    network = load_network(replace(read_checkpoint(result.checkpoint), best={}))
 
     def restore(planes: Tensor) -> Tensor:
         with torch.no_grad():
             return torch.as_tensor(network(planes))
 
     spent = {"steps": result.steps, "cpu_s": result.cpu_s, "valid_db": result.valid_db}
-    form = [str(recipe), entry.network, sorted(map(str, entry.config.items()))]
+    form = [str(row.lab), entry.network, sorted(map(str, entry.config.items()))]
     return restore, {"loss": schedule.loss, "network": form, "trained": spent}
 
 

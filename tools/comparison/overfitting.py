@@ -1,13 +1,15 @@
 """Does a supervised network overfit to where it was trained? A verdict from paired samples.
 
 Both networks of a pair are the same but for their losses, and are judged on the same samples. Its
-lead is the mean over samples of (supervised - other), its error their standard deviation over the
-root of their number; a lead is sure where it exceeds `SURE` errors. What it loses is its lead at
-home less its lead abroad, with the errors of both added in squares.
+lead is the mean over samples of (supervised - other). Samples of one frame share its light and its
+noise, so the error of a lead is that of whole frames (clusters); it is sure where it exceeds `SURE`
+errors. What it loses is its lead at home less its lead abroad, with the errors of both added in
+squares.
 
     holds    it leads at home, surely, and trails abroad, surely
     partly   it loses surely, and leads at home surely, but does not surely trail abroad
     fails    it surely leads abroad and does not surely lose; or its lead surely grows abroad
+    behind   it surely trails at home already: whatever it loses, nothing was gained by it
     untold   all else: the samples are too few to tell
 
 One number of a network says nothing of a loss: other seeds may give another verdict.
@@ -32,7 +34,7 @@ class Lead:
 
     Attributes:
         mean: Over samples.
-        error: Standard error of the mean; infinite for one sample.
+        error: Standard error of the mean; infinite for one frame.
     """
 
     mean: float
@@ -48,16 +50,28 @@ class Lead:
         return Lead(mean=self.mean - other.mean, error=float(np.hypot(self.error, other.error)))
 
 
-def lead_of(one: Sequence[float], other: Sequence[float]) -> Lead:
-    """Give the lead of one over the other, sample by sample."""
+def lead_of(one: Sequence[float], other: Sequence[float], frames: Sequence[int]) -> Lead:
+    """Give the lead of one over the other.
+
+    Args:
+        one: Value of every sample.
+        other: Likewise.
+        frames: Number of the frame that a sample is of.
+    """
     gaps = np.subtract(one, other)
-    error = gaps.std(ddof=1) / np.sqrt(gaps.size) if gaps.size > 1 else np.inf
+    _, member = np.unique(frames, return_inverse=True)
+    sums = np.bincount(member, weights=gaps - gaps.mean())
+    if sums.size < 2:
+        return Lead(mean=float(gaps.mean()), error=float(np.inf))
+    error = np.sqrt(np.square(sums).sum() * sums.size / (sums.size - 1)) / gaps.size
     return Lead(mean=float(gaps.mean()), error=float(error))
 
 
 def verdict_of(home: Lead, abroad: Lead) -> str:
-    """Give holds, partly, fails or untold."""
+    """Give holds, partly, fails, behind or untold."""
     lost = home.less(abroad).sure
+    if home.sure < 0 and abroad.sure <= 0:
+        return "behind"
     if home.sure > 0 and abroad.sure < 0:
         return "holds"
     if home.sure > 0 and lost > 0:
@@ -72,7 +86,7 @@ def overfitting(rows: Mapping[str, Entry]) -> list[Entry]:
 
     Args:
         rows: Name -> `trained`, `loss`, `network` (alike where only losses differ), and of `lab`
-            and `wild` for every metric the values of all samples (`each`).
+            and `wild` for every metric the values of all samples (`each`), and their `frames`.
     """
     found = []
     for name, row in rows.items():
@@ -92,6 +106,7 @@ def _compared(row: Entry, other: Entry) -> Entry:
             lead_of(
                 np.multiply(sign, row[where]["each"][metric]).tolist(),
                 np.multiply(sign, other[where]["each"][metric]).tolist(),
+                row[where]["frames"],
             )
             for where in ("lab", "wild")
         )
@@ -113,6 +128,6 @@ def sentences(found: Sequence[Entry]) -> list[str]:
             lines.append(
                 f"{pair['supervised']} against {pair['other']}, {metric}: ahead by {home:.3f} +- "
                 f"{home_error:.3f} at home, {abroad:.3f} +- {abroad_error:.3f} abroad: "
-                f'"supervised overfits" {one["verdict"]}'
+                f'"supervised overfits": {one["verdict"]}'
             )
     return lines or ["no supervised row beside another loss of the same network: no verdict"]

@@ -4,9 +4,10 @@
               elsewhere than Rec.709 has them; one distance, one exposure, no lamps
     wild      daylight of 4000 to 12000 K, white 4 to 64 times as bright, other distances if asked
 
-Both are texts with a comment: a recipe as a person would have edited it. Where lenses have a haze
-there is a third and a fourth, NAME_display_judged.toml and NAME_wild_judged.toml: few frames, and
-copies of the lens that no network was trained on.
+Both are texts with a comment: a recipe as a person would have edited it. A third and a fourth,
+NAME_display_judged.toml and NAME_wild_judged.toml, are what is judged: pictures alone, since scenes
+that are drawn are the same ones as in training; where lenses have a haze, frames of their own with
+few tiles of each, and copies of the lens that no network was trained on.
 """
 
 import tomllib
@@ -38,6 +39,10 @@ range_most = 64.0
 """
 LABORATORY: Final = {"exposure_min_ev": 0.0, "exposure_max_ev": 0.0, "lamp_share": 0.0}
 JUDGED: Final = "_judged"
+PICTURES_ALONE: Final = {"picture_share": 1.0, "edge_share": 0.0, "night_share": 0.0}
+"""Of the scenes to judge on."""
+JUDGED_TILES: Final = 12
+"""Of a shot: samples of one frame are alike, so many frames count for more."""
 OTHER_COPIES: Final = 907
 """Seed of copies of the lens to judge on."""
 LOSSES: Final = "[schedule]"
@@ -76,7 +81,7 @@ def write_twins(
         folder: For NAME_display.toml and NAME_wild.toml.
         depths_mm: Distances of scenes outside, increasing; empty for the one of the lens.
         camera: Recipe of another camera, NAME; of the first one sizes and losses are taken.
-        counts: Of a lens with a haze; None for those of the recipe, which are judged on too.
+        counts: Of a lens with a haze; None for those of the recipe.
 
     Raises:
         ContractError: If a recipe cannot be read, or has no table that must be changed.
@@ -98,15 +103,17 @@ def write_twins(
         path = folder / f"{(camera or recipe).stem}_{name}.toml"
         path.write_text(content, encoding="utf-8")
         written.append(path)
+        judged = with_keys(content, "data", PICTURES_ALONE)
         if counts is not None:
-            few = with_keys(content, "frames", {"count": counts.judged})
-            few = with_keys(few, "lens", {"seed": OTHER_COPIES})
-            judged_by(path).write_text(few, encoding="utf-8")
+            frames = {"count": counts.judged, "tiles": JUDGED_TILES}
+            judged = with_keys(judged, "frames", frames)
+            judged = with_keys(judged, "lens", {"seed": OTHER_COPIES})
+        judged_by(path).write_text(judged, encoding="utf-8")
     return written[0], written[1]
 
 
 def judged_by(recipe: Path) -> Path:
-    """Give where the recipe of samples to judge on would lie, beside that of a network."""
+    """Give where the recipe of samples to judge on lies, beside that of a network."""
     return recipe.with_name(f"{recipe.stem}{JUDGED}{recipe.suffix}")
 
 

@@ -59,8 +59,16 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
     said = (out / "loss_table.md").read_text(encoding="utf-8")
     assert "| adversarial |" in said
     assert "l1 against adversarial, psnr_db" in said
-    monkeypatch.setattr(loss_table, "measure", lambda *_: pytest.fail("measured again"))
+    with monkeypatch.context() as again:
+        again.setattr(loss_table, "measure", lambda *_: pytest.fail("measured again"))
+        assert run_tool(again, "comparison.loss_table", *options) == 0
+    # other conditions: weights of before are not gone on with
+    faster = lab.read_text(encoding="utf-8").replace("warmup_steps = 2", "warmup_steps = 1")
+    lab.write_text(faster, encoding="utf-8")
     assert run_tool(monkeypatch, "comparison.loss_table", *options) == 0
+    anew = json.loads((out / "loss_table.json").read_text(encoding="utf-8"))["rows"]
+    assert anew["l1"]["lab"]["psnr_db"] != rows["l1"]["lab"]["psnr_db"]
+    assert anew["wiener"]["lab"] == rows["wiener"]["lab"]
 
 
 def test_one_recipe_is_trained_before_a_display_and_judged_outside(
@@ -69,7 +77,9 @@ def test_one_recipe_is_trained_before_a_display_and_judged_outside(
     out = tmp_path / "out"
     options = [recipes[0], "--rows", "l1", "--samples", 2, "--minutes", 10, "--out-dir", out]
     assert run_tool(monkeypatch, "comparison.loss_table", *options, "--only-recipes") == 0
-    assert sorted(path.name for path in out.iterdir()) == ["lab_display.toml", "lab_wild.toml"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        f"lab_{name}.toml" for name in ("display", "display_judged", "wild", "wild_judged")
+    ]
     made = []
 
     def killed(row: loss_table.Row, given: loss_table.Conditions) -> loss_table.Entry:

@@ -68,11 +68,18 @@ class TileMaker:
 
     def developed(self, index: int) -> Developed:
         """Give a tile as the bank meets it."""
+        rng = np.random.default_rng((self._seed, 1, index))
+        tile = self._tiles.read(self._tile_of(index))
+        return draw_developed(rng, tile, self._recipe, self._bank)
+
+    def frame_of(self, index: int) -> int:
+        """Give the number of the frame that a sample is cut from."""
+        return self._tile_of(index) // (self._recipe.frames.shots * self._recipe.frames.tiles)
+
+    def _tile_of(self, index: int) -> int:
         turn, place = divmod(index, len(self._tiles))
         order = np.random.default_rng((self._seed, 0, turn)).permutation(len(self._tiles))
-        rng = np.random.default_rng((self._seed, 1, index))
-        tile = self._tiles.read(int(order[place]))
-        return draw_developed(rng, tile, self._recipe, self._bank)
+        return int(order[place])
 
     def make(self, index: int) -> Sample:
         """Take a tile through the bank."""
