@@ -25,7 +25,8 @@ from camkit.models_def.training.kind import Material, Restorer, read_recipe, tra
 from camkit.models_def.training.pictures import list_pictures
 
 FIRST_SAMPLE: Final = 50_000_000
-"""Number of the first calibration sample: none that a training has seen."""
+"""Number of the first calibration sample: noise and place of none are those of training; tiles of
+frames are the same ones."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +107,13 @@ def freeze_checkpoint(
     if not live_norms(live):
         raise ContractError(f"{source} holds no norms that look at a picture; export it as it is")
     config = saved.config | {"frozen": True}
-    frozen = kind.build_network(saved.network, **config).eval()
+    try:
+        frozen = kind.build_network(saved.network, **config).eval()
+    except ContractError as error:
+        raise ContractError(
+            f"{source} holds a {saved.network}, which has no form with constants in place of its "
+            "norms; normed_unet has one"
+        ) from error
     if material is None:
         options.cache_folder.mkdir(parents=True, exist_ok=True)
         material = kind.prepare(recipe, recipe_path.parent, options.cache_folder)

@@ -57,7 +57,7 @@ def draft_network(name: str, network: nn.Module, layout: SampleLayout) -> Export
     if live := live_norms(network):
         raise ContractError(
             f"{name} has {len(live)} norms that look at a whole picture ({live[0]}, ...), so it "
-            "cannot be tiled; make them constants first: camkit freeze-norms"
+            "cannot be tiled; camkit freeze-norms makes those of a normed_unet constants"
         )
     model = to_onnx(network, channels=layout.input_channels, scale=layout.scale)
     graph = inspect_graph(model)

@@ -21,7 +21,7 @@ from camkit.bundle.facts import Card
 from camkit.bundle.manifest import NOT_TRAINED
 from camkit.bundle.reader import GOLDEN, Bundle, find_bundle, open_bundle
 from camkit.bundle.writer import write_bundle
-from camkit.errors import ContractError
+from camkit.errors import CamkitError, ContractError
 from camkit.export.network_facts import ExportedNetwork, draft_network
 from camkit.models_def.kinds.bayer.samples import LAYOUT
 from camkit.models_def.networks.instance_norm import freeze_norms
@@ -86,7 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("-o", "--out", type=Path, required=True)
     asked = parser.parse_args(arguments)
     config = NormedConfig(width=asked.width, capture_only=asked.capture_only)
-    with_generator(open_bundle(find_bundle(asked.bundle)), config, asked.out)
+    try:
+        with_generator(open_bundle(find_bundle(asked.bundle)), config, asked.out)
+    except CamkitError as error:
+        raise SystemExit(f"{error}") from error
     print(asked.out)
 
 

@@ -26,6 +26,7 @@ from camkit.runtime.calibration.lensfun.profile import Frame, missed_px
 from camkit.runtime.geometry.distortion import check_distortion
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import LATTICE_PX, Warp
+from tools.hdr.record import in_one_line
 
 SIZE_PX: Final = (6000, 4000)
 
@@ -111,6 +112,7 @@ def warped_px(entry: Distortion, radial: RadialEntry, frame: Frame) -> float:
     return float(np.hypot(*np.moveaxis(dense - wanted, -1, 0)).max())
 
 
+@in_one_line
 def main() -> None:
     """Print what became of a database."""
     parser = argparse.ArgumentParser(description=__doc__)

@@ -17,8 +17,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-import numpy as np
-
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.haze_file import read_haze
 from camkit.bundle.psf_file import read_psf
@@ -30,17 +28,16 @@ from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.training.kind import read_recipe
 from camkit.report.analysis.recovery import filled, restored
 from camkit.report.quality import read_picture
-from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, photograph, write_capture
 from camkit.runtime.twin.truth import light_sensor, true_picture
-from tools.lens.cameras import decibels
+from tools.hdr.record import in_one_line
+from tools.lens.whole_frames import RIM_PX, SIMPLE, measures, options
 
 RECIPE: Final = Path(__file__).parents[2] / "models_def" / "recipes" / "thin_plate.toml"
-METHODS: Final = ("develop", "haze", "wiener")
-ZONES: Final = 5
 
 
+@in_one_line
 def main() -> None:
     """Build, photograph, restore, print."""
     parser = argparse.ArgumentParser(
@@ -78,7 +75,7 @@ def main() -> None:
             write_capture(chosen.keep, made, bundle.manifest.sensor, recipe.name)
         print("| method | dB | by zones of the half diagonal | s |")
         print("|---|---|---|---|")
-        for method in METHODS:
+        for method in SIMPLE:
             print(measured(bundle, made, method), flush=True)
 
 
@@ -93,20 +90,13 @@ def build(
 
 def measured(bundle: Bundle, made: Simulation, method: str) -> str:
     """Restore a capture by a method; give the line of a table."""
-    pipeline = Pipeline(
-        bundle, Options(method=method, undistort=False, vignetting=False, threads=1)
-    )
+    pipeline = Pipeline(bundle, options(method=method))
     picture, seconds = timed(lambda: restored(pipeline, made))
-    truth = true_picture(made.clean, light_sensor(bundle.manifest))
-    square = np.square(encode_srgb(picture) - encode_srgb(truth)).mean(axis=0)
-    y, x = np.indices(square.shape)
-    height, width = square.shape
-    radius = np.hypot(y - (height - 1) / 2, x - (width - 1) / 2) / np.hypot(height, width) * 2
-    zones = [
-        decibels(square[(radius >= k / ZONES) & (radius < (k + 1) / ZONES)]) for k in range(ZONES)
-    ]
-    line = " ".join(f"{zone:.1f}" for zone in zones)
-    return f"| {method} | {decibels(square):.2f} | {line} | {seconds:.1f} |"
+    apart = encode_srgb(picture)
+    apart -= encode_srgb(true_picture(made.clean, light_sensor(bundle.manifest)))
+    found = measures(apart, RIM_PX)
+    line = " ".join(f"{zone:.1f}" for zone in found["zones"])
+    return f"| {method} | {found['db']:.2f} | {line} | {seconds:.1f} |"
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:

@@ -75,7 +75,7 @@ def main() -> None:
     """Photograph, restore, print."""
     chosen = parse()
     try:
-        named = dict(named_bundle(word) for word in chosen.bundles)
+        named = named_bundles(chosen.bundles)
         ways = list(ways_of(named))
         first = next(iter(named.values()))
         pictures = list_pictures(chosen.data)[: chosen.pictures]
@@ -126,10 +126,19 @@ def parse() -> argparse.Namespace:
     return chosen
 
 
-def named_bundle(word: str) -> tuple[str, Bundle]:
-    """Open a bundle of the command line: a name or a file, or NAME=FILE."""
-    name, given, file = word.rpartition("=")
-    return (name if given else ""), open_bundle(find_bundle(file))
+def named_bundles(words: Sequence[str]) -> dict[str, Bundle]:
+    """Open the bundles of the command line: a name or a file, or NAME=FILE.
+
+    Raises:
+        ContractError: If two have the same name; one without is named by nothing.
+    """
+    found: dict[str, Bundle] = {}
+    for word in words:
+        name, _, file = word.rpartition("=")
+        if name in found:
+            raise ContractError(f"{word}: give it a name of its own, NAME={file}")
+        found[name] = open_bundle(find_bundle(file))
+    return found
 
 
 def ways_of(named: Mapping[str, Bundle]) -> Iterator[Way]:
@@ -265,7 +274,8 @@ def mean_of(values: Sequence[float | None]) -> str:
 def digest(way: Way, path: Path, iso: float, sources: Mapping[str, Any]) -> str:
     """Give a hash of all that decides an entry."""
     held = hashlib.sha256(way.bundle.path.read_bytes()).hexdigest()
-    told = [held, way.name, way.options.method, path.name, iso, dict(sources)]
+    seen = hashlib.sha256(path.read_bytes()).hexdigest()
+    told = [held, way.name, way.options.method, seen, iso, dict(sources)]
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from camkit.errors import ContractError
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
 from camkit.models_def.training.adversarial.content import Features, content_terms
-from camkit.models_def.training.adversarial.judged import JudgedFitter, Mix
+from camkit.models_def.training.adversarial.judged import JudgedFitter, Mix, load_judges
 from camkit.models_def.training.adversarial.sharp import SharpCrops
 from camkit.models_def.training.adversarial.views import Views
 from camkit.models_def.training.adversarial.wasserstein import (
@@ -112,8 +112,12 @@ class CriticTraining:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Go back to a saved state."""
-        self.network.load_state_dict(state["weights"])
+        """Go back to a saved state.
+
+        Raises:
+            ContractError: If it is that of another critic.
+        """
+        load_judges(self.network, state["weights"])
         self._optimizer.load_state_dict(state["optimizer"])
 
 

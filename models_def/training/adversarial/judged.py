@@ -8,8 +8,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-from torch import Tensor
+from torch import Tensor, nn
 
+from camkit.errors import ContractError
 from camkit.models_def.training.adversarial.views import Views, make_views
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.fitter import Fitter
@@ -18,6 +19,21 @@ from camkit.models_def.training.schedule import learning_rate
 
 Mix = Callable[[Batch, int], Batch]
 """A batch and the number of its step -> the batch with patches of real pairs among its own."""
+
+
+def load_judges(network: nn.Module, weights: State) -> None:
+    """Give the opponents of a generator the weights of a checkpoint, in place.
+
+    Raises:
+        ContractError: If they are those of other opponents.
+    """
+    try:
+        network.load_state_dict(weights)
+    except RuntimeError as error:
+        raise ContractError(
+            "the checkpoint was trained against a critic or discriminators of another shape; "
+            "start without resume"
+        ) from error
 
 
 class JudgedFitter(ABC):

@@ -54,6 +54,12 @@ def test_rim_and_zones_lie_where_they_are() -> None:
     assert whole_frames.measures(apart, 100)["inside"] is None
 
 
+def test_two_bundles_without_names_of_their_own_are_refused() -> None:
+    with pytest.raises(ContractError, match="duet-joint: give it a name of its own, NAME=duet-"):
+        whole_frames.named_bundles(["duet", "duet-joint"])
+    assert list(whole_frames.named_bundles(["duet", "seed=duet-joint"])) == ["", "seed"]
+
+
 def test_black_is_taken_off_evenly() -> None:
     optics = FrozenOptics(psf=tiny_psf(), haze=tiny_haze())
     kernels = tiny_haze().kernels

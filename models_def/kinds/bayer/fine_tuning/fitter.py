@@ -17,7 +17,7 @@ from camkit.models_def.kinds.bayer.fine_tuning.vgg import VggFeatures
 from camkit.models_def.kinds.bayer.recipe import FineTuningRecipe
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.networks.discriminator import Discriminator, DiscriminatorConfig
-from camkit.models_def.training.adversarial.judged import JudgedFitter, Mix
+from camkit.models_def.training.adversarial.judged import JudgedFitter, Mix, load_judges
 from camkit.models_def.training.adversarial.views import Views, pixel_loss
 from camkit.models_def.training.checkpoint import State
 from camkit.models_def.training.first_weights import FirstWeights
@@ -112,7 +112,11 @@ class FineTuningFitter(JudgedFitter):
         }
 
     def load(self, weights: State, average: State, optimizer: dict[str, Any]) -> None:
-        """Go back to a saved state."""
+        """Go back to a saved state.
+
+        Raises:
+            ContractError: If it is that of other discriminators.
+        """
         self.generator.load(weights, average, optimizer["generator"])
+        load_judges(self.opponents, optimizer["opponent_weights"])
         self._optimizer.load_state_dict(optimizer["opponents"])
-        self.opponents.load_state_dict(optimizer["opponent_weights"])

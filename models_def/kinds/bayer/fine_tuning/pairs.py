@@ -77,13 +77,14 @@ class PairSamples:
         """Give what replaces the first patches of a batch by patches of real pairs.
 
         Args:
-            share: How many of them are replaced.
+            share: How many of them are replaced; a part of a patch is one in as many steps.
             seed: Of the draw; a step draws by itself alone, so that a resumed run draws the same.
         """
 
         def mix(batch: Batch, step: int) -> Batch:
             count, _, patch_px, _ = batch.target.shape
-            real = round(share * count)
+            rounds_up = np.random.default_rng((seed, 4, step)).random()
+            real = int(np.floor(share * count + rounds_up))
             if real == 0:
                 return batch
             drawn = self.draw_batch(np.random.default_rng((seed, 3, step)), real, patch_px)

@@ -129,6 +129,12 @@ def test_a_checkpoint_of_another_loss_is_not_resumed(make):
         plain.load(alone.weights(), alone.average(), alone.optimizer_state())
 
 
+def test_a_checkpoint_of_another_critic_is_not_resumed(make):
+    narrow, wide = make(), make(critic={"width": 8})
+    with pytest.raises(ContractError, match="a critic or discriminators of another shape"):
+        wide.load(narrow.weights(), narrow.average(), narrow.optimizer_state())
+
+
 def test_real_pairs_take_the_places_that_the_recipe_gives_them(recipe_path, material, monkeypatch):
     planes = np.full((3, 6, 64, 64), 0.25, dtype=np.float16)
     pairs = PairSamples(

@@ -68,6 +68,10 @@ def test_real_pairs_replace_their_share_of_a_batch_by_the_step_alone():
     mixed = pairs.mixer(0.5, seed=1)(batch(), 7)
     assert (mixed.planes[0] == 0.25).all()
     assert torch.equal(mixed.planes[1], batch().planes[1])
+    # of one patch in four, half a patch of a batch of two is one in every other step
+    seldom = [pairs.mixer(0.25, seed=1)(batch(), step) for step in range(200)]
+    assert 80 < sum(bool((m.planes[0] == 0.25).all()) for m in seldom) < 120
+    assert all(torch.equal(m.planes[1], batch().planes[1]) for m in seldom)
 
 
 def test_recipe_table_is_checked():
