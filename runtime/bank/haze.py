@@ -101,6 +101,10 @@ class Lit:
         """Give the kernels (c, n, n) of an image point, with their light."""
         return self.kernels.at(x_mm, y_mm) * self.light_at(x_mm, y_mm)[:, None, None]
 
+    def outward(self, x_mm: float, y_mm: float) -> FloatArray:
+        """Give them with +y pointing outward; see `FieldKernels.outward`."""
+        return self.kernels.outward(x_mm, y_mm) * self.light_at(x_mm, y_mm)[:, None, None]
+
     def light_at(self, x_mm: float, y_mm: float) -> FloatArray:
         """Give the light (c,) of an image point, interpolated as the kernels are."""
         return self.kernels.between(self.light, x_mm, y_mm)

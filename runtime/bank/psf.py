@@ -122,6 +122,24 @@ class FieldKernels:
             return _normalised(self.between(self.kernels, x_mm, y_mm))
         return _kernel_at(self.kernels, self.field_heights_mm, x_mm, y_mm, turns=self.turns)
 
+    def outward(self, x_mm: float, y_mm: float) -> FloatArray:
+        """Give the kernels of an image point as rows and columns of its own: +y points outward.
+
+        Args:
+            x_mm: See `at`.
+            y_mm: See `at`.
+
+        Returns:
+            (c, h, w) float32, each kernel sums to 1.
+        """
+        height_mm = float(np.hypot(x_mm, y_mm))
+        if self.symmetry == "radial":
+            return self.at(0.0, height_mm)
+        kernels = self.at(x_mm, y_mm)
+        if height_mm == 0:
+            return kernels
+        return _normalised(_turn(kernels, -x_mm / height_mm, y_mm / height_mm))
+
     def between(self, values: FloatArray | FloatGrid, x_mm: float, y_mm: float) -> FloatArray:
         """Give what else is known at the fields at an image point: linear, as the kernels are.
 

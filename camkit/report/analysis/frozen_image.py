@@ -8,6 +8,7 @@ import numpy as np
 from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.sensor import ColorSensor
 from camkit.contracts import FloatArray
+from camkit.errors import ContractError
 from camkit.report.analysis.point_image import (
     DIRECTIONS,
     FAR_PX,
@@ -24,6 +25,7 @@ from camkit.units import to_mm
 
 _PARTS: Final = 8
 """Of the side of a cell, whose light is even."""
+LEAST_APART_UM: Final = 1e-6
 Lookup = Callable[[float, float], FloatArray]
 
 
@@ -45,25 +47,25 @@ def frozen_images(
         angle_at: Gives the field angle of a height in radians, or None.
 
     Raises:
-        ContractError: If kernels of several depths are not known for this one.
+        ContractError: If kernels of several depths are not known for this one, or nothing is known
+            of a single wavelength.
     """
     psf, response = optics.psf, (band.wavelengths_um, band.weights[None])
+    _check_wavelength(band, psf.wavelengths_um)
     haze: Lookup | None = None
     if optics.haze is None:
-        core: Lookup = color_kernels(psf, *response, depth_mm=depth_mm).at
+        kernels = color_kernels(psf, *response, depth_mm=depth_mm)
         share: Callable[[float, float], FloatArray] | None = None
     else:
         hazy = hazy_kernels(psf, optics.haze, *response, depth_mm=depth_mm)
-        core, haze, share = hazy.core.at, hazy.haze.at, hazy.coarse_core.light_at
+        kernels, haze, share = hazy.core, hazy.haze.outward, hazy.coarse_core.light_at
     cell_px = 1 if optics.haze is None else optics.haze.cell_px
     images = []
     for height_mm in heights_mm:
         place = _place(float(height_mm), on_grid=psf.symmetry == "grid")
         held = 1.0 if share is None else float(share(*place)[0])
-        peak = held * core(*place)[0].astype(np.float64)
+        peak = held * kernels.outward(*place)[0].astype(np.float64)
         cells = None if haze is None else haze(*place)[0].astype(np.float64)
-        light = psf.relative_illumination
-        at = np.interp(height_mm, psf.field_heights_mm, light) if light.size > 1 else light[0]
         images.append(
             _image(
                 peak,
@@ -71,10 +73,21 @@ def frozen_images(
                 cell_px,
                 height_mm=float(height_mm),
                 angle_rad=angle_at(float(height_mm)),
-                illumination=float(at),
+                illumination=float(kernels.between(psf.relative_illumination, *place)),
             )
         )
     return images
+
+
+def _check_wavelength(band: Band, known_um: Array) -> None:
+    if band.wavelengths_um.size > 1:
+        return
+    asked = float(band.wavelengths_um[0])
+    if not known_um.min() - LEAST_APART_UM <= asked <= known_um.max() + LEAST_APART_UM:
+        raise ContractError(
+            f"these optics are known from {known_um.min():g} to {known_um.max():g} um; nothing is "
+            f"known at {asked:g} um"
+        )
 
 
 def _place(height_mm: float, *, on_grid: bool) -> tuple[float, float]:

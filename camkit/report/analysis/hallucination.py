@@ -191,8 +191,9 @@ def analyse(
     for scene in scenes:
         if tell is not None:
             tell(scene.name)
-        shot = rig.shoot(scene, lens=rig.lens, setting=Setting(iso=options.iso))
-        pictures = dict(rig.restore(shot).pictures)
+        light = rig.light_in_place(scene)
+        shot = rig.record(scene, light, Setting(iso=options.iso))
+        pictures = _restored(rig, shot)
         clean = true_picture(shot.light.clean, rig.sensor)
         truth = encode_srgb(clean)
         corners = corners_of(truth.shape[1], truth.shape[2], options.side_px)
@@ -216,7 +217,7 @@ def analyse(
         Method(
             name=name,
             patches=tuple(held.patches),
-            worst=() if name == TRUTH else tuple(_worst(held.crops)),
+            worst=() if name == TRUTH else tuple(sorted(held.crops, key=_crop_rank)[:WORST]),
         )
         for name, held in gathered.items()
     )
@@ -251,13 +252,27 @@ def _take(held: _Gathered, picture: FloatArray, view: _View, options: Options) -
         )
 
 
-def _rank(patch: Patch) -> float:
-    excess = patch.values["excess"]
-    return -excess if np.isfinite(excess) else np.inf
+def _restored(rig: Rig, shot: Shot) -> dict[str, FloatArray]:
+    """Give the picture of every method.
+
+    Raises:
+        ContractError: If one gives none.
+    """
+    made = rig.restore(shot)
+    for name, reason in made.faults.items():
+        raise ContractError(f"{shot.scene.name}: {name} gives no picture: {reason}")
+    return dict(made.pictures)
 
 
-def _worst(crops: Sequence[Crop]) -> list[Crop]:
-    return sorted(crops, key=lambda crop: _rank(crop.patch))[:WORST]
+def _rank(patch: Patch) -> tuple[float, float]:
+    """Order by excess, then by detail (that of the filter, which has no excess); largest first."""
+    values = (patch.values[name] for name in ("excess", "detail"))
+    first, second = (-value if np.isfinite(value) else np.inf for value in values)
+    return first, second
+
+
+def _crop_rank(crop: Crop) -> tuple[float, float]:
+    return _rank(crop.patch)
 
 
 def _judge(

@@ -205,12 +205,20 @@ class Rig:
         """
         return self._fall(scene, around, self.lens)
 
-    def _fall(self, scene: Scene, seen: FloatArray, lens: Lens) -> Light:
+    def light_in_place(self, scene: Scene) -> Light:
+        """Let a scene fall on the sensor through the nominal lens, as if it distorted nothing.
+
+        Scene, mirror images around it and capture are then in one geometry: what is photographed
+        again after restoration meets the same haze.
+        """
+        return self._fall(scene, scene.linear, self.lens, distort=False)
+
+    def _fall(self, scene: Scene, seen: FloatArray, lens: Lens, *, distort: bool = True) -> Light:
         extent, scale = self.sensor.known_extent, scene.scale
         ring_px = (seen.shape[1] - scene.linear.shape[1]) // (2 * scale)
         origin = scene.origin_px((extent.width_px, extent.height_px))
         window = scene_window(seen, self.sensor, origin, scale=scale, surround_px=ring_px)
-        options = LightOptions(scale=scale, surround_px=ring_px)
+        options = LightOptions(scale=scale, surround_px=ring_px, distort=distort)
         return light_of(seen, self.sensor, lens, window, options)
 
     def shoot(self, scene: Scene, lens: Lens | None = None, setting: Setting | None = None) -> Shot:

@@ -34,7 +34,9 @@ def field(
         Path | None,
         typer.Option(help="Folder of sharp pictures: photograph and restore whole frames."),
     ] = None,
-    pictures: Annotated[int, typer.Option(min=1, help="How many of them.")] = 1,
+    pictures: Annotated[
+        int | None, typer.Option(min=1, help="How many of them; default: 1.")
+    ] = None,
     frame: Annotated[
         str | None, typer.Option(help="Only WIDTHxHEIGHT about the middle of such frames.")
     ] = None,
@@ -49,6 +51,8 @@ def field(
     """
     check_page(page, overwrite=overwrite)
     frame_px = None if frame is None else _frame_px(frame)
+    if pictures is not None and data is None:
+        raise ContractError("pictures are those of a folder: give --data too, or no --pictures")
     from camkit.report.analysis.field import FieldOptions, measure_field, to_json, to_text
     from camkit.report.analysis.subject import find_subject
     from camkit.report.quality import list_set, read_picture
@@ -63,7 +67,7 @@ def field(
         bars_px=bars_px,
         fields=fields,
         wavelength_um=wavelength_um,
-        pictures=() if data is None else tuple(map(read_picture, list_set(data, pictures))),
+        pictures=() if data is None else tuple(map(read_picture, list_set(data, pictures or 1))),
         frame_px=frame_px,
     )
     found = [measure_field(subject, options, tell) for subject in subjects]

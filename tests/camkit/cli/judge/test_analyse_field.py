@@ -59,6 +59,8 @@ def test_a_bundle_is_measured_and_shown(tmp_path: Path, camkit_command) -> None:
         (["duet", "--frame", "12"], "WIDTHxHEIGHT"),
         (["duet", "--frame", "64x64"], "128 px"),
         (["duet", "--frame", "256x256"], "give --data too"),
+        (["duet", "--pictures", "2"], "give --data too"),
+        (["duet", "--wavelength-um", "5"], "known from 0.42 to 0.68 um"),
         (["pinhole-0"], "> 0 mm"),
         (["pinhole-1.2.3"], "pinhole-DIAMETER"),
         (["no.safetensors"], "no.safetensors"),

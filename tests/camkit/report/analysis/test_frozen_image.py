@@ -1,8 +1,12 @@
 """Images of points of frozen optics: nothing of core and haze is lost, wherever the peak lies."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from camkit.bundle.frozen_optics import FrozenOptics
+from camkit.errors import ContractError
 from camkit.report.analysis.frozen_image import (
     frozen_images,
     sensor_heights_mm,
@@ -60,6 +64,50 @@ def test_an_even_haze_lies_within_a_disc_by_its_area(off_px: tuple[int, int]) ->
     told = np.pi * 100.0**2 / (41 * 16) ** 2
     assert within_cells(cells, 16, off_px, 100.0) == pytest.approx(told, rel=2e-3)
     assert within_cells(cells, 16, (0, 0), FAR_PX) == pytest.approx(1)
+
+
+def test_kernels_on_a_grid_are_seen_along_their_radius() -> None:
+    """A smear of 6 px outward and 1 px across, brighter about the axis; on the diagonal, turned."""
+    at_mm = np.linspace(-0.4, 0.4, 5)
+    y_mm, x_mm = (axis.ravel() for axis in np.meshgrid(at_mm, at_mm, indexing="ij"))
+    height_mm = np.hypot(x_mm, y_mm)
+    kernels = np.stack([_smear(x, y) for x, y in zip(x_mm, y_mm, strict=True)])
+    psf = replace(
+        hazy_optics().psf,
+        kernels=kernels[:, None, None].repeat(3, axis=2),
+        field_heights_mm=height_mm,
+        symmetry="grid",
+        grid_x_mm=at_mm,
+        grid_y_mm=at_mm,
+        relative_illumination=1 - height_mm,
+    )
+    heights = np.array([0.0, 0.2, 0.4]) * np.sqrt(2)
+    images = frozen_images(FrozenOptics(psf=psf), band_of(tiny_sensor()), heights)
+    assert [i.illumination for i in images] == pytest.approx((1 - heights).tolist(), abs=1e-6)
+    for image in images[1:]:
+        wide = {name: _width(line) for name, line in image.lines.items()}
+        assert wide["radial"] == pytest.approx(6, rel=0.1)
+        assert wide["tangential"] == pytest.approx(1, rel=0.2)
+
+
+def _smear(x_mm: float, y_mm: float) -> np.ndarray:
+    far = np.hypot(x_mm, y_mm)
+    out = (0.0, 1.0) if far == 0 else (x_mm / far, y_mm / far)
+    y, x = np.mgrid[-20:21, -20:21]
+    along, across = x * out[0] + y * out[1], x * out[1] - y * out[0]
+    spread = np.exp(-((along / 6) ** 2 + across**2) / 2) if far else np.exp(-(x**2 + y**2) / 2)
+    return (spread / spread.sum()).astype(np.float32)
+
+
+def _width(line: np.ndarray) -> float:
+    at = np.arange(line.size) - line.size // 2
+    middle = (line * at).sum() / line.sum()
+    return float(np.sqrt((line * (at - middle) ** 2).sum() / line.sum()))
+
+
+def test_one_wavelength_that_nothing_is_known_of_is_refused() -> None:
+    with pytest.raises(ContractError, match=r"known from 0\.45 to 0\.62 um; .* at 5 um"):
+        frozen_images(hazy_optics(), band_of(tiny_sensor(), 5.0), np.zeros(1))
 
 
 def test_heights_end_at_the_corner() -> None:

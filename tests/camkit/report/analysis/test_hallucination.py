@@ -23,7 +23,7 @@ from camkit.report.analysis.hallucination_page import (
 )
 from camkit.report.analysis.patches import MEASURES, corners_of, overshoot_of, summary
 from camkit.report.analysis.planted import plant
-from camkit.report.stress.rig import INPUT
+from camkit.report.stress.rig import INPUT, Restored, Rig
 from camkit.report.stress.scene import stress_scenes
 from tests.bundle_factory import tiny_sensor
 from tests.haze_bundle import write_hazy_bundle
@@ -60,6 +60,22 @@ def test_the_true_scene_explains_its_capture(report: Report) -> None:
 def test_the_true_scene_of_a_hazy_camera_explains_its_capture(by_filter: Report) -> None:
     chi2 = by_filter.method(TRUTH).values("chi2")
     assert np.nanmean(chi2) == pytest.approx(1, abs=4 * np.sqrt(2 / SIDE_PX**2 / chi2.size))
+
+
+def test_a_method_that_gives_nothing_is_one_line(
+    bundle: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = Restored(planes={}, pictures={}, faults={"M": "not to be believed"})
+    monkeypatch.setattr(Rig, "restore", lambda *_: nothing)
+    with pytest.raises(ContractError, match="M gives no picture: not to be believed"):
+        analyse(bundle, stress_scenes(bundle, 1), Options(side_px=SIDE_PX))
+
+
+def test_the_worst_of_the_filter_are_those_with_most_left_unexplained(report: Report) -> None:
+    filtered = report.method("wiener")
+    worst = [crop.patch.values["detail"] for crop in filtered.worst]
+    everything = sorted(filtered.values("detail").tolist(), reverse=True)
+    assert worst == everything[: len(worst)]
 
 
 def test_the_capture_taken_for_the_scene_is_denied(report: Report) -> None:

@@ -10,7 +10,8 @@ from camkit.report.analysis.unexplained import LEVEL_PX, Unexplained, unexplaine
 from camkit.report.stress.rig import Rig
 from camkit.report.stress.scene import stress_scenes
 from camkit.report.stress.shot import Shot
-from camkit.runtime.twin.exposure import Setting
+from camkit.runtime.twin.exposure import Setting, signal_of
+from camkit.runtime.twin.light import Light, LightOptions, light_of
 from camkit.runtime.twin.truth import true_picture
 from tests.bundle_factory import tiny_sensor
 from tests.haze_bundle import write_hazy_bundle
@@ -24,7 +25,8 @@ def seen_scene(tmp_path_factory: pytest.TempPathFactory) -> tuple[Rig, Shot, Flo
     folder: Path = tmp_path_factory.mktemp("hazy")
     bundle = write_hazy_bundle(folder, sensor=tiny_sensor(192, 160))
     rig = Rig(bundle, ())
-    shot = rig.shoot(stress_scenes(bundle, 1)[0], lens=rig.lens, setting=Setting(iso=100))
+    scene = stress_scenes(bundle, 1)[0]
+    shot = rig.record(scene, rig.light_in_place(scene), Setting(iso=100))
     return rig, shot, true_picture(shot.light.clean, rig.sensor)
 
 
@@ -40,6 +42,23 @@ def test_of_the_truth_both_are_about_one(seen: tuple[Rig, Shot, FloatArray]) -> 
     assert chi2 == pytest.approx(1, abs=5 * np.sqrt(2 / samples))
     own = 4 / LEVEL_PX**2  # what the mean of as many samples of a colour takes along
     assert detail == pytest.approx(1 - own, abs=5 * np.sqrt(2 / samples))
+
+
+def test_the_light_of_the_truth_photographed_again_is_the_same(
+    seen: tuple[Rig, Shot, FloatArray],
+) -> None:
+    """What lies around a scene throws light into it; where a lens distorts, it must stay too."""
+    rig, shot, _ = seen
+    options = LightOptions(scale=shot.scene.scale, distort=False)
+
+    def missed(light: Light) -> float:
+        clean = true_picture(light.clean, rig.sensor)
+        again = light_of(np.maximum(clean, 0), rig.sensor, rig.lens, light.window, options)
+        one, other = (signal_of(made, rig.sensor) for made in (light, again))
+        return float(np.abs(one - other).max() / one.max())
+
+    assert missed(shot.light) < 1e-5
+    assert missed(rig.light(shot.scene)) > 0.05
 
 
 def test_a_wrong_level_is_no_detail(seen: tuple[Rig, Shot, FloatArray]) -> None:
