@@ -30,6 +30,9 @@ FloatArray = NDArray[np.float32]
 
 PSF_SUM_TOLERANCE: Final = 1e-4
 DEPTH_RTOL: Final = 1e-6
+LEAST_HEIGHT_MM: Final = 1e-6
+MOST_HEIGHT_MM: Final = 1e6
+"""Of the last field, where there are several."""
 """A depth in metres is rarely the same number as in millimetres: 1.1 m is 1100.0000000000002 mm."""
 
 
@@ -247,6 +250,12 @@ class FrozenPsf:
         rising = axes if self.symmetry != "grid" else axes[1:]
         if any((np.diff(a) <= 0).any() or np.isnan(a).any() for a in rising):
             raise ContractError("field heights, depths and wavelengths must increase")
+        farthest = float(np.abs(self.field_heights_mm).max())
+        if not (farthest == 0 or LEAST_HEIGHT_MM <= farthest <= MOST_HEIGHT_MM):
+            raise ContractError(
+                f"the last field lies {LEAST_HEIGHT_MM:g} to {MOST_HEIGHT_MM:g} mm from the axis; "
+                f"got {farthest:g}"
+            )
         if self.depths_mm[0] <= 0:
             raise ContractError(f"depths lie in front of the lens, > 0; got {self.depths_mm[0]}")
         if self.symmetry != "grid" and self.field_heights_mm[0] != 0:

@@ -95,14 +95,15 @@ def check_haze(stages: Sequence[Stage], optics: Optics | None) -> None:
     """Refuse a bank behind which the haze of the optics would stay.
 
     Raises:
-        JoinError: If optics have a haze and a stage wiener comes before any stage haze.
+        JoinError: If optics have a haze and a stage wiener takes light that no stage haze cleared.
     """
     if optics is None or optics.type != "hazy_psf":
         return
+    clear: set[str] = set()
     for number, stage in enumerate(stages, start=1):
-        if isinstance(stage, Dehaze):
-            return
-        if isinstance(stage, Wiener):
+        if isinstance(stage, Dehaze) or stage.takes[0] in clear:
+            clear |= set(stage.gives)
+        elif isinstance(stage, Wiener):
             raise JoinError(
                 f"stage {number} (wiener) deconvolves with core kernels, and no stage haze before "
                 "it takes away what lies beside them"

@@ -17,6 +17,7 @@ from camkit.units import UM_PER_MM, to_mm
 
 _STEP_MM: Final = 0.001
 _BISECTIONS: Final = 60
+MOST_RIM_MM: Final = 1000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,10 +76,13 @@ def wall_radii_mm(profile: Profile, grooves: Grooves) -> Tensor:
     """Give the radii (wall,) float64 at which walls stand, from the axis outwards.
 
     Raises:
-        ContractError: If the profile has no rim, or a groove is narrower than 1 um.
+        ContractError: If the profile has no rim within a metre, or a groove is narrower than 1 um.
     """
-    if not math.isfinite(profile.rim_mm):
-        raise ContractError("a surface with grooves needs a finite semi_diameter_mm")
+    if not profile.rim_mm <= MOST_RIM_MM:
+        raise ContractError(
+            f"a surface with grooves needs a finite semi_diameter_mm, at most {MOST_RIM_MM:g}; got "
+            f"{profile.rim_mm:g}"
+        )
     depth = to_mm(grooves.depth_um)
 
     def ring(radius_mm: Tensor) -> Tensor:

@@ -32,8 +32,9 @@ def cell_means(
         cell_px: Side of a cell, even.
 
     Returns:
-        (c, rows, columns) float32 means, what is no number counted as dark and 0 where a colour has
-        no sample; the same shape, true where a sample of the colour clipped.
+        (c, rows, columns) float32 means, a sample that is no number counted as dark, one beyond all
+        numbers as white, and 0 where a colour has no sample; the same shape, true where a sample of
+        the colour clipped.
     """
     count, height, width = samples.shape
     channels = count if cfa is None else COLOURS
@@ -42,7 +43,7 @@ def cell_means(
     over = np.zeros(means.shape, np.bool_)
     for row in range(rows):
         top, bottom = row * cell_px, height if row + 1 == rows else (row + 1) * cell_px
-        band = samples.read(top, bottom)
+        band = np.nan_to_num(samples.read(top, bottom), nan=0.0, posinf=1.0, neginf=0.0)
         mask = None if clipped is None else clipped.read(top, bottom)
         for channel, places in enumerate(_sites(cfa, channels)):
             total, number = np.zeros(columns), np.zeros(columns)
@@ -55,7 +56,6 @@ def cell_means(
                     hit = np.asarray(mask[min(plane, len(mask) - 1), down, across].any(axis=0))
                     over[channel, row] |= _gathered(hit, columns, cell_px, across) > 0
             means[channel, row] = total / np.maximum(number, 1)
-    np.nan_to_num(means, copy=False, nan=0.0, posinf=1.0, neginf=0.0)
     return means, over
 
 

@@ -393,8 +393,9 @@ def solving_bytes(
     nodes = AZIMUTHS * haze.kernels.shape[0]
     places = 4 * nodes * side**2 * (3 + channels / 4)
     places += kept_bytes(entry, haze, channels, kernel_scale)
-    laid = entry.terms * (4 * spectrum + 16 * cells)
-    laid += 4 * spectrum * -(-entry.terms // TERMS_AT_ONCE)
+    terms = max(entry.terms, CORE_TERMS)
+    laid = terms * (4 * spectrum + 16 * cells)
+    laid += 4 * spectrum * -(-terms // TERMS_AT_ONCE)
     if cores_differ(haze):
         wide = filter_side(side)
         laid += entry.terms * (4 * (sides[0] + wide) * (sides[1] + wide) + 16 * cells)

@@ -5,11 +5,12 @@ from dataclasses import replace
 from functools import cache, lru_cache
 from typing import Final
 
+from camkit.bundle.haze_golden import MAX_CELLS
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Dehaze, Demosaic
 from camkit.errors import BundleError
-from camkit.runtime.bank.cell_means import cell_means
+from camkit.runtime.bank.cell_means import cell_count, cell_means
 from camkit.runtime.bank.haze import (
     KEPT_CAMERAS,
     CoarseBand,
@@ -40,16 +41,24 @@ SOLVED_MP: Final = 3.0
 
 
 def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:
-    """Refuse several, and cells that take more work than is admitted.
+    """Refuse several, cells that take more work than is admitted, and more than a case may hold.
 
     Raises:
-        BundleError: If the bundle lists two, or every pixel would be transformed too often.
+        BundleError: If the bundle lists two, every pixel would be transformed too often, or the
+            sensor has more than `MAX_CELLS` cells along a side.
     """
     count = len(manifest.stages_of(Dehaze))
     if count > 1:
         raise BundleError(f"a bundle has one stage haze at most; {manifest.name} has {count}")
     work = coarse_work(entry, len(manifest.sensor.channels))
     BANK_WORK.check(work, f"the haze of {manifest.name}")
+    extent = manifest.sensor.extent
+    side_px = 0 if extent is None else max(extent.width_px, extent.height_px)
+    if cell_count(side_px, entry.shrink) > MAX_CELLS:
+        raise BundleError(
+            f"{manifest.name} has more than {MAX_CELLS} cells of {entry.shrink} px along a side; "
+            "make shrink larger"
+        )
 
 
 def prepare(entry: Dehaze, job: Job) -> StageWork:

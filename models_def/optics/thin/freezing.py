@@ -326,9 +326,14 @@ def _kept(haze: Array, wanted: Array) -> Array:
 
 
 def _distortion(lens: Lens, angles_rad: Array, field_mm: Array, channels: int) -> RadialDistortion:
-    """Fit where peaks lie to odd powers of the ideal height."""
+    """Fit where peaks lie to odd powers of the ideal height: no more of them than there are peaks.
+
+    More would lie where they please between the fields.
+    """
     radius_mm = float(field_mm[-1])
     ideal = paraxial_data(lens).efl_mm * np.tan(angles_rad) / radius_mm
-    powers = np.stack([ideal ** (2 * k + 1) for k in range(_TERMS)], axis=1)
-    found, *_ = np.linalg.lstsq(powers[1:], field_mm[1:] / radius_mm, rcond=None)
+    terms = min(_TERMS, len(ideal) - 1)
+    powers = np.stack([ideal ** (2 * k + 1) for k in range(terms)], axis=1)
+    found = np.zeros(_TERMS)
+    found[:terms], *_ = np.linalg.lstsq(powers[1:], field_mm[1:] / radius_mm, rcond=None)
     return RadialDistortion(coefficients=np.tile(found, (channels, 1)), radius_mm=radius_mm)

@@ -14,6 +14,9 @@ from camkit.models_def.toml_table import check_keys, read_table, section, typed
 from camkit.units import to_radians
 
 RECIPES: Final = Path(__file__).resolve().parents[2] / "recipes"
+LEAST_MM: Final = 1e-2
+MOST_MM: Final = 1000.0
+"""Lengths of a plate."""
 Faces = Literal["both", "front", "back"]
 
 
@@ -50,8 +53,16 @@ class PlateTable:
     tool_radius_um: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("thickness_mm", "efl_mm", "aperture_mm", "groove_pi", "wavelength_um"):
+        for name in ("groove_pi", "wavelength_um"):
             _at_least(f"plate.{name}", getattr(self, name), 0)
+        for name in ("thickness_mm", "efl_mm", "aperture_mm"):
+            length_mm = getattr(self, name)
+            if not LEAST_MM <= length_mm <= MOST_MM:
+                raise ContractError(
+                    f"plate.{name} must be {LEAST_MM:g} to {MOST_MM:g} mm; got {length_mm!r}"
+                )
+        if self.index <= 1:
+            raise ContractError(f"plate.glass must bend light; got {self.glass}")
         _at_least("plate.tool_radius_um", self.tool_radius_um, 0, open_=False)
         if not 1 <= self.terms <= 12:
             raise ContractError(f"plate.terms must be 1..12; got {self.terms}")
@@ -85,7 +96,11 @@ class PartitionTable:
     weights: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        _at_least("partition.radius_mm", self.radius_mm, 0)
+        if not LEAST_MM <= self.radius_mm <= MOST_MM:
+            raise ContractError(
+                f"partition.radius_mm must be {LEAST_MM:g} to {MOST_MM:g} mm; got "
+                f"{self.radius_mm!r}"
+            )
         if not 0 < self.corner_deg < 80:
             raise ContractError(f"partition.corner_deg must lie in 0..80; got {self.corner_deg}")
         if not 2 <= self.directions <= 50:

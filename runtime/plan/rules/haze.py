@@ -3,6 +3,7 @@
 from typing import Final
 
 from camkit.bundle.stages import Dehaze
+from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.plan.decision import Decision, Subject, Work
 from camkit.runtime.plan.ways import runs
 
@@ -17,10 +18,11 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         return work, None
     if not runs(manifest.stages, Dehaze, work):
         return work, Decision(what="haze", choice="left in", reason=f"--method {work.method}")
-    cells = (subject.height_px // stage.shrink) * (subject.width_px // stage.shrink)
+    sides_px = subject.height_px, subject.width_px
+    down, across = (cell_count(side_px, stage.shrink) for side_px in sides_px)
     return work, Decision(
         what="haze",
         choice="undone everywhere",
-        reason=f"light of one place falls on all others; solved in {cells} cells of "
+        reason=f"light of one place falls on all others; solved in {down * across} cells of "
         f"{stage.shrink} px",
     )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import load, save
 
+from camkit.bundle.chain import JoinError, check_haze
 from camkit.bundle.frozen_optics import FrozenOptics, psf_of_streaks
 from camkit.bundle.haze_file import haze_to_bytes
 from camkit.bundle.manifest import format_of, planes_of
@@ -87,6 +88,17 @@ def test_a_haze_that_the_manifest_does_not_state_is_refused(tmp_path: Path) -> N
 def test_a_bank_that_leaves_the_haze_does_not_join() -> None:
     with pytest.raises(ValueError, match="no stage haze before it"):
         hazy_manifest(stages=tiny_stages("network"))
+
+
+def test_a_bank_beside_the_stage_haze_does_not_join() -> None:
+    """The stage stands before it, and its light goes elsewhere."""
+    stages = tuple(
+        stage.model_copy(update={"takes": ("rgb", "unknown")}) if stage.type == "wiener" else stage
+        for stage in hazy_stages()
+    )
+    check_haze(hazy_stages(), hazy_optics().entry(np.inf))
+    with pytest.raises(JoinError, match="no stage haze before it"):
+        check_haze(stages, hazy_optics().entry(np.inf))
 
 
 def test_a_stage_needs_a_haze_of_its_cells() -> None:

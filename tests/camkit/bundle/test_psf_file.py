@@ -137,6 +137,8 @@ REFUSALS: dict[str, tuple[Callable[[Tensors], object], str]] = {
     ),
     "axis that falls": (_set("wavelengths_um", 1, 0.1), "must increase"),
     "first field off the axis": (_set("field_heights_mm", 0, 0.1), "first field must be 0"),
+    "field of no height": (_set("field_heights_mm", 1, 1e-300), "1e-06 to 1e\\+06 mm from"),
+    "field beyond all": (_set("field_heights_mm", 1, np.inf), "1e-06 to 1e\\+06 mm from"),
     "pitch": (_set("pixel_pitch_um", 0, -1.0), "pixel_pitch_um"),
     "dark corner": (_set("relative_illumination", 1, 0.0), "relative illumination"),
     "distortion": (_set("distortion_coefficients", (0, 0), np.nan), "distortion"),

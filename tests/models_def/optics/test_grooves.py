@@ -78,8 +78,9 @@ def test_grooves_that_the_tool_cannot_cut_are_refused() -> None:
 
 
 def test_grooves_need_a_rim() -> None:
-    with pytest.raises(ContractError, match="finite semi_diameter_mm"):
-        replace(PARABOLA, semi_diameter_mm=math.inf, grooves=Grooves(depth_um=100.0))
+    for rim_mm in (math.inf, 1e300, 3e5):
+        with pytest.raises(ContractError, match="finite semi_diameter_mm, at most 1000"):
+            replace(PARABOLA, semi_diameter_mm=rim_mm, grooves=Grooves(depth_um=100.0))
 
 
 def test_a_file_gives_grooves_back(tmp_path: Path) -> None:

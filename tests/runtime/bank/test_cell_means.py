@@ -67,5 +67,22 @@ def test_what_is_left_over_is_a_cell_from_half_a_cell_on(side: int, cells: int) 
 def test_what_is_no_number_is_dark() -> None:
     planes = np.array([[[np.nan, 1.0], [np.inf, 1.0]], [[-np.inf, 0.0], [0.5, 0.5]]], np.float32)
     means, clipped = cell_means(ArrayRows(planes), None, None, 4)
-    assert means.ravel().tolist() == [0.0, 0.0]
+    assert means.ravel().tolist() == [0.75, 0.25]
     assert not clipped.any()
+
+
+class _OneRowOfCells(ArrayRows):
+    """Rows that are never read beyond a row of cells."""
+
+    def read(self, top: int, bottom: int) -> FloatArray:
+        assert bottom - top <= 8 + 4
+        assert top % 8 == 0
+        return super().read(top, bottom)
+
+
+def test_no_more_than_a_row_of_cells_is_read_at_once() -> None:
+    planes = np.random.default_rng(0).random((1, 44, 40), dtype=np.float32)
+    means, _ = cell_means(_OneRowOfCells(planes), None, "GRBG", 8)
+    assert means.shape == (3, 6, 5)
+    alone, _ = cell_means(ArrayRows(planes[:, 16:24]), None, "GRBG", 8)
+    np.testing.assert_array_equal(means[:, 2:3], alone)

@@ -1,5 +1,6 @@
 """The coarse band: flat stays flat, what a slow model blurs comes back, rows do as the whole."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from camkit.runtime.bank.haze import (
     HazyKernels,
     coarse_work,
     enlarged,
+    few_of,
     hazy_kernels,
     in_cells,
     solve_coarse,
@@ -180,6 +182,19 @@ def test_a_psf_of_other_samples_is_refused() -> None:
     other: FrozenPsf = replace(tiny_psf(), pixel_pitch_um=5.0)
     with pytest.raises(ContractError, match="haze is of pixels of 6"):
         hazy_kernels(other, tiny_haze(), *RESPONSE)
+
+
+@pytest.mark.parametrize("terms", [1, 32])
+def test_no_more_memory_is_taken_than_is_said(terms: int) -> None:
+    width, height = 3000, 2000
+    cells = np.random.default_rng(0).random((3, 250, 375), dtype=np.float32)
+    said = solving_bytes(Dehaze(shrink=8, terms=terms), tiny_haze(), 3, (width, height))
+    few_of.cache_clear()
+    tracemalloc.start()
+    solve_coarse(cells, cells > 2, _kernels(), _window(width, height), terms=terms, rounds=2)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert 0.3 * said < most <= said
 
 
 def test_more_terms_and_larger_captures_cost_more() -> None:

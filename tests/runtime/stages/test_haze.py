@@ -21,8 +21,8 @@ from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import PLAIN, Subject, Work
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.rows import ArrayRows
 from camkit.runtime.stages import haze
+from tests.bundle_factory import tiny_sensor
 from tests.haze_bundle import hazy_manifest, hazy_stages, write_hazy_bundle
 from tests.haze_factory import tiny_haze
 from tests.job_factory import made_mosaic, made_planes, read_all, start
@@ -208,15 +208,6 @@ def test_the_noise_of_the_bank_is_raised(bundle: Bundle, monkeypatch: pytest.Mon
     assert all(2 < rise < 9 for rise in rises)
 
 
-def test_no_number_stays_where_it_is(bundle: Bundle) -> None:
-    samples = np.full((3, 64, 96), 0.3, np.float32)
-    samples[:, 40, 50] = np.nan
-    pipeline = Pipeline(bundle, Options(threads=1, method="haze"))
-    capture = pipeline.capture_of(samples, iso=100, white_balance=None, origin_px=None)
-    picture = pipeline.start(capture).fill()
-    assert np.isfinite(picture[:, :24, :24]).all()
-
-
 def test_it_may_be_cancelled(bundle: Bundle) -> None:
     pipeline = Pipeline(bundle, Options(threads=1))
     work = pipeline.start(_capture(), cancel=lambda: True)
@@ -243,6 +234,13 @@ def test_what_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
     haze.check(Dehaze(shrink=8), _manifest(), 0)
     with pytest.raises(BundleError, match="the haze of tiny"):
         haze.check(fine, _manifest(), 0)
+
+
+def test_more_cells_than_a_golden_case_holds_are_refused() -> None:
+    wide = hazy_manifest(sensor=tiny_sensor(4200, 64))
+    with pytest.raises(BundleError, match="more than 1024 cells of 4 px along a side"):
+        haze.check(Dehaze(shrink=4), wide, 0)
+    haze.check(Dehaze(shrink=8), wide, 0)
 
 
 def test_a_second_one_is_refused() -> None:
@@ -276,12 +274,6 @@ def test_captures_of_any_size_are_cleared(bundle: Bundle, height: int, width: in
     found = _filled(bundle, made_mosaic(samples=samples), assume="centre")
     assert found.shape[1:] == (height, width)
     assert np.isfinite(found).all()
-
-
-def test_cells_of_rows_are_those_of_the_whole() -> None:
-    planes = np.random.default_rng(0).random((1, 40, 40), dtype=np.float32)
-    wanted, _ = cell_means(ArrayRows(planes), None, "GRBG", 8)
-    assert wanted.shape == (3, 5, 5)
 
 
 def test_a_bundle_opens_from_disk(tmp_path: Path) -> None:

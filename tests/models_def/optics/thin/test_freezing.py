@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from camkit.bundle.sensor import BayerSensor, Extent
 from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.models_def.optics.thin.freezing import (
+    _distortion,
     arriving,
     flat_light,
     freeze_hazy,
@@ -97,6 +99,22 @@ def test_peaks_are_where_the_field_heights_say(frozen: tuple) -> None:  # type: 
     assert psf.field_heights_mm[0] == 0
     assert psf.field_heights_mm[-1] == pytest.approx(half, rel=0.02)
     assert abs(psf.distortion.coefficients[0, 0] - 1) < 0.5
+
+
+@pytest.mark.parametrize("fields", [3, 4, 5, 9])
+def test_between_the_fields_the_distortion_is_that_of_the_lens(fields: int) -> None:
+    """r (1 - 0.06 r^2) is two powers, and two heights off the axis tell them."""
+    angles = np.linspace(0, math.radians(25), fields)
+
+    def bent(angle: Any) -> Any:
+        ideal = np.tan(angle) / np.tan(angles[-1])
+        return 18.0 * ideal * (1 - 0.06 * ideal**2) / 0.94
+
+    found = _distortion(LENS, angles, bent(angles), 3)
+    unit = 40.0 * np.tan(angles[1:] - angles[1] / 2) / found.radius_mm
+    placed = sum(c * unit ** (2 * k + 1) for k, c in enumerate(found.coefficients[0]))
+    wanted = bent(angles[1:] - angles[1] / 2)
+    np.testing.assert_allclose(placed * found.radius_mm, wanted, atol=1e-6)
 
 
 def test_peaks_tell_a_lens_from_another(frozen: tuple) -> None:  # type: ignore[type-arg]

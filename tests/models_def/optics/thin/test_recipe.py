@@ -28,7 +28,11 @@ def test_directions_go_from_the_axis_to_the_corner() -> None:
     ("old", "new", "words"),
     [
         ("terms = 6", "terms = 0", "plate.terms"),
-        ("efl_mm = 43.0", "efl_mm = -1.0", "plate.efl_mm must be > 0"),
+        ("efl_mm = 43.0", "efl_mm = -1.0", "plate.efl_mm must be 0.01 to 1000 mm"),
+        ("thickness_mm = 10.0", "thickness_mm = 1e300", "plate.thickness_mm must be 0.01 to"),
+        ("aperture_mm = 23.4", "aperture_mm = 1e9", "plate.aperture_mm must be 0.01 to"),
+        ("radius_mm = 4.5", "radius_mm = 1e-300", "partition.radius_mm must be 0.01 to"),
+        ('"PMMA-Sultanova2009"', '"air"', "glass must bend light; got air"),
         ("efl_mm = 43.0", "", "lacks efl_mm"),
         ('faces = "both"', 'faces = "all"', "one of both, front, back"),
         ("radius_mm = 4.5", "radius_mm = 14.5", "does not fit"),

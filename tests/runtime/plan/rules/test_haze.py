@@ -35,6 +35,16 @@ def test_the_haze_is_undone_everywhere(bundle: Bundle) -> None:
     assert {"blocks", "wavelengths"} <= set(found)
 
 
+def test_what_is_left_over_is_counted_as_the_solver_counts_it(bundle: Bundle) -> None:
+    pipeline = Pipeline(bundle, Options(assume="centre"))
+    mosaic = np.full((20, 30), 900, np.uint16)
+    capture = pipeline.capture_of(mosaic, iso=100, white_balance=None, origin_px=None)
+    plan = pipeline.start(capture).plan
+    assert plan is not None
+    (said,) = (d for d in plan.decisions() if d.what == "haze")
+    assert "12 cells of 8 px" in said.reason
+
+
 def test_without_the_bank_nothing_is_said_of_it(bundle: Bundle) -> None:
     found = _decisions(bundle, method="haze")
     assert found["haze"].choice == "undone everywhere"
