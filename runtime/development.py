@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, Self, get_args
 
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
-from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Progress
@@ -154,6 +154,24 @@ class FileResult:
         }
 
 
+def begin(
+    pipeline: Pipeline,
+    capture: Capture,
+    write: WriteOptions,
+    *,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Reconstruction:
+    """Plan a picture, the memory that its file takes while it is written counted.
+
+    Raises:
+        ContractError: If capture and bundle do not fit each other, or the cap does not do.
+    """
+    pixels, turned = capture.height * capture.width, capture.orientation
+    reserved_bytes = held_bytes(write.picture, pixels=pixels, orientation=turned)
+    return pipeline.start(capture, progress=progress, cancel=cancel, reserved_bytes=reserved_bytes)
+
+
 def develop_file(
     source: Path,
     target: Path,
@@ -176,9 +194,7 @@ def develop_file(
     decode_s = time.perf_counter() - began
     # What both held while the child decoded; later this process grows, but the child is gone.
     decoded_mb = peak_rss_mb() + capture.decoder_peak_mb
-    pixels, turned = capture.height * capture.width, capture.orientation
-    reserved_bytes = held_bytes(write.picture, pixels=pixels, orientation=turned)
-    work = pipeline.start(capture, progress=progress, cancel=cancel, reserved_bytes=reserved_bytes)
+    work = begin(pipeline, capture, write, progress=progress, cancel=cancel)
     # who asks for a time has had the machine timed; nobody else waits for it
     estimate = None if pipeline.options.max_seconds is None else work.explain()
     with atomic_outputs(sidecar_path(target), target) as (proof, part):

@@ -391,8 +391,8 @@ def solving_bytes(
     cells = sides[0] * sides[1]
     spectrum = (sides[0] + side) * (sides[1] + side)
     nodes = AZIMUTHS * haze.kernels.shape[0]
-    places = 4 * nodes * side**2 * (3 + channels / 4)
-    places += kept_bytes(entry, haze, channels, kernel_scale)
+    # a quarter of all places in every colour, and twice those of one colour while few are found
+    places = 4 * nodes * side**2 * (2.25 + channels / 4)
     terms = max(entry.terms, CORE_TERMS)
     laid = terms * (4 * spectrum + 16 * cells)
     laid += 4 * spectrum * -(-terms // TERMS_AT_ONCE)
@@ -400,4 +400,6 @@ def solving_bytes(
         wide = filter_side(side)
         laid += entry.terms * (4 * (sides[0] + wide) * (sides[1] + wide) + 16 * cells)
         places += 12 * nodes * wide**2
-    return int(laid + places + BYTES_PER_CELL * cells)
+    # the kernels of all places are gone before few of them are laid over the picture
+    most = max(places, laid + BYTES_PER_CELL * cells)
+    return int(kept_bytes(entry, haze, channels, kernel_scale) + most)

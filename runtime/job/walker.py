@@ -95,9 +95,12 @@ class Walk:
         return max(planned, self._first_bytes(running))
 
     def _first_bytes(self, running: list[StageWork]) -> int:
-        """Give the memory at the time when stages look at the capture before any row."""
+        """Give the memory at the time when stages look at the capture before any row.
+
+        Whatever becomes of rows, a JPEG say, takes nothing yet.
+        """
         more = max((work.first_bytes - work.held_bytes for work in running), default=0)
-        return self._fixed_bytes(running) + max(more, 0)
+        return self._fixed_bytes(running) - self._job.reserved_bytes + max(more, 0)
 
     def _fixed_bytes(self, running: list[StageWork]) -> int:
         held = sum(work.held_bytes for work in running)

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,12 @@ import tifffile
 from PIL import Image
 
 import camkit
+from camkit.bundle.reader import built_in_bundles, open_bundle
 from camkit.errors import ContractError
-from camkit.runtime.development import WriteOptions
+from camkit.runtime.development import FileFormat, WriteOptions, begin
+from camkit.runtime.options import Options
 from camkit.runtime.output.sidecar import sidecar_path
+from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import read_capture
 from tests.capture_factory import write_tiny_captures
 from tests.dng_factory import write_scene
@@ -89,3 +93,21 @@ def test_a_restored_picture_names_its_camera_too(tmp_path: Path) -> None:
     )
     assert result.output is not None, result.error
     assert read_capture(result.output).metadata.model == "tiny"
+
+
+@pytest.mark.parametrize("format_", ["exr", "jpeg"])
+@pytest.mark.parametrize("orientation", [1, 6])
+def test_whole_frames_of_built_in_cameras_fit_the_default_memory(
+    format_: FileFormat, orientation: int
+) -> None:
+    begun = []
+    for path in built_in_bundles().values():
+        sensor = open_bundle(path).manifest.sensor
+        if sensor.type == "spad" or sensor.extent is None:
+            continue
+        samples = np.full((sensor.extent.height_px, sensor.extent.width_px), 900, np.uint16)
+        pipeline = Pipeline(open_bundle(path), Options(threads=1))
+        capture = pipeline.capture_of(samples, iso=100, white_balance=None, origin_px=None)
+        turned = replace(capture, orientation=orientation)
+        begun.append(begin(pipeline, turned, WriteOptions(format=format_)))
+    assert len(begun) >= 5

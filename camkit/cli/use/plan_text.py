@@ -50,7 +50,8 @@ def print_plans(
         try:
             if task.refusal is not None:
                 raise ContractError(task.refusal)
-            facts |= _planned(task, pipelines.get(task.bundle, task.source), headerless)
+            pipeline = pipelines.get(task.bundle, task.source)
+            facts |= _planned(task, pipeline, write, headerless)
             if task.own:
                 facts["warnings"].append(OVERWRITES)
         except CamkitError as error:
@@ -63,11 +64,16 @@ def print_plans(
 
 
 def _planned(
-    task: "Task", pipeline: "Pipeline", headerless: "MosaicOptions | None"
+    task: "Task",
+    pipeline: "Pipeline",
+    write: "WriteOptions",
+    headerless: "MosaicOptions | None",
 ) -> dict[str, Any]:
+    from camkit.runtime.development import begin
+
     if pipeline.maker is not None:
         return {"status": "planned", "bundle": task.bundle, **pipeline.plan(task.source)}
-    work = pipeline.start(pipeline.read(task.source, headerless))
+    work = begin(pipeline, pipeline.read(task.source, headerless), write)
     work.explain()
     details = dict(work.record)
     return {

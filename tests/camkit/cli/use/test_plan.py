@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from camkit.cli.app import run
+from camkit.runtime.output.writer import HELD_WHOLE
 from tests.capture_factory import write_tiny_captures
 
 
@@ -42,6 +43,22 @@ def test_plan_and_dry_run_say_the_same_to_people(
         outs.append([line for line in lines if not line.startswith(("  about", "    saves"))])
     assert outs[0] == outs[1]
     assert any("size: M (--size says so)" in line for line in outs[0])
+
+
+def test_what_a_format_holds_counts_in_a_plan_too(
+    bundle: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(HELD_WHOLE, "jpeg", 1e6)
+    options = [str(tmp_path / "a.dng"), "--bundle", str(bundle), "--out-dir", str(tmp_path / "o")]
+    for command in (["plan"], ["process", "--dry-run"], ["process"]):
+        assert run([*command, *options, "--format", "jpeg"]) == 1
+        captured = capsys.readouterr()
+        assert "raise --max-mem" in captured.out + captured.err
+        assert run([*command, *options]) == 0
+        capsys.readouterr()
 
 
 def test_sidecar_keeps_the_plan_and_how_far_the_estimate_was_off(
