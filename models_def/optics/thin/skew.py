@@ -2,7 +2,9 @@
 
 Every ray is bent at a plane, by the slope of the profile there: what `trace` does with ideal
 grooves, without their steps, so that spots follow smoothly from the numbers of the profiles. The
-planes lie half a groove into the plate, where the steps are on average.
+planes lie half a groove into the plate, where the steps are on average; the way to the sensor is
+counted from the rear one, so a sensor at that distance from the rear face itself stands half a
+groove too far out (docs/thin-plate.md, "How it is solved").
 """
 
 from collections.abc import Sequence

@@ -14,7 +14,10 @@ from camkit.cli.say import say
 def sag(
     file: Annotated[Path, typer.Argument(help="The lens (.toml or .zmx).", metavar="FILE")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The table (.csv).")],
-    surface: Annotated[int, typer.Option(min=0, help="Which, from 0.")] = 0,
+    surface: Annotated[
+        int | None,
+        typer.Option(min=0, help="Which, from 0; default: the first with grooves, else 0."),
+    ] = None,
     step_um: Annotated[float, typer.Option(min=0.1, help="Of the radius.")] = 10.0,
     glass: GlassFiles = None,
     overwrite: Overwrite = False,
@@ -35,6 +38,9 @@ def sag(
     from camkit.models_def.optics.thin.sag_table import sag_table, write_sag_table
 
     lens, notes = read_noted_lens(file, [read_agf(path) for path in glass or ()])
+    if surface is None:
+        cut = (n for n, found in enumerate(lens.surfaces) if found.grooves is not None)
+        surface = next(cut, 0)
     if surface >= len(lens.surfaces):
         raise ContractError(f"--surface must be 0..{len(lens.surfaces) - 1}; got {surface}")
     table = sag_table(lens.surfaces[surface], step_um)
