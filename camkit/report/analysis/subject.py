@@ -91,8 +91,8 @@ def find_subject(name: str, like: ColorSensor | None = None) -> Subject:
         return _of_files(name, sensor)
     if util.find_spec("torch") is None:
         raise UnsupportedError(
-            f"{name} is no bundle and no frozen optics; lenses and pinholes are traced, which needs "
-            "torch: pip install torch"
+            f"{name} is no bundle and no frozen optics; lenses and pinholes are traced, which "
+            "needs torch: pip install torch"
         )
     hole = PINHOLE.fullmatch(name)
     return _of_lens(name, sensor) if hole is None else _of_hole(name, hole, sensor)
