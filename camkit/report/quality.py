@@ -22,7 +22,7 @@ from camkit.bundle.golden import IMAGE
 from camkit.bundle.reader import Bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime.files.picture import read_light
 from camkit.runtime.geometry.sensor_window import centred_origin
 from camkit.runtime.twin.simulate import Simulation, SimulationOptions, simulate
@@ -178,9 +178,11 @@ def read_picture(path: Path, most_px: int | None = None) -> FloatArray:
     """Read a picture as linear Rec.709, greys replicated; its middle if a side exceeds a limit.
 
     Raises:
-        DecodeError: If it is damaged, not a picture or not finite; names the file.
+        DecodeError: If it is damaged, not a picture, not finite or darker than black; names the file.
     """
     scene = read_light(path)
+    if scene.min() < 0:
+        raise DecodeError(f"{path}: samples down to {scene.min():g}; a scene must be >= 0")
     if most_px is not None:
         _, height, width = scene.shape
         top, left = (max(side - most_px, 0) // 2 for side in (height, width))

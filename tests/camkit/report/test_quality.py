@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camkit.colorimetry import decode_srgb
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
 from camkit.report.quality import (
     BORDER_PX,
     FABRICATION_SEEDS,
@@ -121,6 +121,21 @@ def test_linear_light_is_taken_as_it_is_and_may_exceed_white(tmp_path: Path, suf
     scene = read_picture(path)
     assert set(np.unique(scene)) == {0.5, 40}
     assert scene[:, 4].min() == 40
+
+
+@pytest.mark.parametrize(("lowest", "fine"), [(-0.005, True), (-0.05, False)])
+def test_faint_negatives_are_dark_and_others_refused_by_name(
+    tmp_path: Path, lowest: float, fine: bool
+) -> None:
+    light = np.full((20, 30, 3), 1.0, np.float32)
+    light[4] = lowest
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGB": light}).write(str(tmp_path / "x.exr"))
+    if fine:
+        assert read_picture(tmp_path / "x.exr").min() == 0
+    else:
+        with pytest.raises(DecodeError, match=r"x\.exr: samples down to -0\.0[45]"):
+            read_picture(tmp_path / "x.exr")
 
 
 def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:
