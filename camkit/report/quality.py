@@ -178,7 +178,7 @@ def read_picture(path: Path, most_px: int | None = None) -> FloatArray:
     """Read a picture as linear Rec.709, greys replicated; its middle if a side exceeds a limit.
 
     Raises:
-        DecodeError: If it is damaged, not a picture, not finite or darker than black; names the file.
+        DecodeError: If it is damaged, no picture, not finite or darker than black; names the file.
     """
     scene = read_light(path)
     if scene.min() < 0:
