@@ -51,13 +51,14 @@ class Darks:
 
         Args:
             files: The frames, one or more.
-            times_s: One for each; None for what the files state.
+            times_s: One for each; None for what the files state, as the frames' own files must.
             bracket: The frames that they belong to; the darks of a single frame without a time
                 were exposed as long as it.
             mosaic: As for the bracket.
 
         Raises:
-            ContractError: If a time is not known.
+            ContractError: If a time is not known, or is in seconds where those of the frames
+                were stated as something else.
             DecodeError: If a frame cannot be read or differs from the bracket.
         """
         sums: dict[float, tuple[FloatArray, int]] = {}
@@ -69,10 +70,11 @@ class Darks:
             time_s = told if times_s is None else times_s[number]
             if not bracket.is_timed:
                 time_s = bracket.frames[0].time_s
-            if time_s is None:
+            why = "states no exposure time" if time_s is None else _why_not(times_s, bracket)
+            if time_s is None or why:
                 raise ContractError(
-                    f"the dark frame {path.name} states no exposure time; say --times with one "
-                    "for each of FILES and then for each dark frame"
+                    f"the dark frame {path.name} {why}; say --times with one for each of FILES and "
+                    "then for each dark frame"
                 )
             light = capture.linear_rows(0, capture.height)
             light[clipped_rows(capture, 0, capture.height)] = np.nan
@@ -105,6 +107,16 @@ class Darks:
             dark = dark * np.float32(frame.time_s / nearest)
         broken = ~(dark <= BROKEN_LIGHT)
         return np.where(broken, np.float32(0), dark), broken
+
+
+def _why_not(times_s: Sequence[float] | None, bracket: Survey) -> str:
+    """Say why the file of a dark frame does not tell its time among those of a bracket."""
+    if times_s is not None or not bracket.is_timed:
+        return ""
+    for frame in bracket.frames:
+        if not frame.file_time_s or abs(frame.time_s / frame.file_time_s - 1) > SAME_TIME:
+            return f"states seconds, the time of {frame.path.name} was stated as another number"
+    return ""
 
 
 def _level(light: FloatArray) -> float:

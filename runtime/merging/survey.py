@@ -33,12 +33,14 @@ class Frame:
         time_s: Exposure time.
         sha256: Hash of the file.
         noise: As the file states it.
+        file_time_s: Exposure time as the file states it; None where it states none.
     """
 
     path: Path
     time_s: float
     sha256: str | None
     noise: NoiseModel | None
+    file_time_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +105,13 @@ def survey(
             )
         if time_s is None:
             time_s, is_timed = _UNSTATED_S, False
-        frame = Frame(path=path, time_s=time_s, sha256=capture.sha256, noise=capture.noise)
+        frame = Frame(
+            path=path,
+            time_s=time_s,
+            sha256=capture.sha256,
+            noise=capture.noise,
+            file_time_s=told,
+        )
         if found:
             check_alike(found[0][1], found[0][0].path, capture, path)
         found.append((frame, without_pixels(capture), _lattice(capture)))

@@ -11,17 +11,18 @@ COMMENT: Final = "#"
 MOST_LIST_BYTES: Final = 1 << 20
 
 
-def stated_times(text: str, files: Sequence[Path]) -> tuple[float, ...]:
-    """Give the exposure time of every file.
+def stated_times(text: str, files: Sequence[Path], darks: Sequence[Path] = ()) -> tuple[float, ...]:
+    """Give the exposure time of every file, then of every dark frame.
 
     Args:
         text: Seconds separated by commas, in the order of the files; or the path of a list with
             lines `NAME SECONDS`, of which further words, comments (`#`) and names that are not
             among the files are skipped. Seconds may be fractions, 1/60.
         files: The frames.
+        darks: Their dark frames.
 
     Returns:
-        One time in seconds for each file.
+        One time in seconds for each file, then for each dark frame.
 
     Raises:
         ContractError: If a time is missing, is stated twice, or is no time.
@@ -29,18 +30,20 @@ def stated_times(text: str, files: Sequence[Path]) -> tuple[float, ...]:
     """
     seconds = [_seconds(part) for part in text.split(",")]
     if all(s is not None for s in seconds):
-        if len(seconds) != len(files):
+        if len(seconds) != len(files) + len(darks):
+            and_darks = f" and {len(darks)} dark frames" if darks else ""
             raise ContractError(
-                f"--times states {len(seconds)} times for {len(files)} files; state one for each"
+                f"--times states {len(seconds)} times for {len(files)} files{and_darks}; state one "
+                "for each"
             )
         return tuple(_checked(s, "--times") for s in seconds if s is not None)
     listed = _read_list(Path(text))
-    missing = [path.name for path in files if path.name not in listed]
+    missing = [path.name for path in (*files, *darks) if path.name not in listed]
     if missing:
         raise ContractError(
             f"{text} states no time for {', '.join(missing[:3])}; expected lines NAME SECONDS"
         )
-    return tuple(listed[path.name] for path in files)
+    return tuple(listed[path.name] for path in (*files, *darks))
 
 
 def _read_list(path: Path) -> dict[str, float]:

@@ -55,6 +55,16 @@ def test_a_dark_frame_of_another_size_or_without_a_time_is_refused(
         Darks.read([tmp_path / "e.dng"], None, bracket)
 
 
+def test_seconds_of_darks_do_not_go_with_stated_ratios(tmp_path: Path, bracket: Survey) -> None:
+    files, dark = [frame.path for frame in bracket.frames], _dark(tmp_path / "d.dng", 0.02, 1.0)
+    ratios = survey(files, [8.0, 1.0])
+    told = r"d\.dng states seconds, the time of 0\.dng was .* then for each dark frame"
+    with pytest.raises(ContractError, match=told):
+        Darks.read([dark], None, ratios)
+    Darks.read([dark], [8.0], ratios)
+    Darks.read([dark], None, survey(files, [1.0, 0.125]))
+
+
 @pytest.mark.parametrize("count", [1, 5])
 def test_the_error_of_black_is_the_drift_that_darks_show_else_a_tenth_of_a_step(
     tmp_path: Path, bracket: Survey, count: int

@@ -18,6 +18,12 @@ def test_a_list_goes_by_name_and_skips_what_is_not_asked_for(tmp_path: Path) -> 
     assert stated_times(str(tmp_path / "list.txt"), FILES) == (0.25, 32.0)
 
 
+def test_dark_frames_come_after_the_files_and_are_counted_apart() -> None:
+    assert stated_times("1,2,3", FILES, [Path("dark.png")]) == (1, 2, 3)
+    with pytest.raises(ContractError, match="5 times for 2 files and 1 dark frames"):
+        stated_times("1,2,3,4,5", FILES, [Path("dark.png")])
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [

@@ -126,9 +126,12 @@ def _times(
     from camkit.runtime.merging.times import stated_times
 
     try:
-        every = stated_times(text, [*files, *darks])
-    except ContractError:
-        return stated_times(text, files), None
+        every = stated_times(text, files, darks)
+    except ContractError as error:
+        try:
+            return stated_times(text, files), None
+        except ContractError:
+            raise error from None
     return every[: len(files)], every[len(files) :]
 
 

@@ -85,7 +85,7 @@ def test_a_list_of_times_may_name_the_darks_too(
         out.unlink(missing_ok=True)
     assert "dark frame dark.png states no exposure time" in done.err
     done = camkit_command("calibrate", "psf", *bracket, *asked, "-o", out, "--times", "1,2")
-    assert "2 times for 3 files" in done.err
+    assert "2 times for 3 files and 1 dark frames" in done.err
 
 
 @pytest.mark.parametrize(
