@@ -112,7 +112,7 @@ def test_one_frame_and_its_darks_need_no_times(tmp_path: Path) -> None:
     hazy, path = Hazy(core=0.6, seed=4), tmp_path / "edge.dng"
     write_mosaic(path, exposed(mosaic_of(hazy.edge_planes(0.1)), 0.8, 1), 0.0)
     darks, timed = hazy.write_darks(tmp_path), survey([path], [1.0], alike=True)
-    found = measure_edge(timed, FOUR_UM, Darks.read(darks, None, timed))
+    found = measure_edge(timed, FOUR_UM, Darks.read(darks, [1.0] * len(darks), timed))
     mute = survey([path], None, alike=True)
     assert (mute.is_timed, mute.frames[0].time_s) == (False, 1.0)
     # what the darks say of their time counts for nothing where the frame says nothing
