@@ -29,14 +29,18 @@ class Darks:
     black the dark is a current. `rows` is what `merging.merge.merge` asks for.
     """
 
-    def __init__(self, means: dict[float, FloatArray], drift: float = 0.0) -> None:
+    def __init__(
+        self, means: dict[float, FloatArray], counts: dict[float, int], drift: float
+    ) -> None:
         """Take dark light by exposure time, NaN where the dark itself is clipped.
 
         Args:
             means: By exposure time.
+            counts: Of the frames in each mean.
             drift: Standard deviation of the level from frame to frame, 1.0 = white.
         """
         self._means = means
+        self._counts = counts
         self._drift = drift
 
     @classmethod
@@ -85,28 +89,42 @@ class Darks:
         like = bracket.like
         step = 1 / (like.white_level - float(like.black_level.max()))
         means = {time_s: total / np.float32(count) for time_s, (total, count) in sums.items()}
-        return cls(means, _drift(list(levels.values()), DRIFT_DN * step))
+        counts = {time_s: count for time_s, (_, count) in sums.items()}
+        return cls(means, counts, _drift(list(levels.values()), DRIFT_DN * step))
 
     def level_error(self, bracket: Survey) -> float:
-        """Give the standard error of black in the merged light of a bracket, at most.
+        """Give the standard error of black in the merged light of a bracket.
 
         Every frame and every dark has a black of its own. Where shot noise rules, frames are
-        weighted by their times, and the error of each comes through with the same strength.
+        weighted by their times s, so that the error of each comes through by 1 / sum(s). That of a
+        mean of k darks is 1 / sqrt(k) of it; it is the same in all frames that take this mean, and
+        grows with the factor f by which each takes it:
+
+            error = drift sqrt(n + sum over means of (sum f)^2 / k) / sum(s)
 
         Args:
             bracket: What the darks were read for; 1.0 = white of its longest frame.
         """
         shares = bracket.times_s / bracket.times_s[0]
-        return self._drift * float(np.sqrt(2 * shares.size) / shares.sum())
+        factors = dict.fromkeys(self._means, 0.0)
+        for frame in bracket.frames:
+            time_s, factor = self._taken(frame)
+            factors[time_s] += factor
+        of_darks = sum(total**2 / self._counts[time_s] for time_s, total in factors.items())
+        return self._drift * float(np.sqrt(shares.size + of_darks) / shares.sum())
 
     def rows(self, frame: Frame, top: int, bottom: int) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Give the dark light of rows of a frame, and where it leaves nothing to measure."""
-        nearest = min(self._means, key=lambda time_s: abs(np.log(time_s / frame.time_s)))
-        dark = self._means[nearest][:, top:bottom]
-        if abs(nearest / frame.time_s - 1) > SAME_TIME:
-            dark = dark * np.float32(frame.time_s / nearest)
+        time_s, factor = self._taken(frame)
+        dark = self._means[time_s][:, top:bottom] * np.float32(factor)
         broken = ~(dark <= BROKEN_LIGHT)
         return np.where(broken, np.float32(0), dark), broken
+
+    def _taken(self, frame: Frame) -> tuple[float, float]:
+        """Give the time of the darks that a frame takes, and by which factor it takes them."""
+        nearest = min(self._means, key=lambda time_s: abs(np.log(time_s / frame.time_s)))
+        is_same = abs(nearest / frame.time_s - 1) <= SAME_TIME
+        return nearest, 1.0 if is_same else frame.time_s / nearest
 
 
 def _why_not(times_s: Sequence[float] | None, bracket: Survey) -> str:

@@ -1,12 +1,21 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from camkit.contracts import NoiseModel
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.darks import Darks
+from camkit.runtime.merging.merge import merge
 from camkit.runtime.merging.survey import Survey, survey
-from tests.runtime.calibration.point_factory import Point, write_bracket, write_mosaic
+from tests.runtime.calibration.point_factory import (
+    BLACK,
+    WHITE,
+    Point,
+    write_bracket,
+    write_mosaic,
+)
 
 SMALL = Point(side=64, x=31.4, y=30.2, reach=10)
 
@@ -73,4 +82,33 @@ def test_the_error_of_black_is_the_drift_that_darks_show_else_a_tenth_of_a_step(
     files = [_dark(tmp_path / f"d{n}.dng", 0.02 + level, 1.0) for n, level in enumerate(levels)]
     drift = np.std(levels, ddof=1) if count > 1 else 0.1 / (4095 - 256)
     found = Darks.read(files, None, bracket).level_error(bracket)
-    assert found == pytest.approx(drift * np.sqrt(2 * 2) / (1 + 1 / 8), rel=0.02)
+    of_darks = (1 + 1 / 8) / np.sqrt(count)
+    assert found == pytest.approx(drift * np.hypot(np.sqrt(2), of_darks) / (1 + 1 / 8), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("times_s", "dark_times_s"),
+    [((1.0, 0.125), (0.125, 0.125)), ((1.0, 1.0, 1.0, 1.0), (1.0,)), ((1.0, 0.125), (1.0, 0.125))],
+)
+def test_the_error_of_black_is_what_frames_and_darks_of_another_black_do_to_the_light(
+    tmp_path: Path, times_s: tuple[float, ...], dark_times_s: tuple[float, ...]
+) -> None:
+    """Short darks err more, and one dark errs alike in all frames that share it."""
+    every, count, step = (*times_s, *dark_times_s), len(times_s), 1 / (WHITE - BLACK)
+    shot = NoiseModel(shot=(1e-2,) * 3, read_variance=(0.0,) * 3)
+
+    def taken(wrong: int | None) -> tuple[float, float]:
+        """Give merged light and its error, where one file has a black that is 4 DN off."""
+        files = [tmp_path / f"{n}.dng" for n in range(len(every))]
+        for n, (path, time_s) in enumerate(zip(files, every, strict=True)):
+            level = (0.3 * time_s if n < count else 0.0) + (4 * step if n == wrong else 0.0)
+            steps = np.indices((64, 64)).sum(axis=0) % 3 * step  # no camera gives one level
+            write_mosaic(path, level + steps, time_s)
+        frames = survey(files[:count], None, alike=True)
+        frames = replace(frames, frames=tuple(replace(f, noise=shot) for f in frames.frames))
+        darks = Darks.read(files[count:], None, frames)
+        return float(merge(frames, None, darks.rows).light.mean()), darks.level_error(frames)
+
+    light, error = taken(None)
+    moved = [(taken(wrong)[0] - light) / (4 * step) for wrong in range(len(every))]
+    assert error == pytest.approx(0.1 * step * np.hypot.reduce(moved), rel=0.03)
