@@ -217,6 +217,8 @@ def draw_pairs(
         view, capture = read_view(pair.path, given.lens)
         if view.like.cfa is None:
             light = capture.linear_rows(0, capture.height)
+            if found.white_balance is not None:
+                light *= np.array(found.white_balance, dtype=np.float32)[:, None, None]
         else:
             light = pipeline.process(pair.path).image
         counts = np.rint(np.clip(light, 0, 1) * 65535).astype(np.uint16).transpose(1, 2, 0)
