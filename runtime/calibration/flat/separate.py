@@ -24,6 +24,8 @@ LEAST_SHARE: Final = 0.15
 """Shifts by a fifth of the width pass, by a tenth do not: there poses that are wrong by a hundredth
 cost more than 1 % of the light."""
 LEAST_CENTRE_SHARE: Final = 0.01
+MOST_CENTRE_ERROR: Final = 0.003
+"""Of the radius, standard error of an optical centre up to which it is found and not noise."""
 RADIAL_INTERVALS: Final = 6
 SPACING: Final = 0.25
 """Of the knots of the display's pattern, in widths of the picture."""
@@ -132,13 +134,13 @@ class _Surroundings:
 def separate(views: Views) -> Parts:
     """Take pictures apart, the optical centre with them where they show it."""
     around = _Surroundings(views)
-    parts = _fit(views, around, views.centre)
+    parts = middle = _fit(views, around, views.centre)
     if not parts.separated:
         return parts
     for _ in range(CENTRE_ROUNDS):
         moved = _moved_centre(views, around, parts)
         if moved is None:
-            break
+            return middle
         before, parts = parts.centre, _fit(views, around, moved, found=True)
         if np.hypot(moved[0] - before[0], moved[1] - before[1]) < _SAME_CENTRE:
             break
@@ -181,8 +183,14 @@ def _moved_centre(views: Views, around: _Surroundings, parts: Parts) -> tuple[fl
     moves = _repeated(-np.stack([slope * dx, slope * dy], axis=1), views)
     if not np.abs(moves).max() > 0 or around.least_share(moves) < LEAST_CENTRE_SHARE:
         return None
-    beside = np.concatenate([_repeated(parts.radial.terms(radius), views), moves], axis=1)
-    step = linalg.lstsq(around.left_of(beside), parts.rest.ravel())[0][-2:]
+    lens = around.left_of(_repeated(parts.radial.terms(radius), views))
+    seen = around.left_of(moves)
+    seen = seen - lens @ linalg.lstsq(lens, seen)[0]
+    rest = parts.rest.ravel()
+    step = linalg.lstsq(seen, rest)[0]
+    variance = float(np.mean((rest - seen @ step) ** 2))
+    if variance > MOST_CENTRE_ERROR**2 * float(linalg.eigvalsh(seen.T @ seen)[0]):
+        return None
     x, y = parts.centre[0] + float(step[0]), parts.centre[1] + float(step[1])
     far = np.hypot(x - views.centre[0], y - views.centre[1]) > MOST_OFFSET
     return None if far else (x, y)

@@ -97,3 +97,17 @@ def test_a_lens_without_vignetting_has_no_centre_to_find() -> None:
     falling = np.log(LENS.lens(np.hypot(views.x - LENS.centre[0], views.y - LENS.centre[1])))
     parts = separate(replace(views, log_light=views.log_light - falling))
     assert parts.illumination(np.linspace(0, 1, 9)) == pytest.approx(1, abs=EXACT_TOLERANCE)
+    assert not parts.centre_found
+    assert parts.centre == views.centre
+
+
+@pytest.mark.parametrize(("corner_share", "found"), [(0.0, False), (0.05, True), (1.0, True)])
+def test_a_centre_is_found_in_vignetting_and_not_in_noise(corner_share: float, found: bool) -> None:
+    views = _views(GOOD)
+    falling = np.log(LENS.lens(np.hypot(views.x - LENS.centre[0], views.y - LENS.centre[1])))
+    for seed in range(4):
+        noise = 1e-3 * np.random.default_rng(seed).standard_normal(views.log_light.shape)
+        light = views.log_light - (1 - corner_share) * falling + noise
+        parts = separate(replace(views, log_light=light))
+        assert parts.centre_found == found
+        assert parts.centre == pytest.approx(LENS.centre if found else (0, 0), abs=0.006)
