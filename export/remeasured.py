@@ -35,7 +35,7 @@ from camkit.bundle.reader import (
     STRESS_PSF,
     Bundle,
 )
-from camkit.bundle.sensor import BayerSensor, ChannelResponse, PlanesSensor
+from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, PlanesSensor
 from camkit.bundle.stages import Illumination, Parts, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FrozenPsf, RadialDistortion
@@ -52,6 +52,8 @@ from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
 PITCH_TOLERANCE: Final = 0.02
+LEAST_REACH: Final = 0.95
+"""Of the way to the corner, which blocks of pictures never reach."""
 OWN_NAMES: Final = (STRESS_PSF, STRESS_HAZE, CARD, PREVIEW, GOLDEN)
 DESIGN: Final = (PRESCRIPTION, PLATE, PLATE_HEIGHTS)
 
@@ -229,15 +231,33 @@ def _leave_out_networks(draft: _Draft) -> None:
 
 
 def _put_centre(draft: _Draft, measured: Measured) -> None:
-    flat, geometry = measured.flat, measured.geometry
+    flat, geometry, extent = measured.flat, measured.geometry, draft.sensor.known_extent
+    width, height = extent.width_px, extent.height_px
+    for what, part in (("geometry", geometry), ("flat", flat)):
+        size = None if part is None else (part.width_px, part.height_px)
+        if size not in (None, (None, None), (width, height)):
+            raise DecodeError(
+                f"the {what} is of {size[0]}x{size[1]} px, the sensor has {width}x{height}"
+            )
     if geometry is not None:
         centre = geometry.centre_px
     elif flat is not None and flat.centre_found:
         centre = flat.centre_px
     else:
         return
-    extent = draft.sensor.known_extent.model_copy(update={"optical_centre_px": centre})
+    if not (0 <= centre[0] <= width - 1 and 0 <= centre[1] <= height - 1):
+        raise DecodeError(
+            f"the optical centre ({centre[0]:g}, {centre[1]:g}) lies outside of the sensor of "
+            f"{width}x{height} px"
+        )
+    extent = extent.model_copy(update={"optical_centre_px": centre})
     draft.change(sensor=draft.sensor.model_copy(update={"extent": extent}))
+
+
+def _farthest_px(extent: Extent) -> float:
+    """Give the distance of the farthest corner from the optical centre."""
+    x, y = extent.axis_px
+    return float(np.hypot(max(x, extent.width_px - 1 - x), max(y, extent.height_px - 1 - y)))
 
 
 def _put_flat(draft: _Draft, found: FlatFile) -> None:
@@ -249,6 +269,12 @@ def _put_flat(draft: _Draft, found: FlatFile) -> None:
         )
     if not found.separated:
         draft.notes.append("the flat was not told from the display; what it has of it comes along")
+    corner_mm = _farthest_px(draft.sensor.known_extent) * to_mm(pitch_um)
+    if found.heights_mm[-1] < LEAST_REACH * corner_mm:
+        draft.notes.append(
+            f"the flat is known to {found.heights_mm[-1]:.3g} mm of {corner_mm:.3g} from the "
+            "centre; beyond, light is taken to fall no further"
+        )
     optics = draft.manifest.optics
     if isinstance(optics, LensProfile):
         draft.change(optics=optics.model_copy(update={"illumination": entry}))
@@ -263,18 +289,12 @@ def _put_flat(draft: _Draft, found: FlatFile) -> None:
 
 def _put_geometry(draft: _Draft, found: GeometryFile) -> None:
     extent = draft.sensor.known_extent
-    if (found.width_px, found.height_px) != (extent.width_px, extent.height_px):
-        raise DecodeError(
-            f"the geometry is of {found.width_px}x{found.height_px} px, the sensor has "
-            f"{extent.width_px}x{extent.height_px}"
-        )
     rows = (found.radial.coefficients,) * len(draft.sensor.channels)
     radius_mm = found.radial.radius_px * to_mm(extent.pixel_pitch_um)
     entry = RadialEntry(coefficients=rows, radius_mm=radius_mm)
-    x, y = found.centre_px
-    farthest = np.hypot(max(x, extent.width_px - 1 - x), max(y, extent.height_px - 1 - y))
+    farthest = _farthest_px(extent)
     try:
-        check_distortion(entry.to_distortion(), float(farthest) * to_mm(extent.pixel_pitch_um))
+        check_distortion(entry.to_distortion(), farthest * to_mm(extent.pixel_pitch_um))
     except ContractError as error:
         raise DecodeError(f"the geometry cannot be undone: {error}") from error
     if found.covered_radius_px * RANGE_MARGIN < farthest:

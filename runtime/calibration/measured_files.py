@@ -38,11 +38,18 @@ class GeometryFile(Entry, extra="ignore"):
 
 
 class FlatFile(Entry, extra="ignore"):
-    """What `camkit calibrate flat` found, as far as bundles take it."""
+    """What `camkit calibrate flat` found, as far as bundles take it.
+
+    Attributes:
+        width_px: Of the sensor; None in files from before it was stated.
+        height_px: Likewise.
+    """
 
     heights_mm: tuple[NonNegative, ...]
     relative_illumination: tuple[Positive, ...]
     pixel_pitch_um: Positive
+    width_px: Side | None = None
+    height_px: Side | None = None
     centre_px: tuple[Place, Place]
     centre_found: bool
     separated: bool

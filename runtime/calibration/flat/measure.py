@@ -39,7 +39,8 @@ class FlatFacts:
         heights_mm: (height,) distances from the optical centre on the sensor.
         relative_illumination: (height,) 1 at the centre.
         pixel_pitch_um: By which heights are those of the pictures.
-        centre_px: (x, y) of the optical centre in the pictures.
+        size_px: Width and height of the sensor where pictures state their place on it, else theirs.
+        centre_px: (x, y) of the optical centre on it.
         centre_found: Whether it was fitted.
         separated: Whether lens and display were told apart.
         display: Unevenness of what is photographed, as far as it was seen: a share of its
@@ -54,6 +55,7 @@ class FlatFacts:
     heights_mm: FloatGrid
     relative_illumination: FloatGrid
     pixel_pitch_um: float
+    size_px: tuple[int, int]
     centre_px: tuple[float, float]
     centre_found: bool
     separated: bool
@@ -74,6 +76,8 @@ class FlatFacts:
             "heights_mm": [round(float(h), 5) for h in self.heights_mm],
             "relative_illumination": [round(float(v), 5) for v in self.relative_illumination],
             "pixel_pitch_um": self.pixel_pitch_um,
+            "width_px": self.size_px[0],
+            "height_px": self.size_px[1],
             "display_percent": round(100 * self.display, 3),
             "residual_percent": round(100 * self.rest, 4),
             "centre_px": [round(part, 2) for part in self.centre_px],
@@ -134,15 +138,17 @@ def measure_flat(
     farthest = np.hypot(views.x - parts.centre[0], views.y - parts.centre[1]).max()
     radii = np.linspace(0, float(farthest), HEIGHTS)
     shape = (len(pictures), *pictures[0].light.shape)
+    size, origin = _place(like)
     return FlatFacts(
         files=tuple(path.name for path in files),
         poses=tuple(poses),
         heights_mm=radii * radius_px * to_mm(pitch_um),
         relative_illumination=parts.illumination(radii),
         pixel_pitch_um=float(pitch_um),
+        size_px=size,
         centre_px=(
-            (like.width - 1) / 2 + parts.centre[0] * radius_px,
-            (like.height - 1) / 2 + parts.centre[1] * radius_px,
+            origin[0] + (like.width - 1) / 2 + parts.centre[0] * radius_px,
+            origin[1] + (like.height - 1) / 2 + parts.centre[1] * radius_px,
         ),
         centre_found=parts.centre_found,
         separated=parts.separated,
@@ -189,16 +195,19 @@ def _views(pictures: Sequence[FlatPicture], poses: Sequence[Pose], radius_px: fl
 
 
 def _sensor_middle(like: Capture, radius_px: float) -> tuple[float, float]:
-    """Give the middle of the sensor, where a crop states its place on it."""
-    if like.origin_px is None or like.sensor_size_px is None:
-        return 0.0, 0.0
+    """Give the middle of the sensor from that of a picture, in units of half its diagonal."""
     x, y = (
         ((whole - side) / 2 - origin) / radius_px
-        for whole, side, origin in zip(
-            like.sensor_size_px, (like.width, like.height), like.origin_px, strict=True
-        )
+        for whole, origin, side in zip(*_place(like), (like.width, like.height), strict=True)
     )
     return x, y
+
+
+def _place(like: Capture) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Give the size of the sensor and where a picture begins on it; alone, it is all of it."""
+    if like.origin_px is None or like.sensor_size_px is None:
+        return (like.width, like.height), (0, 0)
+    return like.sensor_size_px, like.origin_px
 
 
 def _refuse_reversed(views: Views, parts: Parts) -> None:

@@ -127,6 +127,15 @@ def test_without_geometry_the_centre_is_that_of_the_flat(camkit_command, tmp_pat
     assert done.code == 0, done.err
     assert "tiny with flat as measured" in done.out
     assert _proves_itself(out).manifest.sensor.known_extent.optical_centre_px == (40.0, 33.0)
+    assert "the flat is known to" not in done.err
+
+
+def test_a_flat_that_ends_before_the_corner_says_so(camkit_command, tmp_path: Path) -> None:
+    short = FLAT | {"heights_mm": [0.0, 0.1, 0.3], "width_px": 96, "height_px": 64}
+    words = ("--flat", write_part(tmp_path, "flat", short), "-o", tmp_path / "mine.camkit")
+    done = camkit_command("calibrate", "bundle", write_tiny_bundle(tmp_path), *words)
+    assert done.code == 0, done.err
+    assert "the flat is known to 0.3 mm of 0.385 from the centre" in done.err
 
 
 @pytest.mark.parametrize("keep", [True, False])
@@ -194,6 +203,16 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
         "flat",
         FLAT | {"heights_mm": [0.0, 0.4, 0.2]},
         "is not what `camkit calibrate flat` writes",
+    ),
+    "a flat of another size": (
+        "flat",
+        FLAT | {"width_px": 192, "height_px": 128},
+        "the flat is of 192x128 px, the sensor has 96x64",
+    ),
+    "a centre outside": (
+        "flat",
+        FLAT | {"centre_px": [5000.0, 3.0]},
+        "the optical centre (5000, 3) lies outside of the sensor of 96x64 px",
     ),
     "another pitch": ("flat", FLAT | {"pixel_pitch_um": 3.0}, "pixels of 3 um, the sensor has 6"),
     "no noise": ("noise", {"camera": "x"}, "is not what `camkit calibrate noise` writes"),

@@ -16,6 +16,7 @@ def _facts(count: int, *, separated: bool) -> FlatFacts:
         heights_mm=np.linspace(0, 10, 17),
         relative_illumination=np.linspace(1, 0.5, 17),
         pixel_pitch_um=4.0,
+        size_px=(200, 160),
         centre_px=(100.0, 80.0),
         centre_found=separated,
         separated=separated,

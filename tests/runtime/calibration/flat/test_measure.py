@@ -90,11 +90,13 @@ def test_a_crop_knows_pitch_and_middle_of_its_sensor(tmp_path: Path) -> None:
     plain = Flats()
     lens = Flats(centre=(22 / plain.radius_px, 15 / plain.radius_px))
     place = camkit_description(
-        bundle="b", origin_px=(0, 0), sensor_size_px=(404, 270), pixel_pitch_um=PITCH_UM
+        bundle="b", origin_px=(20, 10), sensor_size_px=(444, 290), pixel_pitch_um=PITCH_UM
     )
     files = lens.write(tmp_path, description=place)
     facts = measure_flat(files, *lens.said(GOOD))
-    assert facts.centre_px == pytest.approx((201.5, 134.5), abs=1.0)
+    assert facts.centre_px == pytest.approx((221.5, 144.5), abs=1.0)
+    record = facts.to_record()
+    assert (record["width_px"], record["height_px"]) == (444, 290)
     assert _error(facts, lens) < TOLERANCE
 
 
