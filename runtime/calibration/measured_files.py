@@ -83,6 +83,18 @@ class NoiseFile(Entry, extra="ignore"):
 
     iso: Annotated[tuple[IsoRecord, ...], Field(min_length=1, max_length=256)]
 
+    @model_validator(mode="after")
+    def _check(self) -> "NoiseFile":
+        if len({one.iso for one in self.iso}) < len(self.iso):
+            raise ValueError("an ISO is stated twice")
+        for one in self.iso:
+            if one.white_level <= one.black_level:
+                raise ValueError(
+                    f"ISO {one.iso:g} has its white level {one.white_level:g} not above its black "
+                    f"level {one.black_level:g}"
+                )
+        return self
+
     def noise(self) -> tuple[IsoNoise, ...]:
         """Give gain and read noise by increasing ISO."""
         return tuple(

@@ -215,6 +215,12 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
         "the optical centre (5000, 3) lies outside of the sensor of 96x64 px",
     ),
     "another pitch": ("flat", FLAT | {"pixel_pitch_um": 3.0}, "pixels of 3 um, the sensor has 6"),
+    "an ISO twice": ("noise", {"iso": NOISE["iso"][:1] * 2}, "an ISO is stated twice"),
+    "white below black": (
+        "noise",
+        {"iso": [NOISE["iso"][0] | {"white_level": 90.0}]},
+        "ISO 400 has its white level 90 not above its black level 100",
+    ),
     "no noise": ("noise", {"camera": "x"}, "is not what `camkit calibrate noise` writes"),
 }
 
