@@ -1,8 +1,9 @@
-"""What the commands of `camkit calibrate` wrote, read back: geometry, flat, noise."""
+"""What the commands of `camkit calibrate` wrote, read back: geometry, flat, tone, noise."""
 
 import tomllib
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -14,6 +15,7 @@ from camkit.errors import DecodeError
 Side = Annotated[int, Field(ge=2, le=100_000)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
+TOP_LEVEL: Final = 255.0
 _T = TypeVar("_T", bound=Entry)
 
 
@@ -26,19 +28,20 @@ class RadialRecord(Entry, extra="ignore"):
 
 
 class GeometryFile(Entry, extra="ignore"):
-    """What `camkit calibrate geometry` found, as far as bundles take it."""
+    """What `camkit calibrate geometry` found, as far as bundles and pairs take it."""
 
     width_px: Side
     height_px: Side
     model: str
     focal_px: Positive | None = None
     centre_px: tuple[Place, Place]
+    coefficients: Annotated[tuple[Factor, ...], Field(max_length=8)] | None = None
     covered_radius_px: Positive
     radial: RadialRecord
 
 
 class FlatFile(Entry, extra="ignore"):
-    """What `camkit calibrate flat` found, as far as bundles take it.
+    """What `camkit calibrate flat` found, as far as bundles and pairs take it.
 
     Attributes:
         width_px: Of the sensor; None in files from before it was stated.
@@ -64,6 +67,24 @@ class FlatFile(Entry, extra="ignore"):
         return IlluminationEntry(
             heights_mm=self.heights_mm, relative_illumination=self.relative_illumination
         )
+
+
+class ToneFile(Entry, extra="ignore"):
+    """What `camkit calibrate tone` found, as far as pairs take it."""
+
+    levels: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=1024)]
+    luminance: tuple[NonNegative, ...]
+
+    @model_validator(mode="after")
+    def _check(self) -> "ToneFile":
+        levels, light = self.levels, self.luminance
+        if len(light) != len(levels):
+            raise ValueError(f"{len(levels)} levels have {len(light)} luminances")
+        if any(b <= a for a, b in pairwise(levels)) or any(b < a for a, b in pairwise(light)):
+            raise ValueError("levels and luminance must rise together")
+        if levels[0] != 0 or levels[-1] != TOP_LEVEL or light[-1] <= light[0]:
+            raise ValueError("levels must reach from 0 to 255, and luminance rise between them")
+        return self
 
 
 class IsoRecord(Entry, extra="ignore"):
@@ -117,6 +138,11 @@ def read_flat(path: Path) -> FlatFile:
     return _read(path, FlatFile, "flat")
 
 
+def read_tone(path: Path) -> ToneFile:
+    """Read what `camkit calibrate tone` wrote; see `read_geometry`."""
+    return _read(path, ToneFile, "tone")
+
+
 def read_noise(path: Path) -> NoiseFile:
     """Read what `camkit calibrate noise` wrote; see `read_geometry`."""
     return _read(path, NoiseFile, "noise")
@@ -139,5 +165,5 @@ def _toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DecodeError(f"cannot read {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise DecodeError(f"{path} is no TOML: {error}") from error

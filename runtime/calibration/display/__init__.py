@@ -5,7 +5,7 @@ shown      pictures as light, upright, whatever their profile
 marks      blocks in the corners of a screen that say which target it shows, drawn and found
 screen     where things lie on a screen: marks, picture, board
 targets    all that is shown, drawn, written, and read back
-camera_file  the TOMLs of `camkit calibrate geometry`, `tone` and `flat`, read back
+camera_file  what `camkit calibrate geometry`, `tone` and `flat` found, for captures
 view         a capture as grey light, and where each pixel would lie without distortion
 sorting    which capture shows which target, and about where
 alignment  from the marks' tenth of a cell to a hundredth of a pixel, by the picture itself

@@ -1,9 +1,8 @@
-"""What earlier calibrations found, read back: geometry, tone curve, relative illumination."""
+"""What earlier calibrations found, for captures of a display: lens, tone curve, illumination."""
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import cv2
 import numpy as np
@@ -11,17 +10,24 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, RectBivariateSpline
 
 from camkit.colorimetry import decode_srgb
+from camkit.contracts import RadialIllumination
 from camkit.errors import DecodeError
-from camkit.runtime.calibration.geometry.camera import LENS_NUMBERS, MODELS, Camera
+from camkit.runtime.calibration.geometry.camera import MODELS, Camera
+from camkit.runtime.calibration.measured_files import (
+    TOP_LEVEL,
+    read_flat,
+    read_geometry,
+    read_tone,
+)
+from camkit.units import to_mm
 
 FloatGrid = NDArray[np.float64]
 
+MOST_FOCAL_PX: Final = 1e6
 NODES: Final = 64
 """Along the longer side of a picture, between which the undoing of distortion is interpolated."""
 _ROUNDS: Final = 60
 _DONE_PX: Final = 1e-6
-_MOST_FOCAL: Final = 1e6
-_TOP: Final = 255.0
 _GAMMA: Final = 2.2
 
 
@@ -44,29 +50,27 @@ class Lens:
         """Read the TOML.
 
         Raises:
-            DecodeError: If it is not what `camkit calibrate geometry` writes.
+            DecodeError: If it is not what `camkit calibrate geometry` writes, or no such lens.
         """
-        table = _read(path, "geometry")
-        try:
-            model = next(m for m in MODELS if m.name == table["model"])
-            every = np.array(table["coefficients"], dtype=np.float64)
-            numbers = [float(table["focal_px"]), *map(float, table["centre_px"])]
-            found = cls(
-                camera=Camera(
-                    model=model, intrinsics=np.array([*numbers, *every[list(model.free)]])
-                ),
-                size=(int(table["width_px"]), int(table["height_px"])),
-                covered_px=float(table["covered_radius_px"]),
-            )
-            lens = found.camera.intrinsics
-            sound = len(numbers) == LENS_NUMBERS and len(every) == model.coefficients
-            _check(sound and bool(np.isfinite(lens).all()), "numbers are missing or not finite")
-            _check(1 < lens[0] < _MOST_FOCAL, "the focal length cannot be")
-        except (KeyError, TypeError, ValueError, IndexError, StopIteration) as error:
+        found = read_geometry(path)
+        model = next((m for m in MODELS if m.name == found.model), None)
+        if model is None or found.focal_px is None or found.coefficients is None:
+            raise DecodeError(f"{path} states no camera; write it with camkit calibrate geometry")
+        if len(found.coefficients) != model.coefficients:
             raise DecodeError(
-                f"{path} does not hold what camkit calibrate geometry writes: {error!r}"
-            ) from error
-        return found
+                f"{path}: {model.name} has {model.coefficients} coefficients; got "
+                f"{len(found.coefficients)}"
+            )
+        if not 1 < found.focal_px < MOST_FOCAL_PX:
+            raise DecodeError(f"{path}: a focal length of {found.focal_px:g} px cannot be")
+        free = [found.coefficients[number] for number in model.free]
+        return cls(
+            camera=Camera(
+                model=model, intrinsics=np.array([found.focal_px, *found.centre_px, *free])
+            ),
+            size=(found.width_px, found.height_px),
+            covered_px=found.covered_radius_px,
+        )
 
     def without_distortion(self, seen_px: FloatGrid) -> FloatGrid:
         """Give where (n, 2) places of a picture would lie without distortion, same focal length.
@@ -139,30 +143,15 @@ class Tone:
         Raises:
             DecodeError: If it is not what that command writes, or does not reach from 0 to 255.
         """
-        every = np.arange(_TOP + 1)
+        every = np.arange(TOP_LEVEL + 1)
         if path is None:
-            light = decode_srgb((every / _TOP).astype(np.float32)).astype(np.float64)
+            light = decode_srgb((every / TOP_LEVEL).astype(np.float32)).astype(np.float64)
             return cls(light=light, measured=False)
-        table = _read(path, "tone")
-        try:
-            levels = np.array(table["levels"], dtype=np.float64)
-            light = np.array(table["luminance"], dtype=np.float64)
-            rises = levels.ndim == 1 and len(levels) >= 2 and (np.diff(levels) > 0).all()
-            _check(
-                bool(rises and light.shape == levels.shape and (np.diff(light) >= 0).all()),
-                "levels and luminance must rise together",
-            )
-            _check(
-                bool(levels[0] <= 0 and levels[-1] >= _TOP and light[-1] > light[0] >= 0),
-                "levels must reach from 0 to 255",
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise DecodeError(
-                f"{path} does not hold what camkit calibrate tone writes: {error!r}"
-            ) from error
+        found = read_tone(path)
+        light = np.array(found.luminance)
         # a power of about 2.2 makes the curve nearly straight between steps
         share = (light - light[0]) / (light[-1] - light[0])
-        root = PchipInterpolator(levels, share ** (1 / _GAMMA))(every)
+        root = PchipInterpolator(np.array(found.levels), share ** (1 / _GAMMA))(every)
         return cls(light=np.asarray(root**_GAMMA / root[-1] ** _GAMMA), measured=True)
 
 
@@ -171,56 +160,43 @@ class Illumination:
     """Relative illumination of a lens, from `camkit calibrate flat`; even without one.
 
     Attributes:
-        radii_px: (height,) distances from the centre; None for an even one.
-        light: (height,) 1 in the centre.
+        light: Over the height; None for an even one.
+        pitch_mm: Of the pixels.
         centre_px: x, y.
     """
 
-    radii_px: FloatGrid | None = None
-    light: FloatGrid | None = None
+    light: RadialIllumination | None = None
+    pitch_mm: float = 1.0
     centre_px: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def read(cls, path: Path | None, pixel_pitch_um: float | None) -> "Illumination":
+    def read(cls, path: Path | None, size: tuple[int, int]) -> "Illumination":
         """Read the TOML.
 
+        Args:
+            path: The file; None for an even one.
+            size: Width and height of the pictures that it is for.
+
         Raises:
-            DecodeError: If it is not what `camkit calibrate flat` writes.
+            DecodeError: If it is not what `camkit calibrate flat` writes, or of another size.
         """
         if path is None:
             return cls()
-        table = _read(path, "flat")
-        try:
-            heights = np.array(table["heights_mm"], dtype=np.float64)
-            light = np.array(table["relative_illumination"], dtype=np.float64)
-            x, y = (float(n) for n in table["centre_px"])
-            pitch_um = table.get("pixel_pitch_um", pixel_pitch_um)
-            rises = heights.shape == light.shape and bool((np.diff(heights) > 0).all())
-            _check(rises and bool((light > 0).all()), "heights must rise, light be > 0")
-            _check(pitch_um is not None, "captures state no pixel pitch")
-        except (KeyError, TypeError, ValueError) as error:
+        found = read_flat(path)
+        if (found.width_px, found.height_px) not in (size, (None, None)):
             raise DecodeError(
-                f"{path} does not hold what camkit calibrate flat writes: {error!r}"
-            ) from error
-        return cls(radii_px=heights * 1000 / float(pitch_um or 1), light=light, centre_px=(x, y))
+                f"{path} is of {found.width_px}x{found.height_px} px, the geometry of "
+                f"{size[0]}x{size[1]}; give both of one camera"
+            )
+        return cls(
+            light=found.to_entry().to_illumination(),
+            pitch_mm=to_mm(found.pixel_pitch_um),
+            centre_px=found.centre_px,
+        )
 
     def at(self, places_px: FloatGrid) -> FloatGrid:
         """Give the light (...) at places (..., 2) of a picture."""
-        if self.radii_px is None or self.light is None:
+        if self.light is None:
             return np.ones(places_px.shape[:-1])
-        radius = np.hypot(*np.moveaxis(places_px - np.array(self.centre_px), -1, 0))
-        return np.asarray(np.interp(radius, self.radii_px, self.light))
-
-
-def _check(sound: bool, what: str) -> None:
-    if not sound:
-        raise ValueError(what)
-
-
-def _read(path: Path, command: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DecodeError(
-            f"cannot read {path} as the TOML of camkit calibrate {command}: {error}"
-        ) from error
+        radius_mm = self.pitch_mm * np.hypot(*np.moveaxis(places_px - self.centre_px, -1, 0))
+        return np.asarray(np.interp(radius_mm**2, self.light.heights_mm**2, self.light.light))

@@ -10,7 +10,7 @@ References: Sun 2021, section 3.6 (the display-capture set-up).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -52,7 +52,7 @@ class Given:
         targets: Its list.
         lens: The geometry of the camera.
         tone: The curve of the display.
-        flat: The TOML of the vignetting; None for none.
+        flat: The vignetting of the camera.
         most_residual_px: Above which a pair is refused.
     """
 
@@ -60,7 +60,7 @@ class Given:
     targets: Targets
     lens: Lens
     tone: Tone
-    flat: Path | None = None
+    flat: Illumination = field(default_factory=Illumination)
     most_residual_px: float = MOST_RESIDUAL_PX
 
     def __post_init__(self) -> None:
@@ -282,9 +282,7 @@ def _patch(view: View, box: Place, given: Given) -> Patch:
     x, y, width, height = box
     window = np.s_[y : y + height, x : x + width]
     here = np.stack(np.meshgrid(np.arange(x, x + width), np.arange(y, y + height)), axis=-1)
-    even = Illumination.read(given.flat, view.like.pixel_pitch_um).at(
-        view.places(here.astype(np.float64))
-    )
+    even = given.flat.at(view.places(here.astype(np.float64)))
     return Patch(
         grey=np.asarray(view.grey[window] / even, dtype=np.float32),
         usable=~view.clipped[window],
@@ -312,8 +310,7 @@ def _primaries(colours: Sequence[Sorted], given: Given) -> tuple[Primaries | Non
     seen, likes = [], []
     for one in colours:
         view, capture = read_view(one.path, given.lens)
-        even = Illumination.read(given.flat, view.like.pixel_pitch_um)
-        light, clipped = colours_of(capture, _middle(one, given.lens), even)
+        light, clipped = colours_of(capture, _middle(one, given.lens), given.flat)
         if clipped > MOST_CLIPPED:
             raise DecodeError(
                 f"{one.path.name} ({one.target.file}): {clipped:.1%} is clipped; expose less"

@@ -41,6 +41,14 @@ COLOURS: Final = {
     "white": (TOP, TOP, TOP),
 }
 _PATCH_ASPECT: Final = 1.5
+_NO_LIST: Final = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
 _UNSAFE: Final = re.compile(r"[^A-Za-z0-9_-]+")
 
 
@@ -141,7 +149,7 @@ class Targets:
                 f"cannot read {path}: {error.strerror or error}; --targets is a folder that camkit "
                 "calibrate targets wrote"
             ) from error
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except _NO_LIST as error:
             raise DecodeError(
                 f"{path} is no list of targets ({type(error).__name__}: {error}); write it with "
                 "camkit calibrate targets"

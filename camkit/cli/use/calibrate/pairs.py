@@ -57,18 +57,19 @@ def pairs(
     within = (".", "capture", "reference")
     folder = Folder.asked(out, (SETTINGS,), within, overwrite=overwrite)
     shots, shown_in = _apart(captures, targets)
-    from camkit.runtime.calibration.display.camera_file import Lens, Tone
+    from camkit.runtime.calibration.display.camera_file import Illumination, Lens, Tone
     from camkit.runtime.calibration.display.pairs import Given, draw_pairs, find_pairs
     from camkit.runtime.calibration.display.targets import Targets
     from camkit.runtime.calibration.record import to_toml
     from camkit.runtime.output.pixels import png_bytes, tiff_bytes
 
+    lens = Lens.read(geometry)
     given = Given(
         folder=shown_in,
         targets=Targets.read(shown_in),
-        lens=Lens.read(geometry),
+        lens=lens,
         tone=Tone.read(tone),
-        flat=flat,
+        flat=Illumination.read(flat, lens.size),
         most_residual_px=most_residual_px,
     )
     found = find_pairs(shots, given)

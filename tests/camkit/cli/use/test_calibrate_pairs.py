@@ -159,4 +159,4 @@ def test_another_geometry_is_refused_by_what_it_leaves(camkit_command, set_up, t
     assert "0.5 is allowed" in done.err
     assert not (tmp_path / "pairs").exists()
     (tmp_path / "geometry.toml").write_text("model = 3\n")
-    assert "does not hold what camkit calibrate geometry writes" in camkit_command(*ask).err
+    assert "is not what `camkit calibrate geometry` writes" in camkit_command(*ask).err

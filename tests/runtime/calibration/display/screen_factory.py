@@ -165,6 +165,8 @@ class Booth:
             "centre_px": list(camera.centre_px),
             "coefficients": camera.coefficients.tolist(),
             "covered_radius_px": float(np.hypot(*self.size)),
+            # of bundles; pairs take the model
+            "radial": {"coefficients": [1.0, 0.0, 0.0, 0.0], "radius_px": 1.0, "residual_px": 0.0},
         }
         path.write_text(to_toml(record), encoding="utf-8")
         return path

@@ -50,38 +50,79 @@ def test_a_tone_curve_gives_light_above_black(tmp_path):
     assert not Tone.read(None).measured
 
 
+TONE_TEXT = "levels = [0, 128, 255]\nluminance = [0.0, 0.2, 1.0]\n"
+FLAT_TEXT = (
+    "heights_mm = [0.0, 1.0]\nrelative_illumination = [1.0, 0.5]\npixel_pitch_um = 10.0\n"
+    "width_px = 300\nheight_px = 200\ncentre_px = [10.0, 20.0]\n"
+    "centre_found = true\nseparated = true\n"
+)
+
+
+def _geometry(tmp_path):
+    return Booth(screen=(640, 400), size=SIZE).write_geometry(tmp_path / "g.toml").read_text()
+
+
+READERS = {
+    "geometry": Lens.read,
+    "tone": Tone.read,
+    "flat": lambda path: Illumination.read(path, SIZE),
+}
+
+
+def test_what_is_sound_is_read(tmp_path):
+    path = tmp_path / "x.toml"
+    for name, text in (("geometry", _geometry(tmp_path)), ("tone", TONE_TEXT), ("flat", FLAT_TEXT)):
+        path.write_text(text)
+        READERS[name](path)
+
+
 @pytest.mark.parametrize(
     "text",
-    [
-        "",
-        "= 3",
-        'levels = "a"',
-        "levels = [0, 255]\nluminance = [1, 0]",
-        "levels=[9]\nluminance=[1]",
-    ],
+    ["", "= 3", "x = " + "[" * 2000 + "]" * 2000, "x = " + "1" * 5000, 'levels = "a"'],
+    ids=["empty", "no key", "deep", "long", "text"],
 )
 def test_broken_files_are_refused(tmp_path, text):
     path = tmp_path / "x.toml"
     path.write_text(text)
-    for read in (lambda: Tone.read(path), lambda: Lens.read(path)):
+    for read in READERS.values():
         with pytest.raises(DecodeError, match=r"x\.toml"):
-            read()
-    with pytest.raises(DecodeError, match=r"x\.toml"):
-        Illumination.read(path, 5.0)
+            read(path)
     path.rename(tmp_path / "targets.toml")
     with pytest.raises(DecodeError, match=r"targets\.toml"):
         Targets.read(tmp_path)
 
 
-def test_illumination_is_read_over_the_height(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "before", "now"),
+    [
+        ("geometry", "width_px = 300", "width_px = inf"),
+        ("geometry", "radial_2", "radial_9"),
+        ("geometry", "radial_2", "fisheye"),
+        ("geometry", "focal_px = 330", "focal_px = 0.330"),
+        ("tone", "1.0]", "inf]"),
+        ("tone", "0.2, 1.0]", "0.2]"),
+        ("tone", "0.2, 1.0]", "1.2, 1.0]"),
+        ("tone", "255", "1023"),
+        ("tone", "[0, ", "[1, "),
+        ("flat", "um = 10.0", "um = 0"),
+        ("flat", "[0.0, 1.0]", "[]"),
+        ("flat", "[0.0, 1.0]", "[0.5, 1.0]"),
+        ("flat", "width_px = 300", "width_px = 600"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(tmp_path, name, before, now):
+    text = {"geometry": _geometry(tmp_path), "tone": TONE_TEXT, "flat": FLAT_TEXT}[name]
+    assert before in text
+    path = tmp_path / "x.toml"
+    path.write_text(text.replace(before, now))
+    with pytest.raises(DecodeError, match=r"x\.toml"):
+        READERS[name](path)
+
+
+def test_illumination_is_linear_in_the_square_of_the_height_as_in_bundles(tmp_path):
     path = tmp_path / "flat.toml"
-    path.write_text(
-        "heights_mm = [0, 1]\nrelative_illumination = [1, 0.5]\ncentre_px = [10.0, 20.0]\n"
-    )
-    found = Illumination.read(path, 10.0)
-    assert found.at(np.array([[10.0, 20.0], [60.0, 20.0]])) == pytest.approx([1.0, 0.75])
-    with pytest.raises(DecodeError, match="no pixel pitch"):
-        Illumination.read(path, None)
-    path.write_text(path.read_text() + "pixel_pitch_um = 10.0\n")
-    stated = Illumination.read(path, None)  # as `calibrate flat` writes it
-    assert stated.at(np.array([60.0, 20.0])) == pytest.approx(0.75)
+    path.write_text(FLAT_TEXT)
+    found = Illumination.read(path, SIZE)
+    places = np.array([[10.0, 20.0], [60.0, 20.0], [110.0, 20.0], [10.0, 190.0]])
+    assert found.at(places) == pytest.approx([1.0, 0.875, 0.5, 0.5])
+    assert Illumination.read(None, SIZE).at(places).tolist() == [1, 1, 1, 1]
