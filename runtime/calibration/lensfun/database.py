@@ -18,6 +18,8 @@ from camkit.runtime.calibration.lensfun.models import (
 from camkit.runtime.calibration.lensfun.xml import MOST_BYTES, read_xml
 
 MOST_FILES: Final = 1024
+LEAST: Final = 1e-5
+MOST: Final = 1e5
 _NEAR: Final = 3
 
 
@@ -181,23 +183,23 @@ def _number(text: str | None, what: str) -> float:
         number = float(text or "")
     except ValueError:
         number = math.nan
-    if not abs(number) <= 1e5:
+    if not abs(number) <= MOST:
         raise DecodeError(f"{what} must be a number; got {text!r}")
     return number
 
 
 def _positive(text: str | None, what: str) -> float:
     number = _number(text, what)
-    if not number > 1e-5:
+    if not number > LEAST:
         raise DecodeError(f"{what} must be > 0; got {text!r}")
     return number
 
 
 def check_positive(value: float, option: str) -> None:
-    """Refuse an option that is no number > 0.
+    """Refuse an option that no lens can have.
 
     Raises:
         ContractError: If so.
     """
-    if not 0 < value < math.inf:
-        raise ContractError(f"{option} must be > 0; got {value:g}")
+    if not LEAST <= value <= MOST:
+        raise ContractError(f"{option} must be > 0, {LEAST:g} to {MOST:g}; got {value:g}")

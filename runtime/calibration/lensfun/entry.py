@@ -69,7 +69,9 @@ class EntryOptions:
         Raises:
             ContractError: If a number is not > 0, or a name is empty or cannot be printed.
         """
-        for option in ("focal_mm", "crop_factor", "aperture", "most_residual_px"):
+        if not 0 < self.most_residual_px < np.inf:
+            raise ContractError(f"most_residual_px must be > 0; got {self.most_residual_px:g}")
+        for option in ("focal_mm", "crop_factor", "aperture"):
             value = getattr(self, option)
             if value is not None:
                 check_positive(value, option)

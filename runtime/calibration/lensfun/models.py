@@ -19,8 +19,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from camkit.bundle.optics import RadialEntry
+from camkit.errors import DecodeError
 
 FloatGrid = NDArray[np.float64]
 TERMS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -58,6 +60,9 @@ class Distortion:
             radius_mm: What lensfun's unit is on the sensor; see `unit_mm`.
             channels: Of the sensor.
             scale: By which ideal radii are multiplied first; below 1 the straight picture grows.
+
+        Raises:
+            DecodeError: If its numbers are larger than a bundle may hold.
         """
         if self.model == "ptlens":
             a, b, c = self.terms
@@ -71,11 +76,17 @@ class Distortion:
         a0, a1, a2, a3 = (a * scale**power for a, power in zip(odd, (1, 3, 5, 7), strict=True))
         if even is not None:
             b0, b1, b2 = (b * scale**power for b, power in zip(even, (2, 4, 6), strict=True))
-        return RadialEntry(
-            coefficients=((a0, a1, a2, a3),) * channels,
-            even_coefficients=None if even is None else ((b0, b1, b2),) * channels,
-            radius_mm=radius_mm,
-        )
+        try:
+            return RadialEntry(
+                coefficients=((a0, a1, a2, a3),) * channels,
+                even_coefficients=None if even is None else ((b0, b1, b2),) * channels,
+                radius_mm=radius_mm,
+            )
+        except ValidationError as error:
+            raise DecodeError(
+                f"no bundle holds the {self.model} at {self.focal_mm:g} mm: its numbers are too "
+                f"large at a scale of {scale:g}"
+            ) from error
 
 
 def _ptlens(r: FloatGrid, a: float, b: float, c: float) -> FloatGrid:

@@ -57,7 +57,7 @@ def parse_xml(data: bytes, what: str) -> Element:
     try:
         parser.Parse(data, _WHOLE)
         return builder.close()
-    except (expat.ExpatError, AssertionError, ValueError) as error:
+    except (expat.ExpatError, AssertionError, LookupError, ValueError) as error:
         raise DecodeError(f"{what} is no sound XML: {error}") from error
 
 

@@ -18,6 +18,7 @@ REFUSED = {
     "a file from elsewhere": (OUTSIDE, "document type of its own"),
     "an unknown entity": (b"<lensdatabase>&x;</lensdatabase>", "no sound XML"),
     "an end too few": (b"<lensdatabase><lens>", "no sound XML"),
+    "an encoding nobody knows": (b'<?xml version="1.0" encoding="foo"?><a/>', "no sound XML"),
     "nothing": (b"", "no sound XML"),
     "bytes": (bytes(range(256)), "no sound XML"),
     "depth": (b"<a>" * (MOST_DEPTH + 1) + b"</a>" * (MOST_DEPTH + 1), "nested too deep"),
