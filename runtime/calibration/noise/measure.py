@@ -236,15 +236,15 @@ def _one_gain(transfers: Sequence[Transfer]) -> tuple[float, float]:
 
 
 def _prnu(flats: Sequence[SitePair], dark_pattern: float) -> float:
-    """Give the response's spread: fixed pattern less that of the dark, over squared signal.
+    """Give the response's spread: fixed pattern less that of the dark, over squared light.
 
     References: EMVA 1288 release 4.0, eq. (63).
     """
-    signal, pattern, noise, samples = (
+    lit, pattern, noise, samples = (
         np.array([getattr(site, name) for site in flats])
-        for name in ("signal", "pattern", "variance", "samples")
+        for name in ("lit", "pattern", "variance", "samples")
     )
-    squared = signal**2
+    squared = lit**2
     weight = samples / np.maximum(noise, 1e-12) ** 2
     share = float((weight * squared) @ (pattern - dark_pattern) / ((weight * squared) @ squared))
     return float(np.sqrt(max(share, 0.0)))

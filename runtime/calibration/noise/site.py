@@ -35,16 +35,18 @@ class SitePair:
     Attributes:
         mean: Of the first frame.
         second_mean: Of the second.
+        lit: Mean of the first less the dark; 0 of dark frames themselves.
         signal: At which `variance` is that of one frame; in the dark the mean of both.
         variance: Of the noise in time, rounding included, in DN^2.
-        pattern: Variance of what both frames share beside smooth light, in DN^2; noise may make it
-            negative.
+        pattern: Variance of what both frames share beside smooth light, at the light of the first,
+            in DN^2; noise may make it negative.
         samples: That stand behind both variances.
         defects: Samples left out.
     """
 
     mean: float
     second_mean: float
+    lit: float
     signal: float
     variance: float
     pattern: float
@@ -62,7 +64,7 @@ def site_pair(first: FloatGrid, second: FloatGrid, dark: float | None, step: flo
         step: Of the converter, in DN.
     """
     mean, second_mean = float(first.mean()), float(second.mean())
-    ratio, signal = 1.0, (mean + second_mean) / 2
+    ratio, lit, signal = 1.0, 0.0, (mean + second_mean) / 2
     if dark is not None:
         lit = mean - dark
         ratio = lit / (second_mean - dark)
@@ -78,6 +80,7 @@ def site_pair(first: FloatGrid, second: FloatGrid, dark: float | None, step: flo
     return SitePair(
         mean=mean,
         second_mean=second_mean,
+        lit=lit,
         signal=signal,
         variance=noise / (1 + ratio**2),
         # ((a + rb)/2)^2 - ((a - rb)/2)^2 is their product

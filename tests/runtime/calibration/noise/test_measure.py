@@ -17,6 +17,7 @@ from tests.runtime.calibration.sensor_factory import BLACK, WHITE, Sensor, write
 GAIN_TOLERANCE = 0.01
 READ_NOISE_TOLERANCE = 0.05
 PRNU_TOLERANCE = 0.05
+DRIFT_TOLERANCE = 0.015
 GAINS = {100.0: 4.0, 400.0: 1.0, 1600.0: 0.25}
 FEW = (0.1, 0.5)
 
@@ -67,10 +68,14 @@ def test_read_noise_below_the_step_is_a_bound_and_said(tmp_path: Path) -> None:
     assert "finer than the converter's step; it lies below" in note
 
 
-def test_single_pictures_would_give_another_gain() -> None:
-    sensor = Sensor(_rng())
-    frame = sensor.frame(0.7)[::2, ::2].astype(np.float64)
-    assert frame.var() / (frame.mean() - BLACK) > 1.2  # instead of 1
+@pytest.mark.parametrize("second", [0.92, 1.09])
+def test_the_response_is_found_where_the_lamp_drifts(tmp_path: Path, second: float) -> None:
+    sensor = Sensor(_rng(), drift=0.0)
+    dark, flat = sensor.write(tmp_path, 400, (0.3, 0.6))
+    for level, path in ((0.3, flat[1]), (0.6, flat[3])):
+        write_raw(path, sensor.frame(level * second), 400, level)
+    (facts,) = measure_sensor(dark, flat).isos
+    assert facts.prnu == pytest.approx(0.01, rel=DRIFT_TOLERANCE)
 
 
 def test_the_sensor_of_a_simulated_camera_comes_back(tmp_path: Path) -> None:

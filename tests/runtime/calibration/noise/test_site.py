@@ -31,6 +31,9 @@ def test_a_lamp_that_drifts_moves_no_point_off_the_line(ratio: float) -> None:
     first, second = (rng.poisson(light * f) / 4 + 7 for f in (1.0, ratio))
     found = site_pair(first, second, 7.0, 1.0)
     assert found.variance == pytest.approx(found.signal / 4, rel=RELATIVE)
+    # 2 % of the light of the first frame, which the second was brought to
+    assert np.sqrt(found.pattern) == pytest.approx(0.02 * found.lit, rel=RELATIVE)
+    assert found.lit == pytest.approx(500, rel=1e-3)
 
 
 def test_uneven_light_is_no_pattern() -> None:
