@@ -1,9 +1,10 @@
 """Read pictures: linear captures (EXR, 16-bit TIFF/PNG), headerless mosaics, sharp scenes.
 
-    read_picture   a capture that is already RGB (linear_rgb_v1)
-    read_mosaic    a single-channel PNG or TIFF that is a Bayer mosaic
-    read_scene     a sharp scene for the simulation, as linear Rec.709
-    read_light     the same as light, which is never negative
+    read_picture      a capture that is already RGB (linear_rgb_v1)
+    read_mosaic       a single-channel PNG or TIFF that is a Bayer mosaic
+    read_scene        a sharp scene for the simulation, as linear Rec.709
+    read_light        the same as light, which is never negative
+    read_orientation  how a file says that its samples are to be turned
 
 PNG, TIFF, JPEG and Radiance HDR are decoded by OpenCV, EXR by the OpenEXR package. Samples stay as
 they are stored; an EXIF orientation is told beside them.
@@ -188,6 +189,18 @@ def read_light(path: Path) -> FloatArray:
     if scene.min() >= -FAINT * scene.max():
         np.maximum(scene, 0, out=scene)
     return scene
+
+
+def read_orientation(path: Path) -> int:
+    """Give the EXIF orientation 1..8 that a file states, 1 where it states none.
+
+    Raises:
+        OSError: If it cannot be read.
+    """
+    if _is_exr(path):
+        return 1
+    tags = read_tiff_tags(path)
+    return orientation_of(tags if tags.directories else exif_of_picture(path.read_bytes()))
 
 
 def _srgb_table(top: int) -> FloatArray:

@@ -15,7 +15,7 @@ from camkit.runtime.calibration.display.profile import (
     space_of,
 )
 from camkit.runtime.capture import Capture
-from camkit.runtime.files.picture import read_picture, read_scene
+from camkit.runtime.files.picture import read_orientation, read_picture, read_scene
 from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.raw import is_picture
@@ -57,8 +57,7 @@ def read_shown(path: Path) -> tuple[FloatArray, Space]:
             f"{path.name}: {light.shape[2]}x{light.shape[1]} px are too few to be shown; expected "
             f"{LEAST_SIDE_PX} or more on either side"
         )
-    upright = light if coded is None else turn(light, coded.orientation)
-    return np.ascontiguousarray(upright), space
+    return np.ascontiguousarray(turn(light, read_orientation(path))), space
 
 
 def _codes(path: Path) -> Capture | None:

@@ -70,13 +70,16 @@ def test_other_profiles_are_refused_by_name_and_damaged_ones_as_such(tmp_path):
             space_of(damaged)
 
 
-def test_pictures_are_shown_upright_and_grey_ones_too(tmp_path):
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
+@pytest.mark.parametrize("colours", [np.s_[:], 0], ids=["colour", "grey"])
+def test_pictures_are_shown_upright_and_grey_ones_too(tmp_path, suffix, colours):
     codes = np.zeros((20, 40, 3), np.uint8)
     codes[:, :20] = 255
     exif = Image.Exif()
     exif[0x0112] = 6
-    Image.fromarray(codes).save(tmp_path / "a.jpg", exif=exif, quality=95)
-    found, _ = read_shown(tmp_path / "a.jpg")
+    path = tmp_path / f"a.{suffix}"
+    Image.fromarray(codes[..., colours]).save(path, exif=exif, quality=95)
+    found, _ = read_shown(path)
     assert found.shape == (3, 40, 20)
     assert found[:, :15].min() > 0.9
     assert found[:, 25:].max() < 0.1
