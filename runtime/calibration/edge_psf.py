@@ -242,7 +242,7 @@ class _Colour:
         dark = None if black_error is None else 0.0
         length = float(np.ptp(along)) or 1.0
         strip = np.minimum((along - along.min()) / length * STRIPS, STRIPS - 1).astype(np.intp)
-        bins = _Bins.of(distance, values, precision, strip)
+        bins = Bins.of(distance, values, precision, strip)
         self.profile = bins.profile()
         self.fit = fit_edge(self.profile, dark)
         wide = self.fit.psf.spreads_px > WIDE * self.profile.reach_px
@@ -265,7 +265,7 @@ class _Colour:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Bins:
+class Bins:
     """Samples sorted by their distance from an edge, and into strips across it.
 
     Attributes:
@@ -280,7 +280,14 @@ class _Bins:
     def of(
         cls, distance: FloatLine, values: FloatLine, precision: FloatLine, strip: NDArray[np.intp]
     ) -> Self:
-        """Sort samples into bins that are narrow near the edge and wide far from it."""
+        """Sort samples into bins that are narrow near the edge and wide far from it.
+
+        Args:
+            distance: (n,) of the samples from the edge, > 0 where it is bright.
+            values: (n,) their light.
+            precision: (n,) one over its variance.
+            strip: (n,) number of each sample's strip, below `STRIPS`.
+        """
         most = float(np.abs(distance).max())
         fine = np.arange(0, FINE_REACH_PX, FINE_PX)
         growth = FINE_PX * GROWTH ** np.arange(1, _MOST_BINS)
@@ -316,21 +323,6 @@ class _Bins:
                 f"{LEAST_REACH_PX:g} are needed: put the edge into the middle"
             )
         return profile
-
-
-def edge_profile(distance: FloatLine, values: FloatLine, precision: FloatLine) -> EdgeProfile:
-    """Give the profile of samples, in bins that are narrow near the edge and wide far from it.
-
-    Args:
-        distance: (n,) of the samples from the edge, > 0 where it is bright.
-        values: (n,) their light.
-        precision: (n,) one over its variance.
-
-    Raises:
-        DecodeError: If a side of the edge is not seen.
-    """
-    strip = np.zeros(distance.size, dtype=np.intp)
-    return _Bins.of(distance, values, precision, strip).profile()
 
 
 def _plain(planes: NDArray[np.float32], survey: Survey) -> FloatGrid:

@@ -46,14 +46,12 @@ class Step:
         level: What the display was told.
         light: Mean of the middle over the exposure.
         error: Standard deviation of that mean.
-        exposure: Relative, 1 where pictures state none.
     """
 
     path: Path
     level: float
     light: float
     error: float
-    exposure: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,7 +163,7 @@ def measure_tone(
         found.append((path, level, light, error))
     exposures, notes = exposures_of(files, captures)
     steps = [
-        Step(path=path, level=level, light=light / t, error=error / t, exposure=t)
+        Step(path=path, level=level, light=light / t, error=error / t)
         for (path, level, light, error), t in zip(found, exposures, strict=True)
     ]
     steps.sort(key=lambda step: step.level)

@@ -70,14 +70,12 @@ class Aligned:
         correlation: Of capture and model.
         model: (h, w) the picture as the camera would see it.
         inside: (h, w) where it lies on the patch, its border left out.
-        blur: Of the capture, in samples.
     """
 
     to_picture: FloatGrid
     correlation: float
     model: FloatGrid
     inside: NDArray[np.bool_]
-    blur: float
 
 
 def align(patch: Patch, shown: FloatArray, start: FloatGrid) -> Aligned:
@@ -107,9 +105,7 @@ def align(patch: Patch, shown: FloatArray, start: FloatGrid) -> Aligned:
             f"capture and picture correlate by {correlation:.2f} where the marks put them, "
             f"{LEAST_CORRELATION} is needed: are captures and --targets of one set?"
         )
-    return Aligned(
-        to_picture=matrix, correlation=correlation, model=model, inside=inside, blur=blur
-    )
+    return Aligned(to_picture=matrix, correlation=correlation, model=model, inside=inside)
 
 
 def map_places(matrix: FloatGrid, places: FloatGrid) -> FloatGrid:

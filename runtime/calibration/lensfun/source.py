@@ -41,11 +41,6 @@ class Source:
     notes: tuple[str, ...]
 
     @property
-    def aspect(self) -> float:
-        """Give the longer over the shorter side."""
-        return max(self.size_px) / min(self.size_px)
-
-    @property
     def corner_px(self) -> float:
         """Give the distance of the outermost pixel from the middle."""
         return float(np.hypot(self.size_px[0] - 1, self.size_px[1] - 1)) / 2

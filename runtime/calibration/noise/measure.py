@@ -83,6 +83,7 @@ class IsoFacts:
             "dsnu_e": _short(self.dsnu_dn * self.gain_e_per_dn, 4),
             "linearity_percent": None if linearity is None else _short(100 * linearity, 3),
             "pairs": self.pairs,
+            "defects_percent": _short(100 * self.defects, 3),
         }
 
 

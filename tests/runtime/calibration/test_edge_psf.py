@@ -8,7 +8,7 @@ from scipy import special
 
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.darks import Darks
-from camkit.runtime.calibration.edge_psf import RoundPsf, edge_profile, fit_edge, measure_edge
+from camkit.runtime.calibration.edge_psf import Bins, RoundPsf, fit_edge, measure_edge
 from camkit.runtime.calibration.measured import PsfOptions
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.merging.survey import Survey, survey
@@ -31,8 +31,9 @@ def _fitted(spreads: tuple[float, ...], shares: tuple[float, ...], dark: float =
     y, x = np.indices((120, 800)).astype(np.float64)
     distance = ((x - 400.2) * np.cos(0.1) - (y - 59.5) * np.sin(0.1)).ravel()
     values = dark + 0.5 * sum(a * special.ndtr(distance / s) for s, a in zip(spreads, shares, strict=True))  # noqa: E501 # fmt: skip
-    profile = edge_profile(distance, np.asarray(values), np.full(distance.size, 1e8))
-    return fit_edge(profile, dark).psf
+    strip = np.zeros(distance.size, dtype=np.intp)
+    bins = Bins.of(distance, np.asarray(values), np.full(distance.size, 1e8), strip)
+    return fit_edge(bins.profile(), dark).psf
 
 
 @pytest.mark.parametrize("spread_px", [0.6, 0.85, 1.37, 3.0])
@@ -126,8 +127,9 @@ def test_what_shows_no_edge_is_refused(tmp_path: Path) -> None:
     write_mosaic(path, exposed(np.full((200, 200), 0.4), 1.0, 1), 1.0)
     with pytest.raises(DecodeError, match="no straight edge"):
         measure_edge(survey([path], None, alike=True), FOUR_UM, None)
+    strip = np.zeros(999, dtype=np.intp)
     with pytest.raises(DecodeError, match="shows 7 px to one side of the edge"):
-        edge_profile(np.linspace(-7, 90, 999), np.ones(999), np.ones(999))
+        Bins.of(np.linspace(-7, 90, 999), np.ones(999), np.ones(999), strip).profile()
     with pytest.raises(DecodeError, match="are clipped; expose less"):
         measure_edge(_edge(tmp_path, CLEAR, peak=1.2), FOUR_UM, None)
 

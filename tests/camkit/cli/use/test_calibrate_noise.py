@@ -14,7 +14,7 @@ from tests.runtime.calibration.sensor_factory import Sensor
 KEYS = {
     *("iso", "gain_e_per_dn", "gain_error_percent", "read_noise_e", "read_noise_resolved"),
     *("full_well_e", "black_level", "white_level", "prnu_percent", "dsnu_e", "linearity_percent"),
-    "pairs",
+    *("pairs", "defects_percent"),
 }
 GAIN_TOLERANCE = 0.03  # frames of 128x128
 LEVELS = (0.1, 0.3, 0.6)

@@ -122,7 +122,7 @@ def test_hot_pixels_do_not_count_as_noise(tmp_path: Path, small: Sensor) -> None
         write_raw(path, codes, 400)
     (facts,) = measure_sensor(dark, flat).isos
     assert facts.read_noise_e == pytest.approx(plain.read_noise_e, rel=READ_NOISE_TOLERANCE)
-    assert 60 <= facts.defects * 18 * 128 * 128 <= 140
+    assert 60 <= facts.to_record()["defects_percent"] / 100 * 18 * 128 * 128 <= 140
 
 
 def test_headerless_mosaics_take_their_iso_from_the_caller(tmp_path: Path, small: Sensor) -> None:
