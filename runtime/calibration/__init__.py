@@ -11,6 +11,8 @@ measured   a PSF as it was measured, and what is told of it
 psf        all of it: a bracket of a small light to a frozen PSF
 edge_psf   a slanted edge to a PSF that is round
 dots       one through a plate of dots to the PSF that an array of small pixels sees
+edges      straight edges of a target found in a capture, and their profile in every colour
+focus      the focus of a unit, out of captures of edges
 flat/      pictures of an uneven display to relative illumination
 noise/     pairs of frames to gain, read noise and fixed patterns of every ISO
 tone       pictures of grey steps to the tone curve of a display

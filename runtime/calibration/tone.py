@@ -91,10 +91,10 @@ class ToneFacts:
 
     @property
     def residuals(self) -> FloatGrid | None:
-        """Give how far steps lie off the fitted curve, as a share of it; 0 where none is seen."""
+        """Give how far fitted steps lie off the curve, as a share of it; NaN of others."""
         if self.curve is None:
             return None
-        return np.where(self.seen, self.luminance / self.curve.at(self.levels) - 1, 0.0)
+        return np.where(self.seen, self.luminance / self.curve.at(self.levels) - 1, np.nan)
 
     def to_record(self) -> dict[str, Any]:
         """Give plain values; None where no curve was fitted."""

@@ -97,7 +97,7 @@ def light(before: Bundle, made: Bundle) -> Curve:
 
 
 def held(bundle: Bundle) -> list[FloatGrid]:
-    """Give the share of every colour's light within 0, 1, ... px of the middle, on the axis."""
+    """Give the share of every colour's light within 0.5, 1.5, ... px of the middle, on the axis."""
     kernels = color_kernels(bundle.psf, *_sensor(bundle).response_arrays())
     return [light_within(kernel) for kernel in kernels.at(0.0, 0.0)]
 

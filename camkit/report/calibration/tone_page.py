@@ -17,9 +17,11 @@ _POINTS: Final = 256
 def tone_html(facts: ToneFacts) -> str:
     """Give the page."""
     rest = facts.residuals
+    if rest is None:
+        rest = np.full(facts.levels.size, np.nan)
     rows = tuple(
-        (f"{level:g}", f"{light:.6g}", "-" if rest is None else f"{100 * rest[number]:+.2f}")
-        for number, (level, light) in enumerate(zip(facts.levels, facts.luminance, strict=True))
+        (f"{level:g}", f"{light:.6g}", "-" if np.isnan(off) else f"{100 * off:+.2f}")
+        for level, light, off in zip(facts.levels, facts.luminance, rest, strict=True)
     )
     pictures = {
         "Luminance over level, and the curve fitted, on two scales. Below: how far steps lie off "

@@ -9,6 +9,7 @@ Numbers of marks count the targets that have some, from 0.
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
@@ -183,7 +184,7 @@ def plan_targets(
             f"expected at most {NUMBERS - len(COLOURS)} pictures, as many as marks can number; got "
             f"{len(pictures)}: write several folders"
         )
-    names = _names(pictures)
+    names = _names(pictures, {target.name for target in found})
     for code, (path, name) in enumerate(zip(pictures, names, strict=True), start=len(COLOURS)):
         light, space = read_shown(path)
         at = screen.place(light.shape[2] / light.shape[1])
@@ -278,13 +279,13 @@ def _squares(board: Board, side: int) -> Codes:
     return np.kron(squares, np.ones((side, side), dtype=np.uint8))
 
 
-def _names(pictures: Sequence[Path]) -> list[str]:
-    """Give a name for each, of letters that any file system takes."""
+def _names(pictures: Sequence[Path], taken: AbstractSet[str]) -> list[str]:
+    """Give a name for each that no other target has, of letters that any file system takes."""
     names: dict[str, Path] = {}
     for path in pictures:
         name = _UNSAFE.sub("_", path.stem) or "_"
-        if name in names or name in COLOURS:
-            other = names.get(name, "a colour of its own")
+        if name in names or name in taken:
+            other = names.get(name, "a target of its own")
             raise ContractError(
                 f"{path} and {other} would both be called {name}; give every picture once, under "
                 "different names"

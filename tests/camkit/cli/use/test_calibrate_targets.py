@@ -95,6 +95,19 @@ def test_bad_input_is_one_line_and_no_file(camkit_command, picture, tmp_path, ch
     assert not out.exists()
 
 
+@pytest.mark.parametrize("name", ["board", "grey-16", "red-half"])
+def test_a_picture_by_the_name_of_another_target_is_refused(
+    camkit_command, picture, tmp_path, name
+):
+    path, out = picture.rename(tmp_path / f"{name}.png"), tmp_path / "targets"
+    asked = ("calibrate", "targets", path, "-o", out, "--screen", "640x400")
+    done = camkit_command(*asked, "--levels", "16,255")
+    assert done.code == ExitCode.USAGE
+    assert f"a target of its own would both be called {name}" in done.err
+    if name == "grey-16":
+        assert camkit_command(*asked, "--levels", "0,255").code == 0
+
+
 def test_a_folder_of_other_things_is_left_alone(camkit_command, picture, tmp_path):
     out = tmp_path / "home"
     out.mkdir()

@@ -29,10 +29,13 @@ def test_every_step_is_in_the_table_with_or_without_a_curve(curve: PowerCurve | 
     assert page.count("<img") == 1
     assert "a note" in page
     assert ("-0.99" in page) == (curve is not None)
+    # the step without light was not fitted
+    assert page.count("<td>-</td>") == (4 if curve is None else 1)
+    assert "+0.00" not in page
 
 
 def test_residuals_are_drawn_below_in_percent() -> None:
     below = draw_tone(_facts(CURVE)).axes[2]
     assert below.get_ylabel() == "off the curve, %"
     (marks,) = (line for line in below.get_lines() if line.get_marker() == "o")
-    assert marks.get_ydata() == pytest.approx([0, *(100 * (LIGHT[1:] / [0.108423, 0.403702, 1.01] - 1))], abs=0.01)  # noqa: E501 # fmt: skip
+    assert marks.get_ydata() == pytest.approx([np.nan, *(100 * (LIGHT[1:] / [0.108423, 0.403702, 1.01] - 1))], abs=0.01, nan_ok=True)  # noqa: E501 # fmt: skip
