@@ -17,7 +17,7 @@ from camkit.runtime.plan.decision import Decision, Subject, Work
 from camkit.runtime.plan.estimate import estimate_seconds, tier_work_of
 from camkit.runtime.plan.loss import LossModel, read_loss_model
 from camkit.runtime.plan.rule import apply_rules
-from camkit.runtime.plan.rules.size import REFERENCE, size_cost_db
+from camkit.runtime.plan.rules.size import REFERENCE, SIZE, size_cost_db
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.tiers import work_shares
 from camkit.runtime.plan.ways import (
@@ -60,12 +60,22 @@ class Plan:
         return [s for s in self.subject.bundle.manifest.sizes if s in named | {REFERENCE}]
 
     def decisions(self, speed: Speed | None = None) -> list[Decision]:
-        """Give the decisions; with a speed, with the seconds they save."""
+        """Give the decisions; with a speed, with the seconds they save.
+
+        What a size costs is that of the subject as it is known now: it may have been looked at
+        since the plan was made.
+        """
+        made = [
+            replace(decision, cost_db=size_cost_db(self.subject, decision.choice))
+            if decision.what == SIZE
+            else decision
+            for _, decision, _ in self.steps
+        ]
         if speed is None:
-            return [decision for _, decision, _ in self.steps]
+            return made
         return [
             replace(decision, saving_s=self._saving_s(number, speed))
-            for number, (_, decision, _) in enumerate(self.steps)
+            for number, decision in enumerate(made)
         ]
 
     def _saving_s(self, step: int, speed: Speed) -> float:

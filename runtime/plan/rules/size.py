@@ -6,6 +6,8 @@ from camkit.runtime.plan.decision import Decision, Subject, Work
 from camkit.runtime.plan.loss import read_loss_model
 
 ORDER: Final = 10
+SIZE: Final = "size"
+"""What this rule decides."""
 REFERENCE: Final = "M"
 """The size that `exact` takes and losses are measured against."""
 
@@ -22,7 +24,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     else:
         reason = f"quality {options.quality}"
     return work, Decision(
-        what="size", choice=work.size, reason=reason, cost_db=size_cost_db(subject, work.size)
+        what=SIZE, choice=work.size, reason=reason, cost_db=size_cost_db(subject, work.size)
     )
 
 

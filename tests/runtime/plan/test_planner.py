@@ -132,6 +132,15 @@ def test_savings_are_positive_where_cells_are_skipped(plan_with: Callable[..., P
     assert all(d.saving_s == 0 and d.cost_db == 0 for d in exact)
 
 
+def test_a_size_that_was_asked_for_costs_what_this_capture_says(bundle: Bundle) -> None:
+    """The capture is looked at for the estimate alone, after the plan was made."""
+    work = _start(bundle, size="S")
+    assert work.explain() is not None
+    (told,) = (d for d in work.record["decisions"] if d["what"] == "size")
+    assert told["cost_db"] > 0
+    assert told["saving_s"] is not None
+
+
 def test_draft_counts_what_the_smaller_size_saves(plan_with: Callable[..., Plan]) -> None:
     decisions = {d.what: d for d in plan_with(quality="draft").decisions(SPEED)}
     assert decisions["size"].saving_s is not None
