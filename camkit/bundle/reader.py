@@ -444,5 +444,5 @@ def find_bundle(name_or_path: str | Path) -> Path:
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}."
     raise BundleError(
         f"no built-in bundle is called {text!r}; {hint if known else 'there is none.'} "
-        "A bundle of your own is named by its path: --bundle FILE.camkit"
+        "A bundle of your own is named by its path, FILE.camkit"
     )

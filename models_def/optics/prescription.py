@@ -246,7 +246,10 @@ def read_prescription(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> 
         DecodeError: If a glass catalogue is damaged.
     """
     text = path.read_text(encoding="utf-8")
-    return parse_prescription(text, catalogues, folder=path.parent)
+    try:
+        return parse_prescription(text, catalogues, folder=path.parent)
+    except ContractError as error:
+        raise ContractError(f"{path.name}: {error}") from error
 
 
 def parse_prescription(

@@ -176,10 +176,18 @@ class ThinRecipe:
 
 
 def find_thin_recipe(path: Path) -> ThinRecipe:
-    """Read a recipe by its path, or that of camkit with this name; see `read_thin_recipe`."""
+    """Read a recipe by its path, or that of camkit with this name.
+
+    Raises:
+        ContractError: As `read_thin_recipe`, or if neither is there.
+    """
+    if path.is_file() or path.name != str(path) or path.suffix:
+        return read_thin_recipe(path)
     own = RECIPES / f"{path}.toml"
-    named = not path.is_file() and len(path.parts) == 1 and own.is_file()
-    return read_thin_recipe(own if named else path)
+    if not own.is_file():
+        known = sorted(found.stem for found in RECIPES.glob("thin_*_lens.toml"))
+        raise ContractError(f"no recipe is called {path}; there are {', '.join(known)}, or a file")
+    return read_thin_recipe(own)
 
 
 def read_thin_recipe(path: Path) -> ThinRecipe:

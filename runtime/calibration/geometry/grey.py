@@ -49,6 +49,8 @@ def _read_light(path: Path) -> FloatArray:
         picture = is_picture(path)
     except OSError as error:
         raise DecodeError(f"cannot read {path}: {error.strerror or error}") from error
+    except DecodeError as error:
+        raise DecodeError(f"{path}: {error}") from error
     if picture:
         return np.asarray(read_scene(path).mean(axis=0))
     capture = read_capture(path)

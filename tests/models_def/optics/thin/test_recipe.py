@@ -24,6 +24,11 @@ def test_directions_go_from_the_axis_to_the_corner() -> None:
     assert angles[-1] == pytest.approx(0.49916, abs=1e-4)
 
 
+def test_names_that_nothing_has_are_answered_with_those_that_there_are() -> None:
+    with pytest.raises(ContractError, match="no recipe is called thin-plate; there are thin_plate"):
+        find_thin_recipe(Path("thin-plate"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -74,7 +74,7 @@ def test_what_is_no_picture_is_refused_by_name(tmp_path: Path, name: str, conten
 def test_folders_and_pipes_are_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.png")
     for path in (tmp_path, tmp_path / "pipe.png", tmp_path / "absent.png"):
-        with pytest.raises(DecodeError):
+        with pytest.raises(DecodeError, match=path.name):
             read_grey(path)
 
 
