@@ -30,10 +30,10 @@ FloatArray = NDArray[np.float32]
 
 PSF_SUM_TOLERANCE: Final = 1e-4
 DEPTH_RTOL: Final = 1e-6
+"""A depth in metres is rarely the same number as in millimetres: 1.1 m is 1100.0000000000002 mm."""
 LEAST_HEIGHT_MM: Final = 1e-6
 MOST_HEIGHT_MM: Final = 1e6
 """Of the last field, where there are several."""
-"""A depth in metres is rarely the same number as in millimetres: 1.1 m is 1100.0000000000002 mm."""
 
 
 def cfa_channels(cfa: CfaPattern) -> tuple[tuple[int, int], tuple[int, int]]:

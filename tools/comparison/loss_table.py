@@ -348,16 +348,17 @@ def restorer(row: Row, conditions: Conditions) -> tuple[Restorer, Entry]:
     folder = conditions.out_dir / row.lab.stem
     folder.mkdir(parents=True, exist_ok=True)
     begun, digest = folder / f"{row.size}.{CONDITIONS}", conditions.training_digest(row)
-    same = begun.exists() and begun.read_text(encoding="utf-8") == digest
-    there = any(folder.glob(f"*_{row.size}.pt"))
-    begun.write_text(digest, encoding="utf-8")
+    if not (begun.exists() and begun.read_text(encoding="utf-8") == digest):
+        # gone before the hash is there, or a run killed early would go on with them
+        for stale in folder.glob(f"*_{row.size}.pt"):
+            stale.unlink()
+        begun.write_text(digest, encoding="utf-8")
     options = TrainOptions(
         out_dir=folder,
         size=row.size,
         data_folder=conditions.data,
         max_cpu_minutes=conditions.minutes,
-        resume=there and same,
-        overwrite=there and not same,
+        resume=any(folder.glob(f"*_{row.size}.pt")),
         sharp_folder=conditions.sharp if schedule.loss == "adversarial" else None,
         vgg=conditions.vgg if schedule.content.looks else None,
     )
