@@ -4,7 +4,7 @@ developed sample -> one block of the runtime, tapered -> RL, ADMM-TV, cross-chan
 
 They see what the bank sees: planes with surroundings, the kernels of their block, noise, clipped
 pixels. Their numbers are those of `camkit process --method`, tuned on pictures of another camera
-(`camkit.runtime.bank.baselines`), and said in the report.
+(`camkit.runtime.bank.baselines`), or those that `tuned` finds on samples that networks learn from.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,6 +14,7 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from camkit.contracts import NoiseModel
 from camkit.models_def.kinds.bayer.frames.samples import TileMaker
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import Developed, filtered, finish_shot
@@ -21,15 +22,108 @@ from camkit.models_def.kinds.bayer.training import BayerMaker
 from camkit.models_def.training.kind import SampleMaker
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.sample import Sample
-from camkit.runtime.bank.baselines import block_filter, method_numbers
-from camkit.runtime.bank.blocks import Block, taper_edges, to_otf
+from camkit.runtime.bank.baselines import block_filter, method_numbers, richardson_lucy_filter
+from camkit.runtime.bank.blocks import Block, BlockFilter, taper_edges, to_otf
+from camkit.runtime.bank.cross_channel import (
+    CROSS_TV_WEIGHT,
+    CROSS_WEIGHT,
+    cross_channel_filter,
+)
+from camkit.runtime.bank.total_variation import TV_WEIGHT, admm_tv_filter
 
 Method = Callable[[Developed, BayerRecipe], Tensor]
 """A developed sample -> (1, 3, S, S), linear."""
+Numbers = dict[str, float]
+"""Of a method, by name."""
+FilterMaker = Callable[[NoiseModel, Numbers], BlockFilter]
+TURNS: Final = 8
+"""Of `tuned` over all numbers, at most."""
 
 
-def by_block(method: str) -> Method:
-    """Give a method of the runtime (see `block_filter`) on a sample as one block."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tunable:
+    """A method whose numbers may be tuned.
+
+    Attributes:
+        make_filter: Gives the restoration of a block, of noise and numbers.
+        start: Numbers to begin at.
+        factor: Of a step, up or down.
+    """
+
+    make_filter: FilterMaker
+    start: Numbers
+    factor: float = 2.0
+
+
+TUNABLE: Final[dict[str, Tunable]] = {
+    "rl": Tunable(
+        make_filter=lambda noise, numbers: richardson_lucy_filter(
+            noise, rounds=max(1, round(numbers["rounds"]))
+        ),
+        start={"rounds": 16},
+        factor=1.5,
+    ),
+    "admm-tv": Tunable(
+        make_filter=lambda noise, numbers: admm_tv_filter(noise, weight=numbers["tv_weight"]),
+        start={"tv_weight": TV_WEIGHT},
+    ),
+    "cross-channel": Tunable(
+        make_filter=lambda noise, numbers: cross_channel_filter(
+            noise, tv_weight=numbers["tv_weight"], cross_weight=numbers["cross_weight"]
+        ),
+        start={"tv_weight": CROSS_TV_WEIGHT, "cross_weight": CROSS_WEIGHT},
+    ),
+}
+
+
+def tuned(
+    start: Numbers, factor: float, score: Callable[[Numbers], float]
+) -> list[tuple[Numbers, float]]:
+    """Climb: one number after the other goes up or down while the score rises.
+
+    Args:
+        start: Numbers to begin at.
+        factor: Of a step.
+        score: Judges numbers; more is better.
+
+    Returns:
+        All numbers that were tried, and their scores; the best first, beside which no number alone
+        is better a step up or down (or `TURNS` turns are over).
+    """
+    scores: dict[tuple[float, ...], float] = {}
+
+    def judged(values: tuple[float, ...]) -> float:
+        if values not in scores:
+            scores[values] = score(dict(zip(start, values, strict=True)))
+        return scores[values]
+
+    best = tuple(start.values())
+    judged(best)  # of equals the first is the best
+    for _ in range(TURNS):
+        before = best
+        for place in range(len(best)):
+            for step in (factor, 1 / factor):
+                while judged(after := _stepped(best, place, step)) > judged(best):
+                    best = after
+        if best == before:
+            break
+    ranked = sorted(scores, key=lambda values: -scores[values])
+    return [(dict(zip(start, values, strict=True)), scores[values]) for values in ranked]
+
+
+def _stepped(values: tuple[float, ...], place: int, step: float) -> tuple[float, ...]:
+    # rounded: up and down again is where it was
+    changed = float(f"{values[place] * step:.4g}")
+    return (*values[:place], changed, *values[place + 1 :])
+
+
+def by_block(method: str, numbers: Numbers | None = None) -> Method:
+    """Give a method of the runtime (see `block_filter`) on a sample as one block.
+
+    Args:
+        method: Its name.
+        numbers: Of one of `TUNABLE`; None for the runtime's.
+    """
 
     def restore(developed: Developed, recipe: BayerRecipe) -> Tensor:
         given, settings = developed.given, recipe.wiener
@@ -42,7 +136,10 @@ def by_block(method: str) -> Method:
             height_mm=given.height_mm,
         )
         noise = given.noise.raised(given.noise_rise)
-        restored = block_filter(method, settings, noise, kernels.shape[-1])(block)
+        if numbers is None:
+            restored = block_filter(method, settings, noise, kernels.shape[-1])(block)
+        else:
+            restored = TUNABLE[method].make_filter(noise, numbers)(block)
         return torch.from_numpy(restored)[None]
 
     return restore
@@ -53,18 +150,12 @@ def wiener_alone(developed: Developed, recipe: BayerRecipe) -> Tensor:
     return filtered(developed, recipe.with_together(None))
 
 
-METHODS: Final[dict[str, Method]] = {
-    "wiener-alone": wiener_alone,
-    "rl": by_block("rl"),
-    "admm-tv": by_block("admm-tv"),
-    "cross-channel": by_block("cross-channel"),
-}
+METHODS: Final = ("wiener-alone", *TUNABLE)
 
 
-def numbers() -> Mapping[str, Mapping[str, float]]:
-    """Give the numbers by which the methods work, by name."""
-    names = ("rl", "admm-tv", "cross-channel")
-    return {name: dict(method_numbers(name)) for name in names}
+def runtime_numbers(method: str) -> Mapping[str, float]:
+    """Give the numbers of `camkit process --method`; none for wiener-alone."""
+    return dict(method_numbers(method)) if method in TUNABLE else {}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,8 +178,18 @@ class ClassicalMaker:
         return finish_shot(developed, self.recipe, self.method(developed, self.recipe)).sample
 
 
-def with_method(name: str, maker: SampleMaker, recipe: Recipe) -> SampleMaker:
-    """Give a maker of the same samples by a method; exits where the camera has no bank."""
+def with_method(
+    name: str, maker: SampleMaker, recipe: Recipe, numbers: Numbers | None = None
+) -> SampleMaker:
+    """Give a maker of the same samples by a method; exits where the camera has no bank.
+
+    Args:
+        name: One of `METHODS`.
+        maker: Of the usual samples.
+        recipe: Their camera.
+        numbers: Of the method; None for the runtime's.
+    """
     if not (isinstance(maker, BayerMaker | TileMaker) and isinstance(recipe, BayerRecipe)):
         raise SystemExit(f"{name} is for cameras behind a mosaic; {recipe.name} is none")
-    return ClassicalMaker(maker=maker, recipe=recipe, method=METHODS[name])
+    method = by_block(name, numbers) if name in TUNABLE else wiener_alone
+    return ClassicalMaker(maker=maker, recipe=recipe, method=method)

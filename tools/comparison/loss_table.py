@@ -12,7 +12,8 @@ many CPU minutes and judged on samples of both recipes, cut from OTHERS: LAB_jud
 WILD_judged.toml, which are written too, draw no scenes (with `--wild` that is up to them; where
 they are not, LAB and WILD serve). Rows that need no training are `capture`, the input, `wiener`,
 the bank alone, and of cameras behind a mosaic `wiener-alone` (each colour for itself), `rl`,
-`admm-tv` and `cross-channel` (`tools.comparison.classical`). PSNR and SSIM are those of sRGB;
+`admm-tv` and `cross-channel` (`tools.comparison.classical`), their numbers tuned by PSNR on
+`--tune` samples of those that networks learn from. PSNR and SSIM are those of sRGB;
 `perceptual` is the 1-norm of Gram matrices (eq. 3.7), by random features unless `--vgg FILE` gives
 those of VGG-19.
 
@@ -31,39 +32,32 @@ OUT_DIR/WILD_judged (`camkit prepare --out-dir`, the names of the recipes withou
 
 import argparse
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from camkit.colorimetry import rec709_from_camera
 from camkit.errors import CamkitError
-from camkit.models_def.kinds.bayer.frames.samples import TileMaker
-from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
-from camkit.models_def.training.adversarial.content import Features, Relu32, gram_loss
-from camkit.models_def.training.adversarial.views import make_views
+from camkit.models_def.training.adversarial.content import Relu32
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
-from camkit.models_def.training.kind import Restorer, read_recipe, training_kind
-from camkit.models_def.training.sample import Sample, SampleLayout
-from camkit.models_def.training.similarity import ssim
+from camkit.models_def.training.kind import Restorer, read_recipe
 from camkit.models_def.training.trainer import TrainOptions, train
-from tools.comparison.classical import METHODS, numbers, with_method
+from tools.comparison.classical import METHODS, TUNABLE, Numbers, runtime_numbers, tuned
 from tools.comparison.compact_json import to_compact_json
+from tools.comparison.domain import METRICS, Circumstances, as_filtered, circumstances
 from tools.comparison.overfitting import overfitting, sentences
 from tools.comparison.twins import Counts, judged_by, write_twins
 from tools.lens_table import kept
 
-METRICS: Final = ("psnr_db", "ssim", "perceptual")
 DOMAINS: Final = ("lab", "wild")
 JUDGE_SEED: Final = 909
+TUNE_SEED: Final = 808
 DIGITS: Final = 5
 JUDGED: Final = 3
 """Counts how rows are judged; what was judged before is judged again."""
-LEAST_ERROR: Final = 1e-12
 FRAMES: Final = "tiles.json"
 CONDITIONS: Final = "conditions.txt"
 """Behind the name of a checkpoint: the hash of what it was trained by."""
@@ -82,6 +76,7 @@ class Conditions:
         vgg: Weights of VGG-19.
         minutes: CPU time of a row.
         samples: To judge on, of each domain.
+        tune: Samples that numbers of classical methods are tuned on; 0 for the runtime's.
         out_dir: Where everything goes.
     """
 
@@ -91,13 +86,17 @@ class Conditions:
     vgg: Path | None
     minutes: float
     samples: int
+    tune: int
     out_dir: Path
 
     def digest(self, row: "Row") -> str:
         """Give a hash of all that decides a row."""
         recipes = [path for recipe in (row.lab, row.wild) for path in (recipe, judged_by(recipe))]
         texts = [text for recipe in recipes for text in self._told(recipe)]
-        return _hash(JUDGED, row.size, *texts, self.fresh, self.samples, *self._trained_by())
+        tuning = (self.tune,) if row.size in TUNABLE else ()
+        return _hash(
+            JUDGED, row.size, *texts, self.fresh, self.samples, *self._trained_by(), *tuning
+        )
 
     def training_digest(self, row: "Row") -> str:
         """Give a hash of all that decides the weights of a row."""
@@ -131,41 +130,6 @@ class Row:
     wild: Path
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Domain:
-    """Samples to judge on.
-
-    Attributes:
-        samples: Never trained on.
-        frames: Number of the frame that a sample is of; of its own where it is cut from none.
-        layout: Of them.
-        to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
-        designed: The lens that they were taken with, as a bundle holds it.
-    """
-
-    samples: Sequence[Sample]
-    frames: Sequence[int]
-    layout: SampleLayout
-    to_rec709: Tensor
-    designed: Mapping[str, bytes]
-
-    def score(self, restore: Restorer, features: Features) -> Entry:
-        """Judge a restoration by `METRICS`: means over the samples, and `each` by its frame."""
-        found: list[tuple[float, float, float]] = []
-        for sample in self.samples:
-            planes = sample.stacked(self.layout)[None]
-            output, truth = restore(planes), known(sample.target[None], planes)
-            views = make_views(output, truth, sample.weight[None], self.to_rec709)
-            error = max(float((views.seen - views.real).square().mean()), LEAST_ERROR)
-            look = gram_loss(features(views.seen), features(views.real))
-            found.append(
-                (-10 * float(np.log10(error)), float(ssim(views.seen, views.real)), float(look))
-            )
-        each = dict(zip(METRICS, np.transpose(found).tolist(), strict=True))
-        means = {name: float(np.mean(values)) for name, values in each.items()}
-        return {**means, "each": each, "frames": list(self.frames)}
-
-
 def main() -> int:
     """Train and judge every row, and write the table."""
     arguments = parse()
@@ -176,6 +140,7 @@ def main() -> int:
         vgg=arguments.vgg,
         minutes=arguments.minutes,
         samples=arguments.samples,
+        tune=arguments.tune,
         out_dir=arguments.out_dir,
     )
     conditions.out_dir.mkdir(parents=True, exist_ok=True)
@@ -221,7 +186,7 @@ def write(rows: dict[str, Entry], lab: Path, wild: Path, conditions: Conditions)
         "minutes": conditions.minutes,
         "samples": conditions.samples,
         "features": "random" if conditions.vgg is None else conditions.vgg.name,
-        "classical": {"best": best, **numbers()},
+        "classical": {"best": best},
         "overfitting": verdict,
         "rows": rows,
     }
@@ -256,6 +221,13 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--vgg", type=Path, help="weights of VGG-19")
     parser.add_argument("--minutes", type=float, default=60.0, help="CPU time of a row")
     parser.add_argument("--samples", type=count, default=48, help="to judge on, of each recipe")
+    parser.add_argument(
+        "--tune",
+        type=int,
+        default=12,
+        metavar="SAMPLES",
+        help="to tune classical methods on, of those to train on; 0: numbers of the runtime",
+    )
     parser.add_argument("--out-dir", type=Path, default=Path("out/loss-table"))
     return parser.parse_args()
 
@@ -293,52 +265,50 @@ def row_of(name: str, lab: Path, wild: Path) -> Row:
 def measure(row: Row, conditions: Conditions) -> Entry:
     """Train a row, where it needs that, and judge it in both domains."""
     method = row.size if row.size in METHODS else None
-    home, abroad = (domain(path, conditions, method) for path in (row.lab, row.wild))
+    numbers, found = None, {}
+    if method in TUNABLE:
+        tried = tune(method, row.lab, conditions) if conditions.tune else []
+        numbers = tried[0][0] if tried else None
+        found = {"numbers": numbers or runtime_numbers(method), "tuned": tried}
+    home, abroad = (
+        to_judge(path, conditions).domain(conditions.samples, method, numbers)
+        for path in (row.lab, row.wild)
+    )
     if home.designed != abroad.designed:
         raise SystemExit(f"{row.lab} and {row.wild} are of two lenses; a row needs two of one")
-    trained: Entry = {}
     if row.size in UNTRAINED:
         restore = UNTRAINED[row.size]
     else:
-        restore, trained = restorer(row, conditions)
+        restore, found = restorer(row, conditions)
     features = Relu32(conditions.vgg)
     pairs = zip(DOMAINS, (home, abroad), strict=True)
-    return trained | {name: one.score(restore, features) for name, one in pairs}
+    return found | {name: one.score(restore, features) for name, one in pairs}
 
 
-def domain(recipe_path: Path, conditions: Conditions, method: str | None = None) -> Domain:
-    """Make the samples of a recipe that rows are judged on.
+def tune(method: str, recipe_path: Path, conditions: Conditions) -> list[tuple[Numbers, float]]:
+    """Tune a method by PSNR on samples that networks learn from; see `tuned`.
 
     Args:
-        recipe_path: Of the recipe.
+        method: One of `TUNABLE`.
+        recipe_path: What would be trained by.
         conditions: Pictures and number.
-        method: One of `METHODS` in place of the bank.
     """
+    folder = conditions.out_dir / recipe_path.stem
+    taught = circumstances(recipe_path, folder, conditions.data, TUNE_SEED)
+    tunable = TUNABLE[method]
+
+    def score(numbers: Numbers) -> float:
+        return taught.domain(conditions.tune, method, numbers).psnr_db(as_filtered)
+
+    return tuned(tunable.start, tunable.factor, score)
+
+
+def to_judge(recipe_path: Path, conditions: Conditions) -> Circumstances:
+    """Open what rows of a recipe are judged on: unseen pictures, and no drawn scenes if it can."""
     few = judged_by(recipe_path)
-    recipe = read_recipe(few if few.exists() else recipe_path)
-    kind, role = training_kind(recipe.kind), recipe.role(None)
-    matrix = getattr(recipe.sensor, "color_matrix", None)
-    if matrix is None:
-        raise SystemExit(f"{recipe_path} has no sensor.color_matrix, to see pictures")
     folder = conditions.out_dir / f"{recipe_path.stem}_judged"
-    folder.mkdir(parents=True, exist_ok=True)
-    material = kind.prepare(recipe, recipe_path.parent, folder)
-    maker = kind.maker(recipe, role, material, conditions.fresh, JUDGE_SEED)
-    numbers = range(conditions.samples)
-    frames = [maker.frame_of(n) if isinstance(maker, TileMaker) else n for n in numbers]
-    maker = maker if method is None else with_method(method, maker, recipe)
-    return Domain(
-        samples=[maker.make(number) for number in numbers],
-        frames=frames,
-        layout=kind.layout(recipe, role),
-        to_rec709=torch.from_numpy(rec709_from_camera(np.array(matrix))).float(),
-        designed=material.designed,
-    )
-
-
-def known(target: Tensor, planes: Tensor) -> Tensor:
-    """Give a target less what it has from the bank, which is asked for where light was clipped."""
-    return torch.where(target == _wiener(planes), torch.tensor(NOT_JUDGED), target)
+    chosen = few if few.exists() else recipe_path
+    return circumstances(chosen, folder, conditions.fresh, JUDGE_SEED)
 
 
 def restorer(row: Row, conditions: Conditions) -> tuple[Restorer, Entry]:
@@ -379,14 +349,10 @@ def _capture(planes: Tensor) -> Tensor:
     return planes[:, :3]
 
 
-def _wiener(planes: Tensor) -> Tensor:
-    return planes[:, -3:]
-
-
 UNTRAINED: Final[dict[str, Restorer]] = {
     "capture": _capture,
-    "wiener": _wiener,
-    **dict.fromkeys(METHODS, _wiener),
+    "wiener": as_filtered,
+    **dict.fromkeys(METHODS, as_filtered),
 }
 """Of a row without training: what it makes of a sample's planes."""
 CLASSICAL: Final[tuple[str, ...]] = ("wiener", *METHODS)

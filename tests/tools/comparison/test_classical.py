@@ -8,7 +8,16 @@ from camkit.models_def.kinds.bayer.training import BayerMaker
 from camkit.models_def.training.recipe import Recipe
 from tests.bayer_recipe import bank, recipe, recipe_path  # noqa: F401
 from tests.together_factory import TOGETHER
-from tools.comparison.classical import METHODS, ClassicalMaker, by_block, wiener_alone, with_method
+from tools.comparison.classical import (
+    METHODS,
+    TUNABLE,
+    ClassicalMaker,
+    by_block,
+    runtime_numbers,
+    tuned,
+    wiener_alone,
+    with_method,
+)
 
 
 @pytest.fixture
@@ -41,6 +50,40 @@ def test_every_method_comes_closer_to_the_truth_than_the_capture(maker, recipe, 
     capture, restored = np.array(errors).T
     assert (restored < capture).sum() >= 3
     assert restored.sum() < capture.sum()
+
+
+def test_tuning_climbs_to_where_no_step_helps():
+    asked = []
+
+    def score(numbers):
+        asked.append(tuple(numbers.values()))
+        a, b = (np.log2(value) for value in numbers.values())
+        return -float((a - 5) ** 2 + (b + 3) ** 2 + (a - 5) * (b + 3) / 2)
+
+    (best, best_score), *others = tuned({"a": 1.0, "b": 1.0}, 2.0, score)
+    assert best == {"a": 32.0, "b": 0.125}
+    assert best_score == 0
+    assert all(found < best_score for _, found in others)
+    assert len(set(asked)) == len(asked) == 1 + len(others)
+    # nothing gains: the start is the best, and both sides of every number were tried
+    flat = tuned({"a": 4.0, "b": 1.0}, 2.0, lambda _: 0.0)
+    assert flat[0][0] == {"a": 4.0, "b": 1.0}
+    assert len(flat) == 5
+    # what never ends ends
+    assert len(tuned({"a": 1.0, "b": 1.0}, 2.0, lambda numbers: min(numbers["a"], 1e6))) < 60
+
+
+@pytest.mark.parametrize("name", TUNABLE)
+def test_numbers_of_the_runtime_do_what_the_runtime_does(maker, recipe, name):  # noqa: F811
+    known = runtime_numbers(name)
+    if name == "rl":
+        assert known["least_rounds"] == 10
+        return
+    numbers = {key: known[key] for key in TUNABLE[name].start}
+    plain = with_method(name, maker, recipe).make(1).inputs["wiener"]
+    assert torch.equal(with_method(name, maker, recipe, numbers).make(1).inputs["wiener"], plain)
+    other = {key: 4 * value for key, value in numbers.items()}
+    assert not torch.equal(with_method(name, maker, recipe, other).make(1).inputs["wiener"], plain)
 
 
 def test_alone_is_the_bank_without_its_model_of_colours(maker, recipe):  # noqa: F811

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from camkit.models_def.kinds.bayer import training
 from camkit.models_def.kinds.bayer.material import BayerMaterial
@@ -13,8 +12,8 @@ from tests.bayer_recipe import bank, material, one_picture_to_validate_on, recip
 from tests.normed_recipe import NORMED_RECIPE, recipe_path  # noqa: F401
 from tests.tiny_design import run_tool
 from tools.comparison import loss_table
-from tools.comparison.classical import METHODS
-from tools.comparison.loss_table import METRICS
+from tools.comparison.classical import METHODS, TUNABLE
+from tools.comparison.domain import METRICS
 
 FREE = ["capture", "wiener", *METHODS]
 
@@ -36,7 +35,7 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
     lab, wild = recipes
     out = tmp_path / "out"
     options = [lab, "--wild", wild, "--rows", "l1", "adversarial", "--samples", 2]
-    options += ["--minutes", 10, "--out-dir", out]
+    options += ["--minutes", 10, "--tune", 2, "--out-dir", out]
     assert run_tool(monkeypatch, "comparison.loss_table", *options) == 0
     report = json.loads((out / "loss_table.json").read_text(encoding="utf-8"))
     rows = report["rows"]
@@ -51,7 +50,11 @@ def test_rows_are_trained_once_and_judged_at_home_and_abroad(
     assert rows["capture"]["lab"]["psnr_db"] != rows["capture"]["wild"]["psnr_db"]
     best = report["classical"]["best"]
     assert rows[best]["lab"]["psnr_db"] == max(rows[name]["lab"]["psnr_db"] for name in FREE[1:])
-    assert report["classical"]["rl"]["least_rounds"] == 10
+    for name, tunable in TUNABLE.items():
+        (numbers, best_db), *others = rows[name]["tuned"]
+        assert rows[name]["numbers"] == numbers
+        assert all(db <= best_db for _, db in others)
+        assert tunable.start in [tried for tried, _ in rows[name]["tuned"]]
     (pair,) = report["overfitting"]
     assert (pair["supervised"], pair["other"]) == ("l1", "adversarial")
     each = [rows[name]["wild"]["each"]["psnr_db"] for name in ("l1", "adversarial")]
@@ -75,7 +78,8 @@ def test_one_recipe_is_trained_before_a_display_and_judged_outside(
     recipes: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    options = [recipes[0], "--rows", "l1", "--samples", 2, "--minutes", 10, "--out-dir", out]
+    options = [recipes[0], "--rows", "l1", "--samples", 2, "--minutes", 10, "--tune", 0]
+    options += ["--out-dir", out]
     assert run_tool(monkeypatch, "comparison.loss_table", *options, "--only-recipes") == 0
     assert sorted(path.name for path in out.iterdir()) == [
         f"lab_{name}.toml" for name in ("display", "display_judged", "wild", "wild_judged")
@@ -135,27 +139,5 @@ def test_a_row_of_another_lens_has_two_recipes_of_its_own(
 
 def conditions(folder: Path) -> loss_table.Conditions:
     return loss_table.Conditions(
-        data=None, fresh=None, sharp=None, vgg=None, minutes=1.0, samples=1, out_dir=folder
+        data=None, fresh=None, sharp=None, vgg=None, minutes=1.0, samples=1, tune=0, out_dir=folder
     )
-
-
-def test_a_perfect_restoration_is_seen_as_one(recipes: tuple[Path, Path], tmp_path: Path) -> None:
-    home = loss_table.domain(recipes[0], conditions(tmp_path))
-    truth = home.samples[0].target[None]
-    perfect = home.score(lambda _: truth, loss_table.Relu32(None))
-    assert perfect["psnr_db"] > 60
-    assert perfect["ssim"] == pytest.approx(1, abs=1e-3)
-    assert perfect["perceptual"] == pytest.approx(0, abs=1e-4)
-    grey = home.score(lambda _: torch.full_like(truth, 0.1), loss_table.Relu32(None))
-    assert grey["psnr_db"] < 40
-    assert grey["perceptual"] > perfect["perceptual"]
-
-
-def test_what_was_asked_as_the_bank_has_it_is_not_judged() -> None:
-    planes = torch.rand(1, 6, 4, 4)
-    target = torch.rand(1, 3, 4, 4)
-    lost = torch.zeros(1, 1, 4, 4, dtype=torch.bool)
-    lost[..., 1, 2] = True
-    asked = torch.where(lost, planes[:, 3:], target)
-    assert torch.equal(loss_table.known(asked, planes) == -1, lost.expand_as(target))
-    assert torch.equal(loss_table.known(target, planes), target)
