@@ -22,7 +22,7 @@ from camkit.bundle.reader import PRESCRIPTION, Bundle
 from camkit.bundle.stages import Network
 from camkit.bundle.writer import write_physics
 from camkit.colorimetry import apply_matrix, camera_from_rec709
-from camkit.contracts import FloatArray
+from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.tiles import (
     PARTS,
@@ -99,16 +99,32 @@ def check_frames(recipe: BayerRecipe, pictures: Mapping[str, Path | None] | None
 def freeze_copies(recipe: BayerRecipe, lens: Lens, tell: Tell) -> tuple[FrozenOptics, ...]:
     """Freeze core and haze of the fabricated copies of a lens, those to choose by last.
 
+    Where the recipe has distances, every copy is frozen for an object at one of them, in turn.
+
     Raises:
-        ContractError: If no peak of a copy reaches the corner.
+        ContractError: If no peak of a copy reaches the corner, or copies have peaks at some
+            distances only.
     """
     choices = recipe.lens
     count = choices.copies + choices.validation_copies
-    frozen = []
-    for number, copy in enumerate(focused_copies(lens, 1 + count, choices.seed)[1:], start=1):
-        optics, _ = freeze_hazy(copy, recipe.sensor, rays=COPY_RAYS)
+    distances_mm = choices.depths_mm or (lens.object_distance_mm,)
+    turns = (*range(choices.copies), *range(choices.validation_copies))
+    frozen: list[FrozenOptics] = []
+    about = set()
+    for copy, turn in zip(focused_copies(lens, 1 + count, choices.seed)[1:], turns, strict=True):
+        distance_mm = distances_mm[turn % len(distances_mm)]
+        optics, report = freeze_hazy(
+            replace(copy, object_distance_mm=distance_mm), recipe.sensor, rays=COPY_RAYS
+        )
         frozen.append(optics)
-        tell(f"copy {number} of {count} frozen")
+        about.add(report.about)
+        if len(about) > 1:
+            raise ContractError(
+                f"{lens.name} has peaks at some of lens.depths_mm only, so that pictures would lie "
+                f"elsewhere at others; leave {depth_name(distance_mm)} out"
+            )
+        at = f" at {depth_name(distance_mm)}" if choices.depths_mm else ""
+        tell(f"copy {len(frozen)} of {count} frozen{at}")
     return tuple(frozen)
 
 

@@ -109,13 +109,19 @@ def method_numbers(method: str) -> Mapping[str, float]:
     raise UnsupportedError(f"method must be rl, admm-tv or cross-channel; got {method!r}")
 
 
-def richardson_lucy_filter(noise: NoiseModel, *, rounds: int | None = None) -> BlockFilter:
+def richardson_lucy_filter(
+    noise: NoiseModel,
+    *,
+    rounds: int | None = None,
+    rounds_per_snr: float = RL_ROUNDS_PER_SNR,
+) -> BlockFilter:
     """Give Richardson-Lucy as a block filter.
 
     Args:
         noise: Noise after white balance.
         rounds: Each sharpens and raises noise; None lets the signal-to-noise ratio of the block
             decide.
+        rounds_per_snr: How many rounds that is, within limits.
     """
     background = background_of(noise)
     shot, read_variance = np.array(noise.shot), np.array(noise.read_variance)
@@ -123,7 +129,7 @@ def richardson_lucy_filter(noise: NoiseModel, *, rounds: int | None = None) -> B
     def restore(block: Block) -> FloatArray:
         level = np.maximum(block.samples.mean(axis=(-2, -1), dtype=np.float64), 0)
         deviation = np.sqrt(np.maximum(shot * level + read_variance, 1e-20))
-        wanted = RL_ROUNDS_PER_SNR * float((level / deviation).mean())
+        wanted = rounds_per_snr * float((level / deviation).mean())
         count = int(np.clip(wanted, RL_LEAST_ROUNDS, RL_MOST_ROUNDS)) if rounds is None else rounds
         clipped = None if block.unknown is None else spread_clipped(block.unknown)
         return richardson_lucy(block.samples, block.otf, background, count, clipped)

@@ -82,7 +82,9 @@ def read_picture(path: Path, *, keep_codes: bool = False) -> Capture:
     """
     picture = _decode(path)
     samples, notes = picture.samples, [*picture.notes]
-    if samples.ndim == 2 and not _is_exr(path):
+    if samples.ndim == 2 and _begins(path, _JPEG_MAGIC):
+        raise DecodeError("expected an RGB picture, got a grey JPEG; give it in colour")
+    if samples.ndim == 2 and not _begins(path, EXR_MAGIC):
         counted = f"; {COUNTS_ADVICE}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
         raise DecodeError(
             f"expected an RGB picture, got a single channel; {MOSAIC_ADVICE}{counted}"
@@ -116,9 +118,15 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
     """Read a headerless Bayer mosaic from a single-channel PNG or TIFF.
 
     Raises:
-        DecodeError: If the file is damaged, has several channels, or contradicts the options.
+        DecodeError: If the file is damaged, a JPEG, has several channels, or contradicts the
+            options.
         OSError: If it cannot be read.
     """
+    if _begins(path, _JPEG_MAGIC):
+        raise DecodeError(
+            f"{path.name} is a JPEG, which no mosaic is: tones are coded and noise is lost; give "
+            "RAW files, or a PNG or TIFF of the sensor's own samples"
+        )
     picture = _decode(path)
     samples = picture.samples
     if samples.ndim != 2 or samples.dtype not in (np.uint8, np.uint16):
@@ -197,7 +205,7 @@ def read_orientation(path: Path) -> int:
     Raises:
         OSError: If it cannot be read.
     """
-    if _is_exr(path):
+    if _begins(path, EXR_MAGIC):
         return 1
     tags = read_tiff_tags(path)
     return orientation_of(tags if tags.directories else exif_of_picture(path.read_bytes()))
@@ -208,13 +216,13 @@ def _srgb_table(top: int) -> FloatArray:
     return decode_srgb((np.arange(top + 1) / top).astype(np.float32))
 
 
-def _is_exr(path: Path) -> bool:
+def _begins(path: Path, magic: bytes) -> bool:
     with path.open("rb") as file:
-        return file.read(4) == EXR_MAGIC
+        return file.read(len(magic)) == magic
 
 
 def _decode(path: Path) -> _Picture:
-    if _is_exr(path):
+    if _begins(path, EXR_MAGIC):
         return _decode_exr(path)
     tags = read_tiff_tags(path)
     raw_checks.check_chunks_inside(tags)

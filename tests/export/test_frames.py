@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
+from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.errors import ContractError
+from camkit.export import frames
 from camkit.export.frames import (
     FrameSources,
     _with_surroundings,
@@ -19,11 +22,13 @@ from camkit.export.frames import (
     prepare_frames,
 )
 from camkit.models_def.kinds.bayer.bank_fit import BANK_FITTING
-from camkit.models_def.kinds.bayer.frames.samples import developed
+from camkit.models_def.kinds.bayer.frames.samples import TileMaker, developed
 from camkit.models_def.kinds.bayer.frames.tiles import Tile, Tiles, read_frames
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import finish_shot
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe
+from camkit.models_def.optics.lens_file.lens_file import read_lens
+from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.training.bank_fitting import BankFitOptions
 from camkit.models_def.training.checkpoint import read_checkpoint
@@ -104,6 +109,38 @@ def test_copies_and_isos_to_choose_by_are_their_own(runs: Path) -> None:
     valid = _tiles(runs, "valid")
     assert set(valid.facts("copy")) == {2}
     assert set(valid.facts("iso")) == {100.0, 1600.0}
+
+
+def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
+    recipe: BayerRecipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen, abouts = [], ["peaks"] * 4 + ["peaks", "chief rays"]
+
+    def frozen(lens: Lens, *_: object, **__: object) -> tuple[FrozenOptics, SimpleNamespace]:
+        seen.append(lens.object_distance_mm)
+        return hazy_optics(), SimpleNamespace(about=abouts[len(seen) - 1])
+
+    monkeypatch.setattr(frames, "freeze_hazy", frozen)
+    distances = (500.0, 2000.0, np.inf)
+    choices = replace(
+        recipe.lens, depths_mm=distances, copies=3, validation_copies=1, bank_in_focus=True
+    )
+    told: list[str] = []
+    lens = read_lens(Path("duet"))
+    made = frames.freeze_copies(replace(recipe, lens=choices), lens, told.append)
+    assert len(made) == 4
+    assert seen == [500.0, 2000.0, np.inf, 500.0]
+    assert told[1] == "copy 2 of 4 frozen at 2 m"
+    with pytest.raises(ContractError, match=r"peaks at some of lens\.depths_mm only.*2 m out"):
+        frames.freeze_copies(replace(recipe, lens=choices), lens, told.append)
+    seen.clear()
+    usual = replace(recipe, lens=replace(recipe.lens, copies=1, validation_copies=1))
+    frames.freeze_copies(usual, lens, told.append)
+    assert seen == [lens.object_distance_mm] * 2
+    with pytest.raises(ContractError, match=r"say lens\.bank_in_focus = true"):
+        replace(recipe, lens=replace(choices, bank_in_focus=False))
+    with pytest.raises(ContractError, match=r"lens\.copies must be 3 at least, got 2"):
+        replace(recipe, lens=replace(choices, copies=2))
 
 
 def test_surroundings_are_mirrored_at_the_border() -> None:
@@ -220,6 +257,19 @@ def test_samples_repeat_and_tiles_come_once_before_all_again(
     assert np.bincount(frames).tolist() == [per_frame] * recipe.frames.count
     assert len(firsts) == 24
     assert float(maker.make(24).target.sum()) in firsts
+
+
+def test_samples_tell_how_far_their_scene_is(recipe: BayerRecipe, runs: Path) -> None:
+    frames_made = read_frames(runs / "tiny_frames")
+    tiles = frames_made.tiles("train", None)
+    copies = tiles.facts("copy")
+    assert set(copies) == {0, 1}
+    assert TileMaker(recipe, frames_made.bank, tiles, 4).distance_mm(0) is None
+    far = replace(recipe.lens, depths_mm=(500.0, np.inf), bank_in_focus=True)
+    maker = TileMaker(replace(recipe, lens=far), frames_made.bank, tiles, 4)
+    order = [maker._tile_of(number) for number in range(len(tiles))]
+    found = [maker.distance_mm(number) for number in range(len(tiles))]
+    assert found == [(500.0, np.inf)[int(copies[tile])] for tile in order]
 
 
 def test_frames_are_read_by_another_process(

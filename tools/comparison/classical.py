@@ -22,7 +22,12 @@ from camkit.models_def.kinds.bayer.training import BayerMaker
 from camkit.models_def.training.kind import SampleMaker
 from camkit.models_def.training.recipe import Recipe
 from camkit.models_def.training.sample import Sample
-from camkit.runtime.bank.baselines import block_filter, method_numbers, richardson_lucy_filter
+from camkit.runtime.bank.baselines import (
+    RL_ROUNDS_PER_SNR,
+    block_filter,
+    method_numbers,
+    richardson_lucy_filter,
+)
 from camkit.runtime.bank.blocks import Block, BlockFilter, taper_edges, to_otf
 from camkit.runtime.bank.cross_channel import (
     CROSS_TV_WEIGHT,
@@ -38,6 +43,8 @@ Numbers = dict[str, float]
 FilterMaker = Callable[[NoiseModel, Numbers], BlockFilter]
 TURNS: Final = 8
 """Of `tuned` over all numbers, at most."""
+STEP: Final = 2.0
+"""Its factor, up or down."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,21 +54,18 @@ class Tunable:
     Attributes:
         make_filter: Gives the restoration of a block, of noise and numbers.
         start: Numbers to begin at.
-        factor: Of a step, up or down.
     """
 
     make_filter: FilterMaker
     start: Numbers
-    factor: float = 2.0
 
 
 TUNABLE: Final[dict[str, Tunable]] = {
     "rl": Tunable(
         make_filter=lambda noise, numbers: richardson_lucy_filter(
-            noise, rounds=max(1, round(numbers["rounds"]))
+            noise, rounds_per_snr=numbers["rounds_per_snr"]
         ),
-        start={"rounds": 16},
-        factor=1.5,
+        start={"rounds_per_snr": RL_ROUNDS_PER_SNR},
     ),
     "admm-tv": Tunable(
         make_filter=lambda noise, numbers: admm_tv_filter(noise, weight=numbers["tv_weight"]),
@@ -76,14 +80,11 @@ TUNABLE: Final[dict[str, Tunable]] = {
 }
 
 
-def tuned(
-    start: Numbers, factor: float, score: Callable[[Numbers], float]
-) -> list[tuple[Numbers, float]]:
+def tuned(start: Numbers, score: Callable[[Numbers], float]) -> list[tuple[Numbers, float]]:
     """Climb: one number after the other goes up or down while the score rises.
 
     Args:
         start: Numbers to begin at.
-        factor: Of a step.
         score: Judges numbers; more is better.
 
     Returns:
@@ -102,7 +103,7 @@ def tuned(
     for _ in range(TURNS):
         before = best
         for place in range(len(best)):
-            for step in (factor, 1 / factor):
+            for step in (STEP, 1 / STEP):
                 while judged(after := _stepped(best, place, step)) > judged(best):
                     best = after
         if best == before:

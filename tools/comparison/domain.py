@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from camkit.colorimetry import rec709_from_camera
+from camkit.contracts import depth_name
 from camkit.models_def.kinds.bayer.frames.samples import TileMaker
 from camkit.models_def.kinds.bayer.samples import NOT_JUDGED
 from camkit.models_def.training.adversarial.content import Features, gram_loss
@@ -34,6 +35,7 @@ class Domain:
     Attributes:
         samples: Never trained on, unless numbers are tuned.
         frames: Number of the frame that a sample is of; of its own where it is cut from none.
+        distances_mm: How far off their scenes are; empty where nobody says.
         layout: Of them.
         to_rec709: (3, 3) white-balanced camera colours to linear Rec.709.
         designed: The lens that they were taken with, as a bundle holds it.
@@ -41,12 +43,16 @@ class Domain:
 
     samples: Sequence[Sample]
     frames: Sequence[int]
+    distances_mm: Sequence[float]
     layout: SampleLayout
     to_rec709: Tensor
     designed: Mapping[str, bytes]
 
     def score(self, restore: Restorer, features: Features) -> dict[str, Any]:
-        """Judge a restoration by `METRICS`: means over the samples, and `each` by its frame."""
+        """Judge a restoration by `METRICS`: means over the samples, and `each` by its frame.
+
+        Where scenes are at several distances, `at` has the mean PSNR at every one.
+        """
         found = [
             (
                 _psnr_db(views),
@@ -57,7 +63,11 @@ class Domain:
         ]
         each = dict(zip(METRICS, np.transpose(found).tolist(), strict=True))
         means = {name: float(np.mean(values)) for name, values in each.items()}
-        return {**means, "each": each, "frames": list(self.frames)}
+        decibels, far = np.array(each["psnr_db"]), np.array(self.distances_mm)
+        at = {
+            depth_name(far_mm): float(np.mean(decibels[far == far_mm])) for far_mm in np.unique(far)
+        }
+        return {**means, "each": each, "frames": list(self.frames), **({"at": at} if at else {})}
 
     def psnr_db(self, restore: Restorer) -> float:
         """Judge a restoration by its mean PSNR alone."""
@@ -114,12 +124,17 @@ class Circumstances:
             numbers: Of the method; None for the runtime's.
         """
         maker = self.maker
-        frames = [maker.frame_of(n) if isinstance(maker, TileMaker) else n for n in range(count)]
+        frames, distances_mm = list(range(count)), []
+        if isinstance(maker, TileMaker):
+            frames = [maker.frame_of(number) for number in range(count)]
+            found = [maker.distance_mm(number) for number in range(count)]
+            distances_mm = [far_mm for far_mm in found if far_mm is not None]
         if method is not None:
             maker = with_method(method, maker, self.recipe, numbers)
         return Domain(
             samples=[maker.make(number) for number in range(count)],
             frames=frames,
+            distances_mm=distances_mm,
             layout=self.layout,
             to_rec709=self.to_rec709,
             designed=self.designed,

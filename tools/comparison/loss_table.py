@@ -193,7 +193,8 @@ def write(rows: dict[str, Entry], lab: Path, wild: Path, conditions: Conditions)
     written = conditions.out_dir / "loss_table.json"
     written.write_text(to_compact_json(report, DIGITS) + "\n", encoding="utf-8")
     said = "\n".join(f"- {sentence}" for sentence in sentences(verdict))
-    written.with_suffix(".md").write_text(f"{table(rows)}\n{said}\n", encoding="utf-8")
+    tables = "\n".join(filter(None, (table(rows), table_of_distances(rows))))
+    written.with_suffix(".md").write_text(f"{tables}\n{said}\n", encoding="utf-8")
 
 
 def parse() -> argparse.Namespace:
@@ -295,12 +296,11 @@ def tune(method: str, recipe_path: Path, conditions: Conditions) -> list[tuple[N
     """
     folder = conditions.out_dir / recipe_path.stem
     taught = circumstances(recipe_path, folder, conditions.data, TUNE_SEED)
-    tunable = TUNABLE[method]
 
     def score(numbers: Numbers) -> float:
         return taught.domain(conditions.tune, method, numbers).psnr_db(as_filtered)
 
-    return tuned(tunable.start, tunable.factor, score)
+    return tuned(TUNABLE[method].start, score)
 
 
 def to_judge(recipe_path: Path, conditions: Conditions) -> Circumstances:
@@ -374,6 +374,19 @@ def table(rows: dict[str, Entry]) -> str:
         lost = entry["lab"]["psnr_db"] - entry["wild"]["psnr_db"]
         steps = entry.get("trained", {}).get("steps", "")
         lines.append(f"| {name} | {' | '.join(cells)} | {steps} | {lost:.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+def table_of_distances(rows: dict[str, Entry]) -> str:
+    """Give PSNR abroad by distance of the scenes; empty where all are at one."""
+    names = next(iter(rows.values()))["wild"].get("at", {})
+    if not names:
+        return ""
+    lines = [f"| wild psnr_db | {' | '.join(names)} |", "|---" * (1 + len(names)) + "|"]
+    for name, entry in rows.items():
+        at = entry["wild"].get("at", {})
+        cells = [f"{at[far]:.3f}" if far in at else "" for far in names]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

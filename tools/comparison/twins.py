@@ -58,7 +58,7 @@ class Counts:
     Attributes:
         frames: To train on.
         judged: To judge on.
-        copies: Of the lens, for each; one more to choose by.
+        copies: Of the lens, for each, outside not fewer than distances; one more to choose by.
     """
 
     frames: int
@@ -95,6 +95,9 @@ def write_twins(
     outside = text
     if depths_mm:
         outside = with_keys(text, "lens", {"depths_mm": list(depths_mm), "bank_in_focus": True})
+        if counts is not None:  # frames see one distance through one copy
+            copies = max(counts.copies, len(depths_mm))
+            outside = with_keys(outside, "lens", {"copies": copies})
     written = []
     for name, content in (
         ("display", with_keys(text, "data", LABORATORY) + DISPLAY),

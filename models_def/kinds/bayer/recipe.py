@@ -52,7 +52,8 @@ class LensRecipe:
         seed: Seed of the fabrication errors.
         depths_mm: Object distances, increasing, with the sensor where the prescription has it; a
             sample is taken at one of them by chance, the Wiener filter has their mean kernel.
-            Empty for the distance of the prescription.
+            Empty for the distance of the prescription. Of a lens with a haze every copy is used at
+            one of them, in turn.
         bank_in_focus: Whether the Wiener filter has the kernel of the prescription's distance,
             whatever `depths_mm` are, in place of their mean.
     """
@@ -273,12 +274,24 @@ class BayerRecipe(Recipe):
 
     def __post_init__(self) -> None:
         if self.haze is not None and self.lens.depths_mm:
-            raise ContractError("a lens with a haze has one object distance; leave depths_mm out")
+            self._check_hazy_depths()
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
         if shares and shares != depths:
             raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
         if self.data.known_depth_share and depths < 2:
             raise ContractError("data.known_depth_share needs two or more lens.depths_mm")
+
+    def _check_hazy_depths(self) -> None:
+        if not self.lens.bank_in_focus:
+            raise ContractError(
+                "the bank of a lens with a haze knows the distance of the prescription alone; say "
+                "lens.bank_in_focus = true, or leave depths_mm out"
+            )
+        if self.lens.copies < len(self.lens.depths_mm):
+            raise ContractError(
+                "frames of a lens with a haze see one distance through one copy; lens.copies must "
+                f"be {len(self.lens.depths_mm)} at least, got {self.lens.copies}"
+            )
 
     def with_together(self, together: Together | None) -> "BayerRecipe":
         """Give it with another model of colours in its bank."""

@@ -117,6 +117,16 @@ def test_float_tiff_is_linear(tmp_path):
     assert np.array_equal(read_picture(tmp_path / "x.tif").samples, planes)
 
 
+def test_a_grey_jpeg_is_no_mosaic_and_is_not_told_to_say_that_it_is_one(tmp_path):
+    path = tmp_path / "grey.png"  # the content counts, not the name
+    path.write_bytes(cv2.imencode(".jpg", np.full((8, 8), 90, np.uint8))[1].tobytes())
+    with pytest.raises(DecodeError, match=r"grey\.png is a JPEG, which no mosaic is"):
+        read_mosaic(path, OPTIONS)
+    with pytest.raises(DecodeError, match="got a grey JPEG; give it in colour") as raised:
+        read_picture(path)
+    assert "--mosaic" not in str(raised.value)
+
+
 def test_a_headerless_mosaic_needs_its_options_and_then_takes_them(tmp_path):
     mosaic = planes_of(np.uint16, 1000)[0]
     write_png(tmp_path / "x.png", mosaic)

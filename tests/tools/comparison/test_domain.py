@@ -1,5 +1,7 @@
 """What restorations are judged on: exact, blind to what nobody knows, the same for all methods."""
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from tests.bayer_recipe import bank, material, recipe  # noqa: F401
 from tests.normed_recipe import NORMED_RECIPE, recipe_path  # noqa: F401
 from tools.comparison import domain
 from tools.comparison.domain import Circumstances, as_filtered, circumstances, known
+from tools.comparison.loss_table import table_of_distances
 
 
 @pytest.fixture
@@ -35,6 +38,21 @@ def test_a_perfect_restoration_is_seen_as_one(at_home: Circumstances) -> None:
     assert home.psnr_db(lambda _: truth) == perfect["psnr_db"]
 
 
+def test_decibels_are_told_by_distance_where_scenes_are_at_several(
+    at_home: Circumstances,
+) -> None:
+    home = at_home.domain(3)
+    assert "at" not in home.score(as_filtered, Relu32(None))
+    apart = replace(home, distances_mm=[math.inf, 500.0, math.inf])
+    score = apart.score(as_filtered, Relu32(None))
+    first, second, third = score["each"]["psnr_db"]
+    assert list(score["at"]) == ["0.5 m", "infinity"]
+    assert score["at"] == pytest.approx({"0.5 m": second, "infinity": (first + third) / 2})
+    rows = {"a": {"wild": score}, "b": {"wild": {"at": {"infinity": 2.0}}}}
+    assert table_of_distances(rows).splitlines()[-1] == "| b |  | 2.000 |"
+    assert table_of_distances({"a": {"wild": home.score(as_filtered, Relu32(None))}}) == ""
+
+
 def test_what_was_asked_as_the_bank_has_it_is_not_judged() -> None:
     planes = torch.rand(1, 6, 4, 4)
     target = torch.rand(1, 3, 4, 4)
@@ -48,14 +66,14 @@ def test_what_was_asked_as_the_bank_has_it_is_not_judged() -> None:
 def test_a_method_stands_in_place_of_the_bank_on_the_same_captures(
     at_home: Circumstances,
 ) -> None:
-    by_bank, few, many = (
+    by_bank, weak, strong = (
         at_home.domain(2),
-        at_home.domain(2, "rl", {"rounds": 1}),
-        at_home.domain(2, "rl", {"rounds": 40}),
+        at_home.domain(2, "admm-tv", {"tv_weight": 0.1}),
+        at_home.domain(2, "admm-tv", {"tv_weight": 100.0}),
     )
-    for ours, theirs in zip(by_bank.samples, few.samples, strict=True):
+    for ours, theirs in zip(by_bank.samples, weak.samples, strict=True):
         assert torch.equal(ours.inputs["capture"], theirs.inputs["capture"])
-    decibels = [one.psnr_db(as_filtered) for one in (by_bank, few, many)]
+    decibels = [one.psnr_db(as_filtered) for one in (by_bank, weak, strong)]
     assert len(set(decibels)) == 3
 
 

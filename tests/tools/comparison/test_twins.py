@@ -85,3 +85,14 @@ def test_few_frames_are_judged_through_other_copies(tmp_path):
         assert judged.data == replace(trained.data, **PICTURES_ALONE)
         assert trained.networks == judged.networks
         assert judged.frames.tiles == JUDGED_TILES
+
+
+def test_frames_outside_have_a_copy_for_every_distance(tmp_path):
+    recipe = tmp_path / "plate.toml"
+    recipe.write_text(HAZY, encoding="utf-8")
+    counts = Counts(frames=6, judged=8)
+    depths = (500.0, 2000.0, math.inf)
+    shown, wild = map(read_recipe, write_twins(recipe, tmp_path, depths, counts=counts))
+    assert (shown.lens.depths_mm, shown.lens.copies) == ((), 1)
+    assert (wild.lens.depths_mm, wild.lens.copies) == (depths, 3)
+    assert wild.lens.bank_in_focus

@@ -76,6 +76,14 @@ class TileMaker:
         """Give the number of the frame that a sample is cut from."""
         return self._tile_of(index) // (self._recipe.frames.shots * self._recipe.frames.tiles)
 
+    def distance_mm(self, index: int) -> float | None:
+        """Give how far off the scene of a sample is; None where that is not said."""
+        distances = self._recipe.lens.depths_mm
+        if not distances:
+            return None
+        copy = self._tiles.read(self._tile_of(index)).copy
+        return distances[copy % self._recipe.lens.copies % len(distances)]
+
     def _tile_of(self, index: int) -> int:
         turn, place = divmod(index, len(self._tiles))
         order = np.random.default_rng((self._seed, 0, turn)).permutation(len(self._tiles))
