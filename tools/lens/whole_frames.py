@@ -52,7 +52,7 @@ COPY_SEED: Final = 7007
 """Of the fabrication; recipes have others."""
 SIMPLE: Final = ("develop", "haze", "wiener")
 MEASURES: Final = ("db", "level", "detail", "inside", "rim")
-DIGITS: Final = 3
+DIGITS: Final = 5
 Entry = dict[str, Any]
 
 
