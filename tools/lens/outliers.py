@@ -2,10 +2,10 @@
 
     python -m tools.lens.outliers thin-plate supervised=FILE.camkit --data PICTURES -o outliers.png
 
-Every camera is NAME, FILE or LABEL=FILE; what is measured is that of `camkit analyse hallucination`, whose
-page shows all of it for one camera. Here the methods that end with a network stand side by side:
-how many patches have which l1, l2 and perceptual error, and under that the `--worst` patches of
-each that its captures deny most (largest excess), truth, capture and result.
+Every camera is NAME, FILE or LABEL=FILE; what is measured is that of `camkit analyse
+hallucination`, whose page shows all of it for one camera. Here the methods that end with a network
+stand side by side: how many patches have which l1, l2 and perceptual error, and under that the
+`--worst` patches of each that its captures deny most (largest excess), truth, capture and result.
 """
 
 import argparse
