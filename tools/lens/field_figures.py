@@ -1,4 +1,4 @@
-"""Two cameras over the field, side by side: figures 3.7 and 3.9 re-made.
+"""Cameras over the field, side by side: figures 3.7 and 3.9 re-made.
 
     python -m tools.lens.field_figures thin-plate=PSF.safetensors+HAZE.safetensors \
         al2550-a=PSF.safetensors+HAZE.safetensors --data PICTURES --out-dir OUT
