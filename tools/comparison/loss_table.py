@@ -224,7 +224,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--samples", type=count, default=48, help="to judge on, of each recipe")
     parser.add_argument(
         "--tune",
-        type=int,
+        type=none_or_more,
         default=12,
         metavar="SAMPLES",
         help="to tune classical methods on, of those to train on; 0: numbers of the runtime",
@@ -237,6 +237,14 @@ def count(text: str) -> int:
     """Read a number of samples: two at least, to tell an error of their mean."""
     number = int(text)
     if number < 2:
+        raise ValueError(text)
+    return number
+
+
+def none_or_more(text: str) -> int:
+    """Read a number that may be 0."""
+    number = int(text)
+    if number < 0:
         raise ValueError(text)
     return number
 
