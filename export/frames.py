@@ -35,9 +35,11 @@ from camkit.models_def.kinds.bayer.frames.tiles import (
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import tint_crop
+from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.kernel_bank import focused_copies
 from camkit.models_def.optics.prescription import Lens, format_prescription
-from camkit.models_def.optics.thin.freezing import COPY_RAYS, freeze_hazy
+from camkit.models_def.optics.thin.freezing import COPY_RAYS, HazyGrid, freeze_hazy
+from camkit.models_def.optics.thin.middle import find_middles
 from camkit.models_def.training.kind import training_kind
 from camkit.models_def.training.pictures import SceneSource, list_pictures, open_source
 from camkit.runtime.bank.haze import hazy_kernels
@@ -46,6 +48,7 @@ from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.exposure import Setting, expose
 from camkit.runtime.twin.light import Light, LightOptions, lens_of, light_of, scene_window
+from camkit.units import to_mm
 
 Tell = Callable[[str], None]
 Generator = np.random.Generator
@@ -99,30 +102,27 @@ def check_frames(recipe: BayerRecipe, pictures: Mapping[str, Path | None] | None
 def freeze_copies(recipe: BayerRecipe, lens: Lens, tell: Tell) -> tuple[FrozenOptics, ...]:
     """Freeze core and haze of the fabricated copies of a lens, those to choose by last.
 
-    Where the recipe has distances, every copy is frozen for an object at one of them, in turn.
+    Where the recipe has distances, every copy is frozen for an object at one of them, in turn. All
+    light is gathered about what that of the lens itself is, so that pictures lie in one place.
 
     Raises:
-        ContractError: If no peak of a copy reaches the corner, or copies have peaks at some
-            distances only.
+        ContractError: If no peak of a copy reaches the corner.
     """
-    choices = recipe.lens
+    choices, sensor = recipe.lens, recipe.sensor
     count = choices.copies + choices.validation_copies
     distances_mm = choices.depths_mm or (lens.object_distance_mm,)
     turns = (*range(choices.copies), *range(choices.validation_copies))
+    pitch_um = sensor.pixel_pitch_um
+    corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
+    grid = HazyGrid(rays=COPY_RAYS)
+    about = find_middles(lens, corner_px, pitch_um, grid.rays).about
     frozen: list[FrozenOptics] = []
-    about = set()
     for copy, turn in zip(focused_copies(lens, 1 + count, choices.seed)[1:], turns, strict=True):
         distance_mm = distances_mm[turn % len(distances_mm)]
-        optics, report = freeze_hazy(
-            replace(copy, object_distance_mm=distance_mm), recipe.sensor, rays=COPY_RAYS
+        optics, _ = freeze_hazy(
+            replace(copy, object_distance_mm=distance_mm), sensor, grid, about=about
         )
         frozen.append(optics)
-        about.add(report.about)
-        if len(about) > 1:
-            raise ContractError(
-                f"{lens.name} has peaks at some of lens.depths_mm only, so that pictures would lie "
-                f"elsewhere at others; leave {depth_name(distance_mm)} out"
-            )
         at = f" at {depth_name(distance_mm)}" if choices.depths_mm else ""
         tell(f"copy {len(frozen)} of {count} frozen{at}")
     return tuple(frozen)

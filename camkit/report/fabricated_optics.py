@@ -91,23 +91,26 @@ def _trace(bundle: Bundle, text: str, seed: int) -> FrozenOptics:
     from camkit.models_def.optics.kernel_bank import focused_copies
     from camkit.models_def.optics.lens_optics import LensOptics
     from camkit.models_def.optics.prescription import parse_prescription
-    from camkit.models_def.optics.thin.freezing import COPY_RAYS, LEAST_FIELDS, freeze_hazy
+    from camkit.models_def.optics.thin.freezing import (
+        COPY_RAYS,
+        LEAST_FIELDS,
+        HazyGrid,
+        freeze_hazy,
+    )
 
     sensor = light_sensor(bundle.manifest)
     _, copy = focused_copies(parse_prescription(text), 2, seed)
     psf = bundle.psf
     if bundle.manifest.has_haze:
         fields, _, waves, side_px, _ = psf.kernels.shape
-        optics, _ = freeze_hazy(
-            copy,
-            sensor,
+        hazy_grid = HazyGrid(
             fields=max(fields, LEAST_FIELDS),
             wavelengths=waves,
             core_px=side_px // 2,
             cell_px=bundle.haze.cell_px,
             rays=COPY_RAYS,
         )
-        return optics
+        return freeze_hazy(copy, sensor, hazy_grid)[0]
     frozen_grid = FreezeGrid(
         fields=psf.field_heights_mm.size,
         wavelengths=psf.wavelengths_um.size,

@@ -33,7 +33,7 @@ from camkit.errors import UnsupportedError
 from camkit.models_def.optics.frozen import corner_height_mm
 from camkit.models_def.optics.lens_file.lens_file import read_lens
 from camkit.models_def.optics.prescription import Lens
-from camkit.models_def.optics.thin.freezing import freeze_hazy
+from camkit.models_def.optics.thin.freezing import HazyGrid, freeze_hazy
 from camkit.report.analysis.physical import write_camera
 from camkit.report.analysis.recovery import filled, zones_of
 from camkit.report.figure import GRID_COLOR, MARKS, field_color, new_figure, to_png
@@ -193,7 +193,7 @@ def shorter(
     found = [replace(open_, bundle=camera("plain-open", optics_of(open_.bundle)))]
     for number, distance in enumerate(distances_mm):
         lens = with_stop_at(stopped, distance)
-        optics, _ = freeze_hazy(lens, sensor, fields=FREEZE_FIELDS, rays=FREEZE_RAYS)
+        optics, _ = freeze_hazy(lens, sensor, HazyGrid(fields=FREEZE_FIELDS, rays=FREEZE_RAYS))
         bundle = camera(f"plain-stop-{number}", optics)
         found.append(Subject(name=STOP, bundle=bundle, light=light, length_mm=length_mm(lens)))
     return found

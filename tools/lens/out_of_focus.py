@@ -34,7 +34,7 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.reader import Bundle
 from camkit.contracts import FloatArray
 from camkit.models_def.optics.lens_file.lens_file import read_lens
-from camkit.models_def.optics.thin.freezing import freeze_hazy
+from camkit.models_def.optics.thin.freezing import HazyGrid, freeze_hazy
 from camkit.report.analysis.recovery import filled
 from camkit.report.figure import GRID_COLOR, MARKS, field_color, new_figure, to_png
 from camkit.report.quality import read_picture
@@ -121,7 +121,7 @@ def main() -> None:
             near = replace(lens, object_distance_mm=depth * MM_PER_M)
             sensor = light_sensor(bundle.manifest)
             optics: FrozenOptics
-            optics, _ = freeze_hazy(near, sensor, fields=FIELDS, rays=RAYS)
+            optics, _ = freeze_hazy(near, sensor, HazyGrid(fields=FIELDS, rays=RAYS))
             light = light_through(bundle, edge_scene(0.0), optics=optics)
             profiles["depth", depth] = looks(bundle, light, 0.0)
         edges = [measured(*key, lines) for key, lines in profiles.items()]

@@ -32,16 +32,12 @@ from camkit.units import to_mm
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
-FIELDS: Final = 13
-WAVELENGTHS: Final = 5
 CORE_PX: Final = 64
 FADE_PX: Final = 40
 """From here on the core fades out, to nothing at its rim."""
-CELL_PX: Final = 16
 LEAST_FIELDS: Final = 3
 """Between which light is spread by slopes."""
 RAYS: Final = 20_000
-"""In half the stop, for each of some thirty wavelengths."""
 COPY_RAYS: Final = 8000
 """Of a fabricated copy: one draw of errors, not what a bundle holds."""
 ENERGY: Final = 0.995
@@ -50,6 +46,35 @@ LEAST_HAZE: Final = 1e-6
 _ANGLES: Final = 120
 _RINGS: Final = 24
 _TERMS: Final = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HazyGrid:
+    """How finely a lens is sampled.
+
+    Attributes:
+        fields: Places from the axis to the corner.
+        wavelengths: Evenly spaced over the response of the sensor.
+        core_px: Reach of the core kernels.
+        cell_px: Side of a cell of the haze.
+        rays: In half the stop, for each of some thirty wavelengths that are traced.
+    """
+
+    fields: int = 13
+    wavelengths: int = 5
+    core_px: int = CORE_PX
+    cell_px: int = 16
+    rays: int = RAYS
+
+    def __post_init__(self) -> None:
+        if self.fields < LEAST_FIELDS:
+            raise ContractError(
+                f"a haze is frozen at {LEAST_FIELDS} fields at least; got {self.fields}"
+            )
+
+
+FINE: Final = HazyGrid()
+"""For a bundle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,12 +115,9 @@ class HazyReport:
 def freeze_hazy(
     lens: Lens,
     sensor: ColorSensor,
+    grid: HazyGrid = FINE,
     *,
-    fields: int = FIELDS,
-    wavelengths: int = WAVELENGTHS,
-    core_px: int = CORE_PX,
-    cell_px: int = CELL_PX,
-    rays: int = RAYS,
+    about: Middle | None = None,
     tell: Tell = lambda _: None,
 ) -> tuple[FrozenOptics, HazyReport]:
     """Freeze a lens that makes peaks and haze.
@@ -103,22 +125,19 @@ def freeze_hazy(
     Args:
         lens: With its grooves as they are.
         sensor: Size, pitch and response.
-        fields: Places from the axis to the corner.
-        wavelengths: Evenly spaced over the response of the sensor.
-        core_px: Reach of the core kernels.
-        cell_px: Side of a cell of the haze.
-        rays: In half the stop, for every wavelength that is traced.
+        grid: How finely.
+        about: What light is gathered about; None to choose, see `find_middles`.
         tell: Takes a line for every field.
 
     Raises:
         ContractError: If neither a peak nor a chief ray reaches the corner, or the haze is wider
-            than a file holds, or there are too few fields.
+            than a file holds.
     """
-    if fields < LEAST_FIELDS:
-        raise ContractError(f"a haze is frozen at {LEAST_FIELDS} fields at least; got {fields}")
+    fields, wavelengths, core_px = grid.fields, grid.wavelengths, grid.core_px
+    cell_px, rays = grid.cell_px, grid.rays
     pitch_um = sensor.pixel_pitch_um
     corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
-    middles = find_middles(lens, corner_px, pitch_um, rays)
+    middles = find_middles(lens, corner_px, pitch_um, rays, about)
     angles = np.linspace(0.0, middles.corner_rad, fields)
     heights = middles.heights_px(lens, angles, pitch_um, rays)
     response_um, _ = sensor.response_arrays()

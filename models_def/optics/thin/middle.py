@@ -60,7 +60,9 @@ class Middles:
         return np.asarray(found, np.float64)
 
 
-def find_middles(lens: Lens, corner_px: float, pitch_um: float, rays: int) -> Middles:
+def find_middles(
+    lens: Lens, corner_px: float, pitch_um: float, rays: int, about: Middle | None = None
+) -> Middles:
     """Choose what the light of a lens is gathered about: peaks where the corner has one.
 
     Args:
@@ -68,19 +70,24 @@ def find_middles(lens: Lens, corner_px: float, pitch_um: float, rays: int) -> Mi
         corner_px: Of the sensor, from the axis.
         pitch_um: Of the pixels.
         rays: In half the stop.
+        about: What was chosen for another state of the lens, and holds; None to choose.
 
     Raises:
         ContractError: If neither a peak nor a chief ray reaches the corner.
     """
+    if about == CHIEF_RAY:
+        return _chief_rays(lens, corner_px, pitch_um)
     try:
         corner_rad = corner_angle_rad(lens, corner_px, pitch_um, rays)
     except ContractError as error:
+        if about == PEAK:
+            raise
         try:
             return _chief_rays(lens, corner_px, pitch_um)
         except ContractError:
             raise error from None
     light = land_light(lens, corner_rad, lens.reference_wavelength_um, pitch_um, rays)
-    if within(light, peak_height_px(light), NEAR_PX) >= LEAST_NEAR:
+    if about == PEAK or within(light, peak_height_px(light), NEAR_PX) >= LEAST_NEAR:
         return Middles(about=PEAK, corner_rad=corner_rad)
     return _chief_rays(lens, corner_px, pitch_um)
 

@@ -16,17 +16,16 @@ from camkit.contracts import FloatArray, depth_name
 from camkit.errors import ContractError
 from camkit.models_def.optics.prescription import Lens
 from camkit.models_def.optics.thin.freezing import (
-    CELL_PX,
     COPY_RAYS,
-    CORE_PX,
     LEAST_FIELDS,
+    HazyGrid,
     HazyReport,
     Tell,
     freeze_hazy,
 )
 
 DISTANCES_MM: Final = (500.0, 1000.0, 2000.0, 4000.0, 10_000.0, math.inf)
-WAVELENGTHS: Final = 3
+COARSE: Final = HazyGrid(fields=LEAST_FIELDS, wavelengths=3, rays=COPY_RAYS)
 
 
 def freeze_distances(
@@ -34,10 +33,7 @@ def freeze_distances(
     sensor: ColorSensor,
     *,
     distances_mm: tuple[float, ...] = DISTANCES_MM,
-    wavelengths: int = WAVELENGTHS,
-    core_px: int = CORE_PX,
-    cell_px: int = CELL_PX,
-    rays: int = COPY_RAYS,
+    grid: HazyGrid = COARSE,
     tell: Tell = lambda _: None,
 ) -> FrozenOptics:
     """Freeze a lens, focused as it is, for an object at its own distance and at others.
@@ -49,10 +45,7 @@ def freeze_distances(
         lens: With its grooves as they are.
         sensor: Size, pitch and response.
         distances_mm: Of the object, besides that of the lens.
-        wavelengths: Evenly spaced over the response of the sensor.
-        core_px: Reach of the core kernels.
-        cell_px: Side of a cell of the haze.
-        rays: In half the stop, for every wavelength that is traced.
+        grid: How finely.
         tell: Takes a line for every distance.
 
     Returns:
@@ -64,15 +57,7 @@ def freeze_distances(
     """
 
     def frozen(distance_mm: float) -> tuple[FrozenOptics, HazyReport]:
-        return freeze_hazy(
-            replace(lens, object_distance_mm=distance_mm),
-            sensor,
-            fields=LEAST_FIELDS,
-            wavelengths=wavelengths,
-            core_px=core_px,
-            cell_px=cell_px,
-            rays=rays,
-        )
+        return freeze_hazy(replace(lens, object_distance_mm=distance_mm), sensor, grid)
 
     own_mm = lens.object_distance_mm
     own, of_own = frozen(own_mm)

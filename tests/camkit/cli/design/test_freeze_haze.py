@@ -1,6 +1,7 @@
 """`camkit freeze --haze`: a lens to core kernels and haze, or a line that says why not."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,14 +12,13 @@ from camkit.cli.exit_code import ExitCode
 from camkit.models_def.optics.thin import freezing, nearer
 
 LENS = "thin-plate"
+FEW = freezing.HazyGrid(fields=3, wavelengths=2, rays=1000)
 
 
 def test_a_lens_is_frozen_as_core_and_haze(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    few = {"fields": 3, "wavelengths": 2, "rays": 1000}
-    usual = dict(freezing.freeze_hazy.__kwdefaults__)
-    monkeypatch.setattr(freezing.freeze_hazy, "__kwdefaults__", usual | few)
+    monkeypatch.setattr(freezing.freeze_hazy, "__defaults__", (FEW,))
     out, haze, report = (tmp_path / "frozen" / name for name in ("p.st", "h.st", "r.json"))
     words = ("freeze", LENS, "-o", out, "--haze", haze, "--report", report, "--json")
     outcome = camkit_command(*words)
@@ -37,11 +37,10 @@ def test_a_lens_is_frozen_as_core_and_haze(
 def test_other_distances_are_frozen_beside_it(
     camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for made, few in (
-        (freezing.freeze_hazy, {"fields": 3, "wavelengths": 2, "rays": 1000}),
-        (nearer.freeze_distances, {"distances_mm": (1000.0,), "wavelengths": 2, "rays": 500}),
-    ):
-        monkeypatch.setattr(made, "__kwdefaults__", dict(made.__kwdefaults__) | few)
+    monkeypatch.setattr(freezing.freeze_hazy, "__defaults__", (FEW,))
+    usual = dict(nearer.freeze_distances.__kwdefaults__)
+    near = usual | {"distances_mm": (1000.0,), "grid": replace(FEW, rays=500)}
+    monkeypatch.setattr(nearer.freeze_distances, "__kwdefaults__", near)
     out, haze, psf, beside = (tmp_path / name for name in ("p.st", "h.st", "sp.st", "sh.st"))
     words = ("freeze", LENS, "-o", out, "--haze", haze, "--stress-out", psf)
     outcome = camkit_command(*words)

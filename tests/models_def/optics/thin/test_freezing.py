@@ -11,6 +11,7 @@ from camkit.bundle.sensor import BayerSensor, Extent
 from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.models_def.optics.thin.freezing import (
+    HazyGrid,
     _distortion,
     arriving,
     flat_light,
@@ -35,7 +36,9 @@ def _sensor(width_px: int = 96, height_px: int = 64) -> BayerSensor:
 
 @pytest.fixture(scope="module")
 def frozen() -> tuple:  # type: ignore[type-arg]
-    return freeze_hazy(LENS, _sensor(), fields=3, wavelengths=2, core_px=6, cell_px=4, rays=RAYS)
+    return freeze_hazy(
+        LENS, _sensor(), HazyGrid(fields=3, wavelengths=2, core_px=6, cell_px=4, rays=RAYS)
+    )
 
 
 def test_all_light_is_in_core_and_haze(frozen: tuple) -> None:  # type: ignore[type-arg]
@@ -129,8 +132,8 @@ def test_a_blur_without_a_peak_is_frozen_about_its_chief_rays() -> None:
     extent = Extent(width_px=96, height_px=64, pixel_pitch_um=5.0)
     sensor = tiny_sensor().model_copy(update={"extent": extent})
     blurred = perfect_lens(40.0, 4.0, defocus_mm=6.4)  # a disc of 128 px
-    few = {"fields": 3, "wavelengths": 1, "core_px": 40, "cell_px": 8, "rays": RAYS}
-    optics, report = freeze_hazy(blurred, sensor, **few)
+    few = HazyGrid(fields=3, wavelengths=1, core_px=40, cell_px=8, rays=RAYS)
+    optics, report = freeze_hazy(blurred, sensor, few)
     assert report.to_json()["about"] == "chief ray"
     half_mm = math.hypot(96, 64) / 2 * 5e-3
     assert optics.psf.field_heights_mm[-1] == pytest.approx(half_mm, rel=1e-3)
@@ -139,7 +142,9 @@ def test_a_blur_without_a_peak_is_frozen_about_its_chief_rays() -> None:
 
 def test_a_sharp_lens_has_a_haze_of_nothing() -> None:
     optics, report = freeze_hazy(
-        perfect_lens(40.0, 3.0), _sensor(), fields=3, wavelengths=1, core_px=40, rays=RAYS
+        perfect_lens(40.0, 3.0),
+        _sensor(),
+        HazyGrid(fields=3, wavelengths=1, core_px=40, rays=RAYS),
     )
     assert optics.haze is not None
     assert not optics.haze.kernels.any()
@@ -148,4 +153,4 @@ def test_a_sharp_lens_has_a_haze_of_nothing() -> None:
 
 def test_two_fields_are_too_few() -> None:
     with pytest.raises(ContractError, match="3 fields at least; got 2"):
-        freeze_hazy(LENS, _sensor(), fields=2, rays=RAYS)
+        HazyGrid(fields=2)

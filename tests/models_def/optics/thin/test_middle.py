@@ -25,6 +25,13 @@ def test_a_plate_has_peaks_and_an_asphere_has_none_far_out() -> None:
     asphere = read_lens(Path("al2550-a"))
     assert find_middles(asphere, CORNER_PX, 5.0, RAYS).about == PEAK  # 1.75 mm from the axis
     assert find_middles(asphere, 3600.0, 5.96, RAYS).about == CHIEF_RAY
+    # what was chosen for another distance holds
+    for lens, about in ((read_lens(Path("thin-plate")), CHIEF_RAY), (asphere, PEAK)):
+        told = find_middles(lens, 2000.0, 5.96, RAYS, about)
+        assert told.about == about
+        assert told.heights_px(lens, np.array([told.corner_rad]), 5.96, RAYS)[0] == pytest.approx(
+            2000.0, rel=0.01
+        )
 
 
 def test_middles_are_where_peaks_or_chief_rays_land() -> None:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from camkit.bundle.sensor import Extent
 from camkit.errors import ContractError
 from camkit.haze import Haze
 from camkit.models_def.optics.thin import nearer
-from camkit.models_def.optics.thin.freezing import freeze_hazy
+from camkit.models_def.optics.thin.freezing import HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import Middle
 from camkit.models_def.optics.thin.nearer import freeze_distances
 from tests.bundle_factory import tiny_sensor
@@ -26,7 +25,7 @@ SHARP_MM = FOCUS_MM * (FOCUS_MM + DEFOCUS_MM) / DEFOCUS_MM
 SENSOR = tiny_sensor().model_copy(
     update={"extent": Extent(width_px=96, height_px=64, pixel_pitch_um=60.0)}
 )
-FEW: dict[str, Any] = {"wavelengths": 2, "core_px": 6, "cell_px": 4, "rays": 1000}
+FEW = HazyGrid(fields=3, wavelengths=2, core_px=6, cell_px=4, rays=1000)
 
 
 def _haze(optics: FrozenOptics) -> Haze:
@@ -38,7 +37,7 @@ def _haze(optics: FrozenOptics) -> Haze:
 def found() -> FrozenOptics:
     lines: list[str] = []
     distances = (SHARP_MM, 2 * SHARP_MM, math.inf)
-    optics = freeze_distances(LENS, SENSOR, distances_mm=distances, tell=lines.append, **FEW)
+    optics = freeze_distances(LENS, SENSOR, distances_mm=distances, tell=lines.append, grid=FEW)
     assert lines == [f"object at {d / 1000:g} m: kept" for d in distances[:2]]
     return optics
 
@@ -60,7 +59,7 @@ def test_every_distance_is_what_it_is_alone(found: FrozenOptics) -> None:
     haze = _haze(found)
     for index, distance_mm in enumerate(haze.depths_mm):
         lens = replace(LENS, object_distance_mm=float(distance_mm))
-        alone, _ = freeze_hazy(lens, SENSOR, fields=3, **FEW)
+        alone, _ = freeze_hazy(lens, SENSOR, FEW)
         np.testing.assert_array_equal(found.psf.kernels[:, index], alone.psf.kernels[:, 0])
         around = (haze.kernels.shape[-1] - _haze(alone).kernels.shape[-1]) // 2
         middle = slice(around, haze.kernels.shape[-1] - around)
@@ -74,7 +73,7 @@ def test_every_distance_is_what_it_is_alone(found: FrozenOptics) -> None:
 
 def test_no_other_distance_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ContractError, match="perfect is known at no other distance"):
-        freeze_distances(LENS, SENSOR, distances_mm=(math.inf,), **FEW)
+        freeze_distances(LENS, SENSOR, distances_mm=(math.inf,), grid=FEW)
     abouts: Iterator[Middle] = iter(["peak", "chief ray"])
     real = freeze_hazy
 
@@ -89,11 +88,11 @@ def test_no_other_distance_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 
     lines: list[str] = []
     monkeypatch.setattr(nearer, "freeze_hazy", refused)
-    kept = freeze_distances(LENS, SENSOR, distances_mm=(500.0, 580.0), tell=lines.append, **FEW)
+    kept = freeze_distances(LENS, SENSOR, distances_mm=(500.0, 580.0), tell=lines.append, grid=FEW)
     assert kept.psf.depths_mm.tolist() == [580.0, math.inf]
     assert lines == ["object at 0.5 m: left out, too wide", "object at 0.58 m: kept"]
     lines.clear()
     monkeypatch.setattr(nearer, "freeze_hazy", other)
     with pytest.raises(ContractError, match="no other distance"):
-        freeze_distances(LENS, SENSOR, distances_mm=(500.0,), tell=lines.append, **FEW)
+        freeze_distances(LENS, SENSOR, distances_mm=(500.0,), tell=lines.append, grid=FEW)
     assert lines[0] == "object at 0.5 m: left out, by its chief ray"
