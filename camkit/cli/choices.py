@@ -1,11 +1,14 @@
 """Options that several commands share."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from camkit.errors import ContractError
+
+INSTALLED_BY: Final = 'pip install -c constraints.txt -e ".[train]"'
+"""What the design side needs."""
 
 Debug = Annotated[
     bool, typer.Option("--debug", help="Show tracebacks and what the modules log on stderr.")

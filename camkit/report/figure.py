@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIELD_COLORS: Final = ("#1f6fb4", "#2e8b57", "#c8452f", "#8855aa", "#b8860b", "#008b8b")
+CHANNEL_COLORS: Final = {"R": "#c8452f", "G": "#2e8b57", "B": "#1f6fb4"}
 MARKS: Final = ("o", "+", "x", "s", "^", "d")
 GRID_COLOR: Final = "#dddddd"
 _WAVE_COLORS: Final = (
@@ -33,6 +34,11 @@ def wave_color(wavelength_um: float) -> str:
 def field_color(number: int) -> str:
     """Give the colour of a field."""
     return FIELD_COLORS[number % len(FIELD_COLORS)]
+
+
+def channel_color(name: str, number: int) -> str:
+    """Give the colour of a channel of the sensor; of another, that of a field of that number."""
+    return CHANNEL_COLORS.get(name, field_color(number))
 
 
 def new_figure(width_in: float, height_in: float) -> "Figure":

@@ -341,6 +341,11 @@ def few_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
     return tuple(few_kernels(nodes.of(c), terms) for c in range(lit.light.shape[1]))
 
 
+def few_are_kept() -> bool:
+    """Tell whether this process has found few kernels of any camera already."""
+    return few_of.cache_info().currsize > 0
+
+
 @lru_cache(maxsize=KEPT_CAMERAS)
 def filters_of(lit: Lit, terms: int) -> tuple[FewKernels, ...]:
     """Give few kernels of the filters of every channel, see `place_undo`; kept as `few_of`."""

@@ -11,10 +11,11 @@ from camkit.bundle.entry import Entry, NonNegative, Positive
 from camkit.bundle.optics import IlluminationEntry
 from camkit.bundle.sensor import IsoNoise
 from camkit.errors import DecodeError
+from camkit.runtime.calibration.geometry.unfolded import MOST_FACTOR
 
 Side = Annotated[int, Field(ge=2, le=100_000)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
-Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
+Factor = Annotated[float, Field(ge=-MOST_FACTOR, le=MOST_FACTOR)]
 TOP_LEVEL: Final = 255.0
 _T = TypeVar("_T", bound=Entry)
 

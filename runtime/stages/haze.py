@@ -16,6 +16,7 @@ from camkit.runtime.bank.haze import (
     CoarseBand,
     HazyKernels,
     coarse_work,
+    few_are_kept,
     hazy_kernels,
     kept_bytes,
     solve_coarse,
@@ -37,7 +38,9 @@ BYTES_PER_COLUMN: Final = 6_000
 REST_SHARE: Final = 0.4
 """What lies before it is read once more, and a gain and a veil are put on every pixel."""
 SOLVED_MP: Final = 3.0
-"""The kernels of all places and the rounds take as long as the rest of so many megapixels."""
+"""The rounds take as long as the rest of so many megapixels."""
+FIRST_MP: Final = 15.0
+"""The few kernels that those of all places are made of likewise, once a process (measured)."""
 
 
 def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:
@@ -89,7 +92,8 @@ def prepare(entry: Dehaze, job: Job) -> StageWork:
 
 def seconds(_entry: Dehaze, subject: Subject, _work: Work, speed: Speed) -> float:
     """Give the seconds that it will take."""
-    return (REST_SHARE * subject.megapixels + SOLVED_MP) * speed.rest_s_per_mp
+    first_mp = 0.0 if few_are_kept() else FIRST_MP
+    return (REST_SHARE * subject.megapixels + SOLVED_MP + first_mp) * speed.rest_s_per_mp
 
 
 def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from importlib import util
 from pathlib import Path
 
+from camkit.cli.choices import INSTALLED_BY
 from camkit.cli.say import say
 from camkit.errors import ContractError, UnsupportedError
 
@@ -17,7 +18,7 @@ def require_torch(command: str) -> None:
     """
     if util.find_spec("torch") is None:
         raise UnsupportedError(
-            f"{command} needs torch; install it with: pip install torch onnxscript"
+            f"{command} needs torch; install it from the checkout with: {INSTALLED_BY}"
         )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from camkit.cli.choices import Debug, Json
+from camkit.cli.choices import INSTALLED_BY, Debug, Json
 from camkit.cli.say import say
 from camkit.errors import CamkitError
 
@@ -70,9 +70,7 @@ def examine() -> dict[str, Any]:
             "off" if os.environ.get("ORT_DISABLE_TELEMETRY") == "1" else "not switched off"
         ),
         "raw_decoder": _try_decoder(),
-        "design_time": (
-            "ready" if util.find_spec("torch") else "not installed: pip install torch onnxscript"
-        ),
+        "design_time": ("ready" if util.find_spec("torch") else f"not installed: {INSTALLED_BY}"),
         "bundles": {name: str(path) for name, path in sorted(built_in_bundles().items())},
         "packages": {name: package_version(name) or "not installed" for name in PACKAGES},
     }

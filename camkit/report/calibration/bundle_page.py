@@ -11,8 +11,8 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, PlanesSensor
 from camkit.contracts import FrozenPsf
 from camkit.report.calibration.lensfun_page import POINTS, half_diagonal_mm, placed_along
-from camkit.report.calibration.page import Section, Table, to_html
-from camkit.report.figure import GRID_COLOR, field_color, new_figure, to_png
+from camkit.report.calibration.page import Section, Table, sentences, to_html
+from camkit.report.figure import GRID_COLOR, channel_color, new_figure, to_png
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.calibration.peak import light_within
 from camkit.runtime.geometry.distortion import reference_channel
@@ -66,7 +66,7 @@ def bundle_html(before: Bundle, made: Bundle, record: Mapping[str, Any]) -> str:
     ]
     first = Section(
         title=f"From {before.manifest.name}",
-        paragraph=" ".join(record["notes"]) or None,
+        paragraph=sentences(*record["notes"]),
         table=Table(rows=tuple(rows)),
     )
     sections = [parts[name](before, made, record) for name in record["measured"]]
@@ -161,16 +161,16 @@ def _kernels(before: Bundle, made: Bundle, _record: Mapping[str, Any]) -> Sectio
         wide = [np.pad(one, (0, side - one.size), mode="edge") for one in (first, second)]
         curves.append(Curve(radius=np.arange(0.5, side), before=wide[0], now=wide[1]))
     told = "Share of the light within a radius, on the axis, by colours; below, what changed of it."
-    drawn = draw(curves, "radius, px", "share of the light")
+    drawn = draw(curves, "radius, px", "share of the light", _sensor(made).channels)
     return Section(title="Kernels", pictures={told: to_png(drawn)})
 
 
-def draw(curves: Sequence[Curve], across: str, up: str) -> "Figure":
-    """Draw curves before (dashed) and now, and below the difference."""
+def draw(curves: Sequence[Curve], across: str, up: str, channels: Sequence[str] = ()) -> "Figure":
+    """Draw curves before (dashed) and now, and below the difference; in colours of channels."""
     figure = new_figure(7.0, 4.4)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for number, curve in enumerate(curves):
-        color = field_color(number)
+        color = channel_color(channels[number] if channels else "", number)
         above.plot(curve.radius, curve.before, "--", color=color, linewidth=0.9, label="before")
         above.plot(curve.radius, curve.now, color=color, linewidth=1.1, label="measured")
         below.plot(curve.radius, curve.now - curve.before, color=color, linewidth=1)

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.flat.measure import FlatFacts
 
@@ -17,7 +17,7 @@ _MOST_PICTURES: Final = 8
 def flat_html(facts: FlatFacts) -> str:
     """Give the page."""
     told = "Lens and display were told apart." if facts.separated else "NOT told apart:"
-    words = " ".join((told, *facts.notes))
+    words = sentences(told, *facts.notes)
     rows = tuple(
         (name, f"{pose.shift_px[0]:g}, {pose.shift_px[1]:g}", f"{np.degrees(pose.turn_rad):g}")
         for name, pose in zip(facts.files, facts.poses, strict=True)

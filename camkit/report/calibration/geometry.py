@@ -7,7 +7,7 @@ from camkit.report.calibration.geometry_charts import (
     draw_residuals,
     enlargement,
 )
-from camkit.report.calibration.page import Section, Table
+from camkit.report.calibration.page import Section, Table, sentences
 from camkit.runtime.calibration.geometry.adjustment import rms
 from camkit.runtime.calibration.geometry.geometry import Geometry
 
@@ -24,7 +24,7 @@ def geometry_sections(found: Geometry) -> list[Section]:
     )
     factor = enlargement(found.chosen.held_out, found.size)
     return [
-        Section(title="Result", paragraph=" ".join(found.notes) or None, table=_result(found)),
+        Section(title="Result", paragraph=sentences(*found.notes), table=_result(found)),
         Section(
             title="Residuals",
             paragraph=f"Every picture left out once: the camera is that of the others, the pose "

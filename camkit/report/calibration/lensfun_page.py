@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.sensor import Extent
 from camkit.contracts import RadialDistortion
-from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.lensfun.entry import Entry
 from camkit.runtime.calibration.lensfun.ordinary import LensBundle
@@ -100,7 +100,7 @@ def placed_along(ideal_mm: FloatGrid, rows: RadialDistortion, channel: int) -> F
 
 def _html(title: str, curves: Curves, made: Entry | LensBundle) -> str:
     record = made.to_record()
-    notes = " ".join(record.pop("notes")) or None
+    notes = sentences(*record.pop("notes"))
     rows = tuple((name, _told(value)) for name, value in record.items())
     pictures = {
         "How much farther out light lies in the capture than in the straight picture, and how much "

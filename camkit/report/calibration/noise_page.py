@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, field_color, new_figure, to_png
 from camkit.runtime.calibration.noise.measure import IsoFacts, NoiseFacts
 
@@ -23,7 +23,7 @@ _SURE: Final = 2.0
 def noise_html(facts: NoiseFacts) -> str:
     """Give the page."""
     table = Table(header=_HEADER, rows=tuple(_row(iso) for iso in facts.isos))
-    sections = [Section(title="Noise by ISO", paragraph=" ".join(facts.notes) or None, table=table)]
+    sections = [Section(title="Noise by ISO", paragraph=sentences(*facts.notes), table=table)]
     for iso in facts.isos:
         colours = Table(
             header=("colour", "gain, e-/DN", "error, %"),

@@ -33,6 +33,12 @@ class Table:
             raise ContractError(f"rows of a table must be of one width; got {sorted(widths)} cells")
 
 
+def sentences(*notes: str) -> str | None:
+    """Give notes as one paragraph of sentences; None without any."""
+    ended = (note if note.endswith((".", ":")) else f"{note}." for note in notes if note)
+    return " ".join(note[0].upper() + note[1:] for note in ended) or None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """A part of the page, in the order of its attributes.

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.display.pairs import Pairs
 from camkit.runtime.calibration.display.primaries import Primaries
@@ -34,7 +34,7 @@ def pairs_html(found: Pairs) -> str:
     sections = [
         Section(
             title="Pairs",
-            paragraph=" ".join(found.notes) or None,
+            paragraph=sentences(*found.notes),
             table=Table(header=header, rows=rows),
             pictures={
                 "What is left between captures and pictures, tile by tile, over the capture; the "

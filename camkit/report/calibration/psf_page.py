@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.measured import ColourFacts, MeasuredPsf
 from camkit.runtime.calibration.peak import PEAK_PX, light_within
@@ -30,7 +30,7 @@ def psf_html(found: MeasuredPsf) -> str:
     sections = [
         Section(
             title="Light",
-            paragraph=" ".join((told, *found.notes)),
+            paragraph=sentences(told, *found.notes),
             table=Table(header=header, rows=tuple(_row(colour) for colour in found.colours)),
             pictures={
                 "Kernels, as far as they reach; logarithm of the light, 0 at the peak.": to_png(

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.calibration.page import Section, Table, sentences, to_html
 from camkit.report.figure import GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.tone import ToneFacts
 
@@ -29,7 +29,7 @@ def tone_html(facts: ToneFacts) -> str:
     }
     table = Table(header=("level", "luminance", "off the curve, %"), rows=rows)
     section = Section(
-        title="Grey steps", paragraph=" ".join(facts.notes) or None, table=table, pictures=pictures
+        title="Grey steps", paragraph=sentences(*facts.notes), table=table, pictures=pictures
     )
     return to_html("Tone curve of a display", [section])
 

@@ -7,14 +7,13 @@ import torch
 from torch import Tensor
 
 from camkit.models_def.optics.diffraction.shares import CORE_PX, HALF_WIDTH_PX
-from camkit.report.figure import GRID_COLOR, field_color, new_figure
+from camkit.report.figure import GRID_COLOR, channel_color, new_figure
 from camkit.report.plate.facts import PlateFacts
 from camkit.report.plate.psf_chart import shown_reach_px
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CHANNEL_COLORS: Final = {"R": "#c8452f", "G": "#2e8b57", "B": "#1f6fb4"}
 _MOST_STREAKS: Final = 4
 _FLOOR: Final = 1e-7
 
@@ -28,7 +27,7 @@ def draw_cuts(facts: PlateFacts) -> "Figure":
     reach = shown_reach_px(facts)
     for panel, angle in zip(cuts, angles, strict=True):
         for number, channel in enumerate(facts.channels):
-            color = CHANNEL_COLORS.get(channel, field_color(number))
+            color = channel_color(channel, number)
             for psf, style in ((facts.psf, "-"), (facts.bare, ":")):
                 light = along(psf[number], angle)[: reach + 1].clamp_min(_FLOOR)
                 panel.semilogy(light.numpy(), style, color=color, linewidth=1, label=channel)
@@ -37,7 +36,7 @@ def draw_cuts(facts: PlateFacts) -> "Figure":
         panel.set_ylim(_FLOOR, 1)
     cuts[0].set_ylabel("share of the light a pixel of length", fontsize=8)
     for number, channel in enumerate(facts.channels):
-        color = CHANNEL_COLORS.get(channel, field_color(number))
+        color = channel_color(channel, number)
         for psf, style, name in ((facts.psf, "-", channel), (facts.bare, ":", f"{channel}, bare")):
             light = farther(psf[number]).clamp_min(_FLOOR)
             beyond.semilogy(light.numpy(), style, color=color, linewidth=1, label=name)

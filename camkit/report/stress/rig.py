@@ -123,7 +123,8 @@ class Rig:
             UnsupportedError: If its sensor counts photons.
         """
         check_photographs(
-            bundle.manifest, "stress is for cameras (`camkit bench --capture FILE` measures it)"
+            bundle.manifest,
+            "this judges cameras by their optics (`camkit bench --capture FILE` measures others)",
         )
         self.bundle = bundle
         self.before = before

@@ -20,6 +20,8 @@ from camkit.runtime.calibration.geometry.start import fit_models
 
 MOST_WORSE: Final = 0.1
 """Of the least mean square, that a simpler model may be worse, however uncertain that is."""
+NEGLIGIBLE: Final = 0.04
+"""Likewise, however certain that is: 2 % of the error are worth no number."""
 TYPICAL: Final = 1.05
 """Times the least median held-out error, up to which a simpler model is as good."""
 OUTLIER: Final = 3.5
@@ -118,14 +120,16 @@ def simplest(judged: Sequence[Judged]) -> Judged:
     """Give the first that is not meaningfully worse than the best.
 
     The same pictures judge all models, so what counts is by how much more one misses each: the mean
-    over the pictures must exceed its own standard error.
+    over the pictures must exceed its own standard error, and be worth a number.
     """
     best = min(judged, key=lambda one: one.rms_px)
     least = np.square(best.of_views_px)
     for one in judged:
         more = np.square(one.of_views_px) - least
         error = float(more.std(ddof=1)) / np.sqrt(len(more))
-        if one is best or float(more.mean()) <= min(error, MOST_WORSE * float(least.mean())):
+        usual = float(least.mean())
+        allowed = max(min(error, MOST_WORSE * usual), NEGLIGIBLE * usual)
+        if one is best or float(more.mean()) <= allowed:
             return one
     return best
 

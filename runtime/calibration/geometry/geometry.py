@@ -189,10 +189,13 @@ def look_for(files: Sequence[Path], board: Board) -> list[View]:
     if found < LEAST_VIEWS:
         what = f"a board of {board} inner corners"
         told = f"{found} of {len(views)} pictures show {what}" if found else f"no picture shows {what}"  # noqa: E501 # fmt: skip
-        raise DecodeError(
-            f"{told}, {LEAST_VIEWS} are needed: check --board (inner corners, not squares), and "
-            "show the whole board with white around it"
+        cure = (
+            "give more pictures"
+            if found == len(views)
+            else "check --board (inner corners, not squares), and show the whole board with white "
+            "around it"
         )
+        raise DecodeError(f"{told}, {LEAST_VIEWS} are needed: {cure}")
     return views
 
 

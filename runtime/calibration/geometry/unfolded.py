@@ -7,12 +7,16 @@ where nothing was seen, and another model, as good where corners were, does not.
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
 from camkit.errors import DecodeError
-from camkit.runtime.calibration.geometry.camera import FloatGrid
+from camkit.runtime.calibration.geometry.camera import Camera, FloatGrid
 from camkit.runtime.calibration.geometry.choice import Judged, simplest
 from camkit.runtime.calibration.geometry.coverage import Coverage, coverage_of
 from camkit.runtime.calibration.geometry.profile import Profile, profile_of
 
+MOST_FACTOR: Final = 1e6
+"""A coefficient beyond it is none of a lens: its terms cancel where corners are, nowhere else."""
 FOLDED: Final = 1.25
 """Times the held-out error that a model may have to take the place of one that folds."""
 
@@ -31,7 +35,11 @@ def unfolded(
         DecodeError: If none of them is about as good as the best that folds.
     """
     every = [(one, *_seen(one, corners, size)) for one in judged]
-    usable = [found for found in every if found[2].fold_px >= found[1].corner_px]
+    usable = [
+        found
+        for found in every
+        if found[2].fold_px >= found[1].corner_px and _tame(found[0].fit.camera)
+    ]
     best = simplest(judged)
     if usable:
         chosen = simplest([one for one, _, _ in usable])
@@ -44,6 +52,10 @@ def unfolded(
         f"at {coverage.corner_px:.0f} px; corners were seen to {coverage.radius_px:.0f} px: "
         "photograph the board farther out"
     )
+
+
+def _tame(camera: Camera) -> bool:
+    return bool(np.abs(camera.coefficients).max(initial=0.0) <= MOST_FACTOR)
 
 
 def _seen(one: Judged, corners: FloatGrid, size: tuple[int, int]) -> tuple[Coverage, Profile]:

@@ -6,6 +6,7 @@ linearise -> repair -> white_balance -> [demosaic] -> raise_clipped -> illuminat
 
 import math
 import re
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -32,14 +33,39 @@ from camkit.runtime.calibration.lensfun.database import Database
 from camkit.runtime.calibration.lensfun.models import FULL_FRAME_MM
 from camkit.runtime.calibration.lensfun.profile import Frame
 from camkit.runtime.capture import COLOURS, Capture
+from camkit.runtime.files.exif_tags import NUMBER_TAGS, exif_of_picture
+from camkit.runtime.files.tiff_tags import read_tiff_tags
 from camkit.units import to_mm
 
+FOCAL_LENGTH_35_MM: Final = 41989
+"""Tag of EXIF: FocalLengthIn35mmFilm, whole millimetres."""
+EXIF_WITHIN_BYTES: Final = 1 << 18
+CROPS_AGREE: Final = 1.15
+"""Up to this factor: makers round."""
 LICENCE: Final = "CC-BY-SA-3.0"
 """Of the numbers of lensfun's database, which a profile is made of."""
 
 
+def stated_crop(path: Path) -> float | None:
+    """Give the crop factor of a file that states its focal length twice, also as that for 35 mm.
+
+    That one is whole millimetres, so it is a hint; None where it is not stated.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    tags = read_tiff_tags(path)
+    if not tags.directories:
+        with path.open("rb") as file:
+            tags = exif_of_picture(file.read(EXIF_WITHIN_BYTES))
+    told, own = (tags.numbers(tag) for tag in (FOCAL_LENGTH_35_MM, NUMBER_TAGS["focal_length_mm"]))
+    if not told or not own or not (told[0] > 0 and own[0] > 0):
+        return None
+    return told[0] / own[0]
+
+
 def frame_of(
-    capture: Capture, crop_factor: float | None, database: Database
+    capture: Capture, crop_factor: float | None, database: Database, stated: float | None = None
 ) -> tuple[Frame, tuple[str, ...]]:
     """Give size and scale of the captures, and what had to be taken from elsewhere.
 
@@ -47,9 +73,11 @@ def frame_of(
         capture: One of them.
         crop_factor: What a person states; None for what file or database say.
         database: Knows cameras by name.
+        stated: What `stated_crop` says of its file.
 
     Raises:
-        DecodeError: If nothing tells how large the sensor is, or it is no colour picture.
+        DecodeError: If nothing tells how large the sensor is, or file and database contradict each
+            other, or it is no colour picture.
     """
     if capture.channels != COLOURS:
         raise DecodeError(f"expected a mosaic or three colours; got {capture.channels} channel(s)")
@@ -61,6 +89,11 @@ def frame_of(
         crop = FULL_FRAME_MM / (math.hypot(*size) * to_mm(pitch_um))
     if crop is None and (crop := database.crop_factor(known.make, known.model)) is not None:
         notes.append(f"the sensor's size is that of the {known.model} in the database")
+        if stated is not None and not crop / CROPS_AGREE < stated < crop * CROPS_AGREE:
+            raise DecodeError(
+                f"the database has crop factor {crop:g} for the {known.model}, the capture states "
+                f"focal lengths of crop factor {stated:.2f}, as in a crop mode: say --crop-factor"
+            )
     if crop is None:
         raise DecodeError(
             "the capture states no pixel pitch and the database does not know its camera: say "

@@ -197,7 +197,8 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
         raise DecodeError(
             f"{fit.distortion.model}, the nearest of lensfun's models, misses the distortion of "
             f"{source.name} by {fit.residual_px:.2f} px; --most-residual-px is "
-            f"{options.most_residual_px:g}"
+            f"{options.most_residual_px:g}: raise it, or put the geometry into a bundle as it is "
+            "(`camkit calibrate bundle --geometry`)"
         )
     notes, light = source.notes, None
     if source.light is not None and options.aperture is not None:

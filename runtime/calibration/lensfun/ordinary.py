@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from camkit.bundle.manifest import Manifest
-from camkit.runtime.calibration.lensfun.camera import frame_of, manifest_of, slug
+from camkit.runtime.calibration.lensfun.camera import frame_of, manifest_of, slug, stated_crop
 from camkit.runtime.calibration.lensfun.database import Database, check_positive
 from camkit.runtime.calibration.lensfun.models import TERMS
 from camkit.runtime.calibration.lensfun.profile import Found, profile_of
@@ -102,7 +102,7 @@ def lensfun_bundle(
     known = Database(database)
     lenses = known.find(lens)
     shot = read_capture(capture, mosaic=options.mosaic)
-    frame, taken = frame_of(shot, options.crop_factor, known)
+    frame, taken = frame_of(shot, options.crop_factor, known, stated_crop(capture))
     found = profile_of(
         lenses,
         options.focal_mm,

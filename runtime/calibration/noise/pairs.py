@@ -166,8 +166,8 @@ class PairReader:
         if capture.sha256 is not None:
             if capture.sha256 in self._hashes:
                 raise DecodeError(
-                    f"{path.name} is a copy of {self._hashes[capture.sha256].name}; a pair is two "
-                    "exposures"
+                    f"{path.name} is the same file as {self._hashes[capture.sha256].name}, given "
+                    "already as a dark or a flat; a pair is two exposures"
                 )
             self._hashes[capture.sha256] = path
         iso = capture.iso or capture.metadata.iso or self._iso

@@ -9,7 +9,15 @@ from camkit.bundle.chain import rewired
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.writer import write_bundle
 from camkit.export.remeasured import Measured, remeasured
-from camkit.report.calibration.bundle_page import bundle_html, draw, held, light, moved
+from camkit.report.calibration.bundle_page import (
+    Curve,
+    bundle_html,
+    draw,
+    held,
+    light,
+    moved,
+)
+from camkit.report.figure import CHANNEL_COLORS
 from camkit.runtime.calibration.measured_files import read_flat, read_geometry, read_noise
 from tests.bundle_factory import write_tiny_bundle
 from tests.camkit.cli.use.test_calibrate_bundle import (
@@ -32,6 +40,14 @@ def two_bundles(tmp_path_factory: pytest.TempPathFactory) -> tuple[Bundle, Bundl
         noise=read_noise(write_part(folder, "noise", NOISE)),
     )
     return before, remeasured(before, measured, folder / "mine.camkit")[0]
+
+
+def test_colours_of_the_sensor_are_drawn_in_theirs() -> None:
+    at = np.arange(3.0)
+    curve = Curve(radius=at, before=at, now=at)
+    above, _ = draw([curve] * 3, "across", "up", ("R", "G", "B")).axes
+    drawn = [line.get_color() for line in above.lines]
+    assert drawn == [color for color in CHANNEL_COLORS.values() for _ in range(2)]
 
 
 def test_curves_are_those_of_both_bundles(two: tuple[Bundle, Bundle]) -> None:
@@ -64,7 +80,7 @@ def test_every_part_has_a_section(two: tuple[Bundle, Bundle]) -> None:
     for title in ("From tiny", "Geometry", "Vignetting", "Noise"):
         assert f"<h2>{title}</h2>" in page
     assert page.count("<img") == 2
-    for told in ("a &lt;note&gt;", "50.00, 30.00", "ISO 400: gain, e- per DN", "g.toml"):
+    for told in ("A &lt;note&gt;.", "50.00, 30.00", "ISO 400: gain, e- per DN", "g.toml"):
         assert told in page
     assert "Kernels" not in page
 

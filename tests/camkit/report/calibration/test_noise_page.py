@@ -33,7 +33,7 @@ def test_every_iso_has_its_picture_and_a_bound_is_said_as_one() -> None:
     assert page.count("<img") == 2
     assert "below 1.6" in page
     assert "&lt;Kamera&gt;" in page
-    assert "a note" in page
+    assert "A note." in page
 
 
 def test_residuals_of_an_exact_line_lie_on_zero() -> None:

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from camkit.errors import ContractError
-from camkit.report.calibration.page import Section, Table, to_html
+from camkit.report.calibration.page import Section, Table, sentences, to_html
 
 PNG = b"\x89PNG\r\n\x1a\nand more"
 HOSTILE = "</title><script>alert('&\"')</script>"
@@ -78,3 +78,13 @@ def test_the_page_needs_no_torch() -> None:
         "import camkit.report.calibration.page, camkit.cli.use.calibrate.app"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_notes_become_sentences() -> None:
+    assert sentences() is None
+    assert sentences("one is off", "NOT told apart:", "two.", "") == (
+        "One is off. NOT told apart: Two."
+    )
+    assert sentences("a: do not use it", "the centre lies off") == (
+        "A: do not use it. The centre lies off."
+    )

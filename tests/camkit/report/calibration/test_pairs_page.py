@@ -36,5 +36,5 @@ def test_every_pair_and_every_colour_is_in_a_table(primaries) -> None:
     page = pairs_html(found)
     assert page.count("<tr>") == 2 + (0 if primaries is None else 1 + 3 + len(COLOURS))
     assert page.count("<img") == 1
-    for text in ("shot.dng", "0.012", "30x20", "a note", "0.020 px"):
+    for text in ("shot.dng", "0.012", "30x20", "A note.", "0.020 px"):
         assert text in page

@@ -53,7 +53,7 @@ def test_a_target_adds_its_residual_to_kernels_and_shares(target: Reblurred | No
     page = psf_html(_found(target))
     assert page.count("<img") == (2 if target is None else 3)
     assert "0.9000 +- 0.0020" in page
-    assert "a note" in page
+    assert "A note." in page
     assert ("1.29" in page) == (target is not None)
 
 

@@ -27,7 +27,7 @@ def test_every_step_is_in_the_table_with_or_without_a_curve(curve: PowerCurve | 
     page = tone_html(_facts(curve))
     assert page.count("<tr>") == 5
     assert page.count("<img") == 1
-    assert "a note" in page
+    assert "A note." in page
     assert ("-0.99" in page) == (curve is not None)
     # the step without light was not fitted
     assert page.count("<td>-</td>") == (4 if curve is None else 1)

@@ -117,7 +117,9 @@ def test_a_network_that_explodes_is_a_fault_and_not_a_picture(bundle: Bundle, sc
 
 
 def test_a_bundle_without_optics_is_no_camera_and_not_stressed(tmp_path: Path) -> None:
-    with pytest.raises(ContractError, match=r"deglare states no optics, .* stress is for cameras"):
+    with pytest.raises(
+        ContractError, match=r"deglare states no optics, .* judges cameras by their optics"
+    ):
         judge_of(open_bundle(write_glare_bundle(tmp_path)), (), None)
 
 

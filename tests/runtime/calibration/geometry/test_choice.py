@@ -77,6 +77,8 @@ def test_a_worse_model_is_taken_only_within_its_uncertainty(barrel: Camera) -> N
     worse = replace(good, held_out=good.held_out * 1.02)
     assert simplest([same, good]) is same
     assert simplest([worse, good]) is good
+    # less than 2 % of the error are worth no number, however certain they are
+    assert simplest([(hardly := replace(good, held_out=good.held_out * 1.019)), good]) is hardly
 
 
 @pytest.mark.parametrize("bad", [{0}, {4}, {2, 7}])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from camkit.errors import DecodeError
-from camkit.runtime.calibration.geometry.camera import MODELS, FloatGrid, project
+from camkit.runtime.calibration.geometry.camera import MODELS, Camera, FloatGrid, project
 from camkit.runtime.calibration.geometry.choice import Judged, judge_all
-from camkit.runtime.calibration.geometry.unfolded import unfolded
+from camkit.runtime.calibration.geometry.unfolded import MOST_FACTOR, unfolded
 from tests.runtime.calibration.geometry.board_factory import BOARD, camera_of, poses_around
 
 SIZE = (400, 300)
@@ -45,3 +45,23 @@ def test_another_that_is_about_as_good_takes_its_place(
     assert profile.fold_px >= coverage.corner_px
     with pytest.raises(DecodeError, match="folds back"):
         unfolded([replace(same, held_out=folding.held_out * 1.3), folding], corners, SIZE)
+
+
+def test_coefficients_that_cancel_each_other_are_none_of_a_lens(
+    seen: tuple[FloatGrid, list[Judged]],
+) -> None:
+    corners, (straight, *_) = seen
+    # the same numbers above and below: no distortion at all, as straight lines have
+    numbers = np.zeros(8)
+    numbers[[0, 5]], numbers[[1, 6]] = 2e6, 1e6
+    camera = Camera(
+        model=MODELS[-1], intrinsics=np.append(straight.fit.camera.intrinsics[:3], numbers)
+    )
+    wild = replace(
+        straight,
+        fit=replace(straight.fit, camera=camera),
+        held_out=straight.held_out * 0.9,
+    )
+    assert np.abs(camera.coefficients).max() > MOST_FACTOR
+    chosen, *_ = unfolded([straight, wild], corners, SIZE)
+    assert chosen is straight

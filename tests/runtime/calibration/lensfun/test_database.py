@@ -45,6 +45,9 @@ def test_near_names_are_told(tmp_path: Path) -> None:
         database.find("Sharp 24-70mm")
     with pytest.raises(DecodeError, match="none is near"):
         database.find("qqqq")
+    # all the words, in whatever order
+    with pytest.raises(DecodeError, match="near: Unmeasured 50mm"):
+        database.find("50mm unmeas")
 
 
 @pytest.mark.parametrize(

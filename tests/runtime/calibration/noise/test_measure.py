@@ -203,7 +203,7 @@ def test_wrong_company_is_refused_and_named(tmp_path: Path, small: Sensor) -> No
     for darks, told in [
         (dark + other_dark, "ISO 200 has 0 pairs of flats"),
         (tiny, "noise needs 64x64"),
-        ([dark[0], copy], r"copy\.dng is a copy of dark-400-0\.dng"),
+        ([dark[0], copy], r"copy\.dng is the same file as dark-400-0\.dng"),
         (flat[2:], "is no dark frame"),
     ]:
         with pytest.raises(DecodeError, match=told):
