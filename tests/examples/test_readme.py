@@ -23,7 +23,10 @@ STAND_IN = {
     "640,480": "96,64",
     "(480, 640)": "(64, 96)",
 }
-SHELL = 'camkit() { "$PYTHON" -c "from camkit.cli import main; main()" "$@"; }\n'
+SHELL = (
+    'camkit() { "$PYTHON" -c "from camkit.cli import main; main()" "$@"; }\n'
+    'python() { "$PYTHON" "$@"; }\n'
+)
 
 
 PAGES = [

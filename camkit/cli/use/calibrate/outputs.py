@@ -117,7 +117,8 @@ def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> N
         return
     for note in record.get("notes", ()):
         say(f"note: {note}", err=True)
-    for line in (f"{record['out']}:", *lines):
+    named = ", ".join(record[name] for name in ("out", "page") if name in record)
+    for line in (f"{named}:", *lines):
         say(line)
 
 

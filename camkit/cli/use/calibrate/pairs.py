@@ -113,7 +113,8 @@ def _tell(found: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> Non
         return
     for note in found.notes:
         say(f"note: {note}", err=True)
-    say(f"{out}: {len(found.pairs)} pairs at ISO {found.iso:g}")
+    named = ", ".join(str(path) for path in (out, page) if path is not None)
+    say(f"{named}: {len(found.pairs)} pairs at ISO {found.iso:g}")
     worst = max(found.pairs, key=lambda pair: pair.residual_px)
     say(f"  at worst {worst.residual_px:.3f} px RMS, in {worst.path.name}")
     if found.primaries is not None:

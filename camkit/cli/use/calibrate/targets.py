@@ -63,7 +63,8 @@ def targets(
         say(json.dumps({**planned.to_record(), **files}))
         return
     kinds = [target.kind for target in planned.targets]
-    say(f"{out}: {len(kinds)} targets of {planned.screen} px")
+    named = ", ".join(str(path) for path in (out, page) if path is not None)
+    say(f"{named}: {len(kinds)} targets of {planned.screen} px")
     say(
         f"  a board of {planned.board} corners, {kinds.count('grey')} grey steps, "
         f"{kinds.count('colour')} colours, {kinds.count('picture')} pictures"
