@@ -110,20 +110,17 @@ def freeze_copies(recipe: BayerRecipe, lens: Lens, tell: Tell) -> tuple[FrozenOp
     """
     choices, sensor = recipe.lens, recipe.sensor
     count = choices.copies + choices.validation_copies
-    distances_mm = choices.depths_mm or (lens.object_distance_mm,)
-    turns = (*range(choices.copies), *range(choices.validation_copies))
     pitch_um = sensor.pixel_pitch_um
     corner_px = corner_height_mm(sensor) / to_mm(pitch_um)
     grid = HazyGrid(rays=COPY_RAYS)
     about = find_middles(lens, corner_px, pitch_um, grid.rays).about
     frozen: list[FrozenOptics] = []
-    for copy, turn in zip(focused_copies(lens, 1 + count, choices.seed)[1:], turns, strict=True):
-        distance_mm = distances_mm[turn % len(distances_mm)]
-        optics, _ = freeze_hazy(
-            replace(copy, object_distance_mm=distance_mm), sensor, grid, about=about
-        )
-        frozen.append(optics)
-        at = f" at {depth_name(distance_mm)}" if choices.depths_mm else ""
+    for number, copy in enumerate(focused_copies(lens, 1 + count, choices.seed)[1:]):
+        stated_mm = choices.distance_of(number)
+        distance_mm = lens.object_distance_mm if stated_mm is None else stated_mm
+        used = replace(copy, object_distance_mm=distance_mm)
+        frozen.append(freeze_hazy(used, sensor, grid, about=about)[0])
+        at = "" if stated_mm is None else f" at {depth_name(stated_mm)}"
         tell(f"copy {len(frozen)} of {count} frozen{at}")
     return tuple(frozen)
 

@@ -40,7 +40,8 @@ REST_SHARE: Final = 0.4
 SOLVED_MP: Final = 3.0
 """The rounds take as long as the rest of so many megapixels."""
 FIRST_MP: Final = 15.0
-"""The few kernels that those of all places are made of likewise, once a process (measured)."""
+"""The few kernels that those of all places are made of likewise, for the first file of a process
+(measured on one camera; that a second camera waits as well is not foreseen)."""
 
 
 def check(entry: Dehaze, manifest: Manifest, _max_bytes: int) -> None:

@@ -128,7 +128,8 @@ def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
     )
     told: list[str] = []
     lens = read_lens(Path("duet"))
-    made = frames.freeze_copies(replace(recipe, lens=choices), lens, told.append)
+    deep = replace(recipe, lens=choices, frames=replace(recipe.frames, count=3))
+    made = frames.freeze_copies(deep, lens, told.append)
     assert len(made) == 4
     assert seen == [500.0, 2000.0, np.inf, 500.0]
     assert told[1] == "copy 2 of 4 frozen at 2 m"
@@ -138,9 +139,14 @@ def test_copies_are_frozen_at_the_distances_of_the_recipe_in_turn(
     frames.freeze_copies(usual, lens, told.append)
     assert seen == [lens.object_distance_mm] * 2
     with pytest.raises(ContractError, match=r"say lens\.bank_in_focus = true"):
-        replace(recipe, lens=replace(choices, bank_in_focus=False))
-    with pytest.raises(ContractError, match=r"lens\.copies must be 3 at least, got 2"):
-        replace(recipe, lens=replace(choices, copies=2))
+        replace(deep, lens=replace(choices, bank_in_focus=False))
+    with pytest.raises(ContractError, match="must be 3 at least, got 2 and 3"):
+        replace(deep, lens=replace(choices, copies=2))
+    with pytest.raises(ContractError, match="must be 3 at least, got 3 and 2"):
+        replace(deep, frames=replace(deep.frames, count=2))
+    for unused in ({"depth_shares": (1.0, 1.0, 2.0)}, {"known_depth_share": 0.5}):
+        with pytest.raises(ContractError, match=r"in turn; leave data\.depth_shares"):
+            replace(deep, data=replace(recipe.data, **unused))
 
 
 def test_surroundings_are_mirrored_at_the_border() -> None:

@@ -42,7 +42,7 @@ Numbers = dict[str, float]
 """Of a method, by name."""
 FilterMaker = Callable[[NoiseModel, Numbers], BlockFilter]
 TURNS: Final = 8
-"""Of `tuned` over all numbers, at most."""
+"""Of `tuned` over all numbers, and steps of one of them in a turn, at most."""
 STEP: Final = 2.0
 """Its factor, up or down."""
 
@@ -89,7 +89,7 @@ def tuned(start: Numbers, score: Callable[[Numbers], float]) -> list[tuple[Numbe
 
     Returns:
         All numbers that were tried, and their scores; the best first, beside which no number alone
-        is better a step up or down (or `TURNS` turns are over).
+        is better a step up or down (or `TURNS` are over).
     """
     scores: dict[tuple[float, ...], float] = {}
 
@@ -104,7 +104,10 @@ def tuned(start: Numbers, score: Callable[[Numbers], float]) -> list[tuple[Numbe
         before = best
         for place in range(len(best)):
             for step in (STEP, 1 / STEP):
-                while judged(after := _stepped(best, place, step)) > judged(best):
+                for _ in range(TURNS):
+                    after = _stepped(best, place, step)
+                    if judged(after) <= judged(best):
+                        break
                     best = after
         if best == before:
             break

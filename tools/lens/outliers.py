@@ -13,11 +13,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from camkit.bundle.reader import find_bundle, open_bundle
-from camkit.errors import CamkitError
-from camkit.report.analysis.hallucination import Method, Options, analyse
+from camkit.errors import CamkitError, ContractError
+from camkit.report.analysis.hallucination import WORST, Method, Options, analyse
 from camkit.report.analysis.hallucination_page import crop_picture
-from camkit.report.figure import FIELD_COLORS, GRID_COLOR, new_figure, to_png
+from camkit.report.figure import GRID_COLOR, field_color, new_figure, to_png
 from camkit.report.stress.scene import stress_scenes
 from tools.lens.field_drawings import write_few_colours
 
@@ -38,9 +40,12 @@ def main() -> int:
         for word in chosen.cameras:
             before, named, after = word.partition("=")
             bundle = open_bundle(find_bundle(after if named else before))
+            label = before if named else bundle.manifest.name
+            if label in found:
+                raise ContractError(f"two cameras are called {label}; say LABEL=FILE")
             scenes = stress_scenes(bundle, chosen.pictures, chosen.data)
             report = analyse(bundle, scenes, Options(iso=chosen.iso), print)
-            found[before if named else bundle.manifest.name] = report.method(report.control.method)
+            found[label] = report.method(report.control.method)
     except CamkitError as error:
         raise SystemExit(f"error: {error}") from error
     chosen.out.parent.mkdir(parents=True, exist_ok=True)
@@ -57,7 +62,14 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, required=True, help="sharp pictures")
     parser.add_argument("--pictures", type=int, default=5)
     parser.add_argument("--iso", type=float, default=100.0)
-    parser.add_argument("--worst", type=int, default=4, help="patches of each camera")
+    parser.add_argument(
+        "--worst",
+        type=int,
+        default=4,
+        choices=range(1, WORST + 1),
+        metavar="N",
+        help="patches of each camera",
+    )
     parser.add_argument("-o", "--out", type=Path, default=Path("outliers.png"))
     return parser.parse_args()
 
@@ -76,9 +88,11 @@ def draw(found: Mapping[str, Method], worst: int) -> "Figure":
     grid = figure.add_gridspec(len(heights), len(ERRORS) * worst, height_ratios=heights)
     for place, error in enumerate(ERRORS):
         panel = figure.add_subplot(grid[0, place * worst : (place + 1) * worst])
-        for (name, method), color in zip(found.items(), FIELD_COLORS, strict=False):
-            values = method.values(error)
-            panel.hist(values, BINS, histtype="step", color=color, label=name, linewidth=1)
+        values = {name: method.values(error) for name, method in found.items()}
+        edges = np.histogram_bin_edges(np.concatenate(list(values.values())), BINS).tolist()
+        for number, (name, one) in enumerate(values.items()):
+            color = field_color(number)
+            panel.hist(one, edges, histtype="step", color=color, label=name, linewidth=1)
         panel.set_xlabel(error, fontsize=8)
         panel.grid(visible=True, color=GRID_COLOR, linewidth=0.5)
         panel.tick_params(labelsize=7)

@@ -34,9 +34,13 @@ class Table:
 
 
 def sentences(*notes: str) -> str | None:
-    """Give notes as one paragraph of sentences; None without any."""
+    """Give notes as one paragraph of sentences, names of files as they are; None without any."""
     ended = (note if note.endswith((".", ":")) else f"{note}." for note in notes if note)
-    return " ".join(note[0].upper() + note[1:] for note in ended) or None
+    return " ".join(map(_begun, ended)) or None
+
+
+def _begun(note: str) -> str:
+    return note if "." in note.split(maxsplit=1)[0].rstrip(".") else note[0].upper() + note[1:]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -77,6 +77,14 @@ class LensRecipe:
         if any(near >= far for near, far in pairwise((0.0, *self.depths_mm))):
             raise ContractError(f"lens.depths_mm must increase from above 0; got {self.depths_mm}")
 
+    def distance_of(self, copy: int) -> float | None:
+        """Give the distance at which a copy of a lens with a haze is used; None for its own.
+
+        Copies to choose by, which come last, begin at the first distance again.
+        """
+        turn = copy if copy < self.copies else copy - self.copies
+        return self.depths_mm[turn % len(self.depths_mm)] if self.depths_mm else None
+
     def to_json(self) -> dict[str, Any]:
         """Give what decides the kernels, to name files by; what is as usual is left out."""
         usual = {"depths_mm": (), "validation_copies": 1, "bank_in_focus": False}
@@ -287,10 +295,17 @@ class BayerRecipe(Recipe):
                 "the bank of a lens with a haze knows the distance of the prescription alone; say "
                 "lens.bank_in_focus = true, or leave depths_mm out"
             )
-        if self.lens.copies < len(self.lens.depths_mm):
+        least = len(self.lens.depths_mm)
+        if min(self.lens.copies, self.frames.count) < least:
             raise ContractError(
-                "frames of a lens with a haze see one distance through one copy; lens.copies must "
-                f"be {len(self.lens.depths_mm)} at least, got {self.lens.copies}"
+                "a frame of a lens with a haze sees one distance, through one copy; lens.copies "
+                f"and frames.count must be {least} at least, got {self.lens.copies} and "
+                f"{self.frames.count}"
+            )
+        if self.data.depth_shares or self.data.known_depth_share:
+            raise ContractError(
+                "frames of a lens with a haze see its distances in turn; leave data.depth_shares "
+                "and data.known_depth_share out"
             )
 
     def with_together(self, together: Together | None) -> "BayerRecipe":

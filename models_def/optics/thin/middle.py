@@ -86,8 +86,10 @@ def find_middles(
             return _chief_rays(lens, corner_px, pitch_um)
         except ContractError:
             raise error from None
+    if about == PEAK:
+        return Middles(about=PEAK, corner_rad=corner_rad)
     light = land_light(lens, corner_rad, lens.reference_wavelength_um, pitch_um, rays)
-    if about == PEAK or within(light, peak_height_px(light), NEAR_PX) >= LEAST_NEAR:
+    if within(light, peak_height_px(light), NEAR_PX) >= LEAST_NEAR:
         return Middles(about=PEAK, corner_rad=corner_rad)
     return _chief_rays(lens, corner_px, pitch_um)
 

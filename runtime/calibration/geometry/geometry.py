@@ -191,7 +191,7 @@ def look_for(files: Sequence[Path], board: Board) -> list[View]:
         told = f"{found} of {len(views)} pictures show {what}" if found else f"no picture shows {what}"  # noqa: E501 # fmt: skip
         cure = (
             "give more pictures"
-            if found == len(views)
+            if len(views) < LEAST_VIEWS
             else "check --board (inner corners, not squares), and show the whole board with white "
             "around it"
         )

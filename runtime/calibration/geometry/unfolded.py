@@ -46,6 +46,12 @@ def unfolded(
         if chosen.rms_px <= FOLDED * best.rms_px:
             return next(found for found in usable if found[0] is chosen)
     _, coverage, profile = next(found for found in every if found[0] is best)
+    if profile.fold_px >= coverage.corner_px:
+        raise DecodeError(
+            f"the distortion that explains the corners ({best.fit.camera.model.name}) has "
+            "coefficients that are none of a lens and cancel each other: photograph the board at "
+            "more places and tilts"
+        )
     raise DecodeError(
         f"the distortion that explains the corners ({best.fit.camera.model.name}) folds back at "
         f"{profile.fold_px:.0f} px from the optical centre, inside the picture, whose corner lies "

@@ -2,7 +2,7 @@
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -82,7 +82,7 @@ class Database:
                 found.append(lens_of(element, file))
             known |= {_plain(one): one for one in names[:1]}
         if not found:
-            near = _near(wanted, name.lower().split(), list(known))
+            near = _near(wanted, known)
             hint = f"near: {'; '.join(known[one] for one in near)}" if near else "none is near"
             raise DecodeError(f"{self._place} has no lens {name!r}; {hint}")
         return found
@@ -112,12 +112,12 @@ def _files_of(place: Path) -> list[Path]:
     return files
 
 
-def _near(wanted: str, words: Sequence[str], known: Sequence[str]) -> list[str]:
+def _near(wanted: str, known: Iterable[str]) -> list[str]:
     """Give names that are near, those with all the words first."""
-    parts = [_plain(word) for word in words]
-    with_all = sorted((one for one in known if all(part in one for part in parts)), key=len)
-    alike = difflib.get_close_matches(wanted, known, n=_NEAR, cutoff=0.5)
-    return list(dict.fromkeys((*with_all, *alike)))[:_NEAR]
+    words, names = wanted.split(), list(known)
+    with_all = [one for one in names if words and all(word in one for word in words)]
+    alike = difflib.get_close_matches(wanted, names, n=_NEAR, cutoff=0.5)
+    return list(dict.fromkeys((*sorted(with_all, key=len), *alike)))[:_NEAR]
 
 
 def _plain(name: str) -> str:

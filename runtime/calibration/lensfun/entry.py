@@ -197,7 +197,7 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
         raise DecodeError(
             f"{fit.distortion.model}, the nearest of lensfun's models, misses the distortion of "
             f"{source.name} by {fit.residual_px:.2f} px; --most-residual-px is "
-            f"{options.most_residual_px:g}: raise it, or put the geometry into a bundle as it is "
+            f"{options.most_residual_px:g}: raise it; a geometry goes into a bundle as it is "
             "(`camkit calibrate bundle --geometry`)"
         )
     notes, light = source.notes, None

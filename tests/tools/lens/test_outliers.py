@@ -28,5 +28,7 @@ def test_cameras_are_drawn_side_by_side(
         assert drawn.std() > 5
         heights.append(drawn.shape[0])
     assert heights[1] > 1.2 * heights[0]
+    with pytest.raises(SystemExit, match="two cameras are called again"):
+        run_tool(monkeypatch, "lens.outliers", cameras[1], cameras[1], *options)
     with pytest.raises(SystemExit, match=r"error: .*nowhere"):
         run_tool(monkeypatch, "lens.outliers", "nowhere", *options)

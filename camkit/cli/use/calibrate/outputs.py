@@ -69,14 +69,14 @@ class Outputs:
         with atomic_outputs(*texts) as parts:
             for part, text in zip(parts, texts.values(), strict=True):
                 part.write_text(text, encoding="utf-8")
-        named = {"out": self.out, "page": self.page}
-        files = {name: str(path) for name, path in named.items() if path is not None}
+        both = {"out": self.out, "page": self.page}
+        files = {name: str(path) for name, path in both.items() if path is not None}
         if self.as_json:
             say(json.dumps({**record, **files}, allow_nan=False))
             return
         for note in record.get("notes", ()):
             say(f"note: {note}", err=True)
-        for line in (f"{', '.join(files.values())}:", *lines):
+        for line in (f"{named(self.out, self.page)}:", *lines):
             say(line)
 
 
@@ -117,9 +117,13 @@ def tell(record: Mapping[str, Any], lines: Sequence[str], *, as_json: bool) -> N
         return
     for note in record.get("notes", ()):
         say(f"note: {note}", err=True)
-    named = ", ".join(record[name] for name in ("out", "page") if name in record)
-    for line in (f"{named}:", *lines):
+    for line in (f"{named(record['out'], record.get('page'))}:", *lines):
         say(line)
+
+
+def named(out: Path | str, page: Path | str | None) -> str:
+    """Give the names of what was written."""
+    return ", ".join(str(path) for path in (out, page) if path is not None)
 
 
 def _check_free(path: Path, *, overwrite: bool) -> None:

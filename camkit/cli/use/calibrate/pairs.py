@@ -9,7 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.folder import Folder
-from camkit.cli.use.calibrate.outputs import Page, check_page
+from camkit.cli.use.calibrate.outputs import Page, check_page, named
 from camkit.errors import ContractError
 
 if TYPE_CHECKING:
@@ -113,8 +113,7 @@ def _tell(found: "Pairs", out: Path, page: Path | None, *, as_json: bool) -> Non
         return
     for note in found.notes:
         say(f"note: {note}", err=True)
-    named = ", ".join(str(path) for path in (out, page) if path is not None)
-    say(f"{named}: {len(found.pairs)} pairs at ISO {found.iso:g}")
+    say(f"{named(out, page)}: {len(found.pairs)} pairs at ISO {found.iso:g}")
     worst = max(found.pairs, key=lambda pair: pair.residual_px)
     say(f"  at worst {worst.residual_px:.3f} px RMS, in {worst.path.name}")
     if found.primaries is not None:

@@ -9,7 +9,7 @@ import typer
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.say import say
 from camkit.cli.use.calibrate.folder import Folder
-from camkit.cli.use.calibrate.outputs import Page, check_page
+from camkit.cli.use.calibrate.outputs import Page, check_page, named
 
 LEVELS = "0,16,32,48,64,96,128,160,192,224,255"
 
@@ -63,8 +63,7 @@ def targets(
         say(json.dumps({**planned.to_record(), **files}))
         return
     kinds = [target.kind for target in planned.targets]
-    named = ", ".join(str(path) for path in (out, page) if path is not None)
-    say(f"{named}: {len(kinds)} targets of {planned.screen} px")
+    say(f"{named(out, page)}: {len(kinds)} targets of {planned.screen} px")
     say(
         f"  a board of {planned.board} corners, {kinds.count('grey')} grey steps, "
         f"{kinds.count('colour')} colours, {kinds.count('picture')} pictures"

@@ -78,11 +78,8 @@ class TileMaker:
 
     def distance_mm(self, index: int) -> float | None:
         """Give how far off the scene of a sample is; None where that is not said."""
-        distances = self._recipe.lens.depths_mm
-        if not distances:
-            return None
-        copy = self._tiles.read(self._tile_of(index)).copy
-        return distances[copy % self._recipe.lens.copies % len(distances)]
+        copy = self._tiles.facts("copy")[self._tile_of(index)]
+        return self._recipe.lens.distance_of(int(copy))
 
     def _tile_of(self, index: int) -> int:
         turn, place = divmod(index, len(self._tiles))

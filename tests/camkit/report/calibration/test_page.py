@@ -88,3 +88,4 @@ def test_notes_become_sentences() -> None:
     assert sentences("a: do not use it", "the centre lies off") == (
         "A: do not use it. The centre lies off."
     )
+    assert sentences("board_03.png: no board found") == "board_03.png: no board found."

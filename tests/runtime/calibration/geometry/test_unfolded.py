@@ -65,3 +65,6 @@ def test_coefficients_that_cancel_each_other_are_none_of_a_lens(
     assert np.abs(camera.coefficients).max() > MOST_FACTOR
     chosen, *_ = unfolded([straight, wild], corners, SIZE)
     assert chosen is straight
+    far_off = replace(straight, held_out=straight.held_out * 2)
+    with pytest.raises(DecodeError, match=r"rational\) has coefficients that are none of a lens"):
+        unfolded([far_off, wild], corners, SIZE)

@@ -48,6 +48,8 @@ def test_near_names_are_told(tmp_path: Path) -> None:
     # all the words, in whatever order
     with pytest.raises(DecodeError, match="near: Unmeasured 50mm"):
         database.find("50mm unmeas")
+    with pytest.raises(DecodeError, match="none is near"):
+        database.find("")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Where methods fail, drawn from what `camkit stress` wrote: some of its scenarios in one picture.
 
-    python -m tools.failure_chart stress.json -o failures.png --scenarios psf_scale black_level
+    python -m tools.stress.failure_chart stress.json -o failures.png --scenarios psf_scale haze
 
 A panel for each: PSNR of every method over the knob, dotted lines where a network breaks.
 """
@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from camkit.report.figure import FIELD_COLORS, GRID_COLOR, MARKS, new_figure, to_png
+from camkit.report.figure import GRID_COLOR, MARKS, field_color, new_figure, to_png
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -32,10 +33,15 @@ def main() -> int:
     parser.add_argument("--scenarios", nargs="+", required=True)
     parser.add_argument("-o", "--out", type=Path, required=True)
     chosen = parser.parse_args()
-    known = {one["scenario"]: one for one in json.loads(chosen.report.read_text(encoding="utf-8"))}
+    try:
+        read = json.loads(chosen.report.read_text(encoding="utf-8"))
+        known = {one["scenario"]: one for one in read}
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise SystemExit(f"error: {chosen.report} is no report of camkit stress: {error}") from None
     missing = [name for name in chosen.scenarios if not known.get(name, {}).get("values")]
     if missing:
         raise SystemExit(f"error: {chosen.report} has no measured {', '.join(missing)}")
+    chosen.out.parent.mkdir(parents=True, exist_ok=True)
     chosen.out.write_bytes(to_png(draw([known[name] for name in chosen.scenarios])))
     return 0
 
@@ -47,18 +53,28 @@ def draw(scenarios: Sequence[Scenario]) -> "Figure":
     panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     for panel in panels[len(scenarios) :]:
         panel.set_axis_off()
+    # a method looks alike in every panel, whether the others have it or not
+    methods = list(dict.fromkeys(name for one in scenarios for name in one["psnr_db"]))
+    shown: dict[str, Artist] = {}
     for panel, scenario in zip(panels, scenarios, strict=False):
-        _panel(panel, scenario)
+        _panel(panel, scenario, methods)
+        lines, names = panel.get_legend_handles_labels()
+        shown |= dict(zip(names, lines, strict=True))
     figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=9, fontsize=8
+        [shown[name] for name in methods],
+        methods,
+        loc="outside upper center",
+        ncols=9,
+        fontsize=8,
     )
     return figure
 
 
-def _panel(panel: "Axes", scenario: Scenario) -> None:
+def _panel(panel: "Axes", scenario: Scenario, methods: Sequence[str]) -> None:
     values = np.array(scenario["values"], dtype=float)
-    for number, (method, decibels) in enumerate(scenario["psnr_db"].items()):
-        color = FIELD_COLORS[number % len(FIELD_COLORS)]
+    for method, decibels in scenario["psnr_db"].items():
+        number = methods.index(method)
+        color = field_color(number)
         mean = np.array(decibels, dtype=float)
         mark = MARKS[number % len(MARKS)]
         panel.plot(values, mean, color=color, marker=mark, markersize=3, linewidth=1, label=method)
