@@ -7,8 +7,9 @@ pixels. Their numbers are those of `camkit process --method`, tuned on pictures 
 (`camkit.runtime.bank.baselines`), or those that `tuned` finds on samples that networks learn from.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import torch
@@ -25,7 +26,6 @@ from camkit.models_def.training.sample import Sample
 from camkit.runtime.bank.baselines import (
     RL_ROUNDS_PER_SNR,
     block_filter,
-    method_numbers,
     richardson_lucy_filter,
 )
 from camkit.runtime.bank.blocks import Block, BlockFilter, taper_edges, to_otf
@@ -40,6 +40,8 @@ Method = Callable[[Developed, BayerRecipe], Tensor]
 """A developed sample -> (1, 3, S, S), linear."""
 Numbers = dict[str, float]
 """Of a method, by name."""
+Values = tuple[float, ...]
+"""Of numbers, in their order."""
 FilterMaker = Callable[[NoiseModel, Numbers], BlockFilter]
 TURNS: Final = 8
 """Of `tuned` over all numbers, and steps of one of them in a turn, at most."""
@@ -91,31 +93,36 @@ def tuned(start: Numbers, score: Callable[[Numbers], float]) -> list[tuple[Numbe
         All numbers that were tried, and their scores; the best first, beside which no number alone
         is better a step up or down (or `TURNS` are over).
     """
-    scores: dict[tuple[float, ...], float] = {}
+    scores: dict[Values, float] = {}
 
-    def judged(values: tuple[float, ...]) -> float:
+    def judged(values: Values) -> float:
         if values not in scores:
             scores[values] = score(dict(zip(start, values, strict=True)))
         return scores[values]
 
-    best = tuple(start.values())
+    best, before = tuple(start.values()), None
     judged(best)  # of equals the first is the best
+    ways = list(product(range(len(best)), (STEP, 1 / STEP)))
     for _ in range(TURNS):
-        before = best
-        for place in range(len(best)):
-            for step in (STEP, 1 / STEP):
-                for _ in range(TURNS):
-                    after = _stepped(best, place, step)
-                    if judged(after) <= judged(best):
-                        break
-                    best = after
         if best == before:
             break
+        before = best
+        for place, step in ways:
+            best = _climbed(best, place, step, judged)
     ranked = sorted(scores, key=lambda values: -scores[values])
     return [(dict(zip(start, values, strict=True)), scores[values]) for values in ranked]
 
 
-def _stepped(values: tuple[float, ...], place: int, step: float) -> tuple[float, ...]:
+def _climbed(values: Values, place: int, step: float, judged: Callable[[Values], float]) -> Values:
+    for _ in range(TURNS):
+        after = _stepped(values, place, step)
+        if judged(after) <= judged(values):
+            break
+        values = after
+    return values
+
+
+def _stepped(values: Values, place: int, step: float) -> Values:
     # rounded: up and down again is where it was
     changed = float(f"{values[place] * step:.4g}")
     return (*values[:place], changed, *values[place + 1 :])
@@ -155,11 +162,6 @@ def wiener_alone(developed: Developed, recipe: BayerRecipe) -> Tensor:
 
 
 METHODS: Final = ("wiener-alone", *TUNABLE)
-
-
-def runtime_numbers(method: str) -> Mapping[str, float]:
-    """Give the numbers of one of `TUNABLE` as `camkit process --method` has them."""
-    return dict(method_numbers(method))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

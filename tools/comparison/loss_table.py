@@ -45,7 +45,8 @@ from camkit.models_def.training.adversarial.content import Relu32
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
 from camkit.models_def.training.kind import Restorer, read_recipe
 from camkit.models_def.training.trainer import TrainOptions, train
-from tools.comparison.classical import METHODS, TUNABLE, Numbers, runtime_numbers, tuned
+from camkit.runtime.bank.baselines import method_numbers
+from tools.comparison.classical import METHODS, TUNABLE, Numbers, tuned
 from tools.comparison.compact_json import to_compact_json
 from tools.comparison.domain import METRICS, Circumstances, as_filtered, circumstances
 from tools.comparison.overfitting import overfitting, sentences
@@ -278,7 +279,7 @@ def measure(row: Row, conditions: Conditions) -> Entry:
     if method in TUNABLE:
         tried = tune(method, row.lab, conditions) if conditions.tune else []
         numbers = tried[0][0] if tried else None
-        found = {"numbers": numbers or runtime_numbers(method), "tuned": tried}
+        found = {"numbers": numbers or dict(method_numbers(method)), "tuned": tried}
     home, abroad = (
         to_judge(path, conditions).domain(conditions.samples, method, numbers)
         for path in (row.lab, row.wild)

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camkit.report.calibration.page import Section, Table, sentences, to_html
-from camkit.report.figure import GRID_COLOR, field_color, new_figure, to_png
+from camkit.report.figure import CHANNEL_COLORS, GRID_COLOR, field_color, new_figure, to_png
 from camkit.runtime.calibration.noise.measure import IsoFacts, NoiseFacts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLORS: Final = {"R": "#c8452f", "G1": "#2e8b57", "G2": "#8fbc5a", "B": "#1f6fb4", "Y": "#444444"}
+_COLORS: Final = {**CHANNEL_COLORS, "G1": CHANNEL_COLORS["G"], "G2": "#8fbc5a", "Y": "#444444"}
 _HEADER: Final = (
     *("ISO", "gain, e-/DN", "error, %", "read noise, e-", "at white, e-", "black, DN"),
     *("white, DN", "PRNU, %", "DSNU, e-", "linearity, %", "levels"),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from camkit.report.calibration.page import Section, Table, sentences, to_html
-from camkit.report.figure import GRID_COLOR, new_figure, to_png
+from camkit.report.figure import CHANNEL_COLORS, GRID_COLOR, new_figure, to_png
 from camkit.runtime.calibration.measured import ColourFacts, MeasuredPsf
 from camkit.runtime.calibration.peak import PEAK_PX, light_within
 
@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLORS: Final = {"blue": "#1f6fb4", "green": "#2e8b57", "red": "#c8452f"}
+_COLORS: Final = {
+    name: CHANNEL_COLORS[channel] for name, channel in (("blue", "B"), ("green", "G"), ("red", "R"))
+}
 _DECADES: Final = 6
 
 

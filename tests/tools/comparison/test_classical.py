@@ -6,6 +6,7 @@ import torch
 
 from camkit.models_def.kinds.bayer.training import BayerMaker
 from camkit.models_def.training.recipe import Recipe
+from camkit.runtime.bank.baselines import method_numbers
 from tests.bayer_recipe import bank, recipe, recipe_path  # noqa: F401
 from tests.together_factory import TOGETHER
 from tools.comparison.classical import (
@@ -13,7 +14,6 @@ from tools.comparison.classical import (
     TUNABLE,
     ClassicalMaker,
     by_block,
-    runtime_numbers,
     tuned,
     wiener_alone,
     with_method,
@@ -77,7 +77,7 @@ def test_tuning_climbs_to_where_no_step_helps():
 
 @pytest.mark.parametrize("name", TUNABLE)
 def test_numbers_of_the_runtime_do_what_the_runtime_does(maker, recipe, name):  # noqa: F811
-    known = runtime_numbers(name)
+    known = method_numbers(name)
     numbers = {key: known[key] for key in TUNABLE[name].start}
     plain = with_method(name, maker, recipe).make(1).inputs["wiener"]
     assert torch.equal(with_method(name, maker, recipe, numbers).make(1).inputs["wiener"], plain)
