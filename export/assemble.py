@@ -25,7 +25,13 @@ from camkit.bundle.frozen_optics import FrozenOptics, read_optics_file
 from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
 from camkit.bundle.haze_file import haze_to_bytes, read_haze
 from camkit.bundle.haze_golden import haze_golden_to_bytes
-from camkit.bundle.manifest import Manifest, Threshold, format_of, planes_of
+from camkit.bundle.manifest import (
+    Manifest,
+    Threshold,
+    bounds_light,
+    format_of,
+    planes_of,
+)
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import (
     CARD,
@@ -299,7 +305,9 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
     known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
     data = (c.training_data for sizes in camera.checkpoints.values() for c in sizes.values())
     return Manifest(
-        format_version=format_of(camera.optics.psf, hazy=camera.optics.haze is not None),
+        format_version=format_of(
+            camera.optics.psf, hazy=camera.optics.haze is not None, bounded=bounds_light(stages)
+        ),
         kind=recipe.kind,
         name=recipe.name,
         version=parts.version,

@@ -41,7 +41,7 @@ from camkit.models_def.optics.prescription import Lens, format_prescription
 from camkit.models_def.optics.thin.freezing import COPY_RAYS, HazyGrid, freeze_hazy
 from camkit.models_def.optics.thin.middle import find_middles
 from camkit.models_def.training.kind import training_kind
-from camkit.models_def.training.pictures import SceneSource, list_pictures, open_source
+from camkit.models_def.training.pictures import DrawnShares, SceneSource, list_pictures, open_source
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.illumination import illumination_band
 from camkit.runtime.options import Options
@@ -200,9 +200,7 @@ class _Studio:
             scenes=data.procedural_scenes,
             scene_px=data.scene_px,
             first_scene=-data.procedural_scenes if self._choosing else 0,
-            edge_share=0.0 if self._choosing else data.edge_share,
-            night_share=0.0 if self._choosing else data.night_share,
-            lamp_share=0.0 if self._choosing else data.lamp_share,
+            drawn=DrawnShares() if self._choosing else data.drawn,
         )
 
     def fill(self, store: Tiles, number: int, copy: int) -> None:

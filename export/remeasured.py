@@ -318,7 +318,10 @@ def _finish(draft: _Draft) -> None:
         frozen = FrozenOptics(psf=draft.psf, haze=draft.haze)
         made = frozen.entry(np.inf if focus_mm is None else focus_mm)
         stated = tuple(map(int, manifest.format_version.split(".")))
-        needed = tuple(map(int, format_of(draft.psf, hazy=draft.haze is not None).split(".")))
+        least = format_of(
+            draft.psf, hazy=draft.haze is not None, bounded=draft.manifest.bounds_light
+        )
+        needed = tuple(map(int, least.split(".")))
         newest = ".".join(map(str, max(stated, needed)))
         draft.change(optics=made, format_version=newest)
     parts = Parts(

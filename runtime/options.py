@@ -19,6 +19,19 @@ DemosaicMethod = Literal["fast", "quality"]
 Assumption = Literal["centre", "scale"]
 Quality = Literal["exact", "best", "adaptive", "draft"]
 OnUnsafe = Literal["warn", "fallback", "fail"]
+Laws = Literal["stated", "enforce"]
+_CHOICES: Final = {
+    "quality": Quality,
+    "mode": Mode,
+    "dtype": Dtype,
+    "provider": Provider,
+    "demosaic": DemosaicMethod,
+    "color": OutputColor,
+    "assume": Assumption,
+    "on_unsafe": OnUnsafe,
+    "laws": Laws,
+}
+"""Options that are one of several words."""
 
 DEFAULT_MAX_MEM_BYTES: Final = 930_000_000
 LEAST_MAX_MEM_BYTES: Final = 400_000_000
@@ -53,6 +66,9 @@ class Options:
         on_unsafe: What becomes of a capture outside the bundle's envelope, and of a tile whose
             output is not finite or not bounded: warn (a bad tile is an error), fallback (what
             came before the network, in capture or tile), fail (an error before work).
+        laws: What holds the light of a network back: stated (the bound of the bundle, if it states
+            one) or enforce (the usual bound where it states none).
+        strength: How much of what a network adds to the picture in front of it is kept, 0..1.
         max_mem_bytes: Memory the process may take; None for the default of 0.93 GB.
         threads: Threads in all; None for those the process may use.
         tile_px: Output side of the windows, for tests and measurements; None lets the plan choose.
@@ -80,6 +96,8 @@ class Options:
     assume: Assumption | None = None
     force_bundle: bool = False
     on_unsafe: OnUnsafe = "warn"
+    laws: Laws = "stated"
+    strength: float = 1.0
     max_mem_bytes: int | None = None
     threads: int | None = None
     tile_px: int | None = None
@@ -90,24 +108,17 @@ class Options:
 
     def __post_init__(self) -> None:
         _check_of_kind(self.of_kind)
-        _check_choice("quality", self.quality, get_args(Quality))
-        for name, value in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
-            if value is not None and not 0 < value < 1e6:
-                raise ContractError(f"the most {name} must be > 0; got {value}")
+        _check_words(self)
+        for name, most in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
+            if most is not None and not 0 < most < 1e6:
+                raise ContractError(f"the most {name} must be > 0; got {most}")
         if self.max_seconds is not None and self.quality != "exact":
             raise ContractError(
                 "--max-seconds finds the best quality that fits by itself; leave --quality out"
             )
         _check_depth(self.depth_m)
-        _check_choice("mode", self.mode, get_args(Mode))
-        _check_choice("dtype", self.dtype, get_args(Dtype))
-        _check_choice("provider", self.provider, get_args(Provider))
-        if self.demosaic is not None:
-            _check_choice("demosaic", self.demosaic, get_args(DemosaicMethod))
-        _check_choice("color", self.color, get_args(OutputColor))
-        _check_choice("on_unsafe", self.on_unsafe, get_args(OnUnsafe))
-        if self.assume is not None:
-            _check_choice("assume", self.assume, get_args(Assumption))
+        if not 0 <= self.strength <= 1:
+            raise ContractError(f"strength must lie in 0..1; got {self.strength}")
         _check_origin(self.origin_px, self.assume)
         if self.white_balance is not None and not all(0 < g < 100 for g in self.white_balance):
             raise ContractError(f"white balance gains must lie in 0..100; got {self.white_balance}")
@@ -237,6 +248,13 @@ def checked_origin(origin_px: Any) -> tuple[int, int]:
 def _check_origin(origin_px: tuple[int, int] | None, assume: str | None) -> None:
     if origin_px is not None and checked_origin(origin_px) and assume is not None:
         raise ContractError(f"origin_px and assume {assume} both say where a capture lies: choose")
+
+
+def _check_words(options: Options) -> None:
+    for name, kind in _CHOICES.items():
+        value = getattr(options, name)
+        if value is not None:
+            _check_choice(name, value, get_args(kind))
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:

@@ -18,7 +18,7 @@ date by camkit/bundle/upgrade.py: read `read_manifest`.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
@@ -30,19 +30,21 @@ from camkit.bundle.golden import IMAGE
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
-from camkit.bundle.stages import JoinError, Parts, Stage
+from camkit.bundle.stages import JoinError, Network, Parts, Stage
 from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
 
-FORMAT_VERSION: Final = (2, 7)
+FORMAT_VERSION: Final = (2, 8)
 FOCUS_VERSION: Final = (2, 5)
 """From here on a PSF may hold kernels of a moved sensor; others state what they always did."""
 PROFILE_VERSION: Final = (2, 6)
 """From here on optics may be a lens profile, and distortion have even powers."""
 HAZE_VERSION: Final = (2, 7)
 """From here on optics may have a haze beside core kernels."""
+LIGHT_VERSION: Final = (2, 8)
+"""From here on a stage may bound the light that its network moves."""
 NOT_TRAINED: Final = "not trained"
 """As `training_data`: weights are random, so that time and memory mean something and pictures do
 not."""
@@ -188,6 +190,11 @@ class Manifest(Entry):
         return self.optics is not None and self.optics.type == "hazy_psf"
 
     @property
+    def bounds_light(self) -> bool:
+        """Tell whether the light that a network moves is bounded."""
+        return bounds_light(self.stages)
+
+    @property
     def is_trained(self) -> bool:
         """Tell whether what its networks make is a picture to be judged."""
         return self.training_data != NOT_TRAINED
@@ -217,6 +224,11 @@ class Manifest(Entry):
     def mac_per_pixel(self, size: str) -> float:
         """Give the multiplications per pixel of the networks of one size, all roles together."""
         return sum(sizes[size].mac_per_pixel for sizes in self.networks.values() if size in sizes)
+
+
+def bounds_light(stages: Iterable[Stage]) -> bool:
+    """Tell whether one of the stages bounds the light that its network moves."""
+    return any(isinstance(stage, Network) and stage.light is not None for stage in stages)
 
 
 def planes_of(stages: tuple[Stage, ...], parts: Parts) -> dict[str, Plane]:
@@ -264,13 +276,16 @@ class _Head(Entry, extra="ignore"):
     exported_with: dict[str, Any] = Field(default_factory=dict)
 
 
-def format_of(psf: FrozenPsf, *, hazy: bool = False) -> str:
+def format_of(psf: FrozenPsf, *, hazy: bool = False, bounded: bool = False) -> str:
     """Give the format of a bundle with such a PSF: what came later needs a newer one.
 
     Args:
         psf: Of its optics.
         hazy: Whether a haze lies beside it.
+        bounded: Whether the light of a network is bounded.
     """
+    if bounded:
+        return ".".join(map(str, LIGHT_VERSION))
     if hazy:
         return ".".join(map(str, HAZE_VERSION))
     if psf.distortion.even_coefficients is not None:

@@ -28,6 +28,7 @@ from camkit.bundle.haze_file import haze_from_bytes
 from camkit.bundle.manifest import (
     FOCUS_VERSION,
     HAZE_VERSION,
+    LIGHT_VERSION,
     PROFILE_VERSION,
     Manifest,
     read_manifest,
@@ -258,6 +259,8 @@ def bundle_from_bytes(data: bytes, *, path: Path, max_bytes: int = MAX_BUNDLE_BY
 
 def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
+    if manifest.bounds_light:
+        _need_version(manifest, LIGHT_VERSION, "a network's light is bounded")
     # Unpacking and hashing leave Python's lock to others.
     with ThreadPoolExecutor(CHECKED_AT_ONCE) as pool:
         checks = [

@@ -1,4 +1,4 @@
-"""Scenes whose truth is known to the last pixel: edges without halo, stars and discs on black.
+"""Scenes whose truth is known to the last pixel: edges without halo, patches, stars, discs, lamps.
 
 Photographs are sharpened by those who took them, so an edge of theirs may carry a halo, and few
 show stars. A network that is to leave clean edges clean must see some in training, and `camkit
@@ -33,7 +33,12 @@ DISC_SHARE: Final = (0.05, 0.6)
 MOST_LAMPS: Final = 3
 LAMP_LIGHT: Final = (2.0, 200.0)
 """1 the white of the picture."""
-LAMP_RADIUS_PX: Final = (0.7, 6.0)
+LAMP_RADIUS_PX: Final = (0.7, 12.0)
+PATCH_PX: Final = (12.0, 96.0)
+PATCH_LIGHT: Final = (0.02, 1.0)
+"""Of the brightest colour of a patch."""
+FAINTEST: Final = 0.03
+"""Light of a patch's faintest colour over that of its brightest: a deep primary has two of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +69,22 @@ def edges(rng: Generator, side_px: int) -> FloatArray:
         level = min(dark * _log_uniform(rng, RATIO), BRIGHTEST)
         scene += cover * (_colour(rng, level) - scene)
     return np.asarray(scene, np.float32)
+
+
+def patches(rng: Generator, side_px: int) -> FloatArray:
+    """Draw a chart of even patches in any colour, deep primaries too, (3, side, side)."""
+    pitch = _log_uniform(rng, PATCH_PX)
+    cells = int(np.ceil(side_px / pitch)) + 1
+    darkest, brightest = np.log(PATCH_LIGHT)
+    bright = np.exp(rng.uniform(darkest, brightest, (1, cells, cells)))
+    shares = np.exp(rng.uniform(np.log(FAINTEST), 0, (3, cells, cells)))
+    deep = rng.random((1, cells, cells)) < 0.3
+    shares = np.where(deep, np.where(rng.random((3, cells, cells)) < 0.5, FAINTEST, 1.0), shares)
+    colours = bright * shares / shares.max(axis=0)
+    start_y, start_x = rng.uniform(0, pitch, 2)
+    y, x = ((np.arange(side_px) + start) / pitch for start in (start_y, start_x))
+    chart = colours[:, y.astype(int)][:, :, x.astype(int)]
+    return np.asarray(chart, np.float32)
 
 
 def night(rng: Generator, side_px: int) -> FloatArray:

@@ -17,7 +17,7 @@ from camkit.models_def.training.losses import (
 )
 from camkit.models_def.training.precision import half_precision
 from camkit.models_def.training.recipe import NetworkRecipe
-from camkit.models_def.training.sample import Batch
+from camkit.models_def.training.sample import Batch, Finish
 from camkit.models_def.training.schedule import ema_decay, learning_rate, update_average
 
 ANOTHER_LOSS: Final = "the checkpoint was trained by another loss; start without resume"
@@ -68,6 +68,7 @@ class Fitter:
         device: str,
         first: FirstWeights | None = None,
         betas: tuple[float, float] = (0.9, 0.999),
+        finish: Finish | None = None,
     ) -> None:
         """Build the network with random weights, or with the first ones given.
 
@@ -77,7 +78,9 @@ class Fitter:
             device: cpu or cuda.
             first: First weights.
             betas: Of AdamW.
+            finish: What is done behind the network before its output is judged; None for nothing.
         """
+        self._finish = finish
         self.schedule, self.device = entry.schedule, torch.device(device)
         torch.manual_seed(entry.schedule.seed)
         self.network = _to_device(build(entry.network, **entry.config), self.device)
@@ -103,6 +106,8 @@ class Fitter:
             progress: How much of the schedule lies behind, 0..1.
         """
         output = self.run(batch.planes, progress)
+        if self._finish is not None:
+            output = self._finish(output, batch)
         target, weight = batch.target.to(self.device), batch.weight.to(self.device)
         measure = patch_distances if self.schedule.loss == "l1" else patch_errors
         errors = measure(output, target, weight)

@@ -21,7 +21,7 @@ from camkit.errors import ContractError
 from camkit.kinds import find_kind
 from camkit.models_def.toml_table import read_table, typed
 from camkit.models_def.training.recipe import DEFAULT_KIND, Recipe, with_new_names
-from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.models_def.training.sample import Finish, Sample, SampleLayout
 
 Restorer = Callable[[Tensor], Tensor]
 """(1, c, h, w) of all inputs -> (1, c, scale h, scale w) of all outputs."""
@@ -129,6 +129,10 @@ class TrainingKind(Protocol[R, M]):
 
     def layout(self, recipe: R, role: str) -> SampleLayout:
         """Say what the samples of a role hold, and so what its networks take and give."""
+        ...
+
+    def finish(self, recipe: R, role: str) -> Finish | None:
+        """Return what is done behind the network of a role; None for nothing."""
         ...
 
     def prepare(self, recipe: R, recipe_folder: Path, cache_folder: Path) -> M:

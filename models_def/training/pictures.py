@@ -17,7 +17,7 @@ from camkit.colorimetry import decode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
 from camkit.scenes import procedural_scene
-from camkit.scenes.clean import edges, night, with_lamps
+from camkit.scenes.clean import edges, night, patches, with_lamps
 
 PICTURE_ENDINGS: Final = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
 SCENE_SEED: Final = 7_000_000
@@ -64,6 +64,23 @@ def to_linear(picture: NDArray[np.uint8]) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnShares:
+    """How often something is drawn whose truth is known to the last pixel.
+
+    Attributes:
+        edge: Probability of clean edges instead of a picture or scene.
+        night: Probability of stars and discs on black.
+        patch: Probability of a chart of patches in any colour.
+        lamp: Probability of lamps in whatever else is drawn.
+    """
+
+    edge: float = 0.0
+    night: float = 0.0
+    patch: float = 0.0
+    lamp: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SceneSource:
     """Draws sharp crops.
 
@@ -72,9 +89,7 @@ class SceneSource:
         picture_share: Probability of a picture rather than a procedural scene.
         scenes: Number of different procedural scenes.
         scene_px: Their side.
-        edge_share: Probability of clean edges instead of either.
-        night_share: Probability of stars and discs on black.
-        lamp_share: Probability of lamps in whatever else is drawn.
+        drawn: How often something else is drawn.
         first_scene: Number of the first procedural scene; others draw other scenes.
     """
 
@@ -83,9 +98,7 @@ class SceneSource:
     scenes: int
     scene_px: int
     _held: dict[int, NDArray[Any]]
-    edge_share: float = 0.0
-    night_share: float = 0.0
-    lamp_share: float = 0.0
+    drawn: DrawnShares = DrawnShares()
     first_scene: int = 0
 
     def draw_crop(self, rng: Generator, side_px: int) -> FloatArray:
@@ -94,16 +107,19 @@ class SceneSource:
         Returns:
             (3, side_px, side_px) float32 linear Rec.709; a smaller picture is mirrored outwards.
         """
-        lit = self.lamp_share > 0 and rng.random() < self.lamp_share
+        lit = self.drawn.lamp > 0 and rng.random() < self.drawn.lamp
         crop = self._draw_unlit(rng, side_px)
         return with_lamps(rng, crop) if lit else crop
 
     def _draw_unlit(self, rng: Generator, side_px: int) -> FloatArray:
-        if clean := self.edge_share + self.night_share:
+        asked = self.drawn
+        shares = (asked.edge, edges), (asked.night, night), (asked.patch, patches)
+        if sum(share for share, _ in shares):
             drawn = rng.random()  # only where asked for: other recipes keep their samples
-            if drawn < clean:
-                draw = edges if drawn < self.edge_share else night
-                return draw(rng, side_px)
+            for share, draw in shares:
+                if drawn < share:
+                    return draw(rng, side_px)
+                drawn -= share
         picture = self._draw_picture(rng)
         crops = [_cut(rng, picture, side_px) for _ in range(CANDIDATES)]
         best = max(crops, key=_liveliness)
@@ -134,9 +150,7 @@ def open_source(
     picture_share: float,
     scenes: int,
     scene_px: int,
-    edge_share: float = 0.0,
-    night_share: float = 0.0,
-    lamp_share: float = 0.0,
+    drawn: DrawnShares = DrawnShares(),
     first_scene: int = 0,
 ) -> SceneSource:
     """Open a source of crops; without a folder it is procedural only."""
@@ -146,9 +160,7 @@ def open_source(
         scenes=scenes,
         scene_px=scene_px,
         _held={},
-        edge_share=edge_share,
-        night_share=night_share,
-        lamp_share=lamp_share,
+        drawn=drawn,
         first_scene=first_scene,
     )
 

@@ -70,7 +70,7 @@ class PoolFiles:
 
     def __init__(self, folder: Path, size: int, side_px: int, layout: SampleLayout) -> None:
         self.size, self.layout = size, layout
-        given, wanted = layout.input_channels, layout.output_channels
+        given, wanted = layout.stored_channels, layout.output_channels
         shape, fine = (size, given, side_px, side_px), layout.scale * side_px
         self.planes: NDArray[np.float16] = _map(folder / "planes.f16", np.float16, shape)
         shape = (size, wanted, fine, fine)
@@ -203,7 +203,7 @@ class SamplePool:
         files, layout = self._files, self._files.layout
         fine_px, given, wanted = (
             layout.scale * patch_px,
-            layout.input_channels,
+            layout.stored_channels,
             layout.output_channels,
         )
         planes = np.empty((batch, given, patch_px, patch_px), dtype=np.float32)
@@ -215,10 +215,8 @@ class SamplePool:
                 rng, files.planes[slot], files.targets[slot], patch_px, layout
             )
             weights[k] = files.weights[slot]
-        return Batch(
-            inputs=layout.named(torch.from_numpy(planes)),
-            target=torch.from_numpy(targets),
-            weight=torch.from_numpy(weights),
+        return layout.batch(
+            torch.from_numpy(planes), torch.from_numpy(targets), torch.from_numpy(weights)
         )
 
     def _ensure(self, low: int, end: int) -> None:

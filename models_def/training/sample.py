@@ -1,7 +1,7 @@
 """A training sample: what a network is given, by name, and what it should make of it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor
@@ -19,11 +19,14 @@ class SampleLayout:
         outputs: What it gives, in the order of its channels; one scale.
         turned: Whether a sample turned or mirrored is as good a sample. Not where the network
             should know which way blur points.
+        masks: What a sample holds besides, on the samples of the inputs, for what is done behind
+            the network.
     """
 
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     turned: bool = True
+    masks: tuple[Port, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.inputs or len({port.scale for port in self.outputs}) != 1:
@@ -33,6 +36,11 @@ class SampleLayout:
     def input_channels(self) -> int:
         """Channels of all inputs."""
         return sum(port.channels for port in self.inputs)
+
+    @property
+    def stored_channels(self) -> int:
+        """Channels of all inputs and masks."""
+        return self.input_channels + sum(port.channels for port in self.masks)
 
     @property
     def output_channels(self) -> int:
@@ -45,9 +53,18 @@ class SampleLayout:
         return self.outputs[0].scale
 
     def named(self, planes: Tensor) -> dict[str, Tensor]:
-        """Split (b, channels, h, w) of all inputs by their names."""
-        parts = torch.split(planes, [port.channels for port in self.inputs], dim=1)
-        return {port.name: part for port, part in zip(self.inputs, parts, strict=True)}
+        """Split (b, channels, h, w) of all inputs, or inputs and masks, by their names."""
+        ports = self.inputs
+        if planes.shape[1] != self.input_channels:
+            ports += self.masks
+        parts = torch.split(planes, [port.channels for port in ports], dim=1)
+        return {port.name: part for port, part in zip(ports, parts, strict=True)}
+
+    def batch(self, planes: Tensor, target: Tensor, weight: Tensor) -> "Batch":
+        """Return the patches of a step from (b, stored channels, p, p) planes."""
+        named = self.named(planes)
+        masks = {port.name: named.pop(port.name) for port in self.masks}
+        return Batch(inputs=named, target=target, weight=weight, masks=masks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +72,7 @@ class Sample:
     """A finished sample.
 
     Attributes:
-        inputs: Name -> (c, s, s), what the network is given.
+        inputs: Name -> (c, s, s), what the network is given, and the masks.
         target: (c, scale s, scale s), what it should give; negative where nothing can be known.
         weight: (c,) factor to the square-root domain of the signal, see `losses`.
     """
@@ -65,17 +82,18 @@ class Sample:
     weight: Tensor
 
     def stacked(self, layout: SampleLayout) -> Tensor:
-        """Give all inputs as one (channels, s, s), in the order of the layout.
+        """Give inputs and masks as one (channels, s, s), in the order of the layout.
 
         Raises:
             ContractError: If the sample is not of that layout.
         """
-        planes = torch.cat([self.inputs[port.name] for port in layout.inputs])
+        ports = layout.inputs + layout.masks
+        planes = torch.cat([self.inputs[port.name] for port in ports])
         side = layout.scale * planes.shape[-1]
         wanted = (layout.output_channels, side, side)
-        if len(planes) != layout.input_channels or tuple(self.target.shape) != wanted:
+        if len(planes) != layout.stored_channels or tuple(self.target.shape) != wanted:
             raise ContractError(
-                f"a sample must have {layout.input_channels} channels and a target of {wanted}; "
+                f"a sample must have {layout.stored_channels} channels and a target of {wanted}; "
                 f"got {tuple(planes.shape)} and {tuple(self.target.shape)}"
             )
         return planes
@@ -89,13 +107,19 @@ class Batch:
         inputs: Name -> (b, c, p, p), in the order of the network's channels.
         target: (b, c, scale p, scale p).
         weight: (b, c).
+        masks: Name -> (b, c, p, p).
     """
 
     inputs: Mapping[str, Tensor]
     target: Tensor
     weight: Tensor
+    masks: Mapping[str, Tensor] = field(default_factory=dict)
 
     @property
     def planes(self) -> Tensor:
         """All inputs as one (b, channels, p, p)."""
         return torch.cat(list(self.inputs.values()), dim=1)
+
+
+Finish = Callable[[Tensor, Batch], Tensor]
+"""What is done behind a network: its (b, c, h, w) output and the batch -> (b, c, h, w)."""

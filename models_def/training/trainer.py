@@ -284,7 +284,10 @@ class _Run:
             self.data += own.credit
             self.fitter: Fits = own.make(material)
         elif refinement is None:
-            self.fitter = Fitter(self.entry, kind.build_network, options.device, first)
+            finish = kind.finish(self.recipe, self.role)
+            self.fitter = Fitter(
+                self.entry, kind.build_network, options.device, first, finish=finish
+            )
         else:
             self.data += refinement.credit
             self.entry = replace(self.entry, schedule=refinement.schedule)

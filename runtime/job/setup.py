@@ -7,6 +7,7 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Demosaic, Linearise, RaiseClipped, Stage, WhiteBalance
 from camkit.errors import ContractError
+from camkit.runtime.job.laws import lawful
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
 from camkit.runtime.plan.speed import Speed
@@ -42,7 +43,10 @@ class Setup:
     @property
     def stages(self) -> tuple[Stage, ...]:
         """Give the stages that are walked."""
-        return DEVELOPMENT if self.bundle is None else self.bundle.manifest.stages
+        if self.bundle is None:
+            return DEVELOPMENT
+        manifest = self.bundle.manifest
+        return lawful(manifest.stages, manifest.all_planes, self.options.laws)
 
     @property
     def known_bundle(self) -> Bundle:

@@ -24,6 +24,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
+from camkit.runtime.network.light_keeper import Behind
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.network.tiling import (
     PixelCost,
@@ -216,6 +217,7 @@ def infer_cells(
     cancel: Cancel | None = None,
     guard: TileGuard | None = None,
     stand_in: slice,
+    behind: Behind | None = None,
 ) -> Iterator[FloatArray]:
     """Run the networks on their cells and yield the rows of the picture from top to bottom.
 
@@ -227,6 +229,7 @@ def infer_cells(
         cancel: Asked before each window.
         guard: Looks at every window; None refuses NaN and inf only.
         stand_in: Channels of the source that stand where no network runs.
+        behind: Changes the output of a window in place; it also sees all channels of the source.
 
     Yields:
         (k, rows, w) float32, consecutive.
@@ -250,7 +253,10 @@ def infer_cells(
             check_cancelled(cancel)
             y0, x0, y1, x1 = window.pixels
             given = np.ascontiguousarray(held[None, :, y0 - first : y1 - first, x0:x1])
-            made = _checked(networks[window.network].run(given), given, window, guard)
+            output = networks[window.network].run(given)
+            if behind is not None:
+                behind(output[0], given[0], _kept_box(window, layout))
+            made = _checked(output, given, window, guard)
             _place(made, window, layout, band, top)
             done += 1
             if progress is not None:
@@ -272,6 +278,14 @@ def _checked(
             "pixels first"
         )
     return np.asarray(made[0])
+
+
+def _kept_box(window: CellWindow, layout: CellLayout) -> tuple[int, int, int, int]:
+    """Return (top, left, bottom, right) of the pixels of a window that its cells cover."""
+    cell, (height, width) = layout.cell_px, layout.size_px
+    top, left, bottom, right = (edge * cell for edge in window.cells)
+    y, x = window.pixels[:2]
+    return top - y, left - x, min(bottom, height) - y, min(right, width) - x
 
 
 def _describe(window: CellWindow) -> str:

@@ -32,7 +32,12 @@ class TileGuard:
     """
 
     def __init__(
-        self, *, fallback: bool, stand_in: slice | None = None, bound: Bound | None = None
+        self,
+        *,
+        fallback: bool,
+        stand_in: slice | None = None,
+        bound: Bound | None = None,
+        inputs: int | None = None,
     ) -> None:
         """Choose what becomes of a bad tile.
 
@@ -41,7 +46,10 @@ class TileGuard:
             stand_in: Which channels of what the network is given stand in for its output; None if
                 none can.
             bound: What is believed; None for `plain_bound`.
+            inputs: Channels that the network takes of what it is given, the first ones; None for
+                all.
         """
+        self._inputs = inputs
         self._fallback = fallback and stand_in is not None
         self._stand_in = stand_in
         self._bound = plain_bound() if bound is None else bound
@@ -61,7 +69,7 @@ class TileGuard:
             ContractError: If the tile is bad and there is no fallback, or the planes that stand in
                 are not finite either.
         """
-        trouble = _trouble(output, given, self._bound)
+        trouble = _trouble(output, given[: self._inputs], self._bound)
         if trouble is None:
             return output
         tile = describe()

@@ -27,6 +27,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
+from camkit.runtime.network.light_keeper import Behind
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.rows import RowSource
 
@@ -288,6 +289,7 @@ def infer_bands(
     cancel: Cancel | None = None,
     guard: TileGuard | None = None,
     scale: int = 1,
+    behind: Behind | None = None,
 ) -> Iterator[FloatArray]:
     """Run a network over a picture and yield its rows from top to bottom.
 
@@ -299,6 +301,7 @@ def infer_bands(
         cancel: Asked before each window.
         guard: Looks at every tile; None refuses NaN and inf only.
         scale: s, samples along a side of the output for one pixel of the input.
+        behind: Changes the output of a window in place; it also sees all channels of the source.
 
     Yields:
         (k, rows, s w) float32 pieces of bands, consecutive, together the whole picture.
@@ -323,7 +326,10 @@ def infer_bands(
         for j, column in enumerate(layout.columns):
             check_cancelled(cancel)
             filled = _filled(window, held, column.origin_px)
-            kept = _kept(run(filled), row, column, (height, width), scale)
+            output = run(filled)
+            if behind is not None:
+                behind(output[0], filled[0], _box(row, column, (height, width)))
+            kept = _kept(output, row, column, (height, width), scale)
             if guard is not None:
                 given = _kept(filled, row, column, (height, width))
                 kept = guard.check(kept, given, partial(_describe, i, j, row, column))
@@ -334,7 +340,7 @@ def infer_bands(
             done += 1
             if progress is not None:
                 progress(done, layout.window_count)
-        del kept
+        del kept, output
         while pieces:  # the rows of the next windows are made before their band is
             yield pieces.pop(0)
 
@@ -366,11 +372,19 @@ def _kept(
     output: FloatArray, row: Span, column: Span, size: tuple[int, int], scale: int = 1
 ) -> FloatArray:
     """Crop the pixels that a window contributes; none lies in the padding."""
-    top, left = row.start_px - row.origin_px, column.start_px - column.origin_px
-    bottom = min(row.stop_px, size[0]) - row.origin_px
-    right = min(column.stop_px, size[1]) - column.origin_px
+    top, left, bottom, right = _box(row, column, size)
     rows, columns = slice(scale * top, scale * bottom), slice(scale * left, scale * right)
     return output[0, :, rows, columns]
+
+
+def _box(row: Span, column: Span, size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Return (top, left, bottom, right) of the kept pixels in their window."""
+    return (
+        row.start_px - row.origin_px,
+        column.start_px - column.origin_px,
+        min(row.stop_px, size[0]) - row.origin_px,
+        min(column.stop_px, size[1]) - column.origin_px,
+    )
 
 
 def _not_finite_message(i: int, j: int, row: Span, column: Span) -> str:

@@ -6,6 +6,7 @@ Without labels one network runs everywhere (`tiling`), with labels on some latti
 (`cell_windows`).
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -23,6 +24,7 @@ from camkit.runtime.network.cell_windows import (
     lay_cells,
 )
 from camkit.runtime.network.guard import TileGuard
+from camkit.runtime.network.light_keeper import Behind
 from camkit.runtime.network.tiling import (
     PixelCost,
     Progress,
@@ -40,18 +42,35 @@ FAST_LEAST_DB: Final = 80.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SizedNetwork:
-    """A network, its size's name and its measured facts."""
+    """A network, its size's name and its measured facts.
+
+    Attributes:
+        size: Name of its size.
+        run: From a window, of which it takes its inputs, to that of its outputs.
+        facts: Of the manifest.
+        masks: Channels that its windows hold behind its inputs, for what is done behind it.
+        beyond_px: How much farther than the network what is done behind it looks.
+        lattice_px: Windows keep to multiples of it besides, for what is done behind the network.
+    """
 
     size: str
     run: Run
     facts: NetworkFacts
+    masks: int = 0
+    beyond_px: int = 0
+    lattice_px: int = 1
+
+    @property
+    def stride_px(self) -> int:
+        """Give what sides and origins of windows are multiples of."""
+        return math.lcm(self.facts.stride_px, self.lattice_px)
 
     @property
     def cost(self) -> PixelCost:
         """Give what the network holds per pixel."""
         return PixelCost(
             arena_bytes=self.facts.bytes_per_pixel,
-            channels=self.facts.input_channels,
+            channels=self.facts.input_channels + self.masks,
             outputs=self.facts.output_channels,
             scale=self.facts.output_scale,
         )
@@ -62,7 +81,8 @@ class SizedNetwork:
         Raises:
             ContractError: If mode fast is asked of a network without an error curve.
         """
-        return self.facts.reach_px if mode != "fast" else fast_halo_px(self.facts.halo_error)
+        reach_px = self.facts.reach_px if mode != "fast" else fast_halo_px(self.facts.halo_error)
+        return reach_px + self.beyond_px
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,6 +133,7 @@ class NetworkWindows:
         cancel: Cancel | None = None,
         guard: TileGuard | None = None,
         stand_in: slice | None = None,
+        behind: Behind | None = None,
     ) -> Iterator[FloatArray]:
         """Yield (k, s rows, s w) of the result from top to bottom."""
         if self.cells is not None:
@@ -127,6 +148,7 @@ class NetworkWindows:
                 cancel=cancel,
                 guard=guard,
                 stand_in=stand_in,
+                behind=behind,
             )
         if self.tiles is None:
             raise ContractError("a network needs tiles or cells")
@@ -139,6 +161,7 @@ class NetworkWindows:
             cancel=cancel,
             guard=guard,
             scale=network.facts.output_scale,
+            behind=behind,
         )
 
     @property
@@ -227,9 +250,8 @@ def _lay_windows(
             CellLimits(cell_px=limits.cell_px, max_bytes=limits.max_bytes, tile_px=limits.tile_px),
         )
         return NetworkWindows(networks=tuple(networks), tiles=None, cells=cells, mode=limits.mode)
-    facts = networks[0].facts
     tile_limits = TileLimits(
-        stride_px=facts.stride_px,
+        stride_px=networks[0].stride_px,
         halo_px=networks[0].halo_px(limits.mode),
         cost=networks[0].cost,
         max_bytes=limits.max_bytes,
@@ -256,7 +278,7 @@ def _cell_networks(networks: Sequence[SizedNetwork], mode: Mode) -> list[CellNet
     return [
         CellNetwork(
             run=network.run,
-            stride_px=network.facts.stride_px,
+            stride_px=network.stride_px,
             halo_px=network.halo_px(mode),
             cost=network.cost,
         )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.machine.slices import run_chunks
-from camkit.runtime.rows import PiecedRows
+from camkit.runtime.rows import PiecedRows, RowSource
 
 DEFAULT_SCALE: Final = 64.0
 FAMILIAR_READ: Final = 3.0
@@ -117,6 +117,7 @@ class StackedRows:
         *,
         scale: float = DEFAULT_SCALE,
         threads: int = 1,
+        masks: Sequence[RowSource] = (),
     ) -> None:
         """Name the sources.
 
@@ -125,22 +126,24 @@ class StackedRows:
             noises: Noise of each, to stabilise it by; None hands the planes on as they are.
             scale: Divisor behind the square root.
             threads: Threads that share the rows of one read; no influence on the bits.
+            masks: What comes below the planes as it is.
 
         Raises:
             ContractError: If the sources differ in size.
         """
-        sizes = [source.shape[1:] for source in sources]
+        sizes = [source.shape[1:] for source in (*sources, *masks)]
         if len(set(sizes)) != 1:
             raise ContractError(f"the planes of a network must have one size; got {sizes}")
         self._sources = tuple(sources)
-        self._noises = noises
+        self._noises, self._masks = noises, tuple(masks)
         self._scale, self._threads = scale, threads
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Give (c, h, w) of all sources together."""
         _, height, width = self._sources[0].shape
-        return sum(source.shape[0] for source in self._sources), height, width
+        stacked: tuple[PiecedRows | RowSource, ...] = (*self._sources, *self._masks)
+        return sum(source.shape[0] for source in stacked), height, width
 
     def read(self, top: int, bottom: int) -> FloatArray:
         """Give the rows top..bottom, (c, rows, w)."""
@@ -154,6 +157,10 @@ class StackedRows:
                 rows = slice(filled, filled + piece.shape[1])
                 self._fill(stacked[start:end, rows], piece, number)
                 filled += piece.shape[1]
+            start = end
+        for mask in self._masks:
+            end = start + mask.shape[0]
+            stacked[start:end] = mask.read(top, bottom)
             start = end
         return stacked
 

@@ -7,18 +7,22 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.light_bound import CELL_PX as LIGHT_CELL_PX
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
+from camkit.runtime.job.laws import front_end
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import USUAL_BYTES
 from camkit.runtime.machine.memory import trim_heap
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
+from camkit.runtime.network.light import FAR, KeptRows
+from camkit.runtime.network.light_keeper import LightKeeper
 from camkit.runtime.network.tiling import Run
 from camkit.runtime.network.windows import (
     NetworkWindows,
@@ -40,8 +44,10 @@ WEIGHT_BYTES: Final = 8.8
 """Memory of a session for each weight: the number, and its place in a block (measured)."""
 OPTIONS: Final = (
     *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
-    *("dtype", "provider"),
+    *("dtype", "provider", "laws", "strength"),
 )
+NOTED_FRACTION: Final = 0.01
+"""Of the picture; a network that moves much light in more of it is worth a note."""
 
 
 def prepare(entry: Network, job: Job) -> StageWork:
@@ -82,13 +88,27 @@ def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float
 
 
 def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
-    """Give the rows that the network of a stage is given: its planes stacked and stabilised."""
+    """Give the rows that the network of a stage is given: its planes stacked and stabilised.
+
+    Behind them come those that say where it is kept, if the stage takes a mask.
+    """
+    planes, masks = _parted(taken)
     noises = None
     if entry.transform == "stabilise":
-        noises = [_familiar_noise(job, stream) for stream in taken]
+        noises = [_familiar_noise(job, stream) for stream in planes]
     return StackedRows(
-        [stream.pieced() for stream in taken], noises, scale=entry.scale, threads=job.threads
+        [stream.pieced() for stream in planes],
+        noises,
+        scale=entry.scale,
+        threads=job.threads,
+        masks=[KeptRows(mask.rows()) for mask in masks],
     )
+
+
+def _parted(taken: Sequence[Stream]) -> tuple[list[Stream], list[Stream]]:
+    """Return the streams of the inputs of a network, and the masks behind them."""
+    planes = [stream for stream in taken if stream.plane.domain != "mask"]
+    return planes, [stream for stream in taken if stream.plane.domain == "mask"]
 
 
 def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
@@ -108,6 +128,9 @@ class _NetworkStage:
         self._windows: NetworkWindows | None = None
         self._weight_bytes = 0
         self._guard: TileGuard | None = None
+        self._keeper: LightKeeper | None = None
+        planes = job.known_bundle.manifest.all_planes
+        self._masks = sum(planes[name].domain == "mask" for name in entry.takes)
 
     def fit(self, max_bytes: int, spent_bytes: int) -> None:
         """Plan the windows: `max_bytes` in all, of which others take `spent_bytes`."""
@@ -128,6 +151,9 @@ class _NetworkStage:
                 size=size,
                 run=self._trimmed(job.setup.networks(entry.role, size), max_bytes),
                 facts=one,
+                masks=self._masks,
+                beyond_px=entry.beyond_px,
+                lattice_px=1 if entry.light is None else LIGHT_CELL_PX,
             )
             for size, one in zip(work.sizes(), facts, strict=True)
         ]
@@ -144,10 +170,11 @@ class _NetworkStage:
         Its activations are the peak: what other stages have freed must not lie beside them.
         """
         cancel = self._job.cancel  # not by the job, which holds the windows
+        inputs = engine.channels
 
         def run(window: FloatArray) -> FloatArray:
             trim_heap(int(TRIM_SHARE * cap_bytes))
-            return engine.run(window, cancel=cancel)
+            return engine.run(window[:, :inputs], cancel=cancel)
 
         return run
 
@@ -156,9 +183,22 @@ class _NetworkStage:
         return 0 if self._windows is None else self._weight_bytes + self._windows.needed_bytes()
 
     def warnings(self) -> tuple[str, ...]:
-        """Name the tiles that were not believed."""
+        """Name the tiles that were not believed, and say where the network moved light."""
         replaced = () if self._guard is None else self._guard.replaced
-        return tuple(f"what came before the network was taken in {tile}" for tile in replaced)
+        tiles = tuple(f"what came before the network was taken in {tile}" for tile in replaced)
+        return (*tiles, *self._moved_light())
+
+    def _moved_light(self) -> tuple[str, ...]:
+        keeper = self._keeper
+        if keeper is None or not keeper.measured or keeper.far_fraction <= NOTED_FRACTION:
+            return ()
+        moved = (
+            f"in {keeper.far_fraction:.1%} of the picture the network changed the brightness of "
+            f"the filter by more than {FAR:.0%}, which noise and lens errors do not explain"
+        )
+        if keeper.bound is not None:
+            return (f"{moved}; the filter's brightness was kept there",)
+        return (f"{moved}; --laws enforce keeps the filter's brightness there",)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
         """Give the outputs of the network."""
@@ -166,11 +206,14 @@ class _NetworkStage:
             raise ContractError("the windows of a network are planned before it runs")
         job, entry = self._job, self._entry
         facts = self._facts()
-        stand_in = self._stand_in(taken)
-        noise = self._noise(taken[-1], len(facts.outputs))
+        planes, masks = _parted(taken)
+        stand_in = self._stand_in(planes)
+        noise = self._noise(planes[-1], len(facts.outputs))
+        self._keeper = self._light_keeper(stand_in, masked=bool(masks))
         self._guard = TileGuard(
             fallback=job.options.on_unsafe == "fallback",
             stand_in=stand_in,
+            inputs=facts.input_channels,
             bound=plain_bound(entry.most_light)
             if noise is None
             else light_bound(entry.most_light, noise, scale=entry.scale),
@@ -181,10 +224,51 @@ class _NetworkStage:
             cancel=job.cancel,
             guard=self._guard,
             stand_in=stand_in,
+            behind=self._keeper,
         )
+        if self._keeper is not None and self._keeper.measured:
+            bands = self._counted(bands, self._keeper)
         if noise is not None:
             bands = self._linear(bands, noise)
-        return self._split(bands, taken[-1], [port.channels for port in facts.outputs])
+        return self._split(bands, planes[-1], [port.channels for port in facts.outputs])
+
+    def _light_keeper(self, stand_in: slice | None, *, masked: bool) -> LightKeeper | None:
+        """Return what is done behind the network; None for nothing.
+
+        Raises:
+            ContractError: If its output cannot be mixed with what it improves on.
+        """
+        entry, options = self._entry, self._job.options
+        if stand_in is None:
+            if options.strength != 1:
+                raise ContractError(
+                    f"strength mixes what a network makes with the picture in front of it, and the "
+                    f"one of the role {entry.role} makes something else; leave it out"
+                )
+            return None
+        behind_bank = front_end(entry, self._job.setup.stages) is not None
+        measured = entry.transform == "stabilise" and behind_bank
+        if not measured and options.strength == 1:
+            return None
+        return LightKeeper(
+            front=stand_in,
+            kept=self._facts().input_channels if masked else None,
+            bound=entry.light,
+            measured=measured,
+            strength=options.strength,
+            scale=entry.scale,
+            threads=self._job.threads,
+        )
+
+    def _counted(self, bands: Iterator[FloatArray], keeper: LightKeeper) -> Iterator[FloatArray]:
+        """Write down with every band in how much of the picture so far light was moved."""
+        for band in bands:
+            self._job.sections["laws"] = {
+                "enforced": keeper.bound is not None,
+                "fallback_fraction": round(keeper.fallback_fraction, 6),
+            }
+            yield band
+            del band
 
     def _noise(self, last: Stream, ports: int) -> NoiseModel | None:
         """Give the noise by which outputs are taken back: every port by that of the last input."""

@@ -194,6 +194,10 @@ class ToyPart:
         del recipe
         return LAYOUTS[role]
 
+    def finish(self, recipe: ToyRecipe, role: str) -> None:
+        """Nothing is done behind a network."""
+        del recipe, role
+
     def prepare(self, recipe: ToyRecipe, recipe_folder: Path, cache_folder: Path) -> ToyMaterial:
         """Read the frozen PSF."""
         del cache_folder

@@ -7,8 +7,16 @@ from pydantic import Field
 
 from camkit.bundle.entry import Positive, Word
 from camkit.bundle.facts import NetworkFacts, Port
+from camkit.bundle.light_bound import BOUND_REACH_PX, LightBound
 from camkit.bundle.plane import Plane
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_domain, need_rows
+from camkit.bundle.stages.entry import (
+    JoinError,
+    Parts,
+    StageEntry,
+    need_domain,
+    need_masks,
+    need_rows,
+)
 
 DEFAULT_ROLE = "restore"
 MAX_FINER = 64
@@ -19,7 +27,8 @@ class Network(StageEntry):
     """A network, in one of the sizes that the bundle holds for its role.
 
     Its planes are the inputs of the network, in order, and what it gives are its outputs. The last
-    input is the best that is known before it: of its grid and domain are the outputs.
+    input is the best that is known before it: of its grid and domain are the outputs. Behind the
+    inputs may come a mask of what clipped, where the light that the network moves is bounded.
 
     Attributes:
         role: Key of `networks` in the manifest.
@@ -30,9 +39,11 @@ class Network(StageEntry):
             it is not believed.
         lights_px: Farther than this from clipped samples its output is its last plane, bit for bit,
             so it need not run there (format 2.2); None for one that acts everywhere.
+        light: How far the local mean of its output may leave that of its last plane (format 2.8);
+            None for one that may move light, as before.
     """
 
-    stands_in: ClassVar[int] = -1
+    stands_in: ClassVar[int] = 1
     type: Literal["network"] = "network"
     takes: tuple[Word, ...] = ("rgb", "restored")
     gives: tuple[Word, ...] = ("clean",)
@@ -41,14 +52,19 @@ class Network(StageEntry):
     scale: Positive = 64.0
     most_light: Positive = 16.0
     lights_px: Annotated[int, Field(ge=1, le=1024)] | None = None
+    light: LightBound | None = None
+
+    @property
+    def beyond_px(self) -> int:
+        """How much farther than the network its stage looks."""
+        return 0 if self.light is None else BOUND_REACH_PX
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the outputs of the network, on a finer grid where it says so."""
         sizes = parts.networks.get(self.role)
         if not sizes:
             raise JoinError(f"the bundle holds no network of the role {self.role!r}")
-        if not taken:
-            raise JoinError("it takes at least one plane")
+        taken = self._without_masks(taken)
         first = taken[0]
         need_rows(first)
         for plane in taken:
@@ -60,6 +76,8 @@ class Network(StageEntry):
         for size, facts in sizes.items():
             _check_ports(size, facts.inputs, taken)
         outputs = _outputs(sizes)
+        if self.light is not None:
+            self._check_bound(taken[-1], outputs)
         if self.transform == "stabilise":
             for port in outputs:
                 _check_noise(port.channels, parts)
@@ -82,6 +100,26 @@ class Network(StageEntry):
             )
             for port in outputs
         )
+
+    def _without_masks(self, planes: Sequence[Plane]) -> list[Plane]:
+        """Return the planes that are inputs, without the masks behind them."""
+        inputs = [plane for plane in planes if plane.domain != "mask"]
+        masks = [plane for plane in planes if plane.domain == "mask"]
+        if not inputs:
+            raise JoinError("it takes at least one plane")
+        if masks and self.light is None:
+            raise JoinError("it takes a mask only where the light that it moves is bounded")
+        if list(planes) != inputs + masks or len(masks) > 1:
+            raise JoinError("it takes one mask at most, behind its inputs")
+        need_masks(masks, inputs[0], "leaves as they are")
+        return inputs
+
+    def _check_bound(self, last: Plane, outputs: Sequence[Port]) -> None:
+        """Refuse a bound on outputs that have no counterpart among what is taken."""
+        if self.transform != "stabilise":
+            raise JoinError("light is bounded where planes are stabilised, and this takes them raw")
+        if [(port.channels, port.scale) for port in outputs] != [(len(last.channels), 1)]:
+            raise JoinError("its light is bounded by its last plane, which its output must match")
 
 
 def _check_ports(size: str, ports: Sequence[Port], taken: Sequence[Plane]) -> None:

@@ -85,6 +85,15 @@ def process(
         str,
         typer.Option(help="Outside the bundle's measured range: warn, fallback (Wiener) or fail."),
     ] = "warn",
+    laws: Annotated[
+        str,
+        typer.Option(
+            help="stated or enforce: keep the filter's brightness where no bundle bounds a network."
+        ),
+    ] = "stated",
+    strength: Annotated[
+        float, typer.Option(help="How much of what a network adds is kept, 0 to 1.")
+    ] = 1.0,
     max_mem: Annotated[str | None, typer.Option(help="Memory cap, such as 2G or 900M.")] = None,
     threads: Annotated[int | None, typer.Option(help="Threads in all.")] = None,
     jobs: Annotated[int, typer.Option(help="Captures at once.")] = 1,
@@ -130,6 +139,8 @@ def process(
         assume=assume,  # type: ignore[arg-type]
         force_bundle=force_bundle,
         on_unsafe=on_unsafe,  # type: ignore[arg-type]
+        laws=laws,  # type: ignore[arg-type]
+        strength=strength,
         max_mem_bytes=None if max_mem is None else parse_memory(max_mem),
         threads=threads,
         unit=None if unit is None else read_unit(unit),

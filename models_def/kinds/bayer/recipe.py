@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.bundle.light_bound import LightBound
 from camkit.bundle.sensor import BayerSensor
 from camkit.bundle.stages import Dehaze, Together, Wiener
 from camkit.bundle.stages.network import DEFAULT_ROLE
@@ -17,6 +18,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.scene_light import DisplayRecipe, WildRecipe
 from camkit.models_def.toml_table import section, typed
+from camkit.models_def.training.pictures import DrawnShares
 from camkit.models_def.training.recipe import (
     DataRecipe,
     Recipe,
@@ -30,8 +32,13 @@ from camkit.models_def.training.recipe import (
 )
 
 ROLES: Final = (DEFAULT_ROLE,)
-OWN: Final = ("object_distance_mm", "scale", "haze", "wiener", "lens", "frames", "fine_tuning")
-CAMERA_PARTS: Final = ("name", "object_distance_mm", "scale", "sensor", "haze", "wiener", "lens")
+OWN: Final = (
+    *("object_distance_mm", "scale", "light", "haze", "wiener", "lens", "frames"),
+    "fine_tuning",
+)
+CAMERA_PARTS: Final = (
+    *("name", "object_distance_mm", "scale", "sensor", "light", "haze", "wiener", "lens"),
+)
 """What says which camera it is; how its networks are trained may differ."""
 _OLDER: Final = {"final": "fine_tuning"}
 
@@ -112,7 +119,12 @@ class BayerDataRecipe(DataRecipe):
             for equally often.
         edge_share: Share of samples of clean edges, which photographs have few of.
         night_share: Share of samples of stars and discs on black.
+        patch_share: Share of samples of charts in any colour, deep primaries too.
         lamp_share: Share of all samples into which lamps far beyond white are put.
+        designed_share: Share of samples through the lens as designed, of several depths only where
+            `known_depth_share` has their kernels apart.
+        light_share: Share of samples in light of any colour, by any white balance from 1, 1, 1 up:
+            raw values of the colours then stand in any ratio.
         known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
             `camkit process --depth-m` gives it; the others' has the mean kernel.
         display: A display that shows the scenes; None for none.
@@ -134,15 +146,22 @@ class BayerDataRecipe(DataRecipe):
     known_depth_share: float = 0.0
     edge_share: float = 0.0
     night_share: float = 0.0
+    patch_share: float = 0.0
     lamp_share: float = 0.0
+    designed_share: float = 0.0
+    light_share: float = 0.0
     display: DisplayRecipe | None = None
     wild: WildRecipe | None = None
 
     def __post_init__(self) -> None:
         DataRecipe.__post_init__(self)
-        check_share("data.edge_share + data.night_share", self.edge_share + self.night_share)
-        if min(self.edge_share, self.night_share) < 0:
-            raise ContractError("data.edge_share and data.night_share must be >= 0")
+        clean = ("edge_share", "night_share", "patch_share")
+        for name in clean:
+            check_share(f"data.{name}", getattr(self, name))
+        named = " + ".join(f"data.{name}" for name in clean)
+        check_share(named, sum(getattr(self, name) for name in clean))
+        check_share("data.light_share", self.light_share)
+        check_share("data.designed_share", self.designed_share)
         check_share("data.lamp_share", self.lamp_share)
         check_share("data.known_depth_share", self.known_depth_share)
         check_share("data.border_share", self.border_share)
@@ -161,9 +180,20 @@ class BayerDataRecipe(DataRecipe):
             raise ContractError("scenes are shown by data.display or lit by data.wild, not both")
 
     def to_json(self) -> dict[str, Any]:
-        """Give what decides samples, to name files by; tables that are not there are left out."""
-        absent = {name for name in ("display", "wild") if getattr(self, name) is None}
+        """Give what decides samples, to name files by; what is not asked for is left out."""
+        later = ("display", "wild", "patch_share", "designed_share", "light_share")
+        absent = {name for name in later if not getattr(self, name)}
         return {name: value for name, value in asdict(self).items() if name not in absent}
+
+    @property
+    def drawn(self) -> DrawnShares:
+        """How often something is drawn whose truth is known to the last pixel."""
+        return DrawnShares(
+            edge=self.edge_share,
+            night=self.night_share,
+            patch=self.patch_share,
+            lamp=self.lamp_share,
+        )
 
     def lit(self, rng: np.random.Generator, scene: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Give the light of a (3, h, w) scene, and what it should become.
@@ -266,6 +296,7 @@ class BayerRecipe(Recipe):
         wiener: Prior and blocks of the Wiener bank in front of the networks.
         lens: The lens, and how far its copies vary.
         fine_tuning: Later training.
+        light: How far networks may move the light of the bank; None for as far as they like.
         haze: How the haze of the lens is undone before the bank; None for a lens without.
         frames: Of a lens with a haze, whose samples are cut from whole frames.
     """
@@ -277,6 +308,7 @@ class BayerRecipe(Recipe):
     wiener: Wiener
     lens: LensRecipe
     fine_tuning: FineTuningRecipe = field(default_factory=FineTuningRecipe)
+    light: LightBound | None = None
     haze: Dehaze | None = None
     frames: FramesRecipe = field(default_factory=FramesRecipe)
 
@@ -286,6 +318,11 @@ class BayerRecipe(Recipe):
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
         if shares and shares != depths:
             raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
+        if self.data.designed_share and depths > 1 and not self.data.known_depth_share:
+            raise ContractError(
+                "data.designed_share needs the kernels of each of lens.depths_mm; set "
+                "data.known_depth_share too"
+            )
         if self.data.known_depth_share and depths < 2:
             raise ContractError("data.known_depth_share needs two or more lens.depths_mm")
 
@@ -335,6 +372,7 @@ def to_bayer_recipe(table: Mapping[str, Any]) -> BayerRecipe:
         lens=section("lens", LensRecipe, table.get("lens", {})),
         data=_data(table.get("data", {})),
         fine_tuning=_fine_tuning(table.get("fine_tuning", {})),
+        light=model("light", LightBound, table) if "light" in table else None,
         haze=model("haze", Dehaze, table) if "haze" in table else None,
         frames=section("frames", FramesRecipe, table.get("frames", {})),
     )
@@ -366,6 +404,8 @@ def samples_digest(recipe: BayerRecipe, seed: int) -> str:
         "object_distance_mm": str(recipe.object_distance_mm),
         "seed": seed,
     }
+    if recipe.light is not None:
+        content["kept"] = True
     if recipe.haze is not None:
         content |= {"haze": recipe.haze.model_dump(mode="json"), "frames": asdict(recipe.frames)}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

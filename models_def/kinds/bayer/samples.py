@@ -8,7 +8,7 @@ A sample is one place on the sensor with one blur. It is simulated with surround
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -22,12 +22,13 @@ from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
+from camkit.models_def.networks.light import bounded, keep_share
 from camkit.models_def.sensors.demosaic import demosaic
 from camkit.models_def.sensors.demosaic import mosaic as sample_cfa
 from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
-from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.models_def.training.sample import Batch, Finish, Sample, SampleLayout
 
 CLIPPED_REACH_PX: Final = 4
 UNKNOWN_ABOVE: Final = 0.9
@@ -39,6 +40,12 @@ LAYOUT: Final = SampleLayout(
     outputs=(Port(name="clean", channels=3),),
 )
 """What the networks take and give. A lens of revolution blurs every way, so samples may turn."""
+KEPT: Final = Port(name="kept", channels=1)
+"""How much of what a network adds is kept beside clipped samples, where its light is bounded."""
+MOST_GAIN: Final = 3.5
+"""Of a white balance; daylight and lamps need 1 to 3."""
+LEAST_CAST: Final = 1 / 8
+"""Of light of any colour: its faintest channel over its brightest."""
 
 Generator = np.random.Generator
 Sides = tuple[bool, bool, bool, bool]
@@ -58,6 +65,9 @@ class Exposure:
         factor: Exposure, 1 for the picture as it is.
         borders: Whether the picture ends at the (top, bottom, left, right) of the sample.
         drift: (size, turn in radians) of the copy's kernels against the traced ones.
+        designed: Whether it is the lens as designed, at the distance of the copy, and no copy.
+        gains: White balance (R, G, B); None for that of the sensor's illuminant.
+        cast: What the light of each channel is multiplied by, behind the white balance.
         depth_known: Whether the Wiener filter has the kernel of the copy's depth.
     """
 
@@ -71,6 +81,9 @@ class Exposure:
     borders: Sides = (False, False, False, False)
     drift: tuple[float, float] = (1.0, 0.0)
     depth_known: bool = False
+    designed: bool = False
+    gains: tuple[float, float, float] | None = None
+    cast: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +168,7 @@ def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposur
     borders = rng.random(4) < 0.4 if at_border else np.zeros(4, dtype=bool)
     least, most = data.exposure_min_ev, data.exposure_max_ev
     stops = rng.triangular(least, min(max(0.0, least), most), most) if most > least else most
-    return Exposure(
+    exposure = Exposure(
         x_mm=float(x_mm),
         y_mm=float(y_mm),
         block_x_mm=float(x_mm + jitter[0]),
@@ -168,6 +181,55 @@ def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposur
         # drawn last, and only where asked for: other recipes keep their samples
         depth_known=data.known_depth_share > 0 and rng.random() < data.known_depth_share,
     )
+    if data.designed_share > 0 and rng.random() < data.designed_share:
+        exposure = replace(exposure, designed=True)
+    if data.light_share > 0 and rng.random() < data.light_share:
+        gains, cast = _draw_light(rng, recipe)
+        exposure = replace(exposure, gains=gains, cast=cast)
+    return exposure
+
+
+def layout_of(recipe: BayerRecipe) -> SampleLayout:
+    """Return what the samples of a recipe hold."""
+    return LAYOUT if recipe.light is None else replace(LAYOUT, masks=(KEPT,))
+
+
+def finish_of(recipe: BayerRecipe) -> Finish | None:
+    """Return what the runtime does behind the network; None where its light is not bounded."""
+    bound = recipe.light
+    if bound is None:
+        return None
+
+    def finish(output: Tensor, batch: Batch) -> Tensor:
+        front = batch.inputs["wiener"].to(output.device)
+        kept = batch.masks[KEPT.name].to(output.device)
+        return bounded(output, front, kept, bound, scale=recipe.scale)
+
+    return finish
+
+
+def _draw_light(
+    rng: Generator, recipe: BayerRecipe
+) -> tuple[tuple[float, float, float] | None, tuple[float, float, float]]:
+    """Draw a white balance from 1, 1, 1 up, and the colour of a light."""
+    gains, cast = None, (1.0, 1.0, 1.0)
+    kind = int(rng.integers(4))
+    if kind == 0:
+        gains = (1.0, 1.0, 1.0)
+    elif kind == 1:
+        red, blue = np.exp(rng.uniform(0, np.log(MOST_GAIN), 2))
+        gains = (float(red), 1.0, float(blue))
+    elif kind == 2:  # raw values of a grey are about equal
+        _, balance = camera_from_rec709(np.array(recipe.sensor.color_matrix))
+        cast = _peak_one(np.array(balance) * np.exp(rng.normal(0, 0.1, 3)))
+    if kind in (1, 3):
+        cast = _peak_one(np.exp(rng.uniform(np.log(LEAST_CAST), 0, 3)))
+    return gains, cast
+
+
+def _peak_one(values: NDArray[np.float64]) -> tuple[float, float, float]:
+    red, green, blue = (float(v) for v in values / values.max())
+    return red, green, blue
 
 
 def _draw_copy(rng: Generator, shares: tuple[float, ...], bank: PsfBank) -> int:
@@ -232,16 +294,21 @@ def photograph(
     if not crop.shape == truth.shape == (3, side, side):
         raise ContractError(f"a crop must be (3, {side}, {side}); got {crop.shape}")
     sensor, data = recipe.sensor, recipe.data
-    matrix, gains = camera_from_rec709(np.array(sensor.color_matrix))
+    matrix, balance = camera_from_rec709(np.array(sensor.color_matrix))
+    gains = balance if exposure.gains is None else exposure.gains
     illumination = bank.illumination_at(float(np.hypot(exposure.x_mm, exposure.y_mm)))
-    to_camera = torch.from_numpy(matrix * exposure.factor).float()
+    cast = np.array(exposure.cast)[:, None]
+    to_camera = torch.from_numpy(cast * matrix * exposure.factor).float()
     sharp, true = (
         (to_camera @ torch.from_numpy(light).reshape(3, -1)).reshape(1, 3, side, side).clamp_(min=0)
         for light in (crop, truth)
     )
-    kernels = _drifted(
-        bank.blur_kernels(exposure.copy, exposure.x_mm, exposure.y_mm), *exposure.drift
-    )
+    place = exposure.x_mm, exposure.y_mm
+    if exposure.designed:
+        kernels = bank.frozen_kernels(*place, exposure.copy % bank.depths)
+    else:
+        kernels = bank.blur_kernels(exposure.copy, *place)
+    kernels = _drifted(kernels, *exposure.drift)
     blurred = _blur(sharp, kernels, bank.radius_px) * illumination
     capture, saturated = expose(blurred, gains, recipe.sensor, exposure.iso, rng)
     noise = sensor.noise_at(exposure.iso).with_gains(gains)
@@ -298,9 +365,12 @@ def finish_shot(developed: Developed, recipe: BayerRecipe, restored: Tensor | No
     # Not asked, a network answers at random: lamps came out dark. Such places stay as the bank has
     # them.
     target = torch.where(target == NOT_JUDGED, stable[1], target)
+    inputs = {port.name: x[0] for port, x in zip(LAYOUT.inputs, stable, strict=True)}
+    if recipe.light is not None:
+        inputs[KEPT.name] = cut_middle(keep_share(developed.unknown), data.sample_px)[0]
     return Shot(
         sample=Sample(
-            inputs={port.name: x[0] for port, x in zip(LAYOUT.inputs, stable, strict=True)},
+            inputs=inputs,
             target=target[0],
             weight=recipe.scale * shot.sqrt(),
         ),

@@ -30,10 +30,11 @@ from camkit.models_def.kinds.bayer.recipe import (
     to_bayer_recipe,
 )
 from camkit.models_def.kinds.bayer.samples import (
-    LAYOUT,
     Developed,
     draw_exposure,
+    finish_of,
     finish_shot,
+    layout_of,
     photograph,
     scene_side_px,
     tint_crop,
@@ -42,7 +43,7 @@ from camkit.models_def.kinds.bayer.validation import BayerJudge, make_validation
 from camkit.models_def.networks.catalog import build_network
 from camkit.models_def.training.kind import Design, SampleMaker
 from camkit.models_def.training.pictures import SceneSource, open_source
-from camkit.models_def.training.sample import Sample, SampleLayout
+from camkit.models_def.training.sample import Finish, Sample, SampleLayout
 
 FAILS_ON: Final = (
     "sources that clip over more than the PSF",
@@ -66,9 +67,7 @@ class BayerMaker:
             picture_share=recipe.data.picture_share,
             scenes=recipe.data.procedural_scenes,
             scene_px=recipe.data.scene_px,
-            edge_share=recipe.data.edge_share,
-            night_share=recipe.data.night_share,
-            lamp_share=recipe.data.lamp_share,
+            drawn=recipe.data.drawn,
         )
 
     def developed(self, index: int) -> Developed:
@@ -103,14 +102,16 @@ class BayerTraining:
 
     def design(self, recipe: BayerRecipe) -> Design:
         """Give the stages of every camera of this kind, with the recipe's bank."""
-        restoring: tuple[Stage, ...] = (recipe.wiener, Network(scale=recipe.scale))
+        wiener, before = recipe.wiener, recipe.wiener.takes[0]
         if recipe.haze is not None:
-            (clear,) = recipe.haze.gives
-            restoring = (
-                recipe.haze,
-                recipe.wiener.model_copy(update={"takes": (clear, *recipe.wiener.takes[1:])}),
-                Network(takes=(clear, *recipe.wiener.gives), scale=recipe.scale),
-            )
+            (before,) = recipe.haze.gives
+            wiener = wiener.model_copy(update={"takes": (before, *wiener.takes[1:])})
+        masks = () if recipe.light is None else wiener.takes[1:]
+        network = Network(
+            takes=(before, *wiener.gives, *masks), scale=recipe.scale, light=recipe.light
+        )
+        hazy = () if recipe.haze is None else (recipe.haze,)
+        restoring: tuple[Stage, ...] = (*hazy, wiener, network)
         return Design(
             stages=(
                 Linearise(),
@@ -133,8 +134,13 @@ class BayerTraining:
 
     def layout(self, recipe: BayerRecipe, role: str) -> SampleLayout:
         """Capture and Wiener planes in, clean planes out."""
-        del recipe, role
-        return LAYOUT
+        del role
+        return layout_of(recipe)
+
+    def finish(self, recipe: BayerRecipe, role: str) -> Finish | None:
+        """Take back the light that a network may not move."""
+        del role
+        return finish_of(recipe)
 
     def prepare(
         self, recipe: BayerRecipe, recipe_folder: Path, cache_folder: Path

@@ -15,10 +15,11 @@ from camkit.contracts import FloatArray
 from camkit.models_def.kinds.bayer.psf_bank import PsfBank
 from camkit.models_def.kinds.bayer.recipe import BayerRecipe
 from camkit.models_def.kinds.bayer.samples import (
-    LAYOUT,
     Exposure,
     Shot,
     corner_height_mm,
+    finish_of,
+    layout_of,
     make_shot,
     scene_side_px,
 )
@@ -147,8 +148,7 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
     """
     with torch.no_grad():
         values = [
-            _psnr(capture, recipe, restore(capture.shot.sample.stacked(LAYOUT)[None])[0])
-            for capture in captures
+            _psnr(capture, recipe, _restored(capture, recipe, restore)) for capture in captures
         ]
     isos, shares = sorted({c.iso for c in captures}), sorted({c.field_share for c in captures})
     by_iso = {f"{iso:g}": _mean(values, [c.iso == iso for c in captures]) for iso in isos}
@@ -158,6 +158,14 @@ def score(captures: Sequence[ValidationCapture], recipe: BayerRecipe, restore: R
     if len(copies) > 1:
         parts["by_copy"] = {f"{n}": _mean(values, [c.copy == n for c in captures]) for n in copies}
     return Score(mean_db=float(np.mean(values)), parts=parts)
+
+
+def _restored(capture: ValidationCapture, recipe: BayerRecipe, restore: Restorer) -> Tensor:
+    """Return (3, s, s) stabilised planes as the runtime has them."""
+    sample, layout, finish = capture.shot.sample, layout_of(recipe), finish_of(recipe)
+    batch = layout.batch(sample.stacked(layout)[None], sample.target[None], sample.weight[None])
+    restored = restore(batch.planes)
+    return restored[0] if finish is None else finish(restored, batch)[0]
 
 
 def to_srgb(stable: Tensor, capture: ValidationCapture, recipe: BayerRecipe) -> FloatArray:

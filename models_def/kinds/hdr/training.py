@@ -119,6 +119,10 @@ class HdrTraining:
         """Captured and lit planes in, clean planes out; see `thesis.samples` for its roles."""
         return layout_of(recipe, role) if role in REFERENCE_ROLES else LAYOUT
 
+    def finish(self, recipe: HdrRecipe, role: str) -> None:
+        """Nothing is done behind a network."""
+        del recipe, role
+
     def prepare(self, recipe: HdrRecipe, recipe_folder: Path, cache_folder: Path) -> HdrMaterial:
         """Compute what the plate writes."""
         return compute_material(recipe, recipe_folder, cache_folder)

@@ -103,6 +103,10 @@ class SpadTraining:
         """Light and its noise in, a picture four times as fine out."""
         return layout_of(recipe, role)
 
+    def finish(self, recipe: SpadRecipe, role: str) -> None:
+        """Nothing is done behind a network."""
+        del recipe, role
+
     def prepare(self, recipe: SpadRecipe, recipe_folder: Path, cache_folder: Path) -> SpadMaterial:
         """Read or make the kernel."""
         del cache_folder

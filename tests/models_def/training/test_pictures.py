@@ -6,7 +6,13 @@ import pytest
 
 from camkit.colorimetry import decode_srgb
 from camkit.errors import ContractError, DecodeError
-from camkit.models_def.training.pictures import list_pictures, open_source, read_picture, to_linear
+from camkit.models_def.training.pictures import (
+    DrawnShares,
+    list_pictures,
+    open_source,
+    read_picture,
+    to_linear,
+)
 
 
 @pytest.fixture
@@ -84,21 +90,27 @@ def test_missing_empty_and_broken_sources_are_refused(tmp_path):
 
 
 def test_a_source_draws_edges_and_nights_as_often_as_it_is_told() -> None:
-    def drawn(**shares: float) -> list[np.ndarray]:
-        source = open_source(None, picture_share=0, scenes=2, scene_px=96, **shares)
+    def drawn(shares: DrawnShares) -> list[np.ndarray]:
+        source = open_source(None, picture_share=0, scenes=2, scene_px=96, drawn=shares)
         rng = np.random.default_rng(0)
         return [source.draw_crop(rng, 48) for _ in range(60)]
 
-    flat = [np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn(edge_share=0.5)]
+    flat = [np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn(DrawnShares(edge=0.5))]
     assert 15 < sum(flat) < 45
-    assert not any(np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn())
-    dark = [np.median(crop) < 0.01 for crop in drawn(night_share=1.0)]
+    assert not any(np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in drawn(DrawnShares()))
+    dark = [np.median(crop) < 0.01 for crop in drawn(DrawnShares(night=1.0))]
     assert np.mean(dark) > 0.5
+    patches = drawn(DrawnShares(patch=1.0))
+    deepest = min(float((crop.min(axis=0) / crop.max(axis=0)).min()) for crop in patches)
+    assert deepest < 0.05, "no deep primary among the patches"
+    assert all(np.median(np.abs(np.diff(crop[1]))) < 1e-6 for crop in patches)
 
 
 def test_lamps_are_put_into_as_many_crops_as_it_is_told(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "grey.png"), np.full((64, 64, 3), 90, np.uint8))
-    source = open_source(tmp_path, picture_share=1, scenes=1, scene_px=64, lamp_share=0.5)
+    source = open_source(
+        tmp_path, picture_share=1, scenes=1, scene_px=64, drawn=DrawnShares(lamp=0.5)
+    )
     rng = np.random.default_rng(0)
     lit = [source.draw_crop(rng, 48).max() > 1 for _ in range(60)]
     assert 15 < sum(lit) < 45

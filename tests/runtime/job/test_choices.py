@@ -36,6 +36,8 @@ CHANGED: dict[str, Any] = {
     "force_bundle": True,
     "origin_px": (2, 4),
     "on_unsafe": "fallback",
+    "laws": "enforce",
+    "strength": 0.5,
     "max_mem_bytes": 500_000_000,
     "threads": 1,
     "tile_px": 32,
@@ -48,7 +50,7 @@ FREE = {"max_mem_bytes", "threads", "method"}
 OF_STAGE = {
     "network": {
         *("size", "quality", "max_seconds", "max_error_db", "mode", "on_unsafe", "tile_px"),
-        *("dtype", "provider"),
+        *("dtype", "provider", "laws", "strength"),
     },
     "wiener": {"depth_m"},
     "demosaic": {"demosaic"},

@@ -1,0 +1,82 @@
+"""The bound on the light that a network may move, in torch: what training puts behind a network.
+
+Twin of camkit/runtime/network/light.py, held together by tests/parity/test_light_parity.py; the
+format is stated in camkit/bundle/light_bound.py.
+"""
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from camkit.bundle.light_bound import (
+    CELL_PX,
+    CELLS_AVERAGED,
+    NEAR_PX,
+    SMOOTHING,
+    LightBound,
+)
+
+_TINY = 1e-6
+
+
+def keep_share(unknown: Tensor) -> Tensor:
+    """Return how much of what a network adds is kept beside clipped samples.
+
+    Args:
+        unknown: (b, 1, h, w) bool.
+
+    Returns:
+        (b, 1, h, w) float32, 0 beside clipped samples, 1 far from them.
+    """
+    clipped = unknown.float()
+    near = [functional.max_pool2d(clipped, 2 * r + 1, 1, r) for r in NEAR_PX]
+    return 1 - torch.stack(near).mean(0)
+
+
+def bounded(
+    output: Tensor, front: Tensor, kept: Tensor | None, bound: LightBound, *, scale: float
+) -> Tensor:
+    """Return an output with the light taken back that exceeds the bound.
+
+    Args:
+        output: (b, c, h, w) of a network, stabilised; h, w multiples of the side of a cell.
+        front: (b, c, h, w), the plane that it improves on.
+        kept: (b, 1, h, w) of `keep_share`; None for 1 everywhere.
+        bound: Of the manifest.
+        scale: Divisor of the stabilising transform.
+    """
+    output = functional.relu(output)
+    both, more = output + front, output - front
+    if kept is not None:
+        both = both * kept
+    moved, weight = _smoothed(_means(more * both)), _smoothed(_means(both))
+    change = moved / weight.clamp(min=_TINY)
+    excess = change
+    if bound.deviations > 0:
+        limit = _limit(_means(front), bound, scale)
+        excess = change - torch.maximum(torch.minimum(change, limit), -limit)
+    taken = functional.interpolate(
+        excess, scale_factor=CELL_PX, mode="bilinear", align_corners=False
+    )
+    restored = output - taken
+    return restored if kept is None else front + kept * (restored - front)
+
+
+def _means(planes: Tensor) -> Tensor:
+    return functional.avg_pool2d(planes, CELL_PX)
+
+
+def _smoothed(cells: Tensor) -> Tensor:
+    channels = cells.shape[1]
+    weights = torch.tensor(SMOOTHING, dtype=cells.dtype, device=cells.device)
+    kernel = torch.outer(weights, weights).expand(channels, 1, -1, -1)
+    padded = functional.pad(cells, (1, 1, 1, 1), mode="replicate")
+    return functional.conv2d(padded, kernel, groups=channels)
+
+
+def _limit(level: Tensor, bound: LightBound, scale: float) -> Tensor:
+    mean = _smoothed(level)
+    spread = (_smoothed(level.square()) - mean.square()).clamp(min=0)
+    noise = (0.5 / scale) ** 2 / (CELL_PX**2 * CELLS_AVERAGED)
+    light = (bound.light_error / 2 * mean).square()
+    return bound.deviations * (bound.psf_error**2 * spread + light + noise).sqrt()

@@ -1,0 +1,103 @@
+"""What is done behind a network, window by window: its light bounded, its change weakened.
+
+    network -> output of a window -> LightKeeper -> pixels that are kept
+
+It also counts in how many cells the network's own local mean left the usual bound.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from camkit.bundle.light_bound import CELL_PX, USUAL_BOUND, LightBound
+from camkit.contracts import FloatArray
+from camkit.runtime.network.light import AddedLight, added_light, take_back
+
+Box = tuple[int, int, int, int]
+"""(top, left, bottom, right) of the pixels of a window that are kept."""
+Behind = Callable[[FloatArray, FloatArray, Box], None]
+"""Changes the (c, h, w) output of a window in place; gets what the network was given, masks too."""
+
+
+@dataclass(slots=True, kw_only=True)
+class LightKeeper:
+    """Bounds the light of one picture's network; serves one thread.
+
+    Attributes:
+        front: Channels of what is given that the network improves on.
+        kept: Channel that says how much is kept beside clipped samples; None for all.
+        bound: What is taken back; None where the light is only measured.
+        measured: Whether the light is measured; without it and a bound only `strength` counts.
+        strength: How much of what the network adds is kept, 0..1.
+        scale: Divisor of the stabilising transform.
+        threads: Threads that share the rows.
+        cells: Cells seen so far.
+        beyond: Of these, cells whose local mean left the usual bound.
+        far: Of these, cells in which much light was moved.
+    """
+
+    front: slice
+    kept: int | None
+    bound: LightBound | None
+    measured: bool
+    strength: float
+    scale: float
+    threads: int = 1
+    cells: int = 0
+    beyond: int = 0
+    far: int = 0
+
+    def __call__(self, output: FloatArray, given: FloatArray, box: Box) -> None:
+        """Change the output of a window.
+
+        Args:
+            output: (c, h, w) float32, stabilised.
+            given: (channels, h, w) float32: inputs of the network, and what is kept.
+            box: Pixels that the window keeps.
+        """
+        front = given[self.front]
+        kept = None if self.kept is None else given[self.kept]
+        if kept is not None and float(kept.min()) == 1:
+            kept = None
+        excess = None
+        if self.bound is not None:
+            added = self._added(front, output, kept, self.bound)
+            self._count(added, box)
+            excess = added.excess
+        elif self.measured:
+            whole = np.s_[:, : _floor(output.shape[1]), : _floor(output.shape[2])]
+            seen = output[whole].copy()
+            self._count(self._added(front[whole], seen, None, USUAL_BOUND), box)
+        if excess is None and kept is None and self.strength == 1:
+            return
+        take_back(front, output, kept, excess, strength=self.strength, threads=self.threads)
+
+    @property
+    def fallback_fraction(self) -> float:
+        """Return the share of cells whose local mean left the usual bound."""
+        return self.beyond / max(self.cells, 1)
+
+    @property
+    def far_fraction(self) -> float:
+        """Return the share of cells in which much light was moved."""
+        return self.far / max(self.cells, 1)
+
+    def _added(
+        self, front: FloatArray, output: FloatArray, kept: FloatArray | None, bound: LightBound
+    ) -> AddedLight:
+        return added_light(front, output, kept, bound, scale=self.scale, threads=self.threads)
+
+    def _count(self, added: AddedLight, box: Box) -> None:
+        top, left, bottom, right = box
+        inside = np.s_[
+            top // CELL_PX : -(-bottom // CELL_PX), left // CELL_PX : -(-right // CELL_PX)
+        ]
+        self.cells += added.beyond[inside].size
+        self.beyond += int(np.count_nonzero(added.beyond[inside]))
+        self.far += int(np.count_nonzero(added.far[inside]))
+
+
+def _floor(side_px: int) -> int:
+    """Return the whole cells of a side, in pixels."""
+    return side_px // CELL_PX * CELL_PX
