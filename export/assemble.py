@@ -5,6 +5,7 @@ checkpoints       -> networks -> ONNX, with what their graphs say   (network_fac
 a first bundle    -> golden captures, and what its networks are given for them
 networks, inputs  -> measured facts                                 (network_facts)
 a second bundle   -> its outputs on the golden captures             (golden_cases)
+a third bundle    -> the laws of its pictures
 everything        -> card, preview, manifest -> bundle -> `check_bundle`
 
 What a camera is made of, its kind says (`camkit.models_def.training.kind.Design`).
@@ -47,7 +48,7 @@ from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError
-from camkit.export.card import card_text, preview_png
+from camkit.export.card import card_text, laws_text, preview_png
 from camkit.export.designed_optics import designed_members
 from camkit.export.golden_cases import (
     HAZE_SCENE,
@@ -73,6 +74,7 @@ from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.haze import make_haze_golden
+from camkit.runtime.proof.laws.proof import hold_laws, with_laws
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -134,12 +136,16 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         if manifest.has_haze:
             members[HAZE_GOLDEN] = haze_golden_to_bytes(make_haze_golden(second, HAZE_SCENE))
         whites = {name: float(case.recipe.get(WHITE, 1.0)) for name, (case, _) in cases.items()}
-        members[CARD] = card_text(second, golden, camera.design.fails_on, whites).encode()
-        members[PREVIEW] = preview_png(second, golden)
         manifest = manifest.model_copy(update={"golden": tuple(case for case, _ in cases.values())})
-        third = Path(folder) / "third.camkit"
-        write_bundle(third, manifest, members)
-        report = check_bundle(third, run=case_work)
+        third = write_bundle(Path(folder) / "third.camkit", manifest, members)
+        laws = hold_laws(third)
+        manifest = with_laws(manifest, laws)
+        card = card_text(second, golden, camera.design.fails_on, whites)
+        members[CARD] = (card + laws_text(laws)).encode()
+        members[PREVIEW] = preview_png(second, golden)
+        proved = Path(folder) / "proved.camkit"
+        write_bundle(proved, manifest, members)
+        report = check_bundle(proved, run=case_work, without=("laws",))
         if not report.passed:
             raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -12,6 +12,7 @@ from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, depth_name
 from camkit.export.energy import energy_diameter_px, modulation
+from camkit.runtime.proof.laws.proof import Found
 
 BORDER_PX: Final = 16
 _PLACES: Final = {"radial": "field heights", "uniform": "place", "grid": "places"}
@@ -78,6 +79,24 @@ def card_text(
         "",
     ]
     return "\n".join(lines)
+
+
+def laws_text(found: Found) -> str:
+    """Write which laws of a picture its networks keep, to be put behind the card."""
+    if isinstance(found, str):
+        return f"\nLaws of a picture: {found}.\n"
+    lines = ["", "## Laws of a picture (`camkit check --level laws`)", ""]
+    lines += ["| size | law | worst | admitted | front end | |", "|---|---|---|---|---|---|"]
+    for size, laws in found.items():
+        for law in laws:
+            front = "" if law.front is None else f"{law.front:.4g}"
+            kept = "kept" if law.kept else f"BROKEN: {law.where}"
+            unit = "" if law.unit == "%" else f" {law.unit}"
+            lines.append(
+                f"| {size or ''} | {law.name.replace('_', ' ')} | {law.worst:.4g}{unit} | "
+                f"{law.limit:.4g}{unit} | {front} | {kept} |"
+            )
+    return "\n".join([*lines, ""])
 
 
 def _response(sensor: Sensor) -> list[str]:

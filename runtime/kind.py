@@ -62,6 +62,7 @@ class RuntimePart:
         maker: What makes its products; None for photographs.
         proving: How its bundles prove themselves, where it has a maker.
         recording: How its captures are simulated, where it has a maker.
+        laws: Name of the module whose `LAWS` holds the laws of its pictures against a bundle.
     """
 
     read: Callable[[Path, MosaicOptions | None, Manifest | None], Capture] = _no_photograph
@@ -72,6 +73,7 @@ class RuntimePart:
     maker: Maker | None = None
     proving: Proving | None = None
     recording: Recording | None = None
+    laws: str = "camkit.runtime.proof.laws.pictures"
 
 
 def runtime_part(kind: str) -> RuntimePart:

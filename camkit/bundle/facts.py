@@ -128,6 +128,22 @@ class CardRow(Entry):
     command: str
 
 
+class StatedLaw(Entry):
+    """The worst number of a law of a picture, as export met it.
+
+    Attributes:
+        worst: The number.
+        limit: What is admitted.
+        unit: Of both; % of shares.
+        kept: Whether the law is kept.
+    """
+
+    worst: float
+    limit: float
+    unit: str = ""
+    kept: bool
+
+
 class Card(Entry):
     """Measured accuracy and speed."""
 

@@ -13,7 +13,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from camkit.bundle.entry import Entry, NonNegative
+from camkit.bundle.entry import Entry
 
 CELL_PX: Final = 4
 """Side of a cell. Cells lie on the lattice of the picture, which windows keep to."""
@@ -21,6 +21,8 @@ SMOOTHING: Final = (0.25, 0.5, 0.25)
 """Over neighbouring cells, along rows and along columns."""
 CELLS_AVERAGED: Final = 64 / 9
 """Cells of equal weight whose mean has the noise of a smoothed cell: 1 / (sum of squares)^2."""
+NOISE_OF_CELLS: Final = 4.0
+"""So many times the noise of a cell counts as noise: a filter and a demosaic raise it."""
 BOUND_REACH_PX: Final = 9
 """From a pixel to the farthest one that its bound is computed from: its own cell, the next one by
 interpolation, one more by smoothing; the second row of a cell lies 9 from the first of that."""
@@ -34,22 +36,30 @@ MASK_REACH_PX: Final = BOUND_REACH_PX + NEAR_PX[1]
 class LightBound(Entry):
     """How far the local mean of a network's output may leave that of its last plane.
 
-    The standard deviation of a stabilised value is what noise, an error of the kernels and one of
-    the light explain:
+    In stabilised values, over smoothed cells of the last plane, m their mean and V their variance:
 
-        sigma^2 = (0.5 / scale)^2 / pixels averaged + psf_error^2 * (variance of cell means)
-                  + (light_error / 2 * mean)^2
+        limit^2 = (noise * n)^2 + (light / 2 * m)^2
+                  + spread^2 * max(V - NOISE_OF_CELLS * n_cell^2, 0)
+
+    with n_cell = 0.5 / (scale * side of a cell), the noise of a cell, and n that of a smoothed one.
+    All zero admits detail alone.
 
     Attributes:
-        deviations: So many standard deviations; 0 admits detail alone.
-        psf_error: Relative error of the kernels.
-        light_error: Relative error of the light.
+        noise: So many standard deviations of the noise.
+        spread: So much of the contrast between cells that noise does not explain: what an error of
+            the kernels may have got wrong.
+        light: Relative error of the light.
     """
 
-    deviations: Annotated[float, Field(ge=0, le=100)] = 0.0
-    psf_error: NonNegative = 0.1
-    light_error: NonNegative = 0.0
+    noise: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    spread: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    light: Annotated[float, Field(ge=0, le=1000)] = 0.0
+
+    @property
+    def admits_detail_alone(self) -> bool:
+        """Whether no light may be moved at all."""
+        return self.noise == self.spread == self.light == 0
 
 
-USUAL_BOUND: Final = LightBound(deviations=3.0, psf_error=0.1, light_error=0.01)
+USUAL_BOUND: Final = LightBound(noise=3.0, spread=0.3, light=0.03)
 """What a network is held against that states no bound of its own."""

@@ -25,7 +25,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from camkit.bundle.chain import CAPTURE, capture_plane, check_haze, check_use, join_stages
 from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Sorted, Word
-from camkit.bundle.facts import Card, NetworkFacts
+from camkit.bundle.facts import Card, NetworkFacts, StatedLaw
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
@@ -125,6 +125,7 @@ class Manifest(Entry):
         products: Name of a result -> the plane that it is.
         networks: Role -> size -> facts.
         freeze: What freezing the PSF kept and what it cost (`loss_db` and whatever it measured).
+        laws: Size -> law of a picture -> what export measured (format 2.8); None where it was not.
         exported_with: Package -> version.
     """
 
@@ -149,6 +150,13 @@ class Manifest(Entry):
     freeze: Annotated[dict[str, int | float | str], Sorted] = Field(default_factory=dict)
     envelope: Annotated[dict[str, Range], Sorted] | None = None
     plan: Annotated[dict[str, Threshold], Sorted] | None = None
+    laws: (
+        Annotated[
+            dict[NetworkSize, Annotated[dict[Word, StatedLaw], Field(max_length=32)]],
+            Field(max_length=16),
+        ]
+        | None
+    ) = None
     exported_with: Annotated[dict[str, str], Sorted] = Field(default_factory=dict)
     members: Annotated[dict[str, Member], Sorted] = Field(default_factory=dict)
 
@@ -188,6 +196,12 @@ class Manifest(Entry):
     def has_haze(self) -> bool:
         """Tell whether a haze lies beside these kernels."""
         return self.optics is not None and self.optics.type == "hazy_psf"
+
+    @property
+    def version_pair(self) -> tuple[int, int]:
+        """Major and minor version of its format."""
+        major, minor = self.format_version.split(".")
+        return int(major), int(minor)
 
     @property
     def bounds_light(self) -> bool:

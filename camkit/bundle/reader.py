@@ -261,6 +261,8 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
     if manifest.bounds_light:
         _need_version(manifest, LIGHT_VERSION, "a network's light is bounded")
+    if manifest.laws is not None:
+        _need_version(manifest, LIGHT_VERSION, "laws of a picture are stated")
     # Unpacking and hashing leave Python's lock to others.
     with ThreadPoolExecutor(CHECKED_AT_ONCE) as pool:
         checks = [
@@ -327,8 +329,7 @@ def _hazy(container: Container, manifest: Manifest, optics: FrozenOptics) -> Fro
 
 def _need_version(manifest: Manifest, needed: tuple[int, int], what: str) -> None:
     """Refuse what the stated format did not know."""
-    version = tuple(int(part) for part in manifest.format_version.split("."))
-    if version < needed:
+    if manifest.version_pair < needed:
         raise BundleError(
             f"{what}, which format {'.'.join(map(str, needed))} brought, and the manifest states "
             f"{manifest.format_version}; export the bundle again"

@@ -12,6 +12,7 @@ from camkit.bundle.light_bound import (
     CELL_PX,
     CELLS_AVERAGED,
     NEAR_PX,
+    NOISE_OF_CELLS,
     SMOOTHING,
     LightBound,
 )
@@ -52,7 +53,7 @@ def bounded(
     moved, weight = _smoothed(_means(more * both)), _smoothed(_means(both))
     change = moved / weight.clamp(min=_TINY)
     excess = change
-    if bound.deviations > 0:
+    if not bound.admits_detail_alone:
         limit = _limit(_means(front), bound, scale)
         excess = change - torch.maximum(torch.minimum(change, limit), -limit)
     taken = functional.interpolate(
@@ -76,7 +77,8 @@ def _smoothed(cells: Tensor) -> Tensor:
 
 def _limit(level: Tensor, bound: LightBound, scale: float) -> Tensor:
     mean = _smoothed(level)
-    spread = (_smoothed(level.square()) - mean.square()).clamp(min=0)
-    noise = (0.5 / scale) ** 2 / (CELL_PX**2 * CELLS_AVERAGED)
-    light = (bound.light_error / 2 * mean).square()
-    return bound.deviations * (bound.psf_error**2 * spread + light + noise).sqrt()
+    cell = (0.5 / scale / CELL_PX) ** 2
+    beyond = (_smoothed(level.square()) - mean.square() - NOISE_OF_CELLS * cell).clamp(min=0)
+    light = (bound.light / 2 * mean).square()
+    noise = bound.noise**2 * cell / CELLS_AVERAGED
+    return (bound.spread**2 * beyond + light + noise).sqrt()

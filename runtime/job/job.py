@@ -190,7 +190,7 @@ class Job:
             if not options.force_bundle:
                 raise ContractError(f"{told}; leave --bundle out, or say --force-bundle")
             self.notes.append(f"{told}: the blur of another lens is undone")
-        elif capture.bundle_name is None and capture.camera and options.assume is not None:
+        elif capture.bundle_name is None and capture.camera and manifest.has_kernels:
             self.notes.append(
                 f"the file names the camera {capture.camera}: unless the lens of bundle {name} was "
                 "on it, the blur of another lens is undone"

@@ -230,7 +230,7 @@ class Reconstruction:
         """
         for number, stage in enumerate(self._setup.stages):
             if isinstance(stage, Network) and stage.role == role:
-                taken = self._walk.taken_by(number)
+                taken = [s for s in self._walk.taken_by(number) if s.plane.domain != "mask"]
                 rows = stage_module(stage.type).given_rows(stage, self.job, taken)
                 made: FloatArray = rows.read(0, rows.shape[1])
                 return made

@@ -7,9 +7,9 @@ from typing import Final
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Color, Demosaic, Linearise, RaiseClipped, Stage, WhiteBalance
 from camkit.errors import ContractError
-from camkit.runtime.job.laws import lawful
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
+from camkit.runtime.plan.laws import lawful
 from camkit.runtime.plan.speed import Speed
 
 DEVELOPMENT: Final[tuple[Stage, ...]] = (
@@ -45,8 +45,7 @@ class Setup:
         """Give the stages that are walked."""
         if self.bundle is None:
             return DEVELOPMENT
-        manifest = self.bundle.manifest
-        return lawful(manifest.stages, manifest.all_planes, self.options.laws)
+        return lawful(self.bundle.manifest, self.options.laws)
 
     @property
     def known_bundle(self) -> Bundle:

@@ -22,6 +22,7 @@ from camkit.bundle.light_bound import (
     CELL_PX,
     CELLS_AVERAGED,
     NEAR_PX,
+    NOISE_OF_CELLS,
     SMOOTHING,
     USUAL_BOUND,
     LightBound,
@@ -276,11 +277,13 @@ def _smoothed(cells: FloatArray) -> FloatArray:
 
 def _limit(mean: FloatArray, spread: FloatArray, bound: LightBound, scale: float) -> FloatArray:
     """Return how far a smoothed cell may leave the front end, of mean and variance of cells."""
-    noise = (0.5 / scale) ** 2 / (CELL_PX**2 * CELLS_AVERAGED)
-    variance = np.float32(bound.psf_error**2) * spread + np.float32(noise)
-    if bound.light_error:
-        variance += np.square(np.float32(bound.light_error / 2) * mean)
-    return np.asarray(np.float32(bound.deviations) * np.sqrt(variance), dtype=np.float32)
+    cell = (0.5 / scale / CELL_PX) ** 2
+    beyond = np.maximum(spread - np.float32(NOISE_OF_CELLS * cell), 0)
+    variance = np.float32(bound.spread**2) * beyond
+    variance += np.float32(bound.noise**2 * cell / CELLS_AVERAGED)
+    if bound.light:
+        variance += np.square(np.float32(bound.light / 2) * mean)
+    return np.asarray(np.sqrt(variance), dtype=np.float32)
 
 
 def _checked(front: FloatArray, output: FloatArray) -> tuple[int, int, int]:

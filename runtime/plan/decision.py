@@ -13,6 +13,7 @@ from camkit.errors import ContractError
 from camkit.runtime.content import Content
 from camkit.runtime.geometry.placement import Placement
 from camkit.runtime.options import Mode, Options
+from camkit.runtime.plan.laws import lawful
 
 Labels = NDArray[np.int8]
 
@@ -61,6 +62,12 @@ class Subject:
     def facts(self, size: str) -> NetworkFacts:
         """Give the facts of one size of the first network of the camera."""
         return self.bundle.network_facts(next(iter(self.bundle.manifest.networks)), size)
+
+    def reach_px(self, size: str) -> int:
+        """Return how far the first network of the camera looks, with what is done behind it."""
+        stages = lawful(self.bundle.manifest, self.options.laws)
+        beyond = max((stage.beyond_px for stage in stages if isinstance(stage, Network)), default=0)
+        return self.facts(size).reach_px + beyond
 
     @property
     def megapixels(self) -> float:

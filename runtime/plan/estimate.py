@@ -128,7 +128,7 @@ def tier_work_of(subject: Subject, work: Work) -> TierWork:
     small = None if work.small is None else subject.facts(work.small)
     return TierWork(
         full_mac=full.mac_per_pixel,
-        full_halo_px=full.reach_px,
+        full_halo_px=subject.reach_px(work.size),
         small_mac=None if small is None else small.mac_per_pixel,
-        small_halo_px=0 if small is None else small.reach_px,
+        small_halo_px=0 if work.small is None else subject.reach_px(work.small),
     )

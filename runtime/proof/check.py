@@ -6,11 +6,12 @@
     golden   the stored cases come out again
     tiling   tiled == whole, bit for bit; no pixel acts further than the stated reach
     range    activations stay where they were measured, and in fp16 where that is claimed
+    laws     pictures keep their light: white, even areas, exposure, zones, borders
 
 A layer whose ground failed is skipped, and says so.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -26,12 +27,16 @@ from camkit.runtime.kind import part_of
 from camkit.runtime.kind_parts.proving import GoldenRun
 from camkit.runtime.network.graph import COST_RTOL, check_graph
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES
+from camkit.runtime.proof.laws.proof import BrokenLawsError, prove_laws
 from camkit.runtime.proof.layers import prove_golden, prove_range, prove_tiling
 from camkit.runtime.stage_finder import check_stages
 
-LAYERS: Final = ("schema", "hash", "graph", "golden", "tiling", "range")
+LAYERS: Final = ("schema", "hash", "graph", "golden", "tiling", "range", "laws")
 Status = Literal["pass", "fail", "skip"]
 _GROUND: Final = ("schema", "hash", "graph")
+Facts = Sequence[Mapping[str, Any]]
+Result = tuple[bool, str] | tuple[bool, str, Facts]
+"""Whether something was shown, what, and for programs every number of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +46,7 @@ class Layer:
     name: str
     status: Status
     message: str
+    facts: Sequence[Mapping[str, Any]] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +72,7 @@ class CheckReport:
             "passed": self.passed,
             "layers": [
                 {"name": layer.name, "status": layer.status, "message": layer.message}
+                | ({"laws": list(layer.facts)} if layer.facts else {})
                 for layer in self.layers
             ],
         }
@@ -77,6 +84,7 @@ def check_bundle(
     *,
     run: GoldenRun | None = None,
     threads: int = 1,
+    without: Collection[str] = (),
 ) -> CheckReport:
     """Check a bundle.
 
@@ -86,6 +94,7 @@ def check_bundle(
             graph).
         run: The pipeline, for the golden cases; without it networks are proved on noise alone.
         threads: Threads per run of a network.
+        without: Layers that are left out of "all".
 
     Raises:
         ContractError: If the level is unknown.
@@ -93,16 +102,17 @@ def check_bundle(
     if level not in ("all", *LAYERS):
         raise ContractError(f"level must be all or one of {', '.join(LAYERS)}; got {level!r}")
     wanted = LAYERS if level == "all" else _needed(level)
-    proofs: dict[str, Callable[[Bundle], tuple[bool, str]]] = {
+    proofs: dict[str, Callable[[Bundle], Result]] = {
         "hash": _prove_hashes,
         "graph": _prove_graphs,
         "golden": lambda bundle: prove_golden(bundle, run=run),
         "tiling": lambda bundle: prove_tiling(bundle, run=run, threads=threads),
         "range": lambda bundle: prove_range(bundle, run=run),
+        "laws": lambda bundle: prove_laws(bundle, threads=threads),
     }
     layers = [_layer("schema", lambda: (True, _describe(Path(path))))]
     opened: list[Bundle] = []
-    for name in wanted[1:]:
+    for name in (name for name in wanted[1:] if name not in without):
         failed = [one.name for one in layers if one.status == "fail" and one.name in _GROUND]
         if failed:
             layers.append(Layer(name=name, status="skip", message=f"needs {failed[0]}"))
@@ -116,24 +126,27 @@ def _needed(level: str) -> tuple[str, ...]:
     return (*below, level)
 
 
-def _prove(
-    proof: Callable[[Bundle], tuple[bool, str]], path: Path, opened: list[Bundle]
-) -> tuple[bool, str]:
+def _prove(proof: Callable[[Bundle], Result], path: Path, opened: list[Bundle]) -> Result:
     """Run a proof on the bundle, which is opened once for all of them."""
     if not opened:
         opened.append(open_bundle(path))
     return proof(opened[0])
 
 
-def _layer(name: str, prove: Callable[[], tuple[bool, str]]) -> Layer:
+def _layer(name: str, prove: Callable[[], Result]) -> Layer:
+    facts: Sequence[Mapping[str, Any]] = ()
     try:
-        proved, message = prove()
+        proved, message, *more = prove()
+        facts = more[0] if more else ()
+    except BrokenLawsError as error:
+        return Layer(name=name, status="fail", message=str(error), facts=error.facts)
     except CamkitError as error:
         return Layer(name=name, status="fail", message=str(error))
     except MemoryError:
         text = "out of memory: the bundle asks for more than this machine has free"
         return Layer(name=name, status="fail", message=text)
-    return Layer(name=name, status="pass" if proved else "skip", message=one_line(message))
+    status: Status = "pass" if proved else "skip"
+    return Layer(name=name, status=status, message=one_line(message), facts=facts)
 
 
 def _describe(path: Path) -> str:

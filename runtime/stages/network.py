@@ -14,7 +14,6 @@ from camkit.errors import ContractError
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
-from camkit.runtime.job.laws import front_end
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.job.walker import USUAL_BYTES
@@ -32,6 +31,7 @@ from camkit.runtime.network.windows import (
 )
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.estimate import network_seconds, role_window_mp
+from camkit.runtime.plan.laws import broken_laws, front_end
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
@@ -186,7 +186,17 @@ class _NetworkStage:
         """Name the tiles that were not believed, and say where the network moved light."""
         replaced = () if self._guard is None else self._guard.replaced
         tiles = tuple(f"what came before the network was taken in {tile}" for tile in replaced)
-        return (*tiles, *self._moved_light())
+        return (*tiles, *self._moved_light(), *self._broken_laws())
+
+    def _broken_laws(self) -> tuple[str, ...]:
+        bundle = self._job.known_bundle
+        broken = broken_laws(bundle.manifest, self._job.work.sizes())
+        if not broken:
+            return ()
+        return (
+            f"bundle {bundle.manifest.name} breaks laws of a picture ({', '.join(broken)}); "
+            "its card says by how much",
+        )
 
     def _moved_light(self) -> tuple[str, ...]:
         keeper = self._keeper

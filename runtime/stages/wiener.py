@@ -172,7 +172,7 @@ def _plain(job: Job) -> PlainBlock | None:
     work, subject = job.work, job.subject
     if work.labels is None or subject is None:
         return None
-    reach = max((subject.facts(size).reach_px for size in work.sizes()), default=0)
+    reach = max((subject.reach_px(size) for size in work.sizes()), default=0)
     return plain_blocks(work.labels, reach)
 
 
@@ -188,7 +188,7 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
         work_share = _light_work(subject.content.lights, (rows, columns), block_px, kernel_px)
         blocks += work_share * (speed.clipped_block_s - speed.block_s)
     if work.labels is not None:
-        reach = max((subject.facts(size).reach_px for size in work.sizes()), default=0)
+        reach = max((subject.reach_px(size) for size in work.sizes()), default=0)
         test = plain_blocks(work.labels, reach)
         if test is not None:
             blocks *= [[not test(row, column) for column in columns] for row in rows]

@@ -15,14 +15,14 @@ def check(
     level: Annotated[
         str,
         typer.Option(
-            help="all, or one of schema, hash, graph, golden, tiling, range "
+            help="all, or one of schema, hash, graph, golden, tiling, range, laws "
             "(with the layers it stands on)."
         ),
     ] = "all",
     json_: Json = False,
     _debug: Debug = False,
 ) -> None:
-    """Prove a bundle: schema, hashes, graphs, golden cases, tiled = whole, fp16 range."""
+    """Prove a bundle: members, graphs, golden cases, tiled = whole, range, laws of a picture."""
     from camkit.bundle.reader import find_bundle
     from camkit.runtime.proof.check import check_bundle
     from camkit.runtime.proof.golden_run import case_work

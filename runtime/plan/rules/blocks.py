@@ -22,7 +22,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     count = len(rows) * len(columns)
     if work.labels is None:
         return work, Decision(what="blocks", choice=f"all {count}", reason="no plain cells")
-    reach = max((subject.facts(s).reach_px for s in work.sizes()), default=0)
+    reach = max((subject.reach_px(s) for s in work.sizes()), default=0)
     kept = count - round(plain_share(work.labels, reach, rows, columns) * count)
     return work, Decision(
         what="blocks",

@@ -24,4 +24,4 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     if shorter:
         least = min(shorter, key=lambda entry: entry.halo_px)
         reason += f"; --mode fast takes {least.halo_px} px at {least.psnr_db:.0f} dB of the exact"
-    return work, Decision(what="halo", choice=f"{facts.reach_px} px", reason=reason)
+    return work, Decision(what="halo", choice=f"{subject.reach_px(work.size)} px", reason=reason)

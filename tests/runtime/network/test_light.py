@@ -17,7 +17,7 @@ from camkit.runtime.network.light import KeptRows, added_light, keep_share, take
 from camkit.runtime.rows import ArrayRows
 
 SCALE = 64.0
-DETAIL = LightBound(deviations=0.0)
+DETAIL = LightBound()
 Array = NDArray[np.float32]
 
 
@@ -84,7 +84,7 @@ def test_detail_whose_mean_is_right_stays_as_it_is() -> None:
 
 def test_within_the_bound_nothing_is_taken_back() -> None:
     front, output = _window(1)
-    wide = LightBound(deviations=100.0, psf_error=10.0)
+    wide = LightBound(noise=100.0, light=10.0)
     made = _bounded(front, output, None, wide)
     np.testing.assert_array_equal(made, np.maximum(output, 0))
 
@@ -92,7 +92,7 @@ def test_within_the_bound_nothing_is_taken_back() -> None:
 @pytest.mark.parametrize("deviations", [0.5, 1.0, 3.0])
 def test_what_stays_of_an_even_change_is_at_most_what_noise_explains(deviations: float) -> None:
     front = np.full((1, 40, 40), 1.0, np.float32)
-    made = _bounded(front, front + np.float32(0.2), None, LightBound(deviations=deviations))
+    made = _bounded(front, front + np.float32(0.2), None, LightBound(noise=deviations))
     noise = 0.5 / SCALE / np.sqrt(CELL_PX**2 * 64 / 9)
     np.testing.assert_allclose(made - front, deviations * noise, rtol=1e-3)
 

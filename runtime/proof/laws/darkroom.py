@@ -1,0 +1,154 @@
+"""Scenes photographed by a bundle's twin, and what networks and their front end make of them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from camkit.bundle.reader import Bundle
+from camkit.bundle.stages import Color, Undistort
+from camkit.contracts import FloatArray
+from camkit.runtime.job.choices import known_options
+from camkit.runtime.kind import part_of
+from camkit.runtime.options import Options
+from camkit.runtime.pipeline import Pipeline
+from camkit.runtime.plan.decision import Work
+from camkit.runtime.plan.ways import without_networks
+from camkit.runtime.twin.simulate import Simulation, SimulationOptions
+from camkit.runtime.twin.truth import light_sensor, true_picture
+
+PLACES: Final = {"middle": 0.0, "half-way": 0.5, "corner": 1.0}
+"""Where on the sensor: share of the way from its middle to its corner."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exposed:
+    """A scene as the camera sees it, and pictures of it.
+
+    Attributes:
+        truth: (3, h, w) linear Rec.709, in the geometry of the sensor.
+        network: Picture behind the networks.
+        front: Picture of the front end alone, as the camera has it without its networks.
+        light: (c, h, w) of `network` in the colours of the camera.
+        front_light: Likewise of `front`.
+    """
+
+    truth: FloatArray
+    network: FloatArray
+    front: FloatArray
+    light: FloatArray
+    front_light: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Darkroom:
+    """A bundle with one size of its networks, and its twin.
+
+    Attributes:
+        bundle: The camera; its twin photographs, and its networks can be left out.
+        size: Of the networks.
+        threads: To compute with.
+    """
+
+    bundle: Bundle
+    size: str
+    threads: int
+
+    @cached_property
+    def isos(self) -> tuple[float, float]:
+        """Lowest and highest ISO that the bundle states."""
+        known = [entry.iso for entry in light_sensor(self.bundle.manifest).noise]
+        return min(known), max(known)
+
+    @cached_property
+    def depth_mm(self) -> float | None:
+        """Distance of the scenes."""
+        return None if self.bundle.manifest.optics is None else self.bundle.reference_depth_mm
+
+    @cached_property
+    def _networks(self) -> Pipeline:
+        return Pipeline(self.bundle, Options(size=self.size, threads=self.threads, **self._flat()))
+
+    @cached_property
+    def _front(self) -> Pipeline:
+        work = without_networks(self.bundle.manifest, Work())
+        assert work is not None
+        return Pipeline(
+            self.bundle, Options(method=work.method, threads=self.threads, **self._flat())
+        )
+
+    def _flat(self) -> dict[str, Any]:
+        """Leave pictures in the geometry of the sensor, where the truth lies."""
+        known = known_options(self.bundle.manifest.stages)
+        return {"undistort": False} if "undistort" in known else {}
+
+    def origin_px(self, place: str, size_px: tuple[int, int]) -> tuple[int, int] | None:
+        """Return where a crop of (height, width) lies; None for a sensor of any size."""
+        extent = self.bundle.manifest.sensor.extent
+        if extent is None:
+            return None
+        share = PLACES[place]
+        room = extent.width_px - size_px[1], extent.height_px - size_px[0]
+        left, top = (int(side / 2 * (1 + share)) // 2 * 2 for side in room)
+        return left, top
+
+    def expose(
+        self, scene: FloatArray, place: str, *, iso: float, seed: int = 1, noise: bool = True
+    ) -> Exposed:
+        """Photograph a scene and make both pictures of it."""
+        options = SimulationOptions(
+            iso=iso,
+            seed=seed,
+            noise=noise,
+            origin_px=self.origin_px(place, scene.shape[1:]),
+            depth_mm=self.depth_mm,
+        )
+        simulation = part_of(self.bundle.manifest).simulate(scene, self.bundle, options)
+        network, light = self._pictures(self._networks, simulation)
+        front, front_light = self._pictures(self._front, simulation)
+        return Exposed(
+            truth=true_picture(simulation.clean, light_sensor(self.bundle.manifest)),
+            network=network,
+            front=front,
+            light=light,
+            front_light=front_light,
+        )
+
+    def _pictures(
+        self, pipeline: Pipeline, simulation: Simulation
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the picture, and its light before the colours of the output."""
+        x_px, y_px = simulation.window.origin_px
+        capture = pipeline.capture_of(
+            simulation.samples,
+            iso=simulation.iso,
+            white_balance=simulation.white_balance,  # type: ignore[arg-type]
+            origin_px=(int(x_px), int(y_px)),
+        )
+        work = pipeline.start(capture)
+        colour = self.bundle.manifest.stage(Color)
+        assert colour is not None
+        stream = work.keep(colour.takes[0])
+        height = stream.shape[1]
+        light = np.asarray(stream.rows().read(0, height), np.float32)
+        return work.fill(), light
+
+
+def is_photographed(bundle: Bundle) -> str | None:
+    """Return why no laws of photographs can be held against a bundle; None if they can."""
+    manifest = bundle.manifest
+    if manifest.sensor.type == "spad" or manifest.stage(Color) is None:
+        return "it makes no photographs"
+    if not manifest.networks:
+        return "no network"
+    if not manifest.is_trained:
+        return "its weights are random"
+    if not manifest.has_kernels:
+        return "its optics have no kernels, so there is no twin that photographs"
+    if without_networks(manifest, Work()) is None:
+        return "its networks cannot be left out"
+    grid = manifest.planes[manifest.products["image"]].grid
+    if manifest.stage(Undistort) is None and not grid.warped:
+        return "its pictures lie on another grid than its captures"
+    return None

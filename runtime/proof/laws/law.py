@@ -1,0 +1,72 @@
+"""A law of a picture, held against a bundle: its worst number, and how much is admitted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from camkit.bundle.facts import StatedLaw
+from camkit.bundle.reader import Bundle
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law:
+    """The worst number that was met.
+
+    Attributes:
+        name: Of the law, as the manifest has it.
+        worst: The worst number.
+        limit: What is admitted; more breaks the law.
+        unit: Of both.
+        front: The same number of the front end alone; None where there is none.
+        where: Where it was met.
+    """
+
+    name: str
+    worst: float
+    limit: float
+    unit: str
+    front: float | None = None
+    where: str = ""
+
+    @property
+    def kept(self) -> bool:
+        """Whether the law is kept; what is no number breaks it."""
+        return self.worst <= self.limit
+
+    def describe(self) -> str:
+        """Return the law in words."""
+        front = "" if self.front is None else f", front end {_text(self.front, self.unit)}"
+        where = f", {self.where}" if self.where and not self.kept else ""
+        said = (
+            "" if self.kept else f" BROKEN (at most {_text(self.limit, self.unit)}{front}{where})"
+        )
+        return f"{self.name.replace('_', ' ')} {_text(self.worst, self.unit)}{said}"
+
+    def stated(self) -> StatedLaw:
+        """Return what a manifest states of it."""
+        return StatedLaw(
+            worst=round(self.worst, 6),
+            limit=round(self.limit, 6),
+            unit=self.unit,
+            kept=self.kept,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        return {
+            "law": self.name,
+            "worst": round(self.worst, 6),
+            "limit": round(self.limit, 6),
+            "unit": self.unit,
+            "front_end": None if self.front is None else round(self.front, 6),
+            "where": self.where,
+            "kept": self.kept,
+        }
+
+
+Laws = Callable[[Bundle, str | None, int], tuple[Law, ...] | str]
+"""(bundle, size of its networks, threads) -> laws; a text says why none can be held."""
+
+
+def _text(value: float, unit: str) -> str:
+    return f"{100 * value:.2f} %" if unit == "%" else f"{value:.3g} {unit}".rstrip()

@@ -1,0 +1,93 @@
+"""The laws of a bundle's pictures held against what it states of them."""
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from typing import Any, Final, cast
+
+from camkit.bundle.facts import StatedLaw
+from camkit.bundle.manifest import LIGHT_VERSION, Manifest
+from camkit.bundle.reader import Bundle
+from camkit.errors import ParityError
+from camkit.runtime.kind import part_of
+from camkit.runtime.proof.laws.law import Law, Laws
+
+SLACK: Final = 1.1
+"""On another processor a broken law may be broken by so many times what is stated."""
+
+
+class BrokenLawsError(ParityError):
+    """Laws that a bundle breaks and does not state as broken.
+
+    Attributes:
+        facts: Every law, as JSON.
+    """
+
+    def __init__(self, message: str, facts: Sequence[Mapping[str, Any]]) -> None:
+        super().__init__(message)
+        self.facts = facts
+
+
+Found = Mapping[str | None, tuple[Law, ...]] | str
+"""Size -> laws, None for a bundle without networks; or why none can be held."""
+
+
+def hold_laws(bundle: Bundle, *, threads: int = 1) -> Found:
+    """Measure the laws for every size of a bundle."""
+    module = import_module(part_of(bundle.manifest).laws)
+    laws = cast("Laws", module.LAWS)
+    found: dict[str | None, tuple[Law, ...]] = {}
+    for size in bundle.manifest.sizes or (None,):
+        made = laws(bundle, size, threads)
+        if isinstance(made, str):
+            return made
+        found[size] = made
+    return found
+
+
+def with_laws(manifest: Manifest, found: Found) -> Manifest:
+    """Return a manifest that states laws; as it is where none can be held."""
+    if isinstance(found, str):
+        return manifest
+    stated = {
+        size: {law.name: law.stated() for law in laws}
+        for size, laws in found.items()
+        if size is not None
+    }
+    version = max(manifest.version_pair, LIGHT_VERSION)
+    return manifest.model_copy(
+        update={"laws": stated, "format_version": ".".join(map(str, version))}
+    )
+
+
+def prove_laws(
+    bundle: Bundle, *, threads: int
+) -> tuple[bool, str] | tuple[bool, str, Sequence[Mapping[str, Any]]]:
+    """Hold the laws of pictures, and compare with what the bundle states.
+
+    Raises:
+        BrokenLawsError: If a law is broken that the bundle does not state as broken so far.
+    """
+    found = hold_laws(bundle, threads=threads)
+    if isinstance(found, str):
+        return False, found
+    facts, unstated, lines = [], [], []
+    for size, laws in found.items():
+        stated = (bundle.manifest.laws or {}).get(size or "", {})
+        facts += [{"size": size} | law.to_json() for law in laws]
+        unstated += [f"{size}: {law.describe()}" for law in laws if not _is_stated(law, stated)]
+        lines.append("".join([f"{size}: " if size else "", ", ".join(map(_line, laws))]))
+    if unstated:
+        raise BrokenLawsError("; ".join(unstated), facts)
+    return True, "; ".join(lines), facts
+
+
+def _is_stated(law: Law, stated: Mapping[str, StatedLaw]) -> bool:
+    """Tell whether a law is kept, or broken no further than is stated."""
+    if law.kept:
+        return True
+    known = stated.get(law.name)
+    return known is not None and not known.kept and law.worst <= SLACK * known.worst
+
+
+def _line(law: Law) -> str:
+    return law.describe().replace("BROKEN", "broken as stated")
