@@ -27,10 +27,9 @@ from camkit.bundle.golden import IMAGE, GoldenArrays, golden_to_bytes
 from camkit.bundle.haze_file import haze_to_bytes, read_haze
 from camkit.bundle.haze_golden import haze_golden_to_bytes
 from camkit.bundle.manifest import (
+    LIGHT_VERSION,
     Manifest,
     Threshold,
-    bounds_light,
-    format_of,
     planes_of,
 )
 from camkit.bundle.psf_file import psf_to_bytes, read_psf
@@ -311,9 +310,7 @@ def _manifest(camera: _Camera, parts: Parts, networks: Networks) -> Manifest:
     known = KnownParts(sensor=recipe.sensor, optics=optics, networks=facts)
     data = (c.training_data for sizes in camera.checkpoints.values() for c in sizes.values())
     return Manifest(
-        format_version=format_of(
-            camera.optics.psf, hazy=camera.optics.haze is not None, bounded=bounds_light(stages)
-        ),
+        format_version=".".join(map(str, LIGHT_VERSION)),  # it states the laws of its pictures
         kind=recipe.kind,
         name=recipe.name,
         version=parts.version,

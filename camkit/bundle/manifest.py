@@ -30,13 +30,15 @@ from camkit.bundle.golden import IMAGE
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
-from camkit.bundle.stages import JoinError, Network, Parts, Stage
+from camkit.bundle.stages import JoinError, Network, Parts, Stage, SuperResolve, Wiener
 from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.contracts import FrozenPsf
 from camkit.errors import BundleError
 
 FORMAT_VERSION: Final = (2, 8)
+TOGETHER_VERSION: Final = (2, 4)
+"""From here on a bank may restore colours together, and half of a kernel fits its windows."""
 FOCUS_VERSION: Final = (2, 5)
 """From here on a PSF may hold kernels of a moved sensor; others state what they always did."""
 PROFILE_VERSION: Final = (2, 6)
@@ -44,7 +46,7 @@ PROFILE_VERSION: Final = (2, 6)
 HAZE_VERSION: Final = (2, 7)
 """From here on optics may have a haze beside core kernels."""
 LIGHT_VERSION: Final = (2, 8)
-"""From here on a stage may bound the light that its network moves."""
+"""From here on a stage may bound the light that it makes, and laws of a picture are stated."""
 NOT_TRAINED: Final = "not trained"
 """As `training_data`: weights are random, so that time and memory mean something and pictures do
 not."""
@@ -205,7 +207,7 @@ class Manifest(Entry):
 
     @property
     def bounds_light(self) -> bool:
-        """Tell whether the light that a network moves is bounded."""
+        """Tell whether the light that a stage makes is bounded."""
         return bounds_light(self.stages)
 
     @property
@@ -241,8 +243,12 @@ class Manifest(Entry):
 
 
 def bounds_light(stages: Iterable[Stage]) -> bool:
-    """Tell whether one of the stages bounds the light that its network moves."""
-    return any(isinstance(stage, Network) and stage.light is not None for stage in stages)
+    """Tell whether one of the stages bounds the light that it makes."""
+    return any(
+        (isinstance(stage, Network) and stage.light is not None)
+        or (isinstance(stage, SuperResolve) and stage.floor > 0)
+        for stage in stages
+    )
 
 
 def planes_of(stages: tuple[Stage, ...], parts: Parts) -> dict[str, Plane]:
@@ -324,13 +330,26 @@ def read_manifest(data: bytes) -> Manifest:
     major = _check_version(head.format_version, head.exported_with)
     try:
         if major < FORMAT_VERSION[0]:
-            return Manifest.model_validate_json(upgrade(data))
-        return Manifest.model_validate_json(data)
+            return _with_old_windows(Manifest.model_validate_json(upgrade(data)))
+        return _with_old_windows(Manifest.model_validate_json(data))
     except (ValidationError, UpgradeError) as error:
         what = _first(error) if isinstance(error, ValidationError) else str(error)
         raise BundleError(
             f"manifest.json breaks the schema of format {head.format_version}: {what}"
         ) from error
+
+
+def _with_old_windows(manifest: Manifest) -> Manifest:
+    """Return a manifest whose bank explains clipped light as it did when the bundle was made."""
+    if manifest.version_pair >= TOGETHER_VERSION:
+        return manifest
+    stages = tuple(
+        stage.model_copy(update={"clip_windows": "whole_kernel"})
+        if isinstance(stage, Wiener)
+        else stage
+        for stage in manifest.stages
+    )
+    return manifest.model_copy(update={"stages": stages})
 
 
 def _check_version(text: str, exported_with: Mapping[str, Any]) -> int:

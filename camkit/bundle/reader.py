@@ -260,7 +260,7 @@ def bundle_from_bytes(data: bytes, *, path: Path, max_bytes: int = MAX_BUNDLE_BY
 def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
     if manifest.bounds_light:
-        _need_version(manifest, LIGHT_VERSION, "a network's light is bounded")
+        _need_version(manifest, LIGHT_VERSION, "the light that a stage makes is bounded")
     if manifest.laws is not None:
         _need_version(manifest, LIGHT_VERSION, "laws of a picture are stated")
     # Unpacking and hashing leave Python's lock to others.

@@ -8,6 +8,7 @@ Where few samples are clipped, small windows do: most of the kernel must fit one
 is the block's at every second, third or fourth frequency.
 """
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
@@ -21,20 +22,56 @@ from camkit.runtime.bank.blocks import Block, taper_edges
 from camkit.runtime.bank.richardson_lucy import richardson_lucy
 from camkit.runtime.bank.spectrum import ComplexArray, apply_transfer
 
-MARGIN_PX: Final = 20
-"""Surroundings that a window sees around the samples it explains."""
-RING_PX: Final = 8
-"""Of the margin is tapered: a window is no periodic picture."""
 SHRINKS: Final = (4, 3, 2)
 """Sides of windows, as parts of a block's side."""
-KERNEL_SHARE: Final = 0.5
-"""Of a kernel's side must fit a window. The rest, some hundredths of its light, wraps around to
-where the explanation no longer counts; half as much was no better (tools/clipped_lights.py)."""
-WINDOW_EXTRA: Final = 64**2
-"""Samples that take as long as what every window takes besides its own (measured)."""
 
 Mask = NDArray[np.bool_]
 Cells = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindowRule:
+    """Which windows explain lights.
+
+    Attributes:
+        margin_px: Surroundings that a window sees around the samples it explains.
+        ring_px: Of the margin is tapered: a window is no periodic picture.
+        most_reach_px: Farther from clipped samples no window explains anything.
+        kernel_share: Of a kernel's side must fit a window; the rest wraps around.
+        sample_cost: Of a sample in a window against one in a block (measured).
+        extra: Samples that take as long as what every window takes besides its own (measured).
+    """
+
+    margin_px: int
+    ring_px: int
+    most_reach_px: int
+    kernel_share: float
+    sample_cost: float
+    extra: int
+
+
+RULES: Final = {
+    # The rest, some hundredths of its light, wraps around to where the explanation no longer
+    # counts; half as much was no better (tools/clipped_lights.py).
+    "half_kernel": WindowRule(
+        margin_px=20,
+        ring_px=8,
+        most_reach_px=16,
+        kernel_share=0.5,
+        sample_cost=1.0,
+        extra=64**2,
+    ),
+    # Bundles of formats before 2.4 were made with it and keep its bits.
+    "whole_kernel": WindowRule(
+        margin_px=32,
+        ring_px=16,
+        most_reach_px=16,
+        kernel_share=0.95,
+        sample_cost=1.3,
+        extra=0,
+    ),
+}
+"""Name in the manifest -> rule."""
 
 
 def explain_lights(
@@ -62,13 +99,16 @@ def explain_lights(
     clipped = block.unknown
     rounds, reach_px = settings.clip_iterations, settings.clip_reach_px
     power = settings.clip_power
-    chosen = choose_windows(np.asarray(clipped.any(axis=0)), side, fitted_px(settings, kernel_px))
+    rule = RULES[settings.clip_windows]
+    chosen = choose_windows(
+        np.asarray(clipped.any(axis=0)), side, fitted_px(settings, kernel_px), rule
+    )
     if chosen is None or reach_px is None:
         near = nearness(clipped, reach_px)
         found = richardson_lucy(samples, block.otf, background, rounds, unknown, power=power)
         return found * near, _unexplained(block, found, unknown, near) / side**2
     size, cells = chosen
-    core, step = size - 2 * MARGIN_PX, side // size
+    core, step = size - 2 * rule.margin_px, side // size
     otf: ComplexArray = np.ascontiguousarray(block.otf[:, ::step, ::step])
     lights = np.zeros_like(samples)
     weight = np.zeros(clipped.shape, dtype=np.float32)
@@ -80,11 +120,11 @@ def explain_lights(
         cell = np.s_[:, row : row + core, column : column + core]
         own[cell] = waiting[cell]
         waiting[cell] = False
-        top, first = (int(np.clip(i - MARGIN_PX, 0, side - size)) for i in (row, column))
+        top, first = (int(np.clip(i - rule.margin_px, 0, side - size)) for i in (row, column))
         place = np.s_[:, top : top + size, first : first + size]
         near = nearness(own[place], reach_px)
         cut = np.ascontiguousarray(unknown[place])
-        window = Block(samples=taper_edges(samples[place], otf, RING_PX), otf=otf)
+        window = Block(samples=taper_edges(samples[place], otf, rule.ring_px), otf=otf)
         found = richardson_lucy(window.samples, otf, background, rounds, cut, power=power)
         left += _unexplained(window, found, cut, near)
         weight[place] += near
@@ -96,7 +136,7 @@ def explain_lights(
 
 
 def choose_windows(
-    clipped: Mask, side_px: int, kernel_px: int | None, *, step_px: int = 1
+    clipped: Mask, side_px: int, kernel_px: int | None, rule: WindowRule, *, step_px: int = 1
 ) -> tuple[int, Cells] | None:
     """Choose windows that cost less than the whole block.
 
@@ -104,20 +144,21 @@ def choose_windows(
         clipped: (b, b) of a block, or of its squares of `step_px`.
         side_px: b.
         kernel_px: Side of the kernel; None for one that fits no window.
+        rule: Of the bank.
         step_px: Side of the squares.
 
     Returns:
         Side of the windows and the first (row, column), in samples, of the cells, of side - 2
-        MARGIN_PX, that cover the clipped samples; None where the whole block is the least work.
+        margins, that cover the clipped samples; None where the whole block is the least work.
     """
     best, least = None, float(side_px * side_px)
     for shrink in () if kernel_px is None else SHRINKS:
         size = side_px // shrink
-        core = size - 2 * MARGIN_PX
-        narrow = size < KERNEL_SHARE * (kernel_px or 0) or core < step_px
+        core = size - 2 * rule.margin_px
+        narrow = size < rule.kernel_share * (kernel_px or 0) or core < step_px
         if narrow or side_px % shrink or size % 4:
             continue
-        cost = size * size + WINDOW_EXTRA
+        cost = size * size * rule.sample_cost + rule.extra
         cells = _cover(clipped, core // step_px, most=int(least / cost))
         if cells is not None and len(cells) * cost < least:
             best = size, tuple((row * step_px, column * step_px) for row, column in cells)
@@ -143,19 +184,23 @@ def _cover(clipped: Mask, core: int, *, most: int) -> Cells | None:
     return tuple(cells)
 
 
-def light_share(clipped: Mask, side_px: int, kernel_px: int | None, *, step_px: int) -> float:
+def light_share(
+    clipped: Mask, side_px: int, kernel_px: int | None, settings: Wiener, *, step_px: int
+) -> float:
     """Give the work of explaining as a share of that in the whole block; see `choose_windows`."""
-    chosen = choose_windows(clipped, side_px, kernel_px, step_px=step_px)
+    rule = RULES[settings.clip_windows]
+    chosen = choose_windows(clipped, side_px, kernel_px, rule, step_px=step_px)
     if chosen is None:
         return 1.0
     size, cells = chosen
-    return len(cells) * (size * size + WINDOW_EXTRA) / side_px**2
+    return len(cells) * (size * size * rule.sample_cost + rule.extra) / side_px**2
 
 
 def fitted_px(settings: Wiener, kernel_px: int | None) -> int | None:
     """Give the side of the kernel to choose windows by; None where whole blocks are explained."""
     reach_px = settings.clip_reach_px
-    return None if reach_px is None or reach_px > MARGIN_PX - RING_PX // 2 else kernel_px
+    most_px = RULES[settings.clip_windows].most_reach_px
+    return None if reach_px is None or reach_px > most_px else kernel_px
 
 
 def nearness(clipped: Mask, reach_px: int | None) -> FloatArray:

@@ -68,7 +68,8 @@ class LightKeeper:
         elif self.measured:
             whole = np.s_[:, : _floor(output.shape[1]), : _floor(output.shape[2])]
             seen = output[whole].copy()
-            self._count(self._added(front[whole], seen, None, USUAL_BOUND), box)
+            if seen.size:
+                self._count(self._added(front[whole], seen, None, USUAL_BOUND), box)
         if excess is None and kept is None and self.strength == 1:
             return
         take_back(front, output, kept, excess, strength=self.strength, threads=self.threads)

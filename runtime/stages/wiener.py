@@ -185,7 +185,7 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
     blocks = np.full((len(rows), len(columns)), set_up * speed.block_s)
     if subject.content is not None and entry.clip_iterations:
         kernel_px = fitted_px(entry, max(subject.bundle.psf.kernels.shape[-2:]))
-        work_share = _light_work(subject.content.lights, (rows, columns), block_px, kernel_px)
+        work_share = _light_work(entry, subject.content.lights, (rows, columns), kernel_px)
         blocks += work_share * (speed.clipped_block_s - speed.block_s)
     if work.labels is not None:
         reach = max((subject.reach_px(size) for size in work.sizes()), default=0)
@@ -204,13 +204,14 @@ def _kernel_share(subject: Subject, columns: Sequence[Span]) -> float:
 
 
 def _light_work(
+    entry: Wiener,
     lights: NDArray[np.bool_],
     spans: tuple[Sequence[Span], Sequence[Span]],
-    block_px: int,
     kernel_px: int | None,
 ) -> NDArray[np.float64]:
     """Give (row, column): what clipped samples cost a block, 1 where it is explained as a whole."""
     rows, columns = spans
+    block_px = rows[0].index.size
     found = np.zeros((len(rows), len(columns)))
     for i, row in enumerate(rows):
         down = slice(row.index.min() // LIGHT_PX, row.index.max() // LIGHT_PX + 1)
@@ -219,6 +220,8 @@ def _light_work(
             squares = lights[down, across]
             if squares.any():
                 side = block_px // LIGHT_PX
-                share = light_share(squares[:side, :side], block_px, kernel_px, step_px=LIGHT_PX)
+                share = light_share(
+                    squares[:side, :side], block_px, kernel_px, entry, step_px=LIGHT_PX
+                )
                 found[i, j] = LIGHTS_AT_LEAST + (1 - LIGHTS_AT_LEAST) * min(share, 1.0)
     return found

@@ -31,6 +31,8 @@ class SuperResolve(StageEntry):
         sampling: What its pixels see through: the plate of the optics; nothing (low_fill); all
             sub-pixels of a pixel at once (full_fill); a Gaussian diffuser.
         sigma: Of a Gaussian, in sub-pixels; of it alone.
+        floor: A sub-pixel of a picture has at least this share of what the darkest of the 3x3
+            pixels around it counted for sure (format 2.8); 0 for none, as before.
     """
 
     type: Literal["super_resolve"] = "super_resolve"
@@ -43,6 +45,7 @@ class SuperResolve(StageEntry):
     network_from_photons: Positive = 80.0
     sampling: Sampled = "plate"
     sigma: Positive | None = None
+    floor: Annotated[float, Field(ge=0, le=1)] = 0.0
 
     @model_validator(mode="after")
     def _check_sigma(self) -> Self:

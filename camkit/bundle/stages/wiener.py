@@ -35,6 +35,9 @@ class Wiener(StageEntry):
             None for whole blocks, as before.
         clip_power: Each round's correction to this power: 2 goes about twice as far in a round,
             up to 3 it settles (format 2.4).
+        clip_windows: Which windows re-estimate clipped pixels where few of a block clip: such as
+            hold half of a kernel's side, or the whole of it (format 2.8; bundles of formats before
+            2.4 have the latter, later ones the former).
         together: How the colours are restored together (format 2.4); None for each alone.
     """
 
@@ -48,6 +51,7 @@ class Wiener(StageEntry):
     clip_iterations: Annotated[int, Field(ge=0, le=100)] = 0
     clip_reach_px: Annotated[int, Field(ge=2, le=1024)] | None = None
     clip_power: Annotated[float, Field(ge=1.0, lt=3.0)] = 1.0
+    clip_windows: Literal["half_kernel", "whole_kernel"] = "half_kernel"
     together: Together | None = None
 
     @model_validator(mode="after")

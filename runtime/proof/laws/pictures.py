@@ -229,7 +229,7 @@ def _borders(pictures: Iterable[Exposed]) -> Law:
             middle = squared[RIM_PX:-RIM_PX, RIM_PX:-RIM_PX]
             rim = (squared.sum() - middle.sum()) / (squared.size - middle.size)
             sums[row] += rim, middle.mean()
-    made, front = (float(np.sqrt(rim / middle)) for rim, middle in sums)
+    made, front = (float(np.sqrt(rim / max(middle, 1e-12))) for rim, middle in sums)
     return Law(name="borders", worst=made, limit=max(BORDERS, front), unit="times", front=front)
 
 

@@ -83,7 +83,7 @@ def test_a_camera_of_physics_alone_states_its_optics_planes_and_format(tmp_path:
     made = write_physics(path, hazy_stages(), tiny_sensor(), optics, 500.0, name="bare")
     known = open_bundle(path).manifest
     assert known == made.manifest
-    assert (known.format_version, known.name, known.networks) == ("2.8", "bare", {})
+    assert (known.format_version, known.name, known.networks) == ("2.7", "bare", {})
     assert (known.licence, known.training_data) == ("Apache-2.0", "none: no network")
     assert known.optics == optics.entry(500.0)
     assert known.products == {"image": known.stages[-1].gives[0]}

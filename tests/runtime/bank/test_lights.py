@@ -6,8 +6,7 @@ import pytest
 from camkit.bundle.stages import Wiener
 from camkit.runtime.bank.blocks import Block, taper_edges, to_otf
 from camkit.runtime.bank.lights import (
-    MARGIN_PX,
-    WINDOW_EXTRA,
+    RULES,
     choose_windows,
     explain_lights,
     light_share,
@@ -27,6 +26,7 @@ SETTINGS = Wiener(
     clip_iterations=6,
     clip_reach_px=REACH_PX,
 )
+RULE = RULES[SETTINGS.clip_windows]
 
 
 def clipped_block(places: list[tuple[int, int]]) -> tuple[Block, np.ndarray]:
@@ -71,16 +71,16 @@ def test_windows_are_chosen_by_kernel_and_work(
     mask = np.zeros((SIDE, SIDE), dtype=bool)
     for cell in cells:
         mask[cell] = True
-    chosen = choose_windows(mask, SIDE, kernel_px)
+    chosen = choose_windows(mask, SIDE, kernel_px, RULE)
     if size is None:
         assert chosen is None
-        assert light_share(mask, SIDE, kernel_px, step_px=1) == 1
+        assert light_share(mask, SIDE, kernel_px, SETTINGS, step_px=1) == 1
     else:
         assert chosen is not None
         assert chosen[0] == size
         assert chosen[1] == ((10, 10),)
-        share = light_share(mask, SIDE, kernel_px, step_px=1)
-        assert share == pytest.approx((size**2 + WINDOW_EXTRA) / SIDE**2)
+        share = light_share(mask, SIDE, kernel_px, SETTINGS, step_px=1)
+        assert share == pytest.approx((size**2 + RULE.extra) / SIDE**2)
 
 
 def test_windows_explain_what_the_whole_block_explains() -> None:
@@ -128,8 +128,8 @@ def test_a_kernel_twice_as_wide_as_a_window_still_fits_it() -> None:
     mask = np.zeros((SIDE, SIDE), dtype=bool)
     mask[60, 70] = True
     half = SIDE // 2
-    assert choose_windows(mask, SIDE, 2 * half) is not None
-    assert choose_windows(mask, SIDE, 2 * half + 2) is None
+    assert choose_windows(mask, SIDE, 2 * half, RULE) is not None
+    assert choose_windows(mask, SIDE, 2 * half + 2, RULE) is None
 
 
 def test_away_from_lights_a_block_is_what_the_filter_alone_makes_of_it() -> None:
@@ -154,16 +154,32 @@ def test_a_light_takes_one_window_wherever_it_lies() -> None:
     for place in (64, 128, 190):
         mask = np.zeros((SIDE, SIDE), dtype=bool)
         mask[place - 2 : place + 2, place - 2 : place + 2] = True
-        assert choose_windows(mask, SIDE, 210) == (128, ((place - 2, place - 2),))
+        assert choose_windows(mask, SIDE, 210, RULE) == (128, ((place - 2, place - 2),))
 
 
 def test_cells_cover_every_clipped_sample_once() -> None:
     mask = np.random.default_rng(0).random((SIDE, SIDE)) < 1e-5
-    chosen = choose_windows(mask, SIDE, KERNEL_PX)
+    chosen = choose_windows(mask, SIDE, KERNEL_PX, RULE)
     assert chosen is not None
     size, cells = chosen
-    core = size - 2 * MARGIN_PX
+    core = size - 2 * RULE.margin_px
     for row, column in cells:
         assert mask[row : row + core, column : column + core].any()
         mask[row : row + core, column : column + core] = False
     assert not mask.any()
+
+
+def test_windows_of_older_bundles_hold_whole_kernels_and_give_their_bits() -> None:
+    """A window of the older rule is wider than the kernel, and explains as the whole block does."""
+    block, _ = clipped_block([(190, 190)])
+    older = SETTINGS.model_copy(update={"clip_windows": "whole_kernel"})
+    mask = np.asarray(block.unknown.any(axis=0))
+    wide = 100
+    assert choose_windows(mask, SIDE, wide, RULES["whole_kernel"])[0] >= 0.95 * wide
+    assert choose_windows(mask, SIDE, wide, RULE)[0] >= 0.5 * wide
+    spread = spread_clipped(block.unknown)
+    background = background_of(ISO_100)
+    found, _ = explain_lights(block, spread, background, older, KERNEL_PX)
+    whole = SETTINGS.model_copy(update={"clip_reach_px": REACH_PX})
+    in_block, _ = explain_lights(block, spread, background, whole, None)
+    np.testing.assert_allclose(found, in_block, atol=0.02 * float(in_block.max()))

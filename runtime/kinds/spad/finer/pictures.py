@@ -5,11 +5,14 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
 from camkit.contracts import FloatArray
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
 
+SURE: Final = 2.0
+"""Standard deviations below what a pixel counted: so much light was there for sure."""
 EMPTY: Final = 0.0
 """Photons of a frame, dark counts taken off: with fewer there is nothing to see."""
 
@@ -72,4 +75,28 @@ def finer_frames(
             )
         if progress is not None:
             progress(number + 1, count)
-    return np.maximum(found, 0, out=found)
+    np.maximum(found, 0, out=found)
+    if camera.stage.floor > 0:
+        for picture, frame in zip(found, frames, strict=True):
+            np.maximum(picture, least_light(camera, frame, dark), out=picture)
+    return found
+
+
+def least_light(
+    camera: FineCamera, frame: FloatArray, dark: NDArray[np.floating] | float
+) -> FloatArray:
+    """Return (m h, m w), the least photons of sub-pixels: no black where light was counted.
+
+    Beside bright points estimates of unit sum fall below zero; what was counted around them says
+    that they are wrong there.
+
+    Args:
+        camera: The array.
+        frame: (h, w) photons, without dark counts.
+        dark: Those, (h, w) or one number.
+    """
+    counts = np.maximum(frame + dark, 0)
+    sure = np.maximum(counts - SURE * np.sqrt(counts + 1) - dark, 0)
+    darkest = minimum_filter(sure, 3, mode="nearest")
+    share = np.float32(camera.stage.floor)
+    return np.asarray(np.kron(share * darkest, np.ones((camera.scale,) * 2)), np.float32)
