@@ -7,12 +7,17 @@ It also counts in how many cells the network's own local mean left the usual bou
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from camkit.bundle.light_bound import CELL_PX, USUAL_BOUND, LightBound
 from camkit.contracts import FloatArray
 from camkit.runtime.network.light import AddedLight, added_light, take_back
+
+LOOK_ROWS: Final = 32
+LOOK_EVERY: Final = 4
+"""One in so many strips of rows is looked at where nothing is taken back."""
 
 Box = tuple[int, int, int, int]
 """(top, left, bottom, right) of the pixels of a window that are kept."""
@@ -66,10 +71,7 @@ class LightKeeper:
             self._count(added, box)
             excess = added.excess
         elif self.measured:
-            whole = np.s_[:, : _floor(output.shape[1]), : _floor(output.shape[2])]
-            seen = output[whole].copy()
-            if seen.size:
-                self._count(self._added(front[whole], seen, None, USUAL_BOUND), box)
+            self._measure(front, output)
         if excess is None and kept is None and self.strength == 1:
             return
         take_back(front, output, kept, excess, strength=self.strength, threads=self.threads)
@@ -83,6 +85,16 @@ class LightKeeper:
     def far_fraction(self) -> float:
         """Return the share of cells in which much light was moved."""
         return self.far / max(self.cells, 1)
+
+    def _measure(self, front: FloatArray, output: FloatArray) -> None:
+        """Look at some rows of an output that stays as it is: where it matters it is everywhere."""
+        height, width = (_floor(side) for side in output.shape[1:])
+        for top in range(0, height, LOOK_EVERY * LOOK_ROWS):
+            rows = np.s_[:, top : min(top + LOOK_ROWS, height), :width]
+            seen = output[rows].copy()
+            if seen.size:
+                added = self._added(front[rows], seen, None, USUAL_BOUND)
+                self._count(added, (0, 0, *seen.shape[1:]))
 
     def _added(
         self, front: FloatArray, output: FloatArray, kept: FloatArray | None, bound: LightBound

@@ -18,8 +18,8 @@ def test_the_newest_format_is_written_and_nothing_is_lost(tmp_path: Path) -> Non
     new = tmp_path / "new.camkit"
     assert repack.repack(EXAMPLE, new) == new.stat().st_size
     before, after = open_bundle(EXAMPLE), open_bundle(new)
-    assert after.manifest.format_version == "2.7"
-    new_format = {"members": {}, "format_version": "2.7"}
+    assert after.manifest.format_version == "2.8"
+    new_format = {"members": {}, "format_version": "2.8"}
     assert after.manifest.model_copy(update={"members": {}}) == before.manifest.model_copy(
         update=new_format
     )

@@ -90,7 +90,7 @@ def build(out: Path, deglare: Deglare) -> int:
         manifest = manifest.model_copy(update={"golden": golden})
         trial = Path(folder) / "trial.camkit"
         write_bundle(trial, manifest, members)
-        report = check_bundle(trial, run=case_work)
+        report = check_bundle(trial, run=case_work, without=("laws",))
     if not report.passed:
         raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
     write_bundle(out, manifest, members)

@@ -163,7 +163,7 @@ def write_baselines(
         bundle = write_bundle(first, manifest, members)
         members[CARD] = card_text(bundle, {}).encode()
         write_bundle(first, manifest, members)
-        report = check_bundle(first, run=PROVING.run)
+        report = check_bundle(first, run=PROVING.run, without=("laws",))
     if not report.passed:
         raise ParityError("the bundle fails its own check: " + "; ".join(report.lines()))
     with atomic_output(out) as part:

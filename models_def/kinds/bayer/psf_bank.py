@@ -80,13 +80,11 @@ class PsfBank:
         Args:
             x_mm: Position.
             y_mm: Likewise.
-            depth: Number of the depth, 0 where there is one; None for the mean kernel.
+            depth: Number of the depth; None for the mean kernel.
 
         Raises:
             ContractError: If the bank does not hold the depths apart.
         """
-        if self.depths == 1:
-            depth = None
         if depth is not None and self.frozen_depths is None:
             raise ContractError("this bank does not hold the frozen kernels of its depths apart")
         frozen = self.frozen

@@ -305,7 +305,8 @@ def photograph(
     )
     place = exposure.x_mm, exposure.y_mm
     if exposure.designed:
-        kernels = bank.frozen_kernels(*place, exposure.copy % bank.depths)
+        depth = exposure.copy % bank.depths if bank.depths > 1 else None
+        kernels = bank.frozen_kernels(*place, depth)
     else:
         kernels = bank.blur_kernels(exposure.copy, *place)
     kernels = _drifted(kernels, *exposure.drift)

@@ -21,7 +21,6 @@ lifetime       decays of fluorescence behind a pulse
 finer          the fine grid behind the plate of a bundle
 twin           scenes recorded by the array of a bundle
 proving        its golden cases
-laws           laws of its pictures: even scenes stay even, no black where light was counted
 products       depth, intensity, light in flight, and their files
 """
 
@@ -37,6 +36,6 @@ from camkit.runtime.kinds.spad.twin.write import SUFFIXES, files_of, write_recor
 PART: Final = RuntimePart(
     maker=MAKER,
     proving=PROVING,
-    laws="camkit.runtime.kinds.spad.laws",
+    laws="camkit.runtime.kinds.spad.twin.laws",
     recording=Recording(suffixes=SUFFIXES, record=record, write=write_recorded, files=files_of),
 )

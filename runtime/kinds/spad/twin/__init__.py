@@ -5,5 +5,6 @@ array      what of it every pixel sees, through the plate, at its own sub-pixel
 counting   photons of it: Poisson, dark counts, hot pixels, blind times
 working    the working points of the prototype
 simulate   all of it as a bundle asks for it
+laws       laws of its pictures: even scenes stay even, no black where light was counted
 write      files that `camkit process` reads
 """
