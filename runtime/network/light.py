@@ -215,12 +215,19 @@ def take_back(
                 if excess is not None:
                     _subtract(rows, excess[channel], top, bottom)
                 if shares is not None:
-                    before = front[channel, pixels]
-                    rows -= before
-                    rows *= shares[pixels] if shares.ndim == 2 else shares
-                    rows += before
+                    _mix(
+                        rows, front[channel, pixels], shares[pixels] if shares.ndim == 2 else shares
+                    )
 
     run_slices(change, -(-height // CELL_PX), threads=threads)
+
+
+def _mix(rows: FloatArray, front: FloatArray, shares: FloatArray) -> None:
+    """Keep a share of the change; where all of it is kept, bits stay as without any mask."""
+    mixed = rows - front
+    mixed *= shares
+    mixed += front
+    np.copyto(rows, mixed, where=shares < 1)
 
 
 def _subtract(rows: FloatArray, excess: FloatArray, top: int, bottom: int) -> None:

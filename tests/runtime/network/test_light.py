@@ -111,6 +111,18 @@ def test_beside_clipped_samples_the_front_end_stays() -> None:
     assert kept[20 - far - 1, 28] == 1
 
 
+def test_far_from_clipped_samples_a_window_gives_the_bits_of_one_without_any() -> None:
+    front, output = _window(11, 96, 96)
+    output *= np.linspace(0.05, 6, 96, dtype=np.float32)  # far from the front end: sums round
+    mask = np.zeros((96, 96), np.bool_)
+    mask[4, 4] = True
+    bound = LightBound(spread=0.2)
+    with_mask = _bounded(front, output, keep_share(mask), bound)
+    without = _bounded(front, output, None, bound)
+    far = np.s_[:, 4 + MASK_REACH_PX + 1 :, 4 + MASK_REACH_PX + 1 :]
+    np.testing.assert_array_equal(with_mask[far], without[far])
+
+
 def test_a_mask_by_rows_is_the_mask_of_the_whole() -> None:
     rng = np.random.default_rng(3)
     mask = rng.random((1, 50, 40)) > 0.99

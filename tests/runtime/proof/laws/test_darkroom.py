@@ -1,0 +1,67 @@
+"""The darkroom: the bundle's own twin, its networks and its front end, on the same capture."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camkit.bundle.reader import find_bundle, open_bundle
+from camkit.bundle.writer import write_bundle
+from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, is_photographed
+from camkit.runtime.proof.laws.pictures import picture_laws
+from camkit.scenes.procedural import procedural_scene
+from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
+
+
+@pytest.fixture(scope="module")
+def room() -> Darkroom:
+    return Darkroom(bundle=open_bundle(find_bundle(Path("duet"))), size="S", threads=1)
+
+
+def test_places_go_from_the_middle_of_the_sensor_to_its_corner(room: Darkroom) -> None:
+    places = [room.origin_px(place, (256, 320)) for place in PLACES]
+    assert places[0] == (2840, 1872)
+    assert places[-1] == (6000 - 320, 4000 - 256)
+    assert all(x % 2 == 0 and y % 2 == 0 for x, y in places)
+    assert room.isos == (100.0, 6400.0)
+
+
+def test_both_pictures_are_of_one_capture_in_the_geometry_of_the_sensor(room: Darkroom) -> None:
+    scene = procedural_scene(5_300_009, 256, 320)
+    seen = room.expose(scene, "middle", iso=100.0)
+
+    def off(picture: np.ndarray) -> float:
+        gap = np.clip(picture, 0, 1) - np.clip(seen.truth, 0, 1)
+        return float(np.sqrt(np.mean(np.square(gap[:, 32:-32, 32:-32]))))
+
+    assert seen.truth.shape == seen.network.shape == seen.front.shape == (3, 256, 320)
+    assert np.corrcoef(seen.truth.ravel(), scene.ravel())[0, 1] > 0.98  # distortion is small there
+    assert off(seen.network) < off(seen.front) < 0.2
+    assert not np.array_equal(seen.light, seen.front_light)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("spad-sr", "it makes no photographs"),
+        ("deglare", "no network"),
+        ("duet", None),
+        ("streak-hdr", None),
+    ],
+)
+def test_what_cannot_be_judged_says_why(name: str, reason: str | None) -> None:
+    assert is_photographed(open_bundle(find_bundle(Path(name)))) == reason
+
+
+def test_random_weights_are_not_judged(tmp_path: Path) -> None:
+    path = write_tiny_bundle(tmp_path)
+    write_bundle(path, tiny_manifest(training_data="not trained"), tiny_members())
+    assert picture_laws(open_bundle(path), "M", 1) == "its weights are random"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", ["S", "M"])
+def test_duet_keeps_every_law(size: str) -> None:
+    laws = picture_laws(open_bundle(find_bundle(Path("duet"))), size, 1)
+    assert not isinstance(laws, str)
+    assert all(law.kept for law in laws), [law.describe() for law in laws]
