@@ -73,7 +73,7 @@ from camkit.runtime.plan.loss import read_loss_model
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.haze import make_haze_golden
-from camkit.runtime.proof.laws.proof import hold_laws, with_laws
+from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -137,7 +137,7 @@ def export_bundle(parts: Parts, out: Path) -> dict[str, Any]:
         whites = {name: float(case.recipe.get(WHITE, 1.0)) for name, (case, _) in cases.items()}
         manifest = manifest.model_copy(update={"golden": tuple(case for case, _ in cases.values())})
         third = write_bundle(Path(folder) / "third.camkit", manifest, members)
-        laws = hold_laws(third)
+        laws = measure_laws(third)
         manifest = with_laws(manifest, laws)
         card = card_text(second, golden, camera.design.fails_on, whites)
         members[CARD] = (card + laws_text(laws)).encode()

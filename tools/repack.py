@@ -23,7 +23,7 @@ from camkit.export.activations import with_activations
 from camkit.export.golden_cases import add_outputs
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
-from camkit.runtime.proof.laws.proof import hold_laws, with_laws
+from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 
 
 def repack(
@@ -61,7 +61,7 @@ def repack(
             cases = {case.name: (case, golden[case.name]) for case in manifest.golden}
             members[GOLDEN] = golden_to_bytes(add_outputs(made, cases))
             manifest = manifest.model_copy(update={"networks": with_activations(made, cases)})
-        manifest = with_laws(manifest, hold_laws(write_bundle(trial, manifest, members)))
+        manifest = with_laws(manifest, measure_laws(write_bundle(trial, manifest, members)))
         write_bundle(trial, manifest, members)
         report = check_bundle(trial, run=case_work, without=("laws",))
     if not report.passed:

@@ -34,7 +34,7 @@ MASK_REACH_PX: Final = BOUND_REACH_PX + NEAR_PX[1]
 
 
 class LightBound(Entry):
-    """How far the local mean of a network's output may leave that of its last plane.
+    """A limit on how far the local mean of a network's output leaves that of its last plane.
 
     In stabilised values, over smoothed cells of the last plane, m their mean and V their variance:
 
@@ -62,4 +62,4 @@ class LightBound(Entry):
 
 
 USUAL_BOUND: Final = LightBound(noise=3.0, spread=0.3, light=0.03)
-"""What a network is held against that states no bound of its own."""
+"""The bound of networks that state none of their own."""

@@ -207,7 +207,7 @@ class Manifest(Entry):
 
     @property
     def bounds_light(self) -> bool:
-        """Tell whether the light that a stage makes is bounded."""
+        """Return whether the light that a stage makes is bounded."""
         return bounds_light(self.stages)
 
     @property
@@ -243,7 +243,7 @@ class Manifest(Entry):
 
 
 def bounds_light(stages: Iterable[Stage]) -> bool:
-    """Tell whether one of the stages bounds the light that it makes."""
+    """Return whether one of the stages bounds the light that it makes."""
     return any(
         (isinstance(stage, Network) and stage.light is not None)
         or (isinstance(stage, SuperResolve) and stage.floor > 0)

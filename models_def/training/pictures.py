@@ -65,7 +65,7 @@ def to_linear(picture: NDArray[np.uint8]) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnShares:
-    """How often something is drawn whose truth is known to the last pixel.
+    """Shares of drawn scenes whose truth is known to the last pixel.
 
     Attributes:
         edge: Probability of clean edges instead of a picture or scene.

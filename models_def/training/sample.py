@@ -82,7 +82,7 @@ class Sample:
     weight: Tensor
 
     def stacked(self, layout: SampleLayout) -> Tensor:
-        """Give inputs and masks as one (channels, s, s), in the order of the layout.
+        """Return inputs and masks as one (channels, s, s), in the order of the layout.
 
         Raises:
             ContractError: If the sample is not of that layout.
@@ -122,4 +122,4 @@ class Batch:
 
 
 Finish = Callable[[Tensor, Batch], Tensor]
-"""What is done behind a network: its (b, c, h, w) output and the batch -> (b, c, h, w)."""
+"""A step behind a network: its (b, c, h, w) output and the batch -> (b, c, h, w)."""

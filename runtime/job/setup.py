@@ -9,7 +9,7 @@ from camkit.bundle.stages import Color, Demosaic, Linearise, RaiseClipped, Stage
 from camkit.errors import ContractError
 from camkit.runtime.network.engine import NetworkEngine
 from camkit.runtime.options import Options
-from camkit.runtime.plan.laws import lawful
+from camkit.runtime.plan.laws import bounded_stages
 from camkit.runtime.plan.speed import Speed
 
 DEVELOPMENT: Final[tuple[Stage, ...]] = (
@@ -45,7 +45,7 @@ class Setup:
         """Give the stages that are walked."""
         if self.bundle is None:
             return DEVELOPMENT
-        return lawful(self.bundle.manifest, self.options.laws)
+        return bounded_stages(self.bundle.manifest, self.options.laws)
 
     @property
     def known_bundle(self) -> Bundle:

@@ -24,7 +24,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
-from camkit.runtime.network.light_keeper import Behind
+from camkit.runtime.network.light_keeper import WindowFinish
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.network.tiling import (
     PixelCost,
@@ -217,7 +217,7 @@ def infer_cells(
     cancel: Cancel | None = None,
     guard: TileGuard | None = None,
     stand_in: slice,
-    behind: Behind | None = None,
+    finish: WindowFinish | None = None,
 ) -> Iterator[FloatArray]:
     """Run the networks on their cells and yield the rows of the picture from top to bottom.
 
@@ -229,7 +229,7 @@ def infer_cells(
         cancel: Asked before each window.
         guard: Looks at every window; None refuses NaN and inf only.
         stand_in: Channels of the source that stand where no network runs.
-        behind: Changes the output of a window in place; it also sees all channels of the source.
+        finish: Changes the output of a window in place; it also sees all channels of the source.
 
     Yields:
         (k, rows, w) float32, consecutive.
@@ -254,8 +254,8 @@ def infer_cells(
             y0, x0, y1, x1 = window.pixels
             given = np.ascontiguousarray(held[None, :, y0 - first : y1 - first, x0:x1])
             output = networks[window.network].run(given)
-            if behind is not None:
-                behind(output[0], given[0], _kept_box(window, layout))
+            if finish is not None:
+                finish(output[0], given[0], _kept_box(window, layout))
             made = _checked(output, given, window, guard)
             _place(made, window, layout, band, top)
             done += 1

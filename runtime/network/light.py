@@ -38,7 +38,7 @@ FAR: Final = 0.2
 """Share of the light; who moves more of it makes another picture."""
 _TINY: Final = np.float32(1e-6)
 _PHASES: Final = tuple((k + 0.5) / CELL_PX - 0.5 for k in range(CELL_PX))
-"""Where the pixels of a cell lie between the centres of cells, in cells."""
+"""Places of the pixels of a cell between the centres of cells, in cells."""
 _STEP_CELLS: Final = 32
 """Rows of cells that are computed at once: what they take stays in cache."""
 
@@ -47,18 +47,18 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AddedLight:
-    """What a network adds to a window, by cells.
+    """The light that a network adds to a window, by cells.
 
     Attributes:
         excess: (c, h / 4, w / 4) change of the stabilised value to be taken back.
-        beyond: (h / 4, w / 4) whether the network's own local mean left the usual bound, and the
-            one that was asked for.
-        far: Of these, where it moved more than a fifth of the light.
+        unexplained: (h / 4, w / 4) whether the network's own local mean left the usual bound and
+            the one that was asked for.
+        large: Of these, where it moved more than a fifth of the light.
     """
 
     excess: FloatArray
-    beyond: Mask
-    far: Mask
+    unexplained: Mask
+    large: Mask
 
 
 def keep_share(unknown: NDArray[Any]) -> FloatArray | None:
@@ -159,7 +159,7 @@ def added_light(
 
 
 def _quiet() -> np.errstate:
-    """Let a network explode: whoever looks at its tiles says so."""
+    """Return a context without warnings: the guard of tiles names networks that explode."""
     return np.errstate(invalid="ignore", over="ignore")
 
 
@@ -177,8 +177,8 @@ def _judged(
     left = moved_by > np.maximum(usual, limit)
     return AddedLight(
         excess=change - np.clip(change, -limit, limit),
-        beyond=np.asarray(left.any(axis=0)),
-        far=np.asarray((left & (moved_by > np.float32(FAR / 2) * mean)).any(axis=0)),
+        unexplained=np.asarray(left.any(axis=0)),
+        large=np.asarray((left & (moved_by > np.float32(FAR / 2) * mean)).any(axis=0)),
     )
 
 

@@ -1,4 +1,4 @@
-"""What is done behind a network, window by window: its light bounded, its change weakened.
+"""The step behind a network, window by window: its light bounded, its change weakened.
 
     network -> output of a window -> LightKeeper -> pixels that are kept
 
@@ -21,7 +21,7 @@ LOOK_EVERY: Final = 4
 
 Box = tuple[int, int, int, int]
 """(top, left, bottom, right) of the pixels of a window that are kept."""
-Behind = Callable[[FloatArray, FloatArray, Box], None]
+WindowFinish = Callable[[FloatArray, FloatArray, Box], None]
 """Changes the (c, h, w) output of a window in place; gets what the network was given, masks too."""
 
 
@@ -38,8 +38,8 @@ class LightKeeper:
         scale: Divisor of the stabilising transform.
         threads: Threads that share the rows.
         cells: Cells seen so far.
-        beyond: Of these, cells whose local mean left the usual bound.
-        far: Of these, cells in which much light was moved.
+        unexplained: Of these, cells whose local mean left the usual bound.
+        large: Of these, cells in which much light was moved.
     """
 
     front: slice
@@ -50,8 +50,8 @@ class LightKeeper:
     scale: float
     threads: int = 1
     cells: int = 0
-    beyond: int = 0
-    far: int = 0
+    unexplained: int = 0
+    large: int = 0
 
     def __call__(self, output: FloatArray, given: FloatArray, box: Box) -> None:
         """Change the output of a window.
@@ -79,12 +79,12 @@ class LightKeeper:
     @property
     def fallback_fraction(self) -> float:
         """Return the share of cells whose local mean left the usual bound."""
-        return self.beyond / max(self.cells, 1)
+        return self.unexplained / max(self.cells, 1)
 
     @property
-    def far_fraction(self) -> float:
+    def large_fraction(self) -> float:
         """Return the share of cells in which much light was moved."""
-        return self.far / max(self.cells, 1)
+        return self.large / max(self.cells, 1)
 
     def _measure(self, front: FloatArray, output: FloatArray) -> None:
         """Look at some rows of an output that stays as it is: where it matters it is everywhere."""
@@ -106,9 +106,9 @@ class LightKeeper:
         inside = np.s_[
             top // CELL_PX : -(-bottom // CELL_PX), left // CELL_PX : -(-right // CELL_PX)
         ]
-        self.cells += added.beyond[inside].size
-        self.beyond += int(np.count_nonzero(added.beyond[inside]))
-        self.far += int(np.count_nonzero(added.far[inside]))
+        self.cells += added.unexplained[inside].size
+        self.unexplained += int(np.count_nonzero(added.unexplained[inside]))
+        self.large += int(np.count_nonzero(added.large[inside]))
 
 
 def _floor(side_px: int) -> int:

@@ -27,7 +27,7 @@ from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.network.guard import TileGuard, is_finite
-from camkit.runtime.network.light_keeper import Behind
+from camkit.runtime.network.light_keeper import WindowFinish
 from camkit.runtime.network.row_buffer import RowBuffer
 from camkit.runtime.rows import RowSource
 
@@ -289,7 +289,7 @@ def infer_bands(
     cancel: Cancel | None = None,
     guard: TileGuard | None = None,
     scale: int = 1,
-    behind: Behind | None = None,
+    finish: WindowFinish | None = None,
 ) -> Iterator[FloatArray]:
     """Run a network over a picture and yield its rows from top to bottom.
 
@@ -301,7 +301,7 @@ def infer_bands(
         cancel: Asked before each window.
         guard: Looks at every tile; None refuses NaN and inf only.
         scale: s, samples along a side of the output for one pixel of the input.
-        behind: Changes the output of a window in place; it also sees all channels of the source.
+        finish: Changes the output of a window in place; it also sees all channels of the source.
 
     Yields:
         (k, rows, s w) float32 pieces of bands, consecutive, together the whole picture.
@@ -327,8 +327,8 @@ def infer_bands(
             check_cancelled(cancel)
             filled = _filled(window, held, column.origin_px)
             output = run(filled)
-            if behind is not None:
-                behind(output[0], filled[0], _box(row, column, (height, width)))
+            if finish is not None:
+                finish(output[0], filled[0], _box(row, column, (height, width)))
             kept = _kept(output, row, column, (height, width), scale)
             if guard is not None:
                 given = _kept(filled, row, column, (height, width))

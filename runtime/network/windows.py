@@ -24,7 +24,7 @@ from camkit.runtime.network.cell_windows import (
     lay_cells,
 )
 from camkit.runtime.network.guard import TileGuard
-from camkit.runtime.network.light_keeper import Behind
+from camkit.runtime.network.light_keeper import WindowFinish
 from camkit.runtime.network.tiling import (
     PixelCost,
     Progress,
@@ -48,21 +48,21 @@ class SizedNetwork:
         size: Name of its size.
         run: From a window, of which it takes its inputs, to that of its outputs.
         facts: Of the manifest.
-        masks: Channels that its windows hold behind its inputs, for what is done behind it.
-        beyond_px: How much farther than the network what is done behind it looks.
-        lattice_px: Windows keep to multiples of it besides, for what is done behind the network.
+        masks: Channels that its windows hold besides its inputs, for the step behind it.
+        extra_reach_px: Pixels that the step behind it looks beyond its reach.
+        lattice_px: Windows keep to multiples of it besides, for the step behind it.
     """
 
     size: str
     run: Run
     facts: NetworkFacts
     masks: int = 0
-    beyond_px: int = 0
+    extra_reach_px: int = 0
     lattice_px: int = 1
 
     @property
     def stride_px(self) -> int:
-        """Give what sides and origins of windows are multiples of."""
+        """Pixels that sides and origins of windows are multiples of."""
         return math.lcm(self.facts.stride_px, self.lattice_px)
 
     @property
@@ -82,7 +82,7 @@ class SizedNetwork:
             ContractError: If mode fast is asked of a network without an error curve.
         """
         reach_px = self.facts.reach_px if mode != "fast" else fast_halo_px(self.facts.halo_error)
-        return reach_px + self.beyond_px
+        return reach_px + self.extra_reach_px
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +133,7 @@ class NetworkWindows:
         cancel: Cancel | None = None,
         guard: TileGuard | None = None,
         stand_in: slice | None = None,
-        behind: Behind | None = None,
+        finish: WindowFinish | None = None,
     ) -> Iterator[FloatArray]:
         """Yield (k, s rows, s w) of the result from top to bottom."""
         if self.cells is not None:
@@ -148,7 +148,7 @@ class NetworkWindows:
                 cancel=cancel,
                 guard=guard,
                 stand_in=stand_in,
-                behind=behind,
+                finish=finish,
             )
         if self.tiles is None:
             raise ContractError("a network needs tiles or cells")
@@ -161,7 +161,7 @@ class NetworkWindows:
             cancel=cancel,
             guard=guard,
             scale=network.facts.output_scale,
-            behind=behind,
+            finish=finish,
         )
 
     @property

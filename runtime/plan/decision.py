@@ -13,7 +13,7 @@ from camkit.errors import ContractError
 from camkit.runtime.content import Content
 from camkit.runtime.geometry.placement import Placement
 from camkit.runtime.options import Mode, Options
-from camkit.runtime.plan.laws import lawful
+from camkit.runtime.plan.laws import bounded_stages
 
 Labels = NDArray[np.int8]
 
@@ -65,9 +65,9 @@ class Subject:
 
     def reach_px(self, size: str) -> int:
         """Return how far the first network of the camera looks, with what is done behind it."""
-        stages = lawful(self.bundle.manifest, self.options.laws)
-        beyond = max((stage.beyond_px for stage in stages if isinstance(stage, Network)), default=0)
-        return self.facts(size).reach_px + beyond
+        stages = bounded_stages(self.bundle.manifest, self.options.laws)
+        extra_px = [stage.extra_reach_px for stage in stages if isinstance(stage, Network)]
+        return self.facts(size).reach_px + max(extra_px, default=0)
 
     @property
     def megapixels(self) -> float:

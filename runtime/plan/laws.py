@@ -17,7 +17,7 @@ from camkit.runtime.options import Laws
 ENFORCE: Final[Laws] = "enforce"
 
 
-def lawful(manifest: Manifest, laws: Laws) -> tuple[Stage, ...]:
+def bounded_stages(manifest: Manifest, laws: Laws) -> tuple[Stage, ...]:
     """Return the stages that are walked.
 
     Args:
@@ -59,7 +59,7 @@ def _bounded(stage: Stage, manifest: Manifest) -> Stage:
 
 
 def _stands_for(network: Network, manifest: Manifest) -> bool:
-    """Tell whether the last plane of a network is of the kind that it gives."""
+    """Return whether the last plane of a network is of the kind that it gives."""
     planes = manifest.all_planes
     given = [planes[name] for name in network.gives]
     last = planes[network.takes[-1]]

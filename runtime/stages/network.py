@@ -88,7 +88,7 @@ def seconds(entry: Network, subject: Subject, work: Work, speed: Speed) -> float
 
 
 def given_rows(entry: Network, job: Job, taken: Sequence[Stream]) -> RowSource:
-    """Give the rows that the network of a stage is given: its planes stacked and stabilised.
+    """Return the rows that the network of a stage is given: its planes stacked and stabilised.
 
     Behind them come those that say where it is kept, if the stage takes a mask.
     """
@@ -152,7 +152,7 @@ class _NetworkStage:
                 run=self._trimmed(job.setup.networks(entry.role, size), max_bytes),
                 facts=one,
                 masks=self._masks,
-                beyond_px=entry.beyond_px,
+                extra_reach_px=entry.extra_reach_px,
                 lattice_px=1 if entry.light is None else LIGHT_CELL_PX,
             )
             for size, one in zip(work.sizes(), facts, strict=True)
@@ -200,10 +200,10 @@ class _NetworkStage:
 
     def _moved_light(self) -> tuple[str, ...]:
         keeper = self._keeper
-        if keeper is None or not keeper.measured or keeper.far_fraction <= NOTED_FRACTION:
+        if keeper is None or not keeper.measured or keeper.large_fraction <= NOTED_FRACTION:
             return ()
         moved = (
-            f"in {keeper.far_fraction:.1%} of the picture the network changed the brightness of "
+            f"in {keeper.large_fraction:.1%} of the picture the network changed the brightness of "
             f"the filter by more than {FAR:.0%}, which noise and lens errors do not explain"
         )
         if keeper.bound is not None:
@@ -234,7 +234,7 @@ class _NetworkStage:
             cancel=job.cancel,
             guard=self._guard,
             stand_in=stand_in,
-            behind=self._keeper,
+            finish=self._keeper,
         )
         if self._keeper is not None and self._keeper.measured:
             bands = self._counted(bands, self._keeper)

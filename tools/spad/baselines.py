@@ -83,7 +83,7 @@ class Baseline:
     Attributes:
         recipe: It was trained by.
         network: With rounded weights.
-        sampling: Behind which it was trained.
+        sampling: WindowFinish which it was trained.
         loss_db: What rounding cost at worst.
         training_data: For people.
     """

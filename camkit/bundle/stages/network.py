@@ -55,8 +55,8 @@ class Network(StageEntry):
     light: LightBound | None = None
 
     @property
-    def beyond_px(self) -> int:
-        """How much farther than the network its stage looks."""
+    def extra_reach_px(self) -> int:
+        """Pixels that its stage looks beyond the reach of the network."""
         return 0 if self.light is None else BOUND_REACH_PX
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:

@@ -180,14 +180,14 @@ class BayerDataRecipe(DataRecipe):
             raise ContractError("scenes are shown by data.display or lit by data.wild, not both")
 
     def to_json(self) -> dict[str, Any]:
-        """Give what decides samples, to name files by; what is not asked for is left out."""
+        """Return what decides samples, to name files by; what is not asked for is left out."""
         later = ("display", "wild", "patch_share", "designed_share", "light_share")
         absent = {name for name in later if not getattr(self, name)}
         return {name: value for name, value in asdict(self).items() if name not in absent}
 
     @property
     def drawn(self) -> DrawnShares:
-        """How often something is drawn whose truth is known to the last pixel."""
+        """Shares of drawn scenes whose truth is known to the last pixel."""
         return DrawnShares(
             edge=self.edge_share,
             night=self.night_share,

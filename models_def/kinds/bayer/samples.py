@@ -41,7 +41,7 @@ LAYOUT: Final = SampleLayout(
 )
 """What the networks take and give. A lens of revolution blurs every way, so samples may turn."""
 KEPT: Final = Port(name="kept", channels=1)
-"""How much of what a network adds is kept beside clipped samples, where its light is bounded."""
+"""The share of a network's change that is kept beside clipped samples, where light is bounded."""
 MOST_GAIN: Final = 3.5
 """Of a white balance; daylight and lamps need 1 to 3."""
 LEAST_CAST: Final = 1 / 8

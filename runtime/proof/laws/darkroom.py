@@ -19,7 +19,7 @@ from camkit.runtime.twin.simulate import Simulation, SimulationOptions
 from camkit.runtime.twin.truth import light_sensor, true_picture
 
 PLACES: Final = {"middle": 0.0, "half-way": 0.5, "corner": 1.0}
-"""Where on the sensor: share of the way from its middle to its corner."""
+"""Place on the sensor -> share of the way from its middle to its corner."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +27,7 @@ class Exposed:
     """A scene as the camera sees it, and pictures of it.
 
     Attributes:
-        truth: (3, h, w) linear Rec.709, in the geometry of the sensor.
+        truth: (3, h, w) linear Rec.709.
         network: Picture behind the networks.
         front: Picture of the front end alone, as the camera has it without its networks.
         light: (c, h, w) of `network` in the colours of the camera.
@@ -68,18 +68,20 @@ class Darkroom:
 
     @cached_property
     def _networks(self) -> Pipeline:
-        return Pipeline(self.bundle, Options(size=self.size, threads=self.threads, **self._flat()))
+        return Pipeline(
+            self.bundle, Options(size=self.size, threads=self.threads, **self._undistorted())
+        )
 
     @cached_property
     def _front(self) -> Pipeline:
         work = without_networks(self.bundle.manifest, Work())
         assert work is not None
         return Pipeline(
-            self.bundle, Options(method=work.method, threads=self.threads, **self._flat())
+            self.bundle, Options(method=work.method, threads=self.threads, **self._undistorted())
         )
 
-    def _flat(self) -> dict[str, Any]:
-        """Leave pictures in the geometry of the sensor, where the truth lies."""
+    def _undistorted(self) -> dict[str, Any]:
+        """Return the options of pictures that lie where their scene does: without distortion."""
         known = known_options(self.bundle.manifest.stages)
         return {"undistort": False} if "undistort" in known else {}
 
@@ -103,6 +105,7 @@ class Darkroom:
             noise=noise,
             origin_px=self.origin_px(place, scene.shape[1:]),
             depth_mm=self.depth_mm,
+            distort=False,  # parts of a chart stay where they are drawn
         )
         simulation = part_of(self.bundle.manifest).simulate(scene, self.bundle, options)
         network, light = self._pictures(self._networks, simulation)
@@ -135,7 +138,7 @@ class Darkroom:
         return work.fill(), light
 
 
-def is_photographed(bundle: Bundle) -> str | None:
+def reason_not_judged(bundle: Bundle) -> str | None:
     """Return why no laws of photographs can be held against a bundle; None if they can."""
     manifest = bundle.manifest
     if manifest.sensor.type == "spad" or manifest.stage(Color) is None:

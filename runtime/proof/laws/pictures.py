@@ -17,7 +17,7 @@ from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Network
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
-from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, Exposed, is_photographed
+from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, Exposed, reason_not_judged
 from camkit.runtime.proof.laws.law import Law
 from camkit.scenes.charts import lamp_chart, patch_chart
 from camkit.scenes.procedural import procedural_scene
@@ -40,7 +40,7 @@ SIDE_PX: Final = 320
 
 
 def picture_laws(bundle: Bundle, size: str | None, threads: int) -> tuple[Law, ...] | str:
-    """Hold the laws of photographs against one size of a bundle's networks.
+    """Measure the laws of photographs for one size of a bundle's networks.
 
     Args:
         bundle: The camera.
@@ -50,7 +50,7 @@ def picture_laws(bundle: Bundle, size: str | None, threads: int) -> tuple[Law, .
     Returns:
         The laws, or why none can be held.
     """
-    reason = is_photographed(bundle)
+    reason = reason_not_judged(bundle)
     extent = bundle.manifest.sensor.extent
     if extent is not None and min(extent.width_px, extent.height_px) < LEAST_SIDE_PX:
         reason = reason or f"the sensor is smaller than the charts ({LEAST_SIDE_PX} px)"

@@ -31,7 +31,7 @@ Found = Mapping[str | None, tuple[Law, ...]] | str
 """Size -> laws, None for a bundle without networks; or why none can be held."""
 
 
-def hold_laws(bundle: Bundle, *, threads: int = 1) -> Found:
+def measure_laws(bundle: Bundle, *, threads: int = 1) -> Found:
     """Measure the laws for every size of a bundle."""
     module = import_module(part_of(bundle.manifest).laws)
     laws = cast("Laws", module.LAWS)
@@ -62,12 +62,12 @@ def with_laws(manifest: Manifest, found: Found) -> Manifest:
 def prove_laws(
     bundle: Bundle, *, threads: int
 ) -> tuple[bool, str] | tuple[bool, str, Sequence[Mapping[str, Any]]]:
-    """Hold the laws of pictures, and compare with what the bundle states.
+    """Measure the laws of pictures, and compare with what the bundle states.
 
     Raises:
         BrokenLawsError: If a law is broken that the bundle does not state as broken so far.
     """
-    found = hold_laws(bundle, threads=threads)
+    found = measure_laws(bundle, threads=threads)
     if isinstance(found, str):
         return False, found
     facts, unstated, lines = [], [], []
@@ -82,7 +82,7 @@ def prove_laws(
 
 
 def _is_stated(law: Law, stated: Mapping[str, StatedLaw]) -> bool:
-    """Tell whether a law is kept, or broken no further than is stated."""
+    """Return whether a law is kept, or broken no further than is stated."""
     if law.kept:
         return True
     known = stated.get(law.name)

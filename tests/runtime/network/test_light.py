@@ -185,10 +185,10 @@ def test_much_moved_light_is_told_from_little() -> None:
     front = np.full((1, 40, 40), 1.0, np.float32)
     little = added_light(front, front * np.float32(1.03), None, DETAIL, scale=SCALE)
     much = added_light(front, front * np.float32(0.7), None, DETAIL, scale=SCALE)
-    assert little.beyond.all()
-    assert not little.far.any()
-    assert much.beyond.all()
-    assert much.far.all()
+    assert little.unexplained.all()
+    assert not little.large.any()
+    assert much.unexplained.all()
+    assert much.large.all()
 
 
 def test_sides_that_are_no_whole_cells_are_refused() -> None:

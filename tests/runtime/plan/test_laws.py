@@ -13,7 +13,7 @@ from camkit.bundle.writer import write_bundle
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.plan.laws import lawful
+from camkit.runtime.plan.laws import bounded_stages
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages
 from tests.job_factory import made_mosaic
 
@@ -40,7 +40,7 @@ def _bundle(folder: Path, light: LightBound | None, version: str) -> Bundle:
 
 
 def _bounds(manifest: Manifest, laws: str) -> list[LightBound | None]:
-    stages = lawful(manifest, laws)  # type: ignore[arg-type]
+    stages = bounded_stages(manifest, laws)  # type: ignore[arg-type]
     return [stage.light for stage in stages if isinstance(stage, Network)]
 
 
@@ -48,9 +48,9 @@ def test_older_bundles_are_bounded_only_where_the_caller_says_so() -> None:
     older = _manifest(None, "2.4")
     assert _bounds(older, "stated") == [None]
     assert _bounds(older, "enforce") == [USUAL_BOUND]
-    (network,) = [s for s in lawful(older, "enforce") if isinstance(s, Network)]
+    (network,) = [s for s in bounded_stages(older, "enforce") if isinstance(s, Network)]
     assert network.takes[-1] == "unknown", "the mask of the bank"
-    assert network.beyond_px == BOUND_REACH_PX
+    assert network.extra_reach_px == BOUND_REACH_PX
 
 
 def test_from_the_new_format_on_every_network_behind_a_bank_is_bounded() -> None:

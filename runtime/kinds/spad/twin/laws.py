@@ -32,7 +32,7 @@ FRAMES: Final = 16
 
 
 def photon_laws(bundle: Bundle, size: str | None, threads: int) -> tuple[Law, ...] | str:
-    """Hold the laws of pictures of photons against one size of a bundle.
+    """Measure the laws of pictures of photons for one size of a bundle.
 
     Args:
         bundle: The camera.

@@ -1,4 +1,4 @@
-"""What a bundle states of laws, held against what is measured."""
+"""Laws as a bundle states them, compared with what is measured."""
 
 from typing import Any
 
@@ -21,10 +21,10 @@ BAD = Law(name="flat", worst=0.05, limit=0.01, unit="%", front=0.002, where="cor
 
 @pytest.fixture
 def stated(tmp_path, monkeypatch):  # type: ignore[no-untyped-def]
-    """Give a function that checks a bundle of some stated laws, of which `GOOD` and `BAD` hold."""
+    """Return a function that checks a bundle of stated laws; `GOOD` and `BAD` are measured."""
 
     def check(laws: dict[str, dict[str, StatedLaw]] | None, *found: Law) -> Any:
-        monkeypatch.setattr(proof, "hold_laws", lambda *_, **__: {"M": found or (GOOD, BAD)})
+        monkeypatch.setattr(proof, "measure_laws", lambda *_, **__: {"M": found or (GOOD, BAD)})
         version = "2.4" if laws is None else ".".join(map(str, LIGHT_VERSION))
         path = tmp_path / "tiny.camkit"
         write_bundle(path, tiny_manifest(laws=laws, format_version=version), tiny_members())
@@ -75,4 +75,4 @@ def test_laws_in_an_older_format_are_refused(tmp_path) -> None:  # type: ignore[
 
 def test_a_sensor_smaller_than_the_charts_is_not_judged(tmp_path) -> None:  # type: ignore[no-untyped-def]
     bundle = open_bundle(write_tiny_bundle(tmp_path))
-    assert proof.hold_laws(bundle) == "the sensor is smaller than the charts (640 px)"
+    assert proof.measure_laws(bundle) == "the sensor is smaller than the charts (640 px)"
