@@ -11,6 +11,7 @@ lies, so windows of a picture equal the whole in bits.
 Format: camkit/bundle/light_bound.py. Twin: camkit/models_def/networks/light.py.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -29,7 +30,6 @@ from camkit.bundle.light_bound import (
 )
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
-from camkit.runtime.machine.slices import run_slices
 from camkit.runtime.rows import RowSource
 
 MASK_ROWS: Final = max(NEAR_PX)
@@ -39,8 +39,9 @@ FAR: Final = 0.2
 _TINY: Final = np.float32(1e-6)
 _PHASES: Final = tuple((k + 0.5) / CELL_PX - 0.5 for k in range(CELL_PX))
 """Places of the pixels of a cell between the centres of cells, in cells."""
-_STEP_CELLS: Final = 32
-"""Rows of cells that are computed at once: what they take stays in cache."""
+_STEP_CELLS: Final = 128
+"""Rows of cells that are computed at once. With fewer, the calls cost more than the sums, and
+threads wait for one another."""
 
 Mask = NDArray[np.bool_]
 
@@ -111,7 +112,6 @@ def added_light(
     bound: LightBound,
     *,
     scale: float,
-    threads: int = 1,
 ) -> AddedLight:
     """Compute what a network adds to a window beyond its bound.
 
@@ -122,7 +122,6 @@ def added_light(
         kept: (h, w) of `keep_share`; None for 1 everywhere.
         bound: Of the manifest.
         scale: Divisor of the stabilising transform; the noise there is 0.5 / scale.
-        threads: Threads that share the rows; no influence on the bits.
 
     Raises:
         ContractError: If the shapes disagree, or a side is no multiple of the side of a cell.
@@ -131,14 +130,9 @@ def added_light(
     rows, columns = height // CELL_PX, width // CELL_PX
     moved, weight, level = (np.empty((channels, rows, columns), np.float32) for _ in range(3))
 
-    def pool(first: int, last: int) -> None:
-        with _quiet():
-            pool_cells(first, last)
-
-    def pool_cells(first: int, last: int) -> None:
-        both, more = np.empty((2, CELL_PX * _STEP_CELLS, width), np.float32)
-        for top in range(first, last, _STEP_CELLS):
-            bottom = min(top + _STEP_CELLS, last)
+    both, more = np.empty((2, CELL_PX * _STEP_CELLS, width), np.float32)
+    with _quiet():
+        for top, bottom in _steps(rows):
             pixels = slice(CELL_PX * top, CELL_PX * bottom)
             sums, changes = both[: CELL_PX * (bottom - top)], more[: CELL_PX * (bottom - top)]
             for channel in range(channels):
@@ -152,10 +146,13 @@ def added_light(
                 _cell_means(changes, moved[channel, top:bottom])
                 _cell_means(sums, weight[channel, top:bottom])
                 _cell_means(before, level[channel, top:bottom])
-
-    run_slices(pool, rows, threads=threads)
-    with _quiet():
         return _judged(moved, weight, level, bound, scale)
+
+
+def _steps(rows: int) -> Iterator[tuple[int, int]]:
+    """Yield first and last row of cells that are computed at once."""
+    for top in range(0, rows, _STEP_CELLS):
+        yield top, min(top + _STEP_CELLS, rows)
 
 
 def _quiet() -> np.errstate:
@@ -189,7 +186,6 @@ def take_back(
     excess: FloatArray | None,
     *,
     strength: float = 1.0,
-    threads: int = 1,
 ) -> None:
     """Take from an output, in place, what is not kept of it.
 
@@ -199,27 +195,21 @@ def take_back(
         kept: (h, w) of `keep_share`; None for 1 everywhere.
         excess: (c, h / 4, w / 4) of `added_light`; None for nothing, with sides of any length.
         strength: How much of what is left of the change is kept, 0..1.
-        threads: Threads that share the rows; no influence on the bits.
     """
     channels, height, _ = front.shape if excess is None else _checked(front, output)
     shares = kept
     if strength != 1.0:
         shares = np.float32(strength) * (np.ones(1, np.float32) if kept is None else kept)
 
-    def change(first: int, last: int) -> None:
-        for top in range(first, last, _STEP_CELLS):
-            bottom = min(top + _STEP_CELLS, last)
-            pixels = slice(CELL_PX * top, CELL_PX * bottom)
-            for channel in range(channels):
-                rows = output[channel, pixels]
-                if excess is not None:
-                    _subtract(rows, excess[channel], top, bottom)
-                if shares is not None:
-                    _mix(
-                        rows, front[channel, pixels], shares[pixels] if shares.ndim == 2 else shares
-                    )
-
-    run_slices(change, -(-height // CELL_PX), threads=threads)
+    for top, bottom in _steps(-(-height // CELL_PX)):
+        pixels = slice(CELL_PX * top, CELL_PX * bottom)
+        for channel in range(channels):
+            rows = output[channel, pixels]
+            if excess is not None:
+                _subtract(rows, excess[channel], top, bottom)
+            if shares is not None:
+                share = shares[pixels] if shares.ndim == 2 else shares
+                _mix(rows, front[channel, pixels], share)
 
 
 def _mix(rows: FloatArray, front: FloatArray, shares: FloatArray) -> None:

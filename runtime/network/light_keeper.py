@@ -36,7 +36,6 @@ class LightKeeper:
         measured: Whether the light is measured; without it and a bound only `strength` counts.
         strength: How much of what the network adds is kept, 0..1.
         scale: Divisor of the stabilising transform.
-        threads: Threads that share the rows.
         cells: Cells seen so far.
         unexplained: Of these, cells whose local mean left the usual bound.
         large: Of these, cells in which much light was moved.
@@ -48,7 +47,6 @@ class LightKeeper:
     measured: bool
     strength: float
     scale: float
-    threads: int = 1
     cells: int = 0
     unexplained: int = 0
     large: int = 0
@@ -74,7 +72,7 @@ class LightKeeper:
             self._measure(front, output)
         if excess is None and kept is None and self.strength == 1:
             return
-        take_back(front, output, kept, excess, strength=self.strength, threads=self.threads)
+        take_back(front, output, kept, excess, strength=self.strength)
 
     @property
     def fallback_fraction(self) -> float:
@@ -99,7 +97,7 @@ class LightKeeper:
     def _added(
         self, front: FloatArray, output: FloatArray, kept: FloatArray | None, bound: LightBound
     ) -> AddedLight:
-        return added_light(front, output, kept, bound, scale=self.scale, threads=self.threads)
+        return added_light(front, output, kept, bound, scale=self.scale)
 
     def _count(self, added: AddedLight, box: Box) -> None:
         top, left, bottom, right = box

@@ -38,6 +38,8 @@ from camkit.runtime.options import Mode
 from camkit.runtime.rows import RowSource
 
 FAST_LEAST_DB: Final = 80.0
+STEP_BYTES: Final = 16.0
+"""For a pixel of a window, of the step behind a network: its cells, and rows on their way."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,8 +70,9 @@ class SizedNetwork:
     @property
     def cost(self) -> PixelCost:
         """Give what the network holds per pixel."""
+        behind = STEP_BYTES if self.extra_reach_px else 0.0
         return PixelCost(
-            arena_bytes=self.facts.bytes_per_pixel,
+            arena_bytes=self.facts.bytes_per_pixel + behind,
             channels=self.facts.input_channels + self.masks,
             outputs=self.facts.output_channels,
             scale=self.facts.output_scale,

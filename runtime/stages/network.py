@@ -267,7 +267,6 @@ class _NetworkStage:
             measured=measured,
             strength=options.strength,
             scale=entry.scale,
-            threads=self._job.threads,
         )
 
     def _counted(self, bands: Iterator[FloatArray], keeper: LightKeeper) -> Iterator[FloatArray]:

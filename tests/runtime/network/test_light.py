@@ -13,6 +13,7 @@ from camkit.bundle.light_bound import (
     LightBound,
 )
 from camkit.errors import ContractError
+from camkit.runtime.network import light
 from camkit.runtime.network.light import KeptRows, added_light, keep_share, take_back
 from camkit.runtime.rows import ArrayRows
 
@@ -21,12 +22,10 @@ DETAIL = LightBound()
 Array = NDArray[np.float32]
 
 
-def _bounded(
-    front: Array, output: Array, kept: Array | None, bound: LightBound, threads: int = 1
-) -> Array:
+def _bounded(front: Array, output: Array, kept: Array | None, bound: LightBound) -> Array:
     made = output.copy()
-    added = added_light(front, made, kept, bound, scale=SCALE, threads=threads)
-    take_back(front, made, kept, added.excess, threads=threads)
+    added = added_light(front, made, kept, bound, scale=SCALE)
+    take_back(front, made, kept, added.excess)
     return made
 
 
@@ -168,10 +167,11 @@ def test_a_pixel_reaches_as_far_as_stated_and_no_further() -> None:
     assert BOUND_REACH_PX + max(NEAR_PX) == MASK_REACH_PX
 
 
-def test_threads_do_not_change_a_bit() -> None:
+def test_the_rows_computed_at_once_do_not_change_a_bit(monkeypatch: pytest.MonkeyPatch) -> None:
     front, output = _window(7, 160, 96)
-    one = _bounded(front, output, None, USUAL_BOUND)
-    np.testing.assert_array_equal(_bounded(front, output, None, USUAL_BOUND, threads=3), one)
+    at_once = _bounded(front, output, None, USUAL_BOUND)
+    monkeypatch.setattr(light, "_STEP_CELLS", 8)
+    np.testing.assert_array_equal(_bounded(front, output, None, USUAL_BOUND), at_once)
 
 
 def test_strength_mixes_what_is_left_with_the_front_end() -> None:

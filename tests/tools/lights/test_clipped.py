@@ -8,20 +8,20 @@ import pytest
 from camkit.bundle.reader import open_bundle
 from camkit.bundle.stages import Wiener
 from tests.bundle_factory import write_tiny_bundle
-from tools import clipped_lights
+from tools.lights import clipped
 
 
 def test_three_ways_are_scored_and_averaged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bundle = write_tiny_bundle(tmp_path)
-    monkeypatch.setattr(clipped_lights, "SCENE_PX", (64, 96))
-    monkeypatch.setattr(clipped_lights, "BORDER_PX", 4)
-    monkeypatch.setattr(clipped_lights, "SCENES", ((7, 6.0, (0, 0)),))
-    monkeypatch.setattr(sys, "argv", ["clipped_lights", "--bundles", str(bundle), "--size", "M"])
-    clipped_lights.main()
+    monkeypatch.setattr(clipped, "SCENE_PX", (64, 96))
+    monkeypatch.setattr(clipped, "BORDER_PX", 4)
+    monkeypatch.setattr(clipped, "SCENES", ((7, 6.0, (0, 0)),))
+    monkeypatch.setattr(sys, "argv", ["clipped", "--bundles", str(bundle), "--size", "M"])
+    clipped.main()
     rows = [line for line in capsys.readouterr().out.splitlines() if "mean" in line]
-    assert [row.split("|")[5].strip() for row in rows] == list(clipped_lights.WAYS)
+    assert [row.split("|")[5].strip() for row in rows] == list(clipped.WAYS)
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_a_way_changes_the_bank_alone(
 ) -> None:
     bundle = open_bundle(write_tiny_bundle(tmp_path))
     before = bundle.manifest.stage(Wiener)
-    after = clipped_lights._explaining(bundle, way).manifest.stage(Wiener)
+    after = clipped._explaining(bundle, way).manifest.stage(Wiener)
     assert before is not None
     assert after is not None
     assert after.clip_reach_px == reach_px

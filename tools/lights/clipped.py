@@ -1,6 +1,6 @@
 """What explaining clipped lights gives: PSNR and CPU seconds on procedural scenes.
 
-    python -m tools.clipped_lights --bundles duet,duet-joint --size S
+    python -m tools.lights.clipped --bundles duet,duet-joint --size S
 
 Three ways: `none` (the linear filter alone), `near` (what the runtime does) and `everywhere` (the
 explanation of the whole block is kept, as camkit did before). PSNR in dB on sRGB values, 64 px of

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from tools import lamps
+from tools.lights import lamps
 
 
 def test_a_table_has_every_scene_and_their_mean(

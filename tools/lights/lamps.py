@@ -1,6 +1,6 @@
 """Share of lamps that come out dark in whole scenes, and PSNR, behind networks and their front end.
 
-    python -m tools.lamps duet OLD.camkit --scenes night:0 night:1 night:2
+    python -m tools.lights.lamps duet OLD.camkit --scenes night:0 night:1 night:2
 
 Scenes of 768x512 pixels in the middle of the sensor at the lowest ISO, exposed so that 0.5 % of
 the pixels saturate. Of what is white in the truth: the shares below 0.5 and below 0.2 in the
