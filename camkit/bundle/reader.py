@@ -43,6 +43,7 @@ from camkit.bundle.optics import (
     StreakEntry,
 )
 from camkit.bundle.psf_file import psf_from_bytes
+from camkit.bundle.stages import Wiener
 from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
@@ -261,6 +262,8 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
     manifest = read_container_manifest(container)
     if manifest.bounds_light:
         _need_version(manifest, LIGHT_VERSION, "the light that a stage makes is bounded")
+    if any(bank.depth != "mean" for bank in manifest.stages_of(Wiener)):
+        _need_version(manifest, LIGHT_VERSION, "a bank finds the distance of the scene")
     if manifest.laws is not None:
         _need_version(manifest, LIGHT_VERSION, "laws of a picture are stated")
     # Unpacking and hashing leave Python's lock to others.

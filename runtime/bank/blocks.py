@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import cv2
 import numpy as np
@@ -65,6 +65,16 @@ PlaceKnowledge = Callable[[ComplexArray, float], object]
 """(OTF, field height in mm) -> what a filter knows of a place before it sees a block there."""
 
 
+class KernelChoice(Protocol):
+    """Several kernels of a camera, one of them for every place of a capture."""
+
+    def number_at(self, x_px: float, y_px: float) -> int:
+        """Give the number of the kernels that a pixel position of the capture has."""
+
+    def kernels_of(self, number: int) -> FieldKernels:
+        """Give the kernels of a number."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LocalPsf:
     """The kernels of a camera and where the capture lies on its sensor.
@@ -72,10 +82,13 @@ class LocalPsf:
     Attributes:
         kernels: Of `camkit.runtime.bank.psf.color_kernels`.
         window: Place of the capture on the sensor.
+        choice: Kernels that differ from place to place, of fields and sides as `kernels`; None for
+            `kernels` everywhere.
     """
 
     kernels: FieldKernels
     window: SensorWindow
+    choice: KernelChoice | None = None
 
     @property
     def channels(self) -> int:
@@ -86,6 +99,14 @@ class LocalPsf:
         """Give the sensor position of a pixel position of the capture."""
         x_mm, y_mm = self.window.to_mm(x_px, y_px)
         return float(x_mm), float(y_mm)
+
+    def number_at(self, x_px: float, y_px: float) -> int:
+        """Give which kernels of the choice a pixel position of the capture has."""
+        return 0 if self.choice is None else self.choice.number_at(x_px, y_px)
+
+    def kernels_of(self, number: int) -> FieldKernels:
+        """Give the kernels of a number."""
+        return self.kernels if self.choice is None else self.choice.kernels_of(number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,33 +406,38 @@ class BlockBank:
         self, strip: "_Strip", pool: ThreadPoolExecutor, cancel: Cancel | None
     ) -> Iterator[FloatArray]:
         """Give the windowed blocks of one block row, from left to right."""
-        places = [self._psf.position_mm(c.centre, strip.span.centre) for c in self._columns]
+        psf, y_px = self._psf, strip.span.centre
+        places = [
+            (psf.number_at(c.centre, y_px), psf.position_mm(c.centre, y_px)) for c in self._columns
+        ]
         filtered = [p for c, p in zip(self._columns, places, strict=True) if not strip.is_plain(c)]
         # Only a round PSF has quadrants that mirror each other.
-        turns = self._psf.kernels.turns
+        turns = psf.kernels.turns
 
-        def key_of(place_mm: tuple[float, float]) -> tuple[float, float]:
-            if self._psf.kernels.field_heights_mm.size == 1:
-                return 0.0, 0.0
-            return (abs(place_mm[0]), abs(place_mm[1])) if turns else place_mm
+        def key_of(place: _Numbered) -> _Numbered:
+            number, (x_mm, y_mm) = place
+            if psf.kernels.field_heights_mm.size == 1:
+                return number, (0.0, 0.0)
+            return number, (abs(x_mm), abs(y_mm)) if turns else (x_mm, y_mm)
 
         keys = sorted({key_of(place) for place in filtered})
         # The pool takes tasks in order: no block waits for a place that nobody is making.
         made = {key: pool.submit(self._place, key) for key in keys}
 
-        def restore(column: Span, place_mm: tuple[float, float]) -> FloatArray:
+        def restore(column: Span, place: _Numbered) -> FloatArray:
             check_cancelled(cancel)
             window = strip.span.weights[:, None] * column.weights
             if strip.is_plain(column):
                 return strip.cut(column)[0][:, strip.span.inner, column.inner] * window
-            sharp = self._filtered(strip.cut(column), made[key_of(place_mm)].result(), place_mm)
+            sharp = self._filtered(strip.cut(column), made[key_of(place)].result(), place[1])
             return sharp[:, strip.span.inner, column.inner] * window
 
         return pool.map(restore, self._columns, places)
 
-    def _place(self, place_mm: tuple[float, float]) -> "_Place":
+    def _place(self, place: "_Numbered") -> "_Place":
         """Give the OTF of a place, and what the filter knows of it."""
-        otf = to_otf(self._psf.kernels.at(*place_mm), self._block_px)
+        number, place_mm = place
+        otf = to_otf(self._psf.kernels_of(number).at(*place_mm), self._block_px)
         # Kernels of one field are those of many heights.
         if self._knowledge is None or self._psf.kernels.field_heights_mm.size == 1:
             return _Place(otf=otf)
@@ -450,6 +476,8 @@ class _Place:
     known: object = None
 
 
+_Numbered = tuple[int, tuple[float, float]]
+"""Which kernels a place has, and where it lies in mm."""
 _Cut = tuple[FloatArray, NDArray[np.bool_] | None]
 
 

@@ -8,9 +8,9 @@ from typing import Final
 from camkit.bundle.haze_golden import MAX_CELLS
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
-from camkit.bundle.stages import Dehaze, Demosaic
+from camkit.bundle.stages import Dehaze
 from camkit.errors import BundleError
-from camkit.runtime.bank.cell_means import cell_count, cell_means
+from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.bank.haze import (
     KEPT_CAMERAS,
     CoarseBand,
@@ -23,6 +23,7 @@ from camkit.runtime.bank.haze import (
     solving_bytes,
 )
 from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.job.cells import cells_of
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
@@ -106,12 +107,10 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
         job: The capture; what lies before the stage is read once.
     """
     bundle = job.known_bundle
-    light, *mask = job.probe(_summed(entry, job), *entry.takes[1:])
-    cfa = job.capture.cfa if light.shape[0] == 1 else None
-    cells, clipped = cell_means(light, mask[0] if mask else None, cfa, entry.shrink)
+    seen = cells_of(job, entry.takes, entry.shrink)
     return solve_coarse(
-        cells,
-        clipped,
+        seen.means,
+        seen.clipped,
         _kernels(bundle, job.options.depth_mm, job.placement.kernel_scale),
         job.window_of(picture.plane),
         terms=entry.terms,
@@ -128,14 +127,6 @@ def _kernels(bundle: Bundle, depth_mm: float | None, scale: float) -> HazyKernel
     assert sensor.type != "spad"  # its counts never join
     response = sensor.response_arrays()
     return hazy_kernels(bundle.psf, bundle.haze, *response, depth_mm=depth_mm).scaled(scale)
-
-
-def _summed(entry: Dehaze, job: Job) -> str:
-    """Name the plane whose samples are summed: the mosaic, where nothing else was made of it."""
-    stages = job.setup.stages
-    giver = next((stage for stage in stages if entry.takes[0] in stage.gives), None)
-    mosaic = isinstance(giver, Demosaic) and job.capture.cfa is not None
-    return giver.takes[0] if giver is not None and mosaic else entry.takes[0]
 
 
 def _cleared(picture: Stream, band: Callable[[], CoarseBand], threads: int) -> Iterator[Rows]:

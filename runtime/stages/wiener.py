@@ -1,6 +1,6 @@
 """The Wiener bank, or a classical method on its blocks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -20,9 +20,11 @@ from camkit.runtime.bank.blocks import (
     cut_block_px,
     lay_spans,
 )
+from camkit.runtime.bank.distance import CELL_PX, KernelsByDistance, KernelsOfScene, find_nearness
 from camkit.runtime.bank.lights import fitted_px, light_share
-from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.content import LIGHT_PX
+from camkit.runtime.job.cells import cells_of
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
@@ -39,6 +41,7 @@ METHODS: Final = ("wiener", "rl", "admm-tv")
 OPTIONS: Final = ("depth_m",)
 FACTS: Final = (FOCUS,)
 FOLLOWS: Final = "noise and level of every block, hence the ISO"
+ESTIMATED: Final = "estimated"
 KERNEL_BLOCKS: Final = 3.2
 """A kernel of another place with its transform, in blocks that are only filtered (measured)."""
 LIGHTS_AT_LEAST: Final = 1 / 7
@@ -89,7 +92,8 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
     depths_mm = bundle.psf.depths_mm
     if depths_mm.size > 1:
         known = ", ".join(map(depth_name, depths_mm))
-        job.record["depth"] = f"mean of {known}" if depth_mm is None else depth_name(depth_mm)
+        untold = ESTIMATED if entry.depth == ESTIMATED else f"mean of {known}"
+        job.record["depth"] = untold if depth_mm is None else depth_name(depth_mm)
     if job.options.unit is not None and FOCUS in job.options.unit.facts:
         job.record[FOCUS] = job.options.focus_um
 
@@ -144,15 +148,11 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
-    kernels = color_kernels(
-        bundle.psf,
-        *sensor.response_arrays(),
-        depth_mm=job.options.depth_mm,
-        focus_um=job.options.focus_um,
-        share=bundle.haze.core_share if bundle.manifest.has_haze else None,
-    )
+    kernels_at = _kernels(job)
     local = LocalPsf(
-        kernels=kernels.scaled(job.placement.kernel_scale), window=job.window_of(planes.plane)
+        kernels=kernels_at(job.options.depth_mm),
+        window=job.window_of(planes.plane),
+        choice=_by_distance(entry, job, planes, kernels_at),
     )
     method = job.work.method if job.work.method in METHODS else METHODS[0]
     noise = job.noise.with_gains(planes.gains)
@@ -165,6 +165,51 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     side = cut_block_px(entry.block_px, entry.overlap_px, local.window.size_px)
     cut = entry.model_copy(update={"block_px": max(side, *local.kernels.kernels.shape[-2:])})
     return restoration_bank(local, cut, noise, method=method, threads=job.threads)
+
+
+def _kernels(job: Job) -> Callable[[float | None], FieldKernels]:
+    """Give the function that gives the kernels of an object distance in mm; None for the mean."""
+    bundle = job.known_bundle
+    sensor = bundle.manifest.sensor
+    assert sensor.type != "spad"  # a spad's counts never join a bank
+
+    def kernels_at(depth_mm: float | None) -> FieldKernels:
+        return color_kernels(
+            bundle.psf,
+            *sensor.response_arrays(),
+            depth_mm=depth_mm,
+            focus_um=job.options.focus_um,
+            share=bundle.haze.core_share if bundle.manifest.has_haze else None,
+        ).scaled(job.placement.kernel_scale)
+
+    return kernels_at
+
+
+def _by_distance(
+    entry: Wiener,
+    job: Job,
+    planes: Stream,
+    kernels_at: Callable[[float | None], FieldKernels],
+) -> KernelsOfScene | None:
+    """Find the distance of every part of the capture; None where it is told, or there is one."""
+    depths_mm = job.known_bundle.psf.depths_mm
+    if entry.depth != ESTIMATED or job.options.depth_mm is not None or depths_mm.size < 2:
+        return None
+    kernels = KernelsByDistance(depths_mm, [kernels_at(float(d)) for d in depths_mm])
+    key = "nearness", entry.takes
+    if (found := job.kept.get(key)) is None:
+        seen = cells_of(job, entry.takes, CELL_PX)
+        found = job.kept[key] = find_nearness(
+            seen.means,
+            seen.clipped,
+            kernels,
+            job.window_of(planes.plane),
+            noise=job.noise.with_gains(planes.gains),
+            cfa=seen.cfa,
+            threads=job.threads,
+        )
+    job.sections["distance"] = found.to_json()
+    return kernels.over(found)
 
 
 def _plain(job: Job) -> PlainBlock | None:

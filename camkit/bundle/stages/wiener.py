@@ -39,6 +39,9 @@ class Wiener(StageEntry):
             hold half of a kernel's side, or the whole of it (format 2.8; bundles of formats before
             2.4 have the latter, later ones the former).
         together: How the colours are restored together (format 2.4); None for each alone.
+        depth: Whose kernels are taken where nobody says how far the scene is: the mean over the
+            depths of the PSF, or those of the distance that every part of the capture shows
+            (format 2.8).
     """
 
     type: Literal["wiener"] = "wiener"
@@ -53,6 +56,7 @@ class Wiener(StageEntry):
     clip_power: Annotated[float, Field(ge=1.0, lt=3.0)] = 1.0
     clip_windows: Literal["half_kernel", "whole_kernel"] = "half_kernel"
     together: Together | None = None
+    depth: Literal["mean", "estimated"] = "mean"
 
     @model_validator(mode="after")
     def _check(self) -> "Wiener":

@@ -35,6 +35,7 @@ from camkit.models_def.kinds.bayer.samples import (
     scene_side_px,
     target_of,
     tint_crop,
+    told_depth,
 )
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.together import Numbers, restore_together
@@ -87,18 +88,23 @@ class _Case:
     alone: float
 
 
-def spread_of(bank: PsfBank) -> Spread:
-    """Measure how much the transfer of the copies to train on scatters around the frozen one."""
+def spread_of(bank: PsfBank, recipe: BayerRecipe) -> Spread:
+    """Measure how much the transfer of the copies to train on scatters around the frozen one.
+
+    Where the bank estimates the depth, the frozen one is that of depths a standard deviation of
+    the estimate nearer and farther than the copy's.
+    """
+    errors = (-recipe.data.depth_error, recipe.data.depth_error)
     count = len(bank.copy_heights_mm)
     chosen = np.unique(np.linspace(0, count - 1, min(HEIGHTS, count)).round().astype(int))
     places = np.hypot(np.fft.fftfreq(GRID_PX)[:, None], np.fft.rfftfreq(GRID_PX)[None])
     variance = []
     for index in chosen:
         height = float(bank.copy_heights_mm[index])
-        frozen = to_otf(bank.frozen_kernels(0.0, height), (GRID_PX, GRID_PX))
         gaps = [
-            (to_otf(bank.blur_kernels(copy, 0.0, height), (GRID_PX, GRID_PX)) - frozen).abs()
+            (_transfer(bank, height, copy) - _known(bank, height, recipe, copy, error)).abs()
             for copy in range(bank.training_copies)
+            for error in (errors if recipe.estimates_depth else (0.0,))
         ]
         mean = torch.stack(gaps).square().mean(dim=0)[0].numpy().astype(np.float64)
         variance.append(tuple(_line(of_colour, places) for of_colour in mean))
@@ -109,7 +115,19 @@ def spread_of(bank: PsfBank) -> Spread:
     )
 
 
-def transfer_errors(bank: PsfBank) -> tuple[float, ...]:
+def _transfer(bank: PsfBank, height_mm: float, copy: int) -> Tensor:
+    return to_otf(bank.blur_kernels(copy, 0.0, height_mm), (GRID_PX, GRID_PX))
+
+
+def _known(
+    bank: PsfBank, height_mm: float, recipe: BayerRecipe, copy: int, error: float = 0.0
+) -> Tensor:
+    """Give the transfer that a bank takes a copy's for; `error` is one of the nearness, in 1/m."""
+    told = told_depth(recipe, copy, error) if recipe.estimates_depth else None
+    return to_otf(bank.frozen_kernels(0.0, height_mm, told), (GRID_PX, GRID_PX))
+
+
+def transfer_errors(bank: PsfBank, recipe: BayerRecipe) -> tuple[float, ...]:
     """Give how far the transfer of every copy lies off the frozen one, those to train on first.
 
     Root of the mean |H_copy - H|^2 over that of |H_copy|^2, below 0.3 cycles per pixel, over all
@@ -119,9 +137,9 @@ def transfer_errors(bank: PsfBank) -> tuple[float, ...]:
     inside = torch.from_numpy(places < JUDGED_BELOW)
     squares, powers = np.zeros(len(bank.copies)), np.zeros(len(bank.copies))
     for height in bank.copy_heights_mm.tolist():
-        frozen = to_otf(bank.frozen_kernels(0.0, height), (GRID_PX, GRID_PX))[..., inside]
         for copy in range(len(bank.copies)):
-            own = to_otf(bank.blur_kernels(copy, 0.0, height), (GRID_PX, GRID_PX))[..., inside]
+            frozen = _known(bank, height, recipe, copy)[..., inside]
+            own = _transfer(bank, height, copy)[..., inside]
             squares[copy] += float((own - frozen).abs().square().sum())
             powers[copy] += float(own.abs().square().sum())
     wrong, whole = (sums.reshape(-1, bank.depths).sum(axis=1) for sums in (squares, powers))
@@ -162,10 +180,10 @@ def fit_bank(
             "to; raise --samples"
         )
     tell(f"{len(cases)} samples, {samples - len(cases)} left out for clipped light")
-    errors = transfer_errors(bank)
+    errors = transfer_errors(bank, recipe)
     own_errors, unseen = errors[: -bank.validation_copies], errors[-bank.validation_copies :]
     tell(f"transfer of copies off by {_told(own_errors)}; of those to choose by {_told(unseen)}")
-    first = FIRST.model_copy(update={"spread": spread_of(bank)})
+    first = FIRST.model_copy(update={"spread": spread_of(bank, recipe)})
     held, own = cases[::HELD_OUT], [c for i, c in enumerate(cases) if i % HELD_OUT]
     values = _to_values(first).requires_grad_()
     optimiser = torch.optim.Adam([values], lr=RATE, betas=(0.9, 0.99))

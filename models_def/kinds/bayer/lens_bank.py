@@ -43,7 +43,7 @@ def build_lens_bank(recipe: BayerRecipe, lens: Lens, cache_folder: Path | None =
         return _trace(recipe, lens)
     content = [format_prescription(lens), json.dumps(recipe.lens.to_json())]
     content += [recipe.sensor.model_dump_json(), str(TRACING)]
-    content += ["depths apart"] if recipe.data.known_depth_share else []
+    content += ["depths apart"] if recipe.tells_depth else []
     name = hashlib.sha256("".join(content).encode()).hexdigest()[:16]
     cached = cache_folder / f"bank-{name}.npz"
     if not cached.exists():
@@ -88,7 +88,7 @@ def _trace(recipe: BayerRecipe, lens: Lens) -> PsfBank:
         frozen_heights_mm=heights,
         relative_illumination=relative_illumination_at(lens, torch.from_numpy(heights)).numpy(),
         depths=depths,
-        frozen_depths=np.stack(kernels[:depths]) if recipe.data.known_depth_share else None,
+        frozen_depths=np.stack(kernels[:depths]) if recipe.tells_depth else None,
         validation_copies=choices.validation_copies,
     )
 

@@ -74,13 +74,13 @@ class PsfBank:
         """Give the (1, 3, h, w) kernels of one copy at a sensor position."""
         return _at(self.copies[copy], self.copy_heights_mm, x_mm, y_mm)
 
-    def frozen_kernels(self, x_mm: float, y_mm: float, depth: int | None = None) -> Tensor:
+    def frozen_kernels(self, x_mm: float, y_mm: float, depth: float | None = None) -> Tensor:
         """Give the (1, 3, h, w) frozen kernels at a sensor position.
 
         Args:
             x_mm: Position.
             y_mm: Likewise.
-            depth: Number of the depth; None for the mean kernel.
+            depth: Number of the depth, linear between two; None for the mean kernel.
 
         Raises:
             ContractError: If the bank does not hold the depths apart.
@@ -89,7 +89,11 @@ class PsfBank:
             raise ContractError("this bank does not hold the frozen kernels of its depths apart")
         frozen = self.frozen
         if depth is not None and self.frozen_depths is not None:
-            frozen = self.frozen_depths[depth]
+            near = min(int(depth), len(self.frozen_depths) - 1)
+            frozen = self.frozen_depths[near]
+            if depth > near:
+                part = np.float32(depth - near)
+                frozen = (1 - part) * frozen + part * self.frozen_depths[near + 1]
         return _at(frozen, self.frozen_heights_mm, x_mm, y_mm)
 
     def illumination_at(self, height_mm: float) -> float:

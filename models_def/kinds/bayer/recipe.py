@@ -122,11 +122,13 @@ class BayerDataRecipe(DataRecipe):
         patch_share: Share of samples of charts in any colour, deep primaries too.
         lamp_share: Share of all samples into which lamps far beyond white are put.
         designed_share: Share of samples through the lens as designed, of several depths only where
-            `known_depth_share` has their kernels apart.
+            a filter is told its depth (`known_depth_share`, or a bank that estimates it).
         light_share: Share of samples in light of any colour, by any white balance from 1, 1, 1 up:
             raw values of the colours then stand in any ratio.
         known_depth_share: Share of samples whose Wiener filter has the kernel of their depth, as
-            `camkit process --depth-m` gives it; the others' has the mean kernel.
+            `camkit process --depth-m` gives it; the others' has the mean kernel. Left out where
+            the bank estimates the depth: then all have it.
+        depth_error: Standard deviation of the depth that a filter is told, in 1/m.
         display: A display that shows the scenes; None for none.
         wild: Daylight and range of scenes; None for pictures as they are.
     """
@@ -144,6 +146,7 @@ class BayerDataRecipe(DataRecipe):
     target_max: float = 4.0
     depth_shares: tuple[float, ...] = ()
     known_depth_share: float = 0.0
+    depth_error: float = 0.0
     edge_share: float = 0.0
     night_share: float = 0.0
     patch_share: float = 0.0
@@ -164,6 +167,8 @@ class BayerDataRecipe(DataRecipe):
         check_share("data.designed_share", self.designed_share)
         check_share("data.lamp_share", self.lamp_share)
         check_share("data.known_depth_share", self.known_depth_share)
+        if self.depth_error < 0:
+            raise ContractError(f"data.depth_error must be >= 0; got {self.depth_error:g}")
         check_share("data.border_share", self.border_share)
         check_share("data.drift_share", self.drift_share)
         if not 0 <= self.drift_scale < 0.5:
@@ -318,13 +323,33 @@ class BayerRecipe(Recipe):
         shares, depths = len(self.data.depth_shares), len(self.lens.depths_mm)
         if shares and shares != depths:
             raise ContractError(f"data.depth_shares has {shares} entries, lens.depths_mm {depths}")
-        if self.data.designed_share and depths > 1 and not self.data.known_depth_share:
+        if self.data.designed_share and depths > 1 and not self.tells_depth:
             raise ContractError(
                 "data.designed_share needs the kernels of each of lens.depths_mm; set "
-                "data.known_depth_share too"
+                "data.known_depth_share or wiener.depth too"
             )
-        if self.data.known_depth_share and depths < 2:
-            raise ContractError("data.known_depth_share needs two or more lens.depths_mm")
+        if self.data.known_depth_share and self.estimates_depth:
+            raise ContractError(
+                "where wiener.depth is estimated every filter is told a depth; leave "
+                "data.known_depth_share out"
+            )
+        if self.tells_depth and depths < 2:
+            raise ContractError(
+                "data.known_depth_share and a wiener.depth that is estimated need two or more "
+                "lens.depths_mm"
+            )
+        if self.data.depth_error and not self.tells_depth:
+            raise ContractError("data.depth_error is for filters that are told a depth")
+
+    @property
+    def estimates_depth(self) -> bool:
+        """Whether the bank of the camera finds the distance of the scene in the capture."""
+        return self.wiener.depth == "estimated"
+
+    @property
+    def tells_depth(self) -> bool:
+        """Whether filters of samples have the kernels of one depth, at least of some."""
+        return self.estimates_depth or self.data.known_depth_share > 0
 
     def _check_hazy_depths(self) -> None:
         if not self.lens.bank_in_focus:
@@ -339,10 +364,10 @@ class BayerRecipe(Recipe):
                 f"and frames.count must be {least} at least, got {self.lens.copies} and "
                 f"{self.frames.count}"
             )
-        if self.data.depth_shares or self.data.known_depth_share:
+        if self.data.depth_shares or self.tells_depth:
             raise ContractError(
-                "frames of a lens with a haze see its distances in turn; leave data.depth_shares "
-                "and data.known_depth_share out"
+                "frames of a lens with a haze see its distances in turn; leave data.depth_shares, "
+                "data.known_depth_share and a wiener.depth that is estimated out"
             )
 
     def with_together(self, together: Together | None) -> "BayerRecipe":

@@ -29,6 +29,7 @@ from camkit.models_def.sensors.exposure import expose
 from camkit.models_def.sensors.stabilise import stabilise
 from camkit.models_def.sensors.wiener import to_otf, wiener_restore
 from camkit.models_def.training.sample import Batch, Finish, Sample, SampleLayout
+from camkit.units import MM_PER_M
 
 CLIPPED_REACH_PX: Final = 4
 UNKNOWN_ABOVE: Final = 0.9
@@ -68,7 +69,8 @@ class Exposure:
         designed: Whether it is the lens as designed, at the distance of the copy, and no copy.
         gains: White balance (R, G, B); None for that of the sensor's illuminant.
         cast: What the light of each channel is multiplied by, behind the white balance.
-        depth_known: Whether the Wiener filter has the kernel of the copy's depth.
+        told: Number of the depth whose kernels the Wiener filter has, between two where the
+            distance is estimated; None for the mean over the depths.
     """
 
     x_mm: float
@@ -80,7 +82,7 @@ class Exposure:
     factor: float = 1.0
     borders: Sides = (False, False, False, False)
     drift: tuple[float, float] = (1.0, 0.0)
-    depth_known: bool = False
+    told: float | None = None
     designed: bool = False
     gains: tuple[float, float, float] | None = None
     cast: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -178,15 +180,33 @@ def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposur
         factor=float(2.0**stops),
         borders=(bool(borders[0]), bool(borders[1]), bool(borders[2]), bool(borders[3])),
         drift=_draw_drift(rng, recipe),
-        # drawn last, and only where asked for: other recipes keep their samples
-        depth_known=data.known_depth_share > 0 and rng.random() < data.known_depth_share,
     )
+    # drawn last, and only where asked for: other recipes keep their samples
+    if recipe.estimates_depth or (
+        data.known_depth_share > 0 and rng.random() < data.known_depth_share
+    ):
+        error = rng.normal() * data.depth_error if data.depth_error else 0.0
+        exposure = replace(exposure, told=told_depth(recipe, exposure.copy, error))
     if data.designed_share > 0 and rng.random() < data.designed_share:
         exposure = replace(exposure, designed=True)
     if data.light_share > 0 and rng.random() < data.light_share:
         gains, cast = _draw_light(rng, recipe)
         exposure = replace(exposure, gains=gains, cast=cast)
     return exposure
+
+
+def told_depth(recipe: BayerRecipe, copy: int, error: float = 0.0) -> float:
+    """Give the number of the depth that a filter is told of a copy.
+
+    Args:
+        recipe: Its lens has several depths.
+        copy: Each depth of a copy counted.
+        error: Of the nearness, in 1/m; what lies beyond the depths is taken for their end.
+    """
+    nearness = MM_PER_M / np.array(recipe.lens.depths_mm)
+    numbers = np.arange(nearness.size)
+    at = nearness[copy % nearness.size] + error
+    return float(np.interp(at, nearness[::-1], numbers[::-1]))
 
 
 def layout_of(recipe: BayerRecipe) -> SampleLayout:
@@ -317,7 +337,7 @@ def photograph(
     frozen = bank.frozen_kernels(
         exposure.block_x_mm,
         exposure.block_y_mm,
-        exposure.copy % bank.depths if exposure.depth_known else None,
+        exposure.told,
     )
     return Developed(
         planes=planes,

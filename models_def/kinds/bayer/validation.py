@@ -22,6 +22,7 @@ from camkit.models_def.kinds.bayer.samples import (
     layout_of,
     make_shot,
     scene_side_px,
+    told_depth,
 )
 from camkit.models_def.sensors.stabilise import unstabilise
 from camkit.models_def.training.kind import Restorer, Score
@@ -124,13 +125,16 @@ def _exposure(recipe: BayerRecipe, bank: PsfBank, share: float, iso: float, turn
     azimuth = turn * GOLDEN_ANGLE_RAD
     x_mm, y_mm = height * np.cos(azimuth), height * np.sin(azimuth)
     offset = BLOCK_OFFSET_PX * recipe.sensor.pixel_pitch_um / 1000
+    copy = bank.training_copies + unseen * bank.depths + depth
+    error = recipe.data.depth_error * (1 - 2 * (turn % 2))
     return Exposure(
         x_mm=float(x_mm),
         y_mm=float(y_mm),
         block_x_mm=float(x_mm + offset * np.cos(3 * azimuth)),
         block_y_mm=float(y_mm + offset * np.sin(3 * azimuth)),
-        copy=bank.training_copies + unseen * bank.depths + depth,
+        copy=copy,
         iso=iso,
+        told=told_depth(recipe, copy, error) if recipe.estimates_depth else None,
     )
 
 

@@ -90,6 +90,33 @@ def test_the_plan_says_whose_kernels_the_bank_has(
     assert start(deep, capture, depth_m=depth_m).record["depth"] == kernels
 
 
+def test_a_bank_that_finds_the_distance_has_its_kernels(tmp_path: Path) -> None:
+    deep = write_deep_bundle(tmp_path)
+    entry = deep.manifest.stage(Wiener)
+    assert entry is not None
+    finds = entry.model_copy(update={"depth": "estimated"})
+    stages = tuple(finds if stage == entry else stage for stage in deep.manifest.stages)
+    finding = replace(deep, manifest=deep.manifest.model_copy(update={"stages": stages}))
+    light = np.tile(texture(120, 160)[:1], (3, 2, 2))
+    seen = simulate(
+        light, deep.manifest.sensor, deep.psf, SimulationOptions(depth_mm=500.0, seed=1)
+    )
+    capture = made_mosaic(samples=seen.samples, origin_px=(0, 0), sensor_size_px=(320, 240))
+
+    def restored(bundle: Bundle, **options: float) -> tuple[FloatArray, dict[str, object]]:
+        made = start(bundle, capture, method="wiener", **options)
+        picture = made.fill()
+        return picture, made.record | made.sections
+
+    found, said = restored(finding)
+    told, _ = restored(finding, depth_m=0.5)
+    mean, _ = restored(deep)
+    assert said["depth"] == "estimated"
+    assert said["distance"]["median_m"] < 0.6  # type: ignore[index]
+    assert np.abs(found - told).mean() < 0.5 * np.abs(mean - told).mean()
+    np.testing.assert_array_equal(told, restored(deep, depth_m=0.5)[0])
+
+
 def test_the_plan_of_one_depth_does_not_speak_of_it(bundle: Bundle) -> None:
     assert "depth" not in start(bundle, made_mosaic()).record
 

@@ -75,7 +75,7 @@ def test_a_fitted_bank_beats_the_one_of_each_colour_alone(recipe, coloured, tmp_
     assert errors[1] < 0.8 * errors[0]
 
 
-def test_the_error_of_a_copy_is_that_by_which_methods_are_compared(coloured):
+def test_the_error_of_a_copy_is_that_by_which_methods_are_compared(recipe, coloured):
     """One definition for training (torch, many heights) and comparisons (numpy, frozen PSFs)."""
     heights_mm = coloured.copy_heights_mm.tolist()
     frozen = _transfers(coloured.frozen_kernels(0.0, height) for height in heights_mm)
@@ -85,7 +85,7 @@ def test_the_error_of_a_copy_is_that_by_which_methods_are_compared(coloured):
         )
         for copy in range(len(coloured.copies))
     ]
-    assert transfer_errors(coloured) == pytest.approx(wanted, rel=1e-4)
+    assert transfer_errors(coloured, recipe) == pytest.approx(wanted, rel=1e-4)
     assert max(wanted) > 2 * min(wanted)
 
 
@@ -94,8 +94,8 @@ def _transfers(kernels):
     return np.stack([transfers(FieldKernels(kernels=of.numpy(), **alone)) for of in kernels])
 
 
-def test_the_spread_is_that_of_the_copies(coloured):
-    spread = spread_of(coloured)
+def test_the_spread_is_that_of_the_copies(recipe, coloured):
+    spread = spread_of(coloured, recipe)
     size = (256, 256)
     frozen = to_otf(coloured.frozen_kernels(0.0, 0.0), size)
     gaps = [
@@ -109,13 +109,33 @@ def test_the_spread_is_that_of_the_copies(coloured):
     assert all(line[0] == 0 for of_height in spread.variance for line in of_height)
 
 
-def test_errors_of_copies_are_those_of_their_transfer(bank):
-    errors = transfer_errors(bank)
+def test_errors_of_copies_are_those_of_their_transfer(recipe, bank):
+    errors = transfer_errors(bank, recipe)
     assert len(errors) == len(bank.copies)
     # copies 4 % wider and 3 % narrower than the frozen one
     assert errors[0] > errors[1] > 0
     same = replace(bank, copies=np.stack([bank.frozen] * 2))
-    assert max(transfer_errors(same)) < 1e-6
+    assert max(transfer_errors(same, recipe)) < 1e-6
+
+
+def test_a_bank_that_finds_the_distance_is_off_by_its_own_copies_alone(recipe, bank):
+    """Copies that are the frozen lens at each of two depths: all that is left is the estimate's."""
+    apart = np.stack([bank.frozen, np.roll(bank.frozen, 1, axis=-1)])
+    deep = replace(
+        bank,
+        copies=np.concatenate([apart] * 2),
+        depths=2,
+        frozen_depths=apart,
+        frozen=apart.mean(0),
+    )
+    lens = replace(recipe.lens, depths_mm=(500.0, 1000.0))
+    wiener = recipe.wiener.model_copy(update={"depth": "estimated"})
+    sure = replace(recipe, lens=lens, wiener=wiener)
+    assert max(transfer_errors(deep, sure)) < 1e-6 < min(transfer_errors(deep, recipe))
+    unsure = replace(sure, data=replace(sure.data, depth_error=0.2))
+    spreads = [np.array(spread_of(deep, of).variance) for of in (sure, unsure, recipe)]
+    assert spreads[0].max() == 0
+    assert 0 < spreads[1].max() < spreads[2].max()
 
 
 def test_too_few_samples_are_refused(recipe, bank, tmp_path):

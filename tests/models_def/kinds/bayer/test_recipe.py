@@ -147,10 +147,22 @@ def test_depths_that_do_not_increase_are_refused(recipe_path, depths_mm):
 
 
 def test_only_several_depths_can_be_known(recipe_path):
-    with pytest.raises(ContractError, match="needs two or more"):
+    with pytest.raises(ContractError, match="need two or more"):
         to_recipe(table(recipe_path, data__known_depth_share=0.5))
     with pytest.raises(ContractError, match=r"must lie in 0\.\.1"):
         to_recipe(table(recipe_path, data__known_depth_share=1.5))
+    with pytest.raises(ContractError, match="need two or more"):
+        to_recipe(table(recipe_path, wiener__depth="estimated"))
+    several = {"lens__depths_mm": [500.0, 900.0]}
+    with pytest.raises(ContractError, match="for filters that are told a depth"):
+        to_recipe(table(recipe_path, **several, data__depth_error=0.1))
+    with pytest.raises(ContractError, match=r"leave data\.known_depth_share out"):
+        to_recipe(
+            table(recipe_path, **several, wiener__depth="estimated", data__known_depth_share=0.5)
+        )
+    found = to_recipe(table(recipe_path, **several, wiener__depth="estimated"))
+    assert found.estimates_depth
+    assert found.tells_depth
 
 
 @pytest.mark.parametrize(

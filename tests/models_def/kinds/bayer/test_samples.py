@@ -145,6 +145,25 @@ def test_drawn_exposures_stay_in_their_ranges(recipe, bank):
     assert 0.1 < at_border <= data.border_share + 0.05
 
 
+def test_a_bank_that_finds_the_distance_is_told_it_with_an_error(recipe, bank):
+    apart = np.stack([bank.frozen, np.roll(bank.frozen, 1, axis=-1)])
+    deep = replace(bank, copies=np.repeat(bank.copies, 2, axis=0), depths=2, frozen_depths=apart)
+    finds = replace(
+        recipe,
+        wiener=recipe.wiener.model_copy(update={"depth": "estimated"}),
+        lens=replace(recipe.lens, depths_mm=(500.0, 1000.0)),
+        data=replace(recipe.data, depth_error=0.2),
+    )
+    drawn = [draw_exposure(np.random.default_rng(i), finds, deep) for i in range(400)]
+    inside = [e.told - e.copy % 2 for e in drawn if 0 < e.told < 1]
+    assert len(inside) > 150, "half of the errors lead beyond the depths, and end there"
+    # depths lie 1 / m apart, so numbers of depths are errors in 1 / m
+    assert np.std([*inside, *(-np.array(inside))]) == pytest.approx(0.2, rel=0.15)
+    between = deep.frozen_kernels(0.0, 0.2, 0.25)
+    near, far = (deep.frozen_kernels(0.0, 0.2, number) for number in (0, 1))
+    torch.testing.assert_close(between, 0.75 * near + 0.25 * far, atol=1e-6, rtol=0)
+
+
 def test_the_filter_knows_the_depth_of_some_samples(recipe, bank):
     wide = np.roll(bank.frozen, 1, axis=-1) / 2 + np.roll(bank.frozen, -1, axis=-1) / 2
     apart = np.stack([bank.frozen, wide])
@@ -155,15 +174,16 @@ def test_the_filter_knows_the_depth_of_some_samples(recipe, bank):
         data=replace(recipe.data, known_depth_share=0.25),
     )
     drawn = [draw_exposure(np.random.default_rng(i), some, deep) for i in range(400)]
-    assert 70 < sum(e.depth_known for e in drawn) < 130
+    assert 70 < sum(e.told is not None for e in drawn) < 130
+    assert all(e.told in (None, e.copy % 2) for e in drawn), "exactly, where no error is asked for"
     unaware = [draw_exposure(np.random.default_rng(i), recipe, deep) for i in range(400)]
-    assert [replace(e, depth_known=False) for e in drawn] == unaware, "the rest is drawn as ever"
+    assert [replace(e, told=None) for e in drawn] == unaware, "the rest is drawn as ever"
     side = scene_side_px(some, deep)
     crop = np.random.default_rng(1).random((3, side, side), dtype=np.float32)
     planes = {
         (depth, known): make_shot(
             crop,
-            replace(drawn[0], copy=depth, depth_known=known),
+            replace(drawn[0], copy=depth, told=depth if known else None),
             some,
             deep,
             np.random.default_rng(2),
