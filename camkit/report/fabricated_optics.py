@@ -28,12 +28,17 @@ where a lens throws its light farther than the widest window."""
 
 
 def fabricated_optics(
-    bundle: Bundle, seed: int, *, cache_folder: Path, prescription: Path | None = None
+    bundle: Bundle,
+    seed: int,
+    *,
+    cache_folder: Path,
+    prescription: Path | None = None,
+    depth_mm: float | None = None,
 ) -> FrozenOptics:
     """Trace one fabricated copy of a bundle's lens, or read what an earlier call traced.
 
     The field grid is twice and the wavelength grid three times as dense as the bundle's; the
-    object lies at its reference depth. A lens with a haze is frozen on its own grid, haze included,
+    object lies at one distance. A lens with a haze is frozen on its own grid, haze included,
     a minute and a half for a plate of 24 megapixels.
 
     Errors are uniform: radius +-0.2 %, thickness +-0.03 mm, index +-0.0005; the copy is focused at
@@ -44,14 +49,19 @@ def fabricated_optics(
         seed: Of the fabrication errors.
         cache_folder: Where traced optics are kept.
         prescription: The lens, if the bundle does not hold it.
+        depth_mm: Object distance; None for the bundle's reference depth, which alone a lens with a
+            haze has.
 
     Raises:
         ContractError: If the lens is not known or its light does not fit the kernels.
     """
     text = lens_text(bundle, prescription)
+    if bundle.manifest.has_haze and depth_mm not in (None, bundle.reference_depth_mm):
+        raise ContractError("a lens with a haze is traced at its reference depth alone")
+    depth_mm = bundle.reference_depth_mm if depth_mm is None else depth_mm
     shape = bundle.psf.kernels.shape
     content = [text, bundle.manifest.sensor.model_dump_json(), repr((shape[:3], seed))]
-    content.append(repr((_max_side_px(bundle.psf), ENERGY, [bundle.reference_depth_mm])))
+    content.append(repr((_max_side_px(bundle.psf), ENERGY, [depth_mm])))
     if bundle.manifest.has_haze:
         content.append(repr(bundle.haze.cell_px))
     name = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
@@ -59,7 +69,7 @@ def fabricated_optics(
     beside = cached.with_stem(f"haze-{seed}-{name}") if bundle.manifest.has_haze else None
     if not cached.exists():
         cache_folder.mkdir(parents=True, exist_ok=True)
-        made = _trace(bundle, text, seed)
+        made = _trace(bundle, text, seed, depth_mm)
         if beside is not None and made.haze is not None:
             write_haze(beside, made.haze)
         write_psf(cached, made.psf)
@@ -86,7 +96,7 @@ def lens_text(bundle: Bundle, prescription: Path | None) -> str:
     return bundle.member(PRESCRIPTION).decode("utf-8")
 
 
-def _trace(bundle: Bundle, text: str, seed: int) -> FrozenOptics:
+def _trace(bundle: Bundle, text: str, seed: int, depth_mm: float) -> FrozenOptics:
     from camkit.models_def.optics.frozen import FreezeGrid, dense_grid, freeze
     from camkit.models_def.optics.kernel_bank import focused_copies
     from camkit.models_def.optics.lens_optics import LensOptics
@@ -114,7 +124,7 @@ def _trace(bundle: Bundle, text: str, seed: int) -> FrozenOptics:
     frozen_grid = FreezeGrid(
         fields=psf.field_heights_mm.size,
         wavelengths=psf.wavelengths_um.size,
-        depths_mm=(bundle.reference_depth_mm,),
+        depths_mm=(depth_mm,),
         energy=ENERGY,
         max_side_px=_max_side_px(psf),
         least_energy=LEAST_ENERGY,

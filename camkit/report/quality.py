@@ -149,14 +149,22 @@ def crop_origin(
     return origin[0], origin[1]
 
 
-def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics) -> Exposed:
+def expose(
+    shot: Shot,
+    scene: FloatArray,
+    bundle: Bundle,
+    lens: FrozenOptics,
+    *,
+    depth_mm: float | None = None,
+) -> Exposed:
     """Photograph a picture.
 
     Args:
         shot: Place, ISO and noise.
         scene: (3, h, w) float32 linear Rec.709, as fine as the pictures of the bundle.
         bundle: The camera; its optics are what methods may know.
-        lens: What the light really goes through, at the bundle's reference depth.
+        lens: What the light really goes through.
+        depth_mm: Object distance, which `lens` knows; None for the bundle's reference depth.
     """
     sensor, scale = light_sensor(bundle.manifest), picture_scale(bundle.manifest)
     quadrant = QUADRANTS[shot.number % len(QUADRANTS)]
@@ -167,7 +175,7 @@ def expose(shot: Shot, scene: FloatArray, bundle: Bundle, lens: FrozenOptics) ->
         seed=shot.noise_seed,
         origin_px=crop_origin(size, whole, FIELD_SHARES[shot.position], quadrant),
         scale=scale,
-        depth_mm=bundle.reference_depth_mm,
+        depth_mm=bundle.reference_depth_mm if depth_mm is None else depth_mm,
     )
     simulation = simulate(scene, sensor, lens.psf, options, haze=lens.haze)
     sharp = encode_srgb(true_picture(simulation.clean, sensor))
