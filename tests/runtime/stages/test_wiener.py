@@ -10,7 +10,9 @@ from camkit.bundle.facts import Port
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import Extent, PlanesSensor
 from camkit.bundle.stages import Linearise, Network, Together, Wiener
+from camkit.bundle.writer import write_bundle
 from camkit.contracts import FloatArray, FrozenPsf, NoiseModel
+from camkit.errors import BundleError
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
 from camkit.runtime.bank.psf import color_kernels
@@ -115,6 +117,10 @@ def test_a_bank_that_finds_the_distance_has_its_kernels(tmp_path: Path) -> None:
     assert said["distance"]["median_m"] < 0.6  # type: ignore[index]
     assert np.abs(found - told).mean() < 0.5 * np.abs(mean - told).mean()
     np.testing.assert_array_equal(told, restored(deep, depth_m=0.5)[0])
+    older = finding.manifest.model_copy(update={"format_version": "2.7"})
+    members = {name: deep.member(name) for name in deep.names}
+    with pytest.raises(BundleError, match=r"finds the distance of the scene, which format 2.8"):
+        write_bundle(tmp_path / "older.camkit", older, members)
 
 
 def test_the_plan_of_one_depth_does_not_speak_of_it(bundle: Bundle) -> None:

@@ -127,8 +127,14 @@ def read_pairs(
 
     Raises:
         ContractError: If the folder or its settings are not as described, a capture has not the
-            size of the sensor, or a pair cannot be aligned; the message names the pair.
+            size of the sensor, or a pair cannot be aligned (the message names the pair); or if the
+            bank of the camera finds distances, which nothing here does.
     """
+    if recipe.estimates_depth:
+        raise ContractError(
+            "pairs are filtered with the mean kernel, and the bank of this camera finds the "
+            'distance (wiener.depth = "estimated"); fine-tune without --pairs'
+        )
     settings = _read_settings(folder / SETTINGS, recipe)
     noise = recipe.sensor.noise_at(settings.iso).with_gains(settings.gains)
     aligner = Aligner(recipe.sensor, bank, distortion)

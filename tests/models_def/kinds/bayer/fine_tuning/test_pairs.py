@@ -1,5 +1,7 @@
 """Real pairs become samples whose target lies on the capture, whatever the lens distorts."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -137,3 +139,10 @@ def test_captures_of_another_kind_are_refused(tmp_path, folder, recipe, bank):
     path.write_bytes(b"junk")
     with pytest.raises(DecodeError, match="cannot be decoded"):
         read_capture(path)
+
+
+def test_a_bank_that_finds_the_distance_is_refused(folder, recipe, bank):
+    wiener = recipe.wiener.model_copy(update={"depth": "estimated"})
+    deep = replace(recipe, wiener=wiener, lens=replace(recipe.lens, depths_mm=(500.0, 1000.0)))
+    with pytest.raises(ContractError, match="fine-tune without --pairs"):
+        read_pairs(folder, deep, bank, None, seed=1)
