@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from camkit.bundle.golden import golden_from_bytes
+from camkit.bundle.light_bound import LightBound
 from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
+from camkit.bundle.stages import Network, Wiener
 from camkit.errors import ParityError
 from camkit.runtime.proof.check import CheckReport, Layer
 from tools import repack
@@ -42,3 +44,17 @@ def test_what_fails_its_check_gets_no_name(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(ParityError, match=r"fails its check: fail +golden +another picture"):
         repack.repack(EXAMPLE, tmp_path / "new.camkit")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_bound_on_light_brings_its_mask_and_new_golden_pictures(tmp_path: Path) -> None:
+    new = tmp_path / "new.camkit"
+    repack.repack(EXAMPLE, new, light_spread=1.0)
+    before, after = open_bundle(EXAMPLE), open_bundle(new)
+    (network,) = after.manifest.stages_of(Network)
+    assert network.light == LightBound(spread=1.0)
+    bank = after.manifest.stage(Wiener)
+    assert bank is not None
+    assert network.takes[-1] == bank.takes[-1], "the mask of what clipped"
+    assert after.manifest.version != before.manifest.version
+    old, found = (golden_from_bytes(bundle.member(GOLDEN)) for bundle in (before, after))
+    assert any(not np.array_equal(old[name].reference, found[name].reference) for name in old)
