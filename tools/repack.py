@@ -3,20 +3,22 @@
 The manifest is brought up to date, golden pictures are packed as they are today, every other member
 keeps its bytes. With `--clip-reach-px N` the Wiener bank explains clipped lights in their
 surroundings alone: then golden outputs and activations are made anew, and the version is raised.
-With `--floor SHARE` pictures of photons have no black where light was counted. The laws of its
-pictures are measured and stated. The result proves itself before it gets its name.
+With `--floor SHARE` pictures of photons have no black where light was counted; with `--limited`
+undistortion leaves no rings around lamps. The laws of its pictures are measured and stated. The
+result proves itself before it gets its name.
 """
 
 import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.manifest import FORMAT_VERSION, Manifest
 from camkit.bundle.reader import GOLDEN, open_bundle
 from camkit.bundle.stages import StageEntry as Stage
-from camkit.bundle.stages import SuperResolve, Wiener
+from camkit.bundle.stages import SuperResolve, Undistort, Wiener
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ParityError
 from camkit.export.activations import with_activations
@@ -27,7 +29,12 @@ from camkit.runtime.proof.laws.proof import measure_laws, with_laws
 
 
 def repack(
-    old: Path, new: Path, *, clip_reach_px: int | None = None, floor: float | None = None
+    old: Path,
+    new: Path,
+    *,
+    clip_reach_px: int | None = None,
+    floor: float | None = None,
+    limited: bool = False,
 ) -> int:
     """Write one bundle anew; give its bytes.
 
@@ -36,6 +43,7 @@ def repack(
         new: The file to write.
         clip_reach_px: Of the Wiener bank; None leaves it as it is.
         floor: Of pictures of photons; None leaves it as it is.
+        limited: Limit the overshoot of undistortion.
 
     Raises:
         BundleError: If the old one is damaged.
@@ -49,11 +57,13 @@ def repack(
     manifest = bundle.manifest.model_copy(update=newest)
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
-        changes: list[tuple[type[Stage], dict[str, float]]] = []
+        changes: list[tuple[type[Stage], dict[str, Any]]] = []
         if clip_reach_px is not None:
             changes.append((Wiener, {"clip_reach_px": clip_reach_px}))
         if floor is not None:
             changes.append((SuperResolve, {"floor": floor}))
+        if limited:
+            changes.append((Undistort, {"overshoot": "limited"}))
         if changes:
             manifest = _changed(manifest, changes)
             made = write_bundle(trial, manifest, members)
@@ -70,9 +80,7 @@ def repack(
     return new.stat().st_size
 
 
-def _changed(
-    manifest: Manifest, changes: Sequence[tuple[type[Stage], dict[str, float]]]
-) -> Manifest:
+def _changed(manifest: Manifest, changes: Sequence[tuple[type[Stage], dict[str, Any]]]) -> Manifest:
     """Return the manifest with changed stages, as the next minor version of the bundle."""
     stages = tuple(
         stage.model_copy(
@@ -91,6 +99,7 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path, required=True)
     parser.add_argument("--clip-reach-px", type=int)
     parser.add_argument("--floor", type=float)
+    parser.add_argument("--limited", action="store_true")
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
     after = repack(
@@ -98,6 +107,7 @@ def main() -> None:
         arguments.out,
         clip_reach_px=arguments.clip_reach_px,
         floor=arguments.floor,
+        limited=arguments.limited,
     )
     print(f"{arguments.out}: {after} bytes, before {before}")
 

@@ -7,6 +7,7 @@ import pytest
 
 from camkit.bundle.golden import golden_from_bytes
 from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
+from camkit.bundle.stages import Undistort
 from camkit.errors import ParityError
 from camkit.runtime.proof.check import CheckReport, Layer
 from tools import repack
@@ -42,3 +43,16 @@ def test_what_fails_its_check_gets_no_name(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(ParityError, match=r"fails its check: fail +golden +another picture"):
         repack.repack(EXAMPLE, tmp_path / "new.camkit")
     assert not list(tmp_path.iterdir())
+
+
+def test_undistortion_without_rings_is_stated_and_proved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new = tmp_path / "new.camkit"
+    arguments = ["repack", str(EXAMPLE), "--limited", "-o", str(new)]
+    monkeypatch.setattr("sys.argv", arguments)
+    repack.main()
+    before, after = (open_bundle(path).manifest for path in (EXAMPLE, new))
+    stages = [m.stage(Undistort) for m in (before, after)]
+    assert [stage.overshoot for stage in stages if stage is not None] == ["kept", "limited"]
+    assert after.version != before.version
