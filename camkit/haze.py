@@ -94,6 +94,12 @@ class Haze:
             raise ContractError(f"pixel_pitch_um must be > 0; got {self.pixel_pitch_um}")
         self._check_light()
 
+    @property
+    def most_share(self) -> float:
+        """Return the largest share of a point's light on the kernels that is haze."""
+        haze = self.kernels.sum(axis=(-2, -1), dtype=np.float64)
+        return float((haze / (haze + self.core_share)).max())
+
     def _check_light(self) -> None:
         if not np.isfinite(self.kernels).all() or (self.kernels < 0).any():
             raise ContractError("haze must be finite and >= 0; freeze the optics again")

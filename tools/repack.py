@@ -5,8 +5,8 @@ keeps its bytes. With `--clip-reach-px N` the Wiener bank explains clipped light
 surroundings alone: then golden outputs and activations are made anew, and the version is raised.
 With `--floor SHARE` pictures of photons have no black where light was counted; with
 `--light-spread SHARE` the light that networks behind a bank move is bounded by so much of the
-contrast between cells. The laws of its pictures are measured and stated. The result proves itself
-before it gets its name.
+contrast between cells; with `--limited` undistortion leaves no rings around lamps. The laws of its
+pictures are measured and stated. The result proves itself before it gets its name.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.manifest import FORMAT_VERSION, Manifest
 from camkit.bundle.reader import GOLDEN, open_bundle
-from camkit.bundle.stages import Network, SuperResolve, Wiener
+from camkit.bundle.stages import Network, SuperResolve, Undistort, Wiener
 from camkit.bundle.stages import StageEntry as Stage
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ParityError
@@ -38,6 +38,7 @@ def repack(
     clip_reach_px: int | None = None,
     floor: float | None = None,
     light_spread: float | None = None,
+    limited: bool = False,
 ) -> int:
     """Write one bundle anew; give its bytes.
 
@@ -47,6 +48,7 @@ def repack(
         clip_reach_px: Of the Wiener bank; None leaves it as it is.
         floor: Of pictures of photons; None leaves it as it is.
         light_spread: Of the bound on networks behind a bank; None leaves it as it is.
+        limited: Limit the overshoot of undistortion.
 
     Raises:
         BundleError: If the old one is damaged.
@@ -68,6 +70,8 @@ def repack(
         if light_spread is not None:  # with the mask that a bound needs
             manifest = manifest.model_copy(update={"stages": bounded_stages(manifest, ENFORCE)})
             changes.append((Network, {"light": LightBound(spread=light_spread)}))
+        if limited:
+            changes.append((Undistort, {"overshoot": "limited"}))
         if changes:
             manifest = _changed(manifest, changes)
             made = write_bundle(trial, manifest, members)
@@ -104,6 +108,7 @@ def main() -> None:
     parser.add_argument("--clip-reach-px", type=int)
     parser.add_argument("--floor", type=float)
     parser.add_argument("--light-spread", type=float)
+    parser.add_argument("--limited", action="store_true")
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
     after = repack(
@@ -112,6 +117,7 @@ def main() -> None:
         clip_reach_px=arguments.clip_reach_px,
         floor=arguments.floor,
         light_spread=arguments.light_spread,
+        limited=arguments.limited,
     )
     print(f"{arguments.out}: {after} bytes, before {before}")
 

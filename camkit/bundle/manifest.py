@@ -30,7 +30,15 @@ from camkit.bundle.golden import IMAGE
 from camkit.bundle.optics import Optics
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import Sensor
-from camkit.bundle.stages import JoinError, Network, Parts, Stage, SuperResolve, Wiener
+from camkit.bundle.stages import (
+    JoinError,
+    Network,
+    Parts,
+    Stage,
+    SuperResolve,
+    Undistort,
+    Wiener,
+)
 from camkit.bundle.strict_json import read_json
 from camkit.bundle.upgrade import UpgradeError, upgrade
 from camkit.contracts import FrozenPsf
@@ -247,6 +255,7 @@ def bounds_light(stages: Iterable[Stage]) -> bool:
     return any(
         (isinstance(stage, Network) and stage.light is not None)
         or (isinstance(stage, SuperResolve) and stage.floor > 0)
+        or (isinstance(stage, Undistort) and stage.overshoot == "limited")
         for stage in stages
     )
 

@@ -19,6 +19,7 @@ from camkit.bundle.frozen_optics import FrozenOptics
 from camkit.bundle.manifest import (
     Manifest,
     Member,
+    bounds_light,
     format_of,
     manifest_to_bytes,
     manifest_without_networks,
@@ -119,7 +120,9 @@ def write_physics(
         stages,
         sensor,
         optics.entry(object_distance_mm),
-        format_version=format_of(optics.psf, hazy=optics.haze is not None),
+        format_version=format_of(
+            optics.psf, hazy=optics.haze is not None, bounded=bounds_light(stages)
+        ),
         **({"version": "0.1.0", "licence": "Apache-2.0"} | facts),
     )
     return write_bundle(path, manifest, optics.members)

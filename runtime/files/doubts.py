@@ -10,12 +10,14 @@ may be odd. Every limit lies beyond what the sound RAW files at hand and simulat
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern
+from camkit.haze import Haze
+from camkit.runtime.capture import Capture
 from camkit.runtime.files.raw_checks import Levels, Samples
 
 ABOVE_WHITE: Final = 1.02
@@ -24,6 +26,7 @@ LEAST_ABOVE_WHITE: Final = 20
 PILE_SHARE: Final = 0.5
 DARKEST_SHARE: Final = 1e-3
 FAR_ABOVE_BLACK: Final = 0.08
+NOTHING_DARK: Final = "nothing is darker than"
 LEAST_CONTRAST: Final = 0.2
 FAR_BELOW_BLACK: Final = 0.02
 NEVER_BRIGHT: Final = 0.03
@@ -82,6 +85,27 @@ def find_doubts(
     return [doubt for doubt in found if doubt]
 
 
+def notes_behind(capture: Capture, haze: Haze) -> list[str]:
+    """Return the notes of a capture without the doubt about its black that a haze explains.
+
+    Haze takes light from bright parts into dark ones: no sample need be darker than the share of
+    the mean that the optics throw far from their peaks.
+
+    Args:
+        capture: With notes of `find_doubts` among others.
+        haze: Of the optics that it was taken with.
+    """
+    notes = list(capture.notes)
+    if not any(note.startswith(NOTHING_DARK) for note in notes):
+        return notes
+    some = _thinned(capture.samples)
+    black = float(capture.black_level.mean())
+    low = float(np.quantile(some, DARKEST_SHARE)) - black
+    if low > haze.most_share * (float(some.mean()) - black):
+        return notes
+    return [note for note in notes if not note.startswith(NOTHING_DARK)]
+
+
 def is_noise(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> bool:
     """Tell whether most of a picture is noise of a large part of its range, white left aside.
 
@@ -94,18 +118,16 @@ def is_noise(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> bool:
 
 
 def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
-    step = max(1, samples.shape[-2] // _SAMPLED_ROWS)
-    some = samples[..., step // 2 :: step, ::_COLUMN_STEP]
     black, span = float(levels.black.mean()), levels.white - float(levels.black.mean())
     low, high = (
         (float(value) - black) / span
-        for value in np.quantile(some, (DARKEST_SHARE, 1 - DARKEST_SHARE))
+        for value in np.quantile(_thinned(samples), (DARKEST_SHARE, 1 - DARKEST_SHARE))
     )
     top = (float(samples.max()) - black) / span
     found = [_above_white_doubt(samples, levels)]
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
         found.append(
-            f"nothing is darker than {low:.0%} of the range above black {black:g}: fog, "
+            f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: fog, "
             "optics with a haze, or a damaged black level (--black-level says it)"
         )
     if low < -FAR_BELOW_BLACK:
@@ -119,6 +141,12 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
             "damaged white level (--white-level says it)"
         )
     return found
+
+
+def _thinned(samples: NDArray[Any]) -> NDArray[Any]:
+    """Return some samples of every part of a picture."""
+    step = max(1, samples.shape[-2] // _SAMPLED_ROWS)
+    return samples[..., step // 2 :: step, ::_COLUMN_STEP]
 
 
 def _above_white_doubt(samples: Samples, levels: Levels) -> str:

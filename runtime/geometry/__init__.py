@@ -6,6 +6,7 @@ shrink          planes made smaller by whole numbers
 scatter         spatially varying blur, for the digital twin
 illumination    vignetting, and its division
 distortion      the radial model, its inverse and its fit
+resampling      samples between pixels, without rings around lamps
 turning         pictures turned upright as EXIF says, and back
 warp            pictures distorted and undistorted, band by band
 """

@@ -8,7 +8,7 @@ are computed on an 8 px lattice that is fixed to the picture and enlarged linear
 do not depend on their height.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Final
 
@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.bundle.stages.undistort import Interpolation
+from camkit.bundle.stages.undistort import Interpolation, Overshoot
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.geometry.distortion import (
@@ -25,20 +25,18 @@ from camkit.runtime.geometry.distortion import (
     reference_channel,
     undistort_points,
 )
+from camkit.runtime.geometry.resampling import Maps, resampled, resampled_limited
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.machine.slices import run_slices
 from camkit.runtime.rows import RowSource
 
 FloatGrid = NDArray[np.float64]
+Resample = Callable[[FloatArray, Maps], FloatArray]
 
 LATTICE_PX: Final = 8
 BAND_ROWS: Final = 256
 LANCZOS_REACH_PX: Final = 4
 MAX_SIDE_PX: Final = 32766
-FLAGS: Final[Mapping[Interpolation, int]] = {
-    "lanczos": cv2.INTER_LANCZOS4,
-    "cubic": cv2.INTER_CUBIC,
-}
 
 
 def undistort_bands(
@@ -49,6 +47,7 @@ def undistort_bands(
     band_rows: int = BAND_ROWS,
     threads: int = 1,
     interpolation: Interpolation = "lanczos",
+    overshoot: Overshoot = "kept",
 ) -> Iterator[FloatArray]:
     """Undistort a capture, band by band; what lies outside it repeats its edge.
 
@@ -59,6 +58,8 @@ def undistort_bands(
         band_rows: Height of the bands, a multiple of 8; the pixels do not depend on it.
         threads: Threads that share a band; the pixels do not depend on them.
         interpolation: Between pixels.
+        overshoot: Whether values at rims of light above white, and below black, are kept or limited
+            to the range of their samples; see `resampled_limited`.
 
     Yields:
         (c, rows, w) float32 in ideal geometry, from top to bottom.
@@ -68,8 +69,10 @@ def undistort_bands(
         UnsupportedError: If a side is too long for cv2.remap.
     """
     warp = Warp(distortion, window, to_sensor=False)
-    flag = FLAGS[interpolation]
-    yield from _warp_bands(source, warp, band_rows=band_rows, threads=threads, flag=flag)
+    resample = partial(
+        resampled_limited if overshoot == "limited" else resampled, interpolation=interpolation
+    )
+    yield from _warp_bands(source, warp, resample, band_rows=band_rows, threads=threads)
 
 
 def distort_array(
@@ -98,7 +101,9 @@ def distort_array(
         for top in range(0, height, BAND_ROWS):
             bottom = min(top + BAND_ROWS, height)
             maps = warp.maps(channel, top, bottom)
-            out[channel, top:bottom] = _remap(scene[channel], maps, cv2.BORDER_REFLECT_101)
+            out[channel, top:bottom] = resampled(
+                scene[channel], maps, border=cv2.BORDER_REFLECT_101
+            )
     return out
 
 
@@ -161,7 +166,7 @@ class Warp:
         x, y = np.meshgrid(columns, rows)
         return self.positions(channel, x, y)
 
-    def maps(self, channel: int, top: int, bottom: int) -> tuple[NDArray[np.int16], object]:
+    def maps(self, channel: int, top: int, bottom: int) -> Maps:
         """Give cv2's fixed-point maps of output rows top..bottom (top on the lattice)."""
         nodes = self.lattice(channel, top, bottom).astype(np.float32)
         width = self.window.size_px[0] + 2 * self._margin_px
@@ -174,7 +179,7 @@ class Warp:
 
 
 def _warp_bands(
-    source: RowSource, warp: Warp, *, band_rows: int, threads: int, flag: int
+    source: RowSource, warp: Warp, resample: Resample, *, band_rows: int, threads: int
 ) -> Iterator[FloatArray]:
     _check_size(source.shape, warp.window, warp.distortion)
     if band_rows < LATTICE_PX or band_rows % LATTICE_PX:
@@ -185,7 +190,7 @@ def _warp_bands(
     for top, (first, last) in zip(tops, spans, strict=True):
         bottom = min(top + band_rows, height)
         band = np.empty((channels, bottom - top, width), dtype=np.float32)
-        fill = partial(_warp_rows, warp, (source.read(first, last), first), (band, top), flag)
+        fill = partial(_warp_rows, warp, (source.read(first, last), first), (band, top), resample)
         run_slices(fill, bottom - top, threads=threads, lattice=LATTICE_PX)
         del fill  # it holds rows that nobody needs while the next band is waited for
         yield band
@@ -196,7 +201,7 @@ def _warp_rows(
     warp: Warp,
     source: tuple[FloatArray, int],
     target: tuple[FloatArray, int],
-    flag: int,
+    resample: Resample,
     begin: int,
     end: int,
 ) -> None:
@@ -207,7 +212,7 @@ def _warp_rows(
             whole, fraction = warp.maps(channel, top + begin, top + end)
             whole[..., 1] -= first
         maps = whole, fraction
-        band[channel, begin:end] = _remap(rows[channel], maps, cv2.BORDER_REPLICATE, flag)
+        band[channel, begin:end] = resample(rows[channel], maps)
 
 
 def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]:
@@ -222,17 +227,6 @@ def _source_spans(warp: Warp, tops: range, height: int) -> list[tuple[int, int]]
         lowest = min(lowest, max(first, 0))
         spans.append((lowest, min(max(last, lowest + 1), height)))
     return spans[::-1]
-
-
-def _remap(
-    plane: FloatArray,
-    maps: tuple[NDArray[np.int16], object],
-    border: int,
-    flag: int = FLAGS["lanczos"],
-) -> FloatArray:
-    whole, fraction = maps
-    out = cv2.remap(np.ascontiguousarray(plane), whole, fraction, flag, borderMode=border)
-    return np.asarray(out, dtype=np.float32)
 
 
 def _check_size(shape: tuple[int, ...], window: SensorWindow, distortion: RadialDistortion) -> None:

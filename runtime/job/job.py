@@ -21,6 +21,7 @@ from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import COLOURS, Capture
 from camkit.runtime.clock import StageClock
 from camkit.runtime.color import ColorStage
+from camkit.runtime.files.doubts import notes_behind
 from camkit.runtime.geometry.placement import Placement, place
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.job.meter import Meter
@@ -79,6 +80,8 @@ class Job:
         self.meter = Meter(progress, cancel)
         self.clock = StageClock()
         self.notes = list(capture.notes)
+        if setup.bundle is not None and setup.bundle.manifest.has_haze:
+            self.notes = notes_behind(capture, setup.bundle.haze)
         self.record: dict[str, Any] = {}
         self.sections: dict[str, Any] = {}
         self.white_balance: Gains = (1.0,) * capture.channels

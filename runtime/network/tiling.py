@@ -34,9 +34,6 @@ from camkit.runtime.rows import RowSource
 DEFAULT_MAX_BYTES: Final = 640 * 2**20
 _FLOAT_BYTES: Final = 4
 _MOST_COUNTS: Final = 64
-HALF_FROM_PX: Final = 8
-"""Strides that are multiples of it have halos of whole half strides: two are whole strides, and
-what is kept begins on a cell of `camkit.bundle.light_bound`."""
 PIECE_ROWS: Final = 64
 """A band is given away in pieces of about so many rows, each of which may be forgotten alone."""
 BANDS_HELD: Final = 2
@@ -71,7 +68,7 @@ class TileLayout:
         height_px: Rows of the picture.
         width_px: Columns of the picture.
         stride_px: Total stride of the network.
-        halo_px: Halo; twice of it is a multiple of the stride.
+        halo_px: Halo, a multiple of the stride.
         window_height_px: Rows of every window.
         window_width_px: Columns of every window.
         rows: Windows from top to bottom.
@@ -151,11 +148,9 @@ def _needed_bytes(
 
 
 def _check_axis(spans: tuple[Span, ...], window: int, layout: TileLayout) -> None:
-    lattice = {2 * layout.halo_px, window} | {span.origin_px for span in spans}
+    lattice = {layout.halo_px, window} | {v for s in spans for v in (s.origin_px, s.start_px)}
     if any(v % layout.stride_px for v in lattice):
-        raise ContractError(
-            f"twice the halo, window and origins must be multiples of {layout.stride_px}"
-        )
+        raise ContractError(f"halo, window and origins must be multiples of {layout.stride_px}")
     edges = [(a.stop_px, b.start_px) for a, b in pairwise(spans)]
     if any(a != b for a, b in edges) or any(s.start_px >= s.stop_px for s in spans):
         raise ContractError("windows must keep every pixel once, in order")
@@ -191,7 +186,7 @@ class TileLimits:
 
     Attributes:
         stride_px: Total stride of the network, >= 1.
-        halo_px: Its reach, or less in fast mode; rounded up, see `HALF_FROM_PX`.
+        halo_px: Its reach, or less in fast mode; rounded up to the stride.
         cost: What the network holds per pixel.
         max_bytes: Cap on one window with its arena, the row buffer and one output band together.
         tile_px: Force output tiles of this size (tests); None leaves it free.
@@ -231,8 +226,7 @@ def lay_windows(height_px: int, width_px: int, limits: TileLimits) -> TileLayout
     """
     if height_px < 1 or width_px < 1:
         raise ContractError(f"a picture has at least 1x1 pixels; got {width_px}x{height_px}")
-    stride = limits.stride_px
-    halo = _ceil_to(limits.halo_px, stride if stride % HALF_FROM_PX else stride // 2)
+    stride, halo = limits.stride_px, _ceil_to(limits.halo_px, limits.stride_px)
     size = _ceil_to(height_px, stride), _ceil_to(width_px, stride)
     if limits.tile_px is not None:
         tile = _ceil_to(limits.tile_px, stride) + 2 * halo

@@ -17,6 +17,8 @@ METHODS: Final[tuple[str, ...]] = ()
 OPTIONS: Final = ("undistort",)
 BYTES_PER_COLUMN: Final = 4_280
 """Of rows on their way (measured, see docs/performance.md)."""
+LIMITED_BYTES_PER_COLUMN: Final = 1_060
+"""Of what is looked at where overshoot is limited: four bytes a sample of a band."""
 REST_SHARE: Final = 0.25
 CUBIC_SHARE: Final = 0.32
 """Of the time of Lanczos (`python -m tools.plan.undistortion`)."""
@@ -38,11 +40,15 @@ def prepare(entry: Undistort, job: Job) -> StageWork:
             job.window_of(light.plane),
             threads=job.threads,
             interpolation=entry.interpolation,
+            overshoot=entry.overshoot,
         )
         plane = job.known_bundle.manifest.planes[entry.gives[0]]
         return (replace(light.with_bands(bands), plane=plane),)
 
-    return StageWork(run=run, held_bytes=BYTES_PER_COLUMN * job.capture.width)
+    bytes_per_column = BYTES_PER_COLUMN
+    if entry.overshoot == "limited":
+        bytes_per_column += LIMITED_BYTES_PER_COLUMN
+    return StageWork(run=run, held_bytes=bytes_per_column * job.capture.width)
 
 
 def seconds(entry: Undistort, subject: Subject, _work: Work, speed: Speed) -> float:

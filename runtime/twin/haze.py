@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.haze import enlarged
@@ -43,15 +44,22 @@ def margin_px(lens: HazeLens, least_px: int) -> int:
 
 
 def hazed(
-    planes: FloatArray, lens: HazeLens, window: SensorWindow, *, around_px: int, workers: int = 1
+    planes: FloatArray,
+    lens: HazeLens,
+    window: SensorWindow,
+    *,
+    around_px: int,
+    ring_px: int = 0,
+    workers: int = 1,
 ) -> tuple[FloatArray, FloatArray]:
     """Give the haze of a scene, and that of a scene of ones.
 
     Args:
-        planes: (c, h + 2 around, w + 2 around) float32, the scene; mirrored beyond.
+        planes: (c, h + 2 around, w + 2 around) float32, the scene, mirrored beyond its ring.
         lens: Its haze.
         window: Where the inner h x w pixels lie on the sensor.
         around_px: Whole cells, see `margin_px`.
+        ring_px: Of the scene beyond the window; farther out it is mirrored, as far as haze reaches.
         workers: Threads of the FFT.
 
     Returns:
@@ -60,10 +68,14 @@ def hazed(
     cell, reach = lens.cell_px, lens.reach_cells
     cells = shrunk(planes, cell)
     rows, columns = cells.shape[1:]
-    pad = ((0, 0), (reach, reach), (reach, reach))
-    wide = np.pad(cells, pad, mode="reflect" if min(rows, columns) > 1 else "edge")
-    first = around_px // cell
     width, height = window.size_px
+    begin = around_px - ring_px
+    down, across = (
+        mirrored_cells(count, reach, cell, (begin, begin + side + 2 * ring_px))
+        for count, side in ((rows, height), (columns, width))
+    )
+    wide = cells[:, down[:, None], across]
+    first = around_px // cell
     # whole cells from the first of the margin on, which may end beside the window's last
     laid = window.resampled(cell, (columns, rows))
     laid = SensorWindow(
@@ -81,8 +93,26 @@ def hazed(
         step_px=max(BLOCK_PX // cell, 1),
         workers=workers,
     )
-    down, across = (np.arange(around_px, around_px + side) for side in (height, width))
-    light, ones = (
-        np.stack([enlarged(plane, cell, down, across) for plane in part]) for part in spread
-    )
+    inner = [np.arange(around_px, around_px + side) for side in (height, width)]
+    light, ones = (np.stack([enlarged(plane, cell, *inner) for plane in part]) for part in spread)
     return light, ones
+
+
+def mirrored_cells(
+    count: int, beyond: int, cell_px: int, scene_px: tuple[int, int]
+) -> NDArray[np.intp]:
+    """Return which cell stands for each of a line that goes on as the mirror image of its scene.
+
+    Args:
+        count: Cells of the line, which stand for themselves.
+        beyond: Cells to add at either end.
+        cell_px: Side of a cell.
+        scene_px: First pixel of the scene on the line, and one past its last.
+    """
+    first, end = scene_px
+    cells = np.arange(-beyond, count + beyond)
+    length = end - first
+    place = ((cells + 0.5) * cell_px - first) % (2 * length)
+    mirror = first + np.minimum(place, 2 * length - place)
+    inside = (cells >= 0) & (cells < count)
+    return np.where(inside, cells, (mirror // cell_px).clip(0, count - 1).astype(np.intp))

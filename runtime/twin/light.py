@@ -227,7 +227,7 @@ def light_of(
         wide = _on_sensor(seen, matrix, lens.psf, window, chosen, around)
         cut = slice(around - margin, margin - around or None)
         extended = np.ascontiguousarray(wide[:, cut, cut])
-        planes = _spread_hazy(wide, extended, lens, window, chosen.workers)
+        planes = _spread_hazy(wide, extended, lens, window, chosen)
     # The FFT leaves a black scene some 1e-8 below zero, which no photon counts can follow.
     np.maximum(planes, 0, out=planes)
     width, height = window.size_px
@@ -262,16 +262,16 @@ def lit_core(lens: Lens) -> KernelLookup:
 
 
 def _spread_hazy(
-    wide: FloatArray, extended: FloatArray, lens: Lens, window: SensorWindow, workers: int
+    wide: FloatArray, extended: FloatArray, lens: Lens, window: SensorWindow, options: LightOptions
 ) -> FloatArray:
     """Spread core and haze, and divide by what they make of a scene of ones."""
     haze = lens.haze
     assert haze is not None
     core, ones = scatter_light(
-        extended, lit_core(lens), window, margin_px=lens.margin_px, workers=workers
+        extended, lit_core(lens), window, margin_px=lens.margin_px, workers=options.workers
     )
-    around = (wide.shape[1] - window.size_px[1]) // 2
-    veil, even = hazed(wide, haze, window, around_px=around, workers=workers)
+    around, ring = (wide.shape[1] - window.size_px[1]) // 2, options.surround_px
+    veil, even = hazed(wide, haze, window, around_px=around, ring_px=ring, workers=options.workers)
     core += veil
     core /= ones + even
     return core

@@ -8,7 +8,7 @@ import pytest
 from camkit.bundle.golden import golden_from_bytes
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
-from camkit.bundle.stages import Network, Wiener
+from camkit.bundle.stages import Network, Undistort, Wiener
 from camkit.errors import ParityError
 from camkit.runtime.proof.check import CheckReport, Layer
 from tools import repack
@@ -58,3 +58,16 @@ def test_a_bound_on_light_brings_its_mask_and_new_golden_pictures(tmp_path: Path
     assert after.manifest.version != before.manifest.version
     old, found = (golden_from_bytes(bundle.member(GOLDEN)) for bundle in (before, after))
     assert any(not np.array_equal(old[name].reference, found[name].reference) for name in old)
+
+
+def test_undistortion_without_rings_is_stated_and_proved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new = tmp_path / "new.camkit"
+    arguments = ["repack", str(EXAMPLE), "--limited", "-o", str(new)]
+    monkeypatch.setattr("sys.argv", arguments)
+    repack.main()
+    before, after = (open_bundle(path).manifest for path in (EXAMPLE, new))
+    stages = [m.stage(Undistort) for m in (before, after)]
+    assert [stage.overshoot for stage in stages if stage is not None] == ["kept", "limited"]
+    assert after.version != before.version

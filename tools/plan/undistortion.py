@@ -1,11 +1,13 @@
-"""Lanczos or cubic undistortion: seconds of either, and what cubic loses of restored pictures.
+"""Ways of undistortion: seconds of each, what it loses of restored pictures, rings around lamps.
 
     python -m tools.plan.undistortion --data PICTURES -o docs/results/undistortion.json
 
 Seconds are CPU seconds of one thread per megapixel, of bands of a picture of the sensor's width, in
-turns; medians. Losses: the middle of every picture, photographed half-way to the corner of the
-sensor at ISO 100 and restored by the bundle, undistorted in both ways and held against the ideal
-picture (its undistortion by Lanczos): PSNR on sRGB values, lanczos less cubic.
+turns; medians (`cubic_limited`: cubic with limited overshoot), and of a night of lamps. Losses: the
+middle of every picture, photographed half-way to the corner of the sensor at ISO 100 and restored
+by the bundle, undistorted in every way and held against the ideal picture (its undistortion by
+Lanczos): PSNR on sRGB values, lanczos less the way. Rings: nights photographed in the middle of the
+sensor, 0.5 % of them saturated; the darkest value and the pixels below -0.05, in camera colours.
 """
 
 import argparse
@@ -21,27 +23,38 @@ import numpy as np
 
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.bundle.stages import Undistort
-from camkit.bundle.stages.undistort import Interpolation
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.report.bench.machine import describe_machine
 from camkit.report.quality import crop_origin, read_picture
+from camkit.runtime.color import OutputColor
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import undistort_bands
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.rows import ArrayRows
+from camkit.runtime.twin.saturation import exposure_for_share
 from camkit.runtime.twin.simulate import SimulationOptions, photograph
 from camkit.runtime.twin.truth import ideal_picture
+from camkit.scenes.named import named_scene
+from camkit.scenes.saturation import with_exposure
 from tools.capture.simulated import captured, color_sensor
 from tools.comparison.compact_json import to_compact_json
 
-WAYS: Final[tuple[Interpolation, ...]] = ("lanczos", "cubic")
+WAYS: Final = {
+    "lanczos": Undistort(),
+    "cubic": Undistort(interpolation="cubic"),
+    "cubic_limited": Undistort(interpolation="cubic", overshoot="limited"),
+}
 TIMED_ROWS: Final = 1024
 SIDE_PX: Final = 512
 SHARE: Final = 0.5
 BORDER_PX: Final = 32
 ISO: Final = 100.0
+NIGHTS: Final = ("night:0", "night:1", "night:2", "night:3")
+NIGHT_PX: Final = (512, 768)
+SATURATED: Final = 0.005
+BLACK: Final = -0.05
 DIGITS: Final = 5
 
 
@@ -60,44 +73,66 @@ def main(words: Sequence[str] | None = None) -> None:
     bundle = open_bundle(find_bundle(arguments.bundle))
     kinds = {".png", ".jpg", ".jpeg"}
     paths = sorted(p for p in arguments.data.iterdir() if p.suffix.lower() in kinds)
-    losses = [loss_db(bundle, path, arguments.size) for path in paths[: arguments.pictures]]
+    losses = [losses_db(bundle, path, arguments.size) for path in paths[: arguments.pictures]]
+    dark = np.random.default_rng(0).random((3, *_timed_px(bundle)), dtype=np.float32)
+    night = _exposed("night:3", _timed_px(bundle), bundle)
     record = {
         "machine": describe_machine(),
         "bundle": bundle.manifest.name,
-        "cpu_s_per_mp": cpu_seconds(bundle, arguments.repeat),
-        "loss_db": {"mean": statistics.fmean(losses), "most": max(losses), "pictures": len(losses)},
+        "cpu_s_per_mp": cpu_seconds(bundle, dark, arguments.repeat),
+        "night_cpu_s_per_mp": cpu_seconds(bundle, night, arguments.repeat),
+        "loss_db": {
+            way: {"mean": statistics.fmean(each), "most": max(each), "pictures": len(each)}
+            for way in WAYS
+            if (each := [loss[way] for loss in losses])
+        },
+        "rings": {name: rings(bundle, name, arguments.size) for name in NIGHTS},
     }
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     arguments.output.write_text(to_compact_json(record, DIGITS) + "\n", encoding="utf-8")
     print(json.dumps(record))
 
 
-def cpu_seconds(bundle: Bundle, repeat: int) -> dict[str, float]:
-    """Give way -> CPU seconds of a megapixel."""
+def _timed_px(bundle: Bundle) -> tuple[int, int]:
+    """Return height and width of what is timed."""
     sensor = color_sensor(bundle)
-    size = sensor.width_px, min(TIMED_ROWS, sensor.height_px)
+    return min(TIMED_ROWS, sensor.height_px), sensor.width_px
+
+
+def _exposed(name: str, size_px: tuple[int, int], bundle: Bundle) -> FloatArray:
+    """Return a night of which a share saturates the camera."""
+    scene = named_scene(name, *size_px)
+    return with_exposure(scene, exposure_for_share(scene, color_sensor(bundle), SATURATED).exposure)
+
+
+def cpu_seconds(bundle: Bundle, picture: FloatArray, repeat: int) -> dict[str, float]:
+    """Return way -> CPU seconds of a megapixel."""
+    sensor, (height, width) = color_sensor(bundle), picture.shape[1:]
     window = SensorWindow(
-        size_px=size,
+        size_px=(width, height),
         origin_px=(0, 0),
         sensor_size_px=(sensor.width_px, sensor.height_px),
         pitch_um=sensor.pixel_pitch_um,
     )
-    picture = np.random.default_rng(0).random((3, size[1], size[0]), dtype=np.float32)
     found: dict[str, list[float]] = {way: [] for way in WAYS}
     for _ in range(repeat):
-        for way in WAYS:
+        for way, stage in WAYS.items():
             began = time.process_time()
             bands = undistort_bands(
-                ArrayRows(picture), bundle.psf.distortion, window, interpolation=way
+                ArrayRows(picture),
+                bundle.psf.distortion,
+                window,
+                interpolation=stage.interpolation,
+                overshoot=stage.overshoot,
             )
             for _band in bands:
                 pass
-            found[way].append((time.process_time() - began) / (size[0] * size[1] / 1e6))
+            found[way].append((time.process_time() - began) / (width * height / 1e6))
     return {way: statistics.median(values) for way, values in found.items()}
 
 
-def loss_db(bundle: Bundle, path: Path, size: str) -> float:
-    """Give what cubic interpolation loses of a restored picture."""
+def losses_db(bundle: Bundle, path: Path, size: str) -> dict[str, float]:
+    """Return way -> what it loses of a restored picture against Lanczos."""
     picture, sensor = read_picture(path), color_sensor(bundle)
     height = min(SIDE_PX, picture.shape[1], sensor.height_px)
     width = min(SIDE_PX, picture.shape[2], sensor.width_px)
@@ -107,20 +142,37 @@ def loss_db(bundle: Bundle, path: Path, size: str) -> float:
     options = SimulationOptions(iso=ISO, origin_px=origin)
     taken = photograph(scene, bundle, options)
     truth = ideal_picture(taken, bundle)
-    psnr = [_psnr_db(_made(_with(bundle, way), taken, size), truth) for way in WAYS]
-    return psnr[0] - psnr[1]
+    psnr = {way: _psnr_db(_made(_with(bundle, way), taken, size), truth) for way in WAYS}
+    return {way: psnr["lanczos"] - value for way, value in psnr.items()}
 
 
-def _with(bundle: Bundle, way: Interpolation) -> Bundle:
+def rings(bundle: Bundle, name: str, size: str) -> dict[str, dict[str, float]]:
+    """Return way -> the darkest value of a night in camera colours, and pixels below black."""
+    height, width = (
+        min(side, most) for side, most in zip(NIGHT_PX, _timed_px(bundle), strict=True)
+    )
+    scene = _exposed(name, (height, width), bundle)
+    taken = photograph(scene, bundle, SimulationOptions(iso=ISO))
+    found = {}
+    for way in WAYS:
+        picture = _made(_with(bundle, way), taken, size, color="camera")
+        below = int(np.count_nonzero(picture.min(axis=0) < BLACK))
+        found[way] = {"darkest": float(picture.min()), "below_black_px": below}
+    return found
+
+
+def _with(bundle: Bundle, way: str) -> Bundle:
+    chosen = WAYS[way]
+    update = {"interpolation": chosen.interpolation, "overshoot": chosen.overshoot}
     stages = tuple(
-        stage.model_copy(update={"interpolation": way}) if isinstance(stage, Undistort) else stage
+        stage.model_copy(update=update) if isinstance(stage, Undistort) else stage
         for stage in bundle.manifest.stages
     )
     return replace(bundle, manifest=bundle.manifest.model_copy(update={"stages": stages}))
 
 
-def _made(bundle: Bundle, taken: Any, size: str) -> FloatArray:
-    pipeline = Pipeline(bundle, Options(size=size, vignetting=True, threads=1))
+def _made(bundle: Bundle, taken: Any, size: str, *, color: OutputColor = "rec709") -> FloatArray:
+    pipeline = Pipeline(bundle, Options(size=size, color=color, threads=1))
     return pipeline.start(captured(pipeline, taken)).fill()
 
 

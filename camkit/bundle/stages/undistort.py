@@ -9,6 +9,7 @@ from camkit.bundle.sensor import MOSAIC
 from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, need_rows, one_linear
 
 Interpolation = Literal["lanczos", "cubic"]
+Overshoot = Literal["limited", "kept"]
 
 
 class Undistort(StageEntry):
@@ -17,12 +18,16 @@ class Undistort(StageEntry):
     Attributes:
         interpolation: Between pixels: lanczos (8x8), as before, or cubic (4x4) for a third of
             its time (format 2.4).
+        overshoot: limited: at the rim of light above white, and where it falls below -0.02, a value
+            stays within the range of the samples that it is interpolated from (format 2.8); kept:
+            nowhere, as before.
     """
 
     type: Literal["undistort"] = "undistort"
     takes: tuple[Word, ...] = ("even",)
     gives: tuple[Word, ...] = ("straight",)
     interpolation: Interpolation = "lanczos"
+    overshoot: Overshoot = "kept"
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the plane in ideal geometry."""

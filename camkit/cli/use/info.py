@@ -12,6 +12,7 @@ from camkit.errors import ContractError
 
 if TYPE_CHECKING:
     from camkit.bundle.reader import Bundle
+    from camkit.runtime.capture import Capture
 
 LONGEST: Final = 300
 """Characters of a value of a part of a list that are printed."""
@@ -130,8 +131,21 @@ def _describe_capture(path: Path, mosaic: Any) -> dict[str, Any]:
         "sensor_size_px": capture.sensor_size_px,
         "pixel_pitch_um": capture.pixel_pitch_um,
         "bundle_named": capture.bundle_name,
-        "notes": capture.notes,
+        "notes": _notes(capture),
     }
+
+
+def _notes(capture: "Capture") -> list[str]:
+    """Return the notes of a capture, those aside that the optics it names explain."""
+    from camkit.bundle.reader import built_in_bundles, open_bundle
+    from camkit.runtime.files.doubts import notes_behind
+
+    path = built_in_bundles().get(capture.bundle_name or "")
+    if path is not None and capture.notes:
+        bundle = open_bundle(path)
+        if bundle.manifest.has_haze:
+            return notes_behind(capture, bundle.haze)
+    return list(capture.notes)
 
 
 def _lines(value: Any, indent: str) -> list[str]:

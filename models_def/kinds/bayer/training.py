@@ -121,7 +121,7 @@ class BayerTraining:
                 *restoring,
                 RaiseClipped(),
                 Illumination(),
-                Undistort(interpolation="cubic"),
+                Undistort(interpolation="cubic", overshoot="limited"),
                 Color(),
             ),
             object_distance_mm=recipe.object_distance_mm,

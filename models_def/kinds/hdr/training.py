@@ -102,7 +102,7 @@ class HdrTraining:
                     lights_px=_lights_px(recipe),
                 ),
                 Illumination(takes=("clean",)),
-                Undistort(),
+                Undistort(overshoot="limited"),
                 Color(),
             ),
             object_distance_mm=recipe.object_distance_mm,

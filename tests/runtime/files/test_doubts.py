@@ -4,8 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from camkit.runtime.files.doubts import LEAST_SIDE_PX, find_doubts, is_noise
+from camkit.runtime.capture import Capture
+from camkit.runtime.files.doubts import LEAST_SIDE_PX, find_doubts, is_noise, notes_behind
 from camkit.runtime.files.raw_checks import Levels
+from tests.haze_factory import tiny_haze
 
 BLACK, WHITE = 256, 4095
 COLOURS = np.array([[0.5, 1.0], [1.0, 0.6]])  # what RGGB gets of a grey light
@@ -90,6 +92,36 @@ def test_a_black_level_of_zero_in_data_that_never_come_near_is_named():
     mosaic = photograph() + np.uint16(500)
     (doubt,) = find_doubts(mosaic, levels(0, 4600), "RGGB")
     assert "nothing is darker than" in doubt
+
+
+def veiled(offset_dn: int = 0) -> Capture:
+    """Give a photograph behind the tiny haze, and black that lies so much too low."""
+    haze = tiny_haze().most_share
+    sharp = photograph(light=1.6).astype(np.float64) - BLACK
+    tones = sharp * np.tile(1 / COLOURS, (128, 160))
+    far = cv2.GaussianBlur(tones, (0, 0), 40) / np.tile(1 / COLOURS, (128, 160))
+    seen = BLACK + (1 - haze) * sharp + haze * far + offset_dn
+    samples = np.clip(np.round(seen), 0, WHITE).astype(np.uint16)
+    notes = ("the file has no valid white balance", *find_doubts(samples, levels(), "RGGB"))
+    return Capture(
+        samples=samples,
+        cfa="RGGB",
+        black_level=levels().black,
+        white_level=WHITE,
+        notes=notes,
+    )
+
+
+def test_the_haze_of_the_optics_is_no_fog():
+    capture = veiled()
+    assert "nothing is darker than" in capture.notes[1]
+    assert notes_behind(capture, tiny_haze()) == ["the file has no valid white balance"]
+
+
+def test_a_black_level_that_haze_does_not_explain_is_named_behind_it_too():
+    capture = veiled(offset_dn=1200)
+    assert notes_behind(capture, tiny_haze()) == list(capture.notes)
+    assert any("nothing is darker than" in note for note in capture.notes)
 
 
 def test_masked_pixels_say_what_black_is():

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camkit.bundle.stages.undistort import Interpolation
 from camkit.contracts import FloatArray, RadialDistortion
 from camkit.errors import ContractError, UnsupportedError
+from camkit.runtime.geometry.resampling import FLOOR
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.geometry.warp import Warp, distort_array, undistort_bands
 from camkit.runtime.rows import ArrayRows, RollingRows
@@ -257,3 +259,33 @@ def test_undistorted_pixels_do_not_depend_on_threads(threads: int) -> None:
         list(undistort_bands(ArrayRows(picture), BARREL, window(), threads=n)) for n in (1, threads)
     )
     np.testing.assert_array_equal(np.concatenate(alone, 1), np.concatenate(shared, 1))
+
+
+@pytest.mark.parametrize(("band_rows", "threads"), [(8, 1), (64, 1), (64, 3), (256, 2)])
+@pytest.mark.parametrize("interpolation", ["lanczos", "cubic"])
+def test_limited_pixels_depend_on_neither_bands_nor_threads(
+    interpolation: Interpolation, band_rows: int, threads: int
+) -> None:
+    rng = np.random.default_rng(6)
+    picture = rng.uniform(0, 0.1, (3, 424, 640)).astype(np.float32)
+    lamps = rng.random(picture.shape) > 0.995
+    picture[lamps] = rng.uniform(0.5, 200, int(lamps.sum())).astype(np.float32)
+    whole, cut = (
+        np.concatenate(
+            list(
+                undistort_bands(
+                    ArrayRows(picture),
+                    BARREL,
+                    window((640, 424), (512, 340)),
+                    band_rows=rows,
+                    threads=count,
+                    interpolation=interpolation,
+                    overshoot="limited",
+                )
+            ),
+            axis=1,
+        )
+        for rows, count in ((424, 1), (band_rows, threads))
+    )
+    assert whole.min() >= FLOOR
+    np.testing.assert_array_equal(cut, whole)

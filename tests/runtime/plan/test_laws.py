@@ -8,7 +8,7 @@ import pytest
 from camkit.bundle.light_bound import BOUND_REACH_PX, USUAL_BOUND, LightBound
 from camkit.bundle.manifest import LIGHT_VERSION, Manifest, planes_of
 from camkit.bundle.reader import Bundle, open_bundle
-from camkit.bundle.stages import Network
+from camkit.bundle.stages import Network, Undistort
 from camkit.bundle.writer import write_bundle
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.options import Options
@@ -62,6 +62,16 @@ def test_from_the_new_format_on_every_network_behind_a_bank_is_bounded() -> None
 def test_a_bound_in_an_older_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BundleError, match=r"light that a stage makes is bounded, which format 2.8"):
         _bundle(tmp_path, BOUND, "2.7")
+    stages = tuple(
+        stage.model_copy(update={"overshoot": "limited"}) if isinstance(stage, Undistort) else stage
+        for stage in tiny_stages()
+    )
+    with pytest.raises(BundleError, match=r"light that a stage makes is bounded, which format 2.8"):
+        write_bundle(
+            tmp_path / "limited.camkit",
+            tiny_manifest(stages=stages, format_version="2.7"),
+            tiny_members(),
+        )
 
 
 @pytest.mark.parametrize(("light", "version"), [(None, "2.4"), (None, NEW), (BOUND, NEW)])

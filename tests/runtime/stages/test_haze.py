@@ -1,5 +1,6 @@
 """The haze found before the first row: the same bits by any bands; left out, or refused."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,14 @@ from camkit.runtime.bank.cell_means import cell_means
 from camkit.runtime.bank.haze import few_of
 from camkit.runtime.cancel import Cancelled
 from camkit.runtime.capture import Capture
+from camkit.runtime.files.doubts import NOTHING_DARK
 from camkit.runtime.job import cells
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.decision import PLAIN, Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.stages import haze
-from tests.bundle_factory import tiny_sensor
+from tests.bundle_factory import tiny_sensor, write_tiny_bundle
 from tests.haze_bundle import hazy_manifest, hazy_stages, write_hazy_bundle
 from tests.haze_factory import tiny_haze
 from tests.job_factory import made_mosaic, made_planes, read_all, start
@@ -284,3 +286,14 @@ def test_captures_of_any_size_are_cleared(bundle: Bundle, height: int, width: in
 
 def test_a_bundle_opens_from_disk(tmp_path: Path) -> None:
     assert write_hazy_bundle(tmp_path).manifest.stage(Dehaze) is not None
+
+
+def test_a_capture_that_its_haze_lifts_is_not_noted_as_fog(bundle: Bundle, tmp_path: Path) -> None:
+    doubt = f"{NOTHING_DARK} 12% of the range above black 64"
+    noted = replace(_capture(), notes=(doubt, "another"))
+    few = noted.samples.astype(np.float64)
+    assert np.quantile(few, 1e-3) - 64 < 0.5 * (few.mean() - 64)
+    assert "another" in start(bundle, noted).job.notes
+    assert doubt not in start(bundle, noted).job.notes
+    clear = open_bundle(write_tiny_bundle(tmp_path))
+    assert doubt in start(clear, noted).job.notes

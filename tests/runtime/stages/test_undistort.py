@@ -51,6 +51,19 @@ def test_the_bundle_says_how_it_interpolates(bundle: Bundle) -> None:
     assert np.abs(made["cubic"] - made["lanczos"]).max() > 1e-4
 
 
+def test_a_bundle_that_says_so_has_no_rings_around_lamps(bundle: Bundle) -> None:
+    light = np.full((3, 64, 96), 0.01, np.float32)
+    light[:, 3:6, 3:6] = 100.0
+    job = made_job(made_mosaic(), bundle)
+    kept, limited = (
+        read_all(run_stage(Undistort(overshoot=overshoot), job, stream_of(light))[0].rows(), 13)
+        for overshoot in ("kept", "limited")
+    )
+    assert kept.min() < -0.1
+    assert limited.min() > 0.0099
+    assert limited.max() <= 100
+
+
 @pytest.mark.parametrize("channels", [("Y",), tuple("abcde")])
 def test_pixels_move_away_from_the_axis_wherever_it_meets_the_sensor(
     tmp_path: Path, channels: tuple[str, ...]

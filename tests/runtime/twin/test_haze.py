@@ -1,16 +1,19 @@
 """The twin of a camera with a haze: as a slow sum over the scene says, flat where that is flat."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from camkit.contracts import FloatArray
 from camkit.runtime.bank.haze import hazy_kernels
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
-from camkit.runtime.twin.haze import BLOCK_PX, HazeLens, hazed, margin_px
+from camkit.runtime.twin.haze import BLOCK_PX, HazeLens, hazed, margin_px, mirrored_cells
 from camkit.runtime.twin.light import (
     LightOptions,
     lens_of,
@@ -46,11 +49,11 @@ def test_haze_is_the_sum_over_the_cells_of_a_scene() -> None:
     around = margin_px(lens, 5)
     assert around == CELL_PX
     planes = np.random.default_rng(1).random((3, 32 + 16, 48 + 16), dtype=np.float32)
-    light, ones = hazed(planes, lens, window, around_px=around)
+    light, ones = hazed(planes, lens, window, around_px=around, ring_px=around)
     # a frame smaller than a block has one kernel, that of the block's middle
     assert BLOCK_PX > 64 + 2 * CELLS * CELL_PX // 2
     cells = planes.reshape(3, 6, 8, 8, 8).mean(axis=(2, 4))
-    wide = np.pad(cells, ((0, 0), (3, 3), (3, 3)), mode="reflect")
+    wide = np.pad(cells, ((0, 0), (3, 3), (3, 3)), mode="symmetric")
     x_mm, y_mm = window.to_mm(23.5, 15.5)
     kernel = lens.haze_at(float(x_mm), float(y_mm))
     wanted = np.zeros((3, 6, 8))
@@ -72,6 +75,43 @@ def _window(width: int, height: int) -> SensorWindow:
     return SensorWindow(
         size_px=(width, height), origin_px=(24, 16), sensor_size_px=(96, 64), pitch_um=6.0
     )
+
+
+@given(
+    count=st.integers(1, 9),
+    beyond=st.integers(0, 30),
+    margin=st.integers(0, 3),
+    ring=st.integers(0, 3),
+)
+def test_cells_beyond_a_scene_are_its_mirror_image_as_far_as_they_go(
+    count: int, beyond: int, margin: int, ring: int
+) -> None:
+    ring = min(ring, margin)
+    cells = np.pad(np.arange(count + 2 * ring), margin - ring, mode="symmetric")
+    scene_px = CELL_PX * (margin - ring), CELL_PX * (margin + count + ring)
+    found = mirrored_cells(len(cells), beyond, CELL_PX, scene_px)
+    wide = np.pad(np.arange(count + 2 * ring), beyond + margin - ring, mode="symmetric")
+    np.testing.assert_array_equal(cells[found], wide)
+
+
+def test_the_border_is_veiled_by_the_mirror_image_of_the_whole_scene() -> None:
+    """A dark rim as wide as the core's margin does not keep the light of the rest away."""
+    kernel = _lens().haze_at(0.0, 0.0)
+    lens = replace(_lens(), haze_at=lambda *_: kernel)
+    scene = np.full((3, 32, 48), 0.02, np.float32)
+    scene[:, CELL_PX:-CELL_PX, CELL_PX:-CELL_PX] = 0.8
+    near, far = CELL_PX, CELL_PX * (CELLS // 2 + 1)
+    mirrored, surrounded = (
+        hazed(
+            np.pad(scene, ((0, 0), (px, px), (px, px)), mode="symmetric"),
+            lens,
+            _window(48, 32),
+            around_px=px,
+            ring_px=ring,
+        )[0]
+        for px, ring in ((near, 0), (far, far))
+    )
+    np.testing.assert_allclose(mirrored, surrounded, rtol=1e-5)
 
 
 @pytest.mark.parametrize("surround_px", [0, 12])

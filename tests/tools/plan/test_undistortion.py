@@ -1,4 +1,4 @@
-"""Both interpolations are timed, and what cubic loses is told."""
+"""Every way of undistortion is timed, and what it loses and rings is told."""
 
 import json
 from pathlib import Path
@@ -23,6 +23,11 @@ def test_seconds_and_losses_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
     words = ["--bundle", str(bundle), "--data", str(tmp_path / "in"), "--size", "M"]
     undistortion.main([*words, "--repeat", "1", "-o", str(out)])
     found = json.loads(out.read_text(encoding="utf-8"))
-    assert set(found["cpu_s_per_mp"]) == {"lanczos", "cubic"}
-    assert found["loss_db"]["pictures"] == 1
-    assert abs(found["loss_db"]["mean"]) < 1
+    ways = {"lanczos", "cubic", "cubic_limited"}
+    assert set(found["cpu_s_per_mp"]) == set(found["night_cpu_s_per_mp"]) == ways
+    assert found["loss_db"]["lanczos"] == {"mean": 0, "most": 0, "pictures": 1}
+    for way in ("cubic", "cubic_limited"):
+        assert found["loss_db"][way]["pictures"] == 1
+        assert abs(found["loss_db"][way]["mean"]) < 1
+    for night in found["rings"].values():
+        assert night["cubic_limited"]["darkest"] >= night["cubic"]["darkest"]

@@ -13,6 +13,8 @@ import pytest
 from camkit.bundle.manifest import Manifest, manifest_to_bytes, read_manifest
 from camkit.bundle.reader import open_bundle
 from camkit.cli.exit_code import ExitCode
+from camkit.runtime.files.doubts import NOTHING_DARK
+from camkit.runtime.raw import read_capture
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "data" / "example-1.0.camkit"
 KINDS: dict[str, Any] = {
@@ -54,6 +56,22 @@ def test_a_capture_is_described_with_its_place_on_the_sensor(captures, camkit_co
     assert facts["bundle_named"] == "tiny"
     assert facts["origin_px"] == [0, 0]
     assert facts["iso"] == 100
+
+
+def test_a_capture_that_its_own_haze_lifts_is_not_described_as_fog(
+    camkit_command, tmp_path: Path
+) -> None:
+    """Bright surroundings leave nothing dark behind thin-plate."""
+    tones = np.full((128, 192, 3), 235, np.uint8)
+    tones[48:80, 64:128] = 30
+    cv2.imwrite(str(tmp_path / "scene.png"), tones)
+    capture = tmp_path / "veiled.dng"
+    made = ["simulate", str(tmp_path / "scene.png"), "--bundle", "thin-plate", "-o", str(capture)]
+    assert camkit_command(*made).code == 0
+    assert any(note.startswith(NOTHING_DARK) for note in read_capture(capture).notes)
+    described = json.loads(camkit_command("info", str(capture), "--json").out)
+    assert described["bundle_named"] == "thin-plate"
+    assert described["notes"] == []
 
 
 def test_a_headerless_mosaic_is_described_with_its_options(captures, camkit_command) -> None:
