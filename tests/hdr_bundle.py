@@ -89,6 +89,15 @@ def hdr_stages() -> tuple[Stage, ...]:
     return rewired(usual, usual)
 
 
+def hdr_stages_from_samples() -> tuple[Stage, ...]:
+    """Give the usual stages, of which streaks are taken from the mosaic (format 2.8)."""
+    changes: dict[type[Stage], dict[str, Any]] = {
+        Demosaic: {"method": "quality"},
+        Highlights: {"takes": ("rgb", "balanced")},
+    }
+    return tuple(s.model_copy(update=changes.get(type(s), {})) for s in hdr_stages())
+
+
 def write_hdr_bundle(
     folder: Path,
     name: str = "streaks.camkit",

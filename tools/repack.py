@@ -5,8 +5,9 @@ keeps its bytes. With `--clip-reach-px N` the Wiener bank explains clipped light
 surroundings alone: then golden outputs and activations are made anew, and the version is raised.
 With `--floor SHARE` pictures of photons have no black where light was counted; with
 `--light-spread SHARE` the light that networks behind a bank move is bounded by so much of the
-contrast between cells; with `--limited` undistortion leaves no rings around lamps. The laws of its
-pictures are measured and stated. The result proves itself before it gets its name.
+contrast between cells; with `--limited` undistortion leaves no rings around lamps; with
+`--streaks-from-samples` streaks are taken from the mosaic, and no network darkens a lamp. The laws
+of its pictures are measured and stated. The result proves itself before it gets its name.
 """
 
 import argparse
@@ -19,16 +20,25 @@ from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.manifest import FORMAT_VERSION, Manifest
 from camkit.bundle.reader import GOLDEN, open_bundle
-from camkit.bundle.stages import Network, SuperResolve, Undistort, Wiener
+from camkit.bundle.stages import (
+    Demosaic,
+    Highlights,
+    Network,
+    SuperResolve,
+    Undistort,
+    Wiener,
+)
 from camkit.bundle.stages import StageEntry as Stage
 from camkit.bundle.writer import write_bundle
-from camkit.errors import ParityError
+from camkit.errors import ContractError, ParityError
 from camkit.export.activations import with_activations
 from camkit.export.golden_cases import add_outputs
 from camkit.runtime.plan.laws import ENFORCE, bounded_stages
 from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
+
+Change = tuple[type[Stage], dict[str, Any]]
 
 
 def repack(
@@ -39,6 +49,7 @@ def repack(
     floor: float | None = None,
     light_spread: float | None = None,
     limited: bool = False,
+    from_samples: bool = False,
 ) -> int:
     """Write one bundle anew; give its bytes.
 
@@ -49,6 +60,7 @@ def repack(
         floor: Of pictures of photons; None leaves it as it is.
         light_spread: Of the bound on networks behind a bank; None leaves it as it is.
         limited: Limit the overshoot of undistortion.
+        from_samples: Whether streaks of lights are taken from the samples of the mosaic.
 
     Raises:
         BundleError: If the old one is damaged.
@@ -62,7 +74,7 @@ def repack(
     manifest = bundle.manifest.model_copy(update=newest)
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
-        changes: list[tuple[type[Stage], dict[str, Any]]] = []
+        changes: list[Change] = []
         if clip_reach_px is not None:
             changes.append((Wiener, {"clip_reach_px": clip_reach_px}))
         if floor is not None:
@@ -72,6 +84,8 @@ def repack(
             changes.append((Network, {"light": LightBound(spread=light_spread)}))
         if limited:
             changes.append((Undistort, {"overshoot": "limited"}))
+        if from_samples:
+            changes += _lights_from_samples(manifest)
         if changes:
             manifest = _changed(manifest, changes)
             made = write_bundle(trial, manifest, members)
@@ -88,7 +102,24 @@ def repack(
     return new.stat().st_size
 
 
-def _changed(manifest: Manifest, changes: Sequence[tuple[type[Stage], dict[str, Any]]]) -> Manifest:
+def _lights_from_samples(manifest: Manifest) -> list[Change]:
+    """Return the changes by which lights are given the mosaic of their colours, and stay white.
+
+    Raises:
+        ContractError: If the bundle seeks no lights in a mosaic.
+    """
+    lights, colours = manifest.stage(Highlights), manifest.stage(Demosaic)
+    if lights is None or colours is None or lights.takes[0] not in colours.gives:
+        raise ContractError(f"{manifest.name} seeks no lights in the colours of a mosaic")
+    # what lights are put into and what they are held against are made alike
+    return [
+        (Demosaic, {"method": lights.method}),
+        (Highlights, {"takes": (lights.takes[0], colours.takes[0])}),
+        (Network, {"keeps_white": True}),
+    ]
+
+
+def _changed(manifest: Manifest, changes: Sequence[Change]) -> Manifest:
     """Return the manifest with changed stages, as the next minor version of the bundle."""
     stages = tuple(
         stage.model_copy(
@@ -109,6 +140,7 @@ def main() -> None:
     parser.add_argument("--floor", type=float)
     parser.add_argument("--light-spread", type=float)
     parser.add_argument("--limited", action="store_true")
+    parser.add_argument("--streaks-from-samples", action="store_true")
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
     after = repack(
@@ -118,6 +150,7 @@ def main() -> None:
         floor=arguments.floor,
         light_spread=arguments.light_spread,
         limited=arguments.limited,
+        from_samples=arguments.streaks_from_samples,
     )
     print(f"{arguments.out}: {after} bytes, before {before}")
 

@@ -253,7 +253,7 @@ class Manifest(Entry):
 def bounds_light(stages: Iterable[Stage]) -> bool:
     """Return whether one of the stages bounds the light that it makes."""
     return any(
-        (isinstance(stage, Network) and stage.light is not None)
+        (isinstance(stage, Network) and (stage.light is not None or stage.keeps_white))
         or (isinstance(stage, SuperResolve) and stage.floor > 0)
         or (isinstance(stage, Undistort) and stage.overshoot == "limited")
         for stage in stages

@@ -43,7 +43,7 @@ from camkit.bundle.optics import (
     StreakEntry,
 )
 from camkit.bundle.psf_file import psf_from_bytes
-from camkit.bundle.stages import Wiener
+from camkit.bundle.stages import Highlights, Wiener
 from camkit.contracts import FrozenPsf, RadialDistortion, RadialIllumination
 from camkit.errors import BundleError, ContractError
 from camkit.haze import Haze
@@ -266,6 +266,9 @@ def _check_bundle(container: Container, path: Path) -> Bundle:
         _need_version(manifest, LIGHT_VERSION, "a bank finds the distance of the scene")
     if manifest.laws is not None:
         _need_version(manifest, LIGHT_VERSION, "laws of a picture are stated")
+    lights = manifest.stage(Highlights)
+    if lights is not None and lights.from_samples:
+        _need_version(manifest, LIGHT_VERSION, "streaks are taken from the samples of the mosaic")
     # Unpacking and hashing leave Python's lock to others.
     with ThreadPoolExecutor(CHECKED_AT_ONCE) as pool:
         checks = [

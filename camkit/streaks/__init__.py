@@ -12,6 +12,8 @@
     spots        lights of cells shared out over the pixels that clipped
     thrown       what lights throw beside themselves, over pixels
     recovery     all of it: cells -> lights, their streaks, the veil of everything else
+    doubt        samples without streaks, believed as far as these are known
+    rims         colours within and beside lights
     painting     lights put into the rows of a picture, veil and streaks taken out
     glare        streaks of a wiped windshield, whose optics nobody knows, taken away
 

@@ -3,9 +3,14 @@
     veil of cells, streaks of lights -> taken from rows of pixels
     lights of pixels                 -> put there, in colours that the output has
 
+    or, where a mosaic is at hand:
+    veil and streaks -> taken from its samples, as far as they are known; then it is demosaicked
+    lights of pixels -> put there in the colour of their lamp, pixels beside them in the scene's
+
 Every pixel follows from the cells and its own place alone: bands of any height have the same bits.
 """
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -14,14 +19,21 @@ from numpy.typing import NDArray
 from camkit.colorimetry import Matrix
 from camkit.contracts import FloatArray
 from camkit.streaks.cell_rows import rows_of_cells
-from camkit.streaks.cells import COLOURS
+from camkit.streaks.cells import COLOURS, PITCH_PX, Sites
+from camkit.streaks.doubt import settled
 from camkit.streaks.recovery import Recovery
+from camkit.streaks.rims import coloured_by_surroundings, in_own_colours
 from camkit.streaks.spots import lit_pixels
 from camkit.streaks.thrown import streaks_of
 
 DIMMEST: Final = 0.1
 """Of its strongest colour: lights have no less of any in the colours of the output."""
+DARKEST: Final = 0.015
+"""Below black, of where samples clip: more than three standard deviations of the noise of dark
+samples at ISO 6400."""
 _NO_CHANGE: Final = np.eye(3)
+Mask = NDArray[np.bool_]
+Index = NDArray[np.int32]
 
 
 class Painter:
@@ -56,27 +68,79 @@ class Painter:
             top: Number of the first row.
             gains: Of the colours.
         """
-        pitch_px, offset_px = self._veil_grid
         rows, width = planes.shape[1:]
         for colour, gain in enumerate(gains):
-            veil = self._veil[colour]
-            under = rows_of_cells(veil, pitch_px, offset_px[colour], top, rows, width)
-            for streaks in self._streaks:
-                streaks.add(under, colour, top)
+            under = self._thrown(colour, top, (rows, width))
             under *= np.float32(gain)
             planes[colour] -= under
             planes[colour] *= np.float32(1 / self._core[colour])
         self._put_lights(planes, top, gains)
 
-    def _put_lights(self, planes: FloatArray, top: int, gains: tuple[float, ...]) -> None:
-        lit, rows = self._lit, planes.shape[1]
+    def clear(self, samples: FloatArray, clipped: Mask, top: int, sites: Sequence[Sites]) -> None:
+        """Take veil and streaks from rows of a mosaic in place, with the doubt that they have.
+
+        Args:
+            samples: (rows, w) float32, 1.0 = where samples clip; see `doubt.settled` for the rows.
+            clipped: (rows, w).
+            top: Number of the first row.
+            sites: Of every colour in a cell of 2 px.
+        """
+        thrown, core = np.empty_like(samples), np.empty_like(samples)
+        for colour, places in enumerate(sites):
+            under = self._thrown(colour, top, samples.shape)
+            for y, x in places:
+                at = np.s_[y::PITCH_PX, x::PITCH_PX]
+                thrown[at] = under[at]
+                core[at] = self._core[colour]
+        samples[:] = settled(samples - thrown, thrown, clipped, sites) / core
+
+    def light_up(
+        self, planes: FloatArray, clipped: Mask, top: int, gains: tuple[float, ...]
+    ) -> FloatArray:
+        """Return rows of a cleared picture with lights in colours of their own.
+
+        Args:
+            planes: As `paint`; see `rims.coloured_by_surroundings` for the rows.
+            clipped: (rows, w): whose own sample clipped.
+            top: Number of the first row.
+            gains: Of the colours.
+        """
+        lit = np.zeros(clipped.shape, np.bool_)
+        lit[self._lit_within(top, len(lit))[1]] = True
+        out = coloured_by_surroundings(planes, clipped, lit) if clipped.any() else planes
+        # a demosaic may overshoot at an edge; noise alone reaches a little below black
+        np.maximum(out, np.array(gains, np.float32)[:, None, None] * -np.float32(DARKEST), out=out)
+        self._put_lights(out, top, gains, own_colours=True)
+        return out
+
+    def _thrown(self, colour: int, top: int, shape: tuple[int, ...]) -> FloatArray:
+        """Give veil and streaks of rows of pixels (rows, w)."""
+        pitch_px, offset_px = self._veil_grid
+        veil = self._veil[colour]
+        under = rows_of_cells(veil, pitch_px, offset_px[colour], top, shape[0], shape[1])
+        for streaks in self._streaks:
+            streaks.add(under, colour, top)
+        return under
+
+    def _lit_within(self, top: int, rows: int) -> tuple[slice, tuple[Index, Index]]:
+        """Give which lit pixels lie in rows, and where."""
+        lit = self._lit
         first, last = np.searchsorted(lit.rows, [top, top + rows])
-        if first == last:
+        return slice(first, last), (lit.rows[first:last] - top, lit.columns[first:last])
+
+    def _put_lights(
+        self, planes: FloatArray, top: int, gains: tuple[float, ...], *, own_colours: bool = False
+    ) -> None:
+        which, at = self._lit_within(top, planes.shape[1])
+        if which.start == which.stop:
             return
-        at = lit.rows[first:last] - top, lit.columns[first:last]
         levels = np.array(gains, np.float32)[:, None]
-        light = lit.light[:, first:last] * levels
-        there = _untinted(np.where(light > 0, light, planes[:, *at]), light > 0)
+        light = self._lit.light[:, which] * levels
+        lit = light > 0
+        there = np.where(lit, light, planes[:, *at])
+        if own_colours:
+            there = in_own_colours(there, lit, self._lit.excess[:, which] * levels, levels)
+        there = _untinted(there, lit)
         planes[:, *at] = _visible(there, self._to_output, self._from_output)
 
 

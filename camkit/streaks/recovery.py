@@ -104,7 +104,11 @@ class Recovery:
 
 
 def recover(
-    cells: Cells, kernels: StreakKernels, pause: Callable[[], None] | None = None
+    cells: Cells,
+    kernels: StreakKernels,
+    pause: Callable[[], None] | None = None,
+    *,
+    least_samples: int = MANY_SAMPLES,
 ) -> Recovery:
     """Find the lights of a capture.
 
@@ -112,6 +116,8 @@ def recover(
         cells: Of 2 px.
         kernels: For these cells.
         pause: Called before every window; may raise to stop.
+        least_samples: In a cell, of colours whose streaks are kept by pixels; 1 where they are
+            taken from the samples of a mosaic.
     """
     coarse = coarser(cells)
     veil = veil_of(coarse.known, kernels.coarse.veil)
@@ -137,7 +143,7 @@ def recover(
         veil=veil,
         core=kernels.coarse.core,
         kernels=tuple(
-            veil if len(sites) >= MANY_SAMPLES else None
+            veil if len(sites) >= least_samples else None
             for veil, sites in zip(kernels.pixel.veil, kernels.sites, strict=True)
         ),
         regions=tuple(regions),

@@ -48,17 +48,19 @@ class LitPixels:
         rows: (n,).
         columns: (n,).
         light: (3, n) float32, 1.0 where samples clip; 0 in colours that keep what was seen.
+        excess: (3, n): what their place exceeds white by, mean over its pixels.
     """
 
     rows: Index
     columns: Index
     light: FloatArray
+    excess: FloatArray
 
 
 def lit_pixels(recovery: Recovery) -> LitPixels:
     """Give the pixels of all lights."""
-    none = np.zeros(0, np.int32)
-    parts = [LitPixels(rows=none, columns=none, light=np.zeros((COLOURS, 0), np.float32))]
+    none, dark = np.zeros(0, np.int32), np.zeros((COLOURS, 0), np.float32)
+    parts = [LitPixels(rows=none, columns=none, light=dark, excess=dark)]
     parts += [_region_pixels(region, recovery.fine) for region in recovery.regions]
     rows = np.concatenate([part.rows for part in parts])
     order = np.argsort(rows, kind="stable")
@@ -66,6 +68,7 @@ def lit_pixels(recovery: Recovery) -> LitPixels:
         rows=rows[order],
         columns=np.concatenate([part.columns for part in parts])[order],
         light=np.concatenate([part.light for part in parts], axis=1)[:, order],
+        excess=np.concatenate([part.excess for part in parts], axis=1)[:, order],
     )
 
 
@@ -106,11 +109,20 @@ def _region_pixels(region: Region, cells: Cells) -> LitPixels:
     places = _places(clipped, region.light)
     lit = _lit(places.numbers, cells, region)
     shaped = _shaped(places.numbers, lit, cells, region)
+    light = _shared_out(shaped, places.light)
     return LitPixels(
         rows=shaped.rows + np.int32(PITCH_PX * region.window.top),
         columns=shaped.columns + np.int32(PITCH_PX * region.window.left),
-        light=_shared_out(shaped, places.light),
+        light=light,
+        excess=_excess(light, shaped.numbers),
     )
+
+
+def _excess(light: FloatArray, numbers: Index) -> FloatArray:
+    """Give what the place of every pixel exceeds white by, mean over its pixels."""
+    pixels = np.maximum(np.bincount(numbers), 1)
+    over = [np.bincount(numbers, np.maximum(plane - 1, 0)) / pixels for plane in light]
+    return np.asarray(over, np.float32)[:, numbers]
 
 
 def _places(clipped: FloatArray, light: FloatArray) -> _Places:

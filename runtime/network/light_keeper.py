@@ -35,6 +35,7 @@ class LightKeeper:
         bound: What is taken back; None where the light is only measured.
         measured: Whether the light is measured; without it and a bound only `strength` counts.
         strength: How much of what the network adds is kept, 0..1.
+        white: (c,) stabilised: no output is darker than what is given, or than this; None for any.
         scale: Divisor of the stabilising transform.
         cells: Cells seen so far.
         unexplained: Of these, cells whose local mean left the usual bound.
@@ -47,6 +48,7 @@ class LightKeeper:
     measured: bool
     strength: float
     scale: float
+    white: FloatArray | None = None
     cells: int = 0
     unexplained: int = 0
     large: int = 0
@@ -70,9 +72,11 @@ class LightKeeper:
             excess = added.excess
         elif self.measured:
             self._measure(front, output)
-        if excess is None and kept is None and self.strength == 1:
-            return
-        take_back(front, output, kept, excess, strength=self.strength)
+        if excess is not None or kept is not None or self.strength != 1:
+            take_back(front, output, kept, excess, strength=self.strength)
+        if self.white is not None:
+            least = np.minimum(front, self.white[:, None, None])
+            np.maximum(output, least, out=output)
 
     @property
     def fallback_fraction(self) -> float:

@@ -1,4 +1,8 @@
-"""Clipped lights found from their streaks before the first row; rows painted as they pass."""
+"""Clipped lights found from their streaks before the first row; rows painted as they pass.
+
+colours            -> veil and streaks taken out, lights put in
+colours and mosaic -> veil and streaks taken from the samples -> demosaicked -> lights put in
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -7,11 +11,14 @@ from typing import Final
 
 import numpy as np
 
+from camkit.bundle.sensor import MOSAIC
 from camkit.bundle.stages import Highlights, Stage
 from camkit.colorimetry import Matrix, rec709_from_camera
+from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.capture import Capture
 from camkit.runtime.color import recover_highlights
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
@@ -19,18 +26,24 @@ from camkit.runtime.job.stream import Stream
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.rows import Rows
+from camkit.runtime.signal.demosaic import DemosaicMethod
+from camkit.runtime.stages.demosaic import ColorRows
 from camkit.streaks.cells import COLOURS, PITCH_PX, Cells, cells_of, sample_sites
+from camkit.streaks.doubt import BLOCK_PX
+from camkit.streaks.doubt import MARGIN_PX as DOUBT_MARGIN_PX
 from camkit.streaks.kernels import StreakKernels, streak_kernels
 from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import FINE_CELLS, recover
+from camkit.streaks.recovery import FINE_CELLS, MANY_SAMPLES, recover
+from camkit.streaks.rims import MARGIN_PX as RIM_MARGIN_PX
+from camkit.streaks.rims import near_clipped, no_brighter
 
 METHODS: Final = ("physics",)
-OPTIONS: Final = ("depth_m",)
+OPTIONS: Final = ("depth_m", "demosaic")
 BYTES_PER_PX: Final = 22
 """Cells, veil, lights and streaks of a picture that is one window (measured)."""
 FINE_BYTES_PER_PX: Final = 47
 """The same of one so small that its lights are judged in cells of 2 px (measured)."""
-KEPT_BYTES_PER_PX: Final = 13
+KEPT_BYTES_PER_PX: Final = 17
 """Veil, streaks and the pixels of lights, of a picture of which nearly too much clipped."""
 BAND_ROWS: Final = 256
 REST_SHARE: Final = 0.4
@@ -55,9 +68,15 @@ def prepare(entry: Highlights, job: Job) -> StageWork:
         return StageWork(run=lambda taken: (taken[0],), warnings=lambda: (note,))
     notes: list[str] = []
 
+    method = job.options.demosaic or entry.method
+
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
-        (picture,) = taken
-        return (picture.with_bands(_painted(picture, job, (light, mask), notes)),)
+        picture, *samples = taken
+        if not samples or samples[0].plane.channels != MOSAIC:
+            made = _painted(picture, job, (light, mask), notes)
+        else:
+            made = _from_samples([picture, *samples], job, (light, mask), notes, method)
+        return (picture.with_bands(made),)
 
     pixels = height * width
     return StageWork(
@@ -96,7 +115,13 @@ def _painted(
     picture: Stream, job: Job, looked_at: tuple[str, str], notes: list[str]
 ) -> Iterator[Rows]:
     """Yield the bands of a picture with its lights; finds them when the first is asked for."""
-    painter, top = _painter(job, looked_at, notes), 0
+    painter = _painter(job, looked_at, notes)
+    yield from _bands_painted(picture, painter, job)
+
+
+def _bands_painted(picture: Stream, painter: Painter, job: Job) -> Iterator[Rows]:
+    """Yield the bands of a picture with its lights."""
+    top = 0
     red, green, blue = picture.gains
     for band in picture.bands():
         if painter.blind and job.capture.cfa is not None:
@@ -106,10 +131,87 @@ def _painted(
         yield band
 
 
-def _painter(job: Job, looked_at: tuple[str, str], notes: list[str]) -> Painter:
+def _from_samples(
+    taken: list[Stream],
+    job: Job,
+    looked_at: tuple[str, str],
+    notes: list[str],
+    method: DemosaicMethod,
+) -> Iterator[Rows]:
+    """Yield the bands of a picture whose streaks are taken from its mosaic.
+
+    Args:
+        taken: The picture and its mosaic; emptied, since rows are kept for all who hold a stream.
+        job: The capture.
+        looked_at: Planes of light and of what clipped.
+        notes: For what the search has to say.
+        method: Of the demosaic.
+    """
+    painter = _painter(job, looked_at, notes, least_samples=1)
+    mosaic, picture = taken.pop(), taken.pop()
+    if painter.blind:
+        del mosaic
+        yield from _bands_painted(picture, painter, job)
+        return
+    cfa, capture = job.capture.cfa, job.capture
+    assert cfa is not None  # it is a mosaic
+    cleared = ClearedRows(mosaic, painter, capture)
+    source = ColorRows(cleared, cfa, method, threads=job.threads)
+    seen, gains, height = picture.rows(), mosaic.gains, capture.height
+    del picture, mosaic
+    for top in range(0, height, BAND_ROWS):
+        bottom = min(top + BAND_ROWS, height)
+        above, below = max(top - RIM_MARGIN_PX, 0), min(bottom + RIM_MARGIN_PX, height)
+        planes, clipped = source.read(above, below), capture.saturated_rows(above, below)
+        inside = np.s_[..., top - above : bottom - above, :]
+        lit = painter.light_up(planes, clipped, above, gains)[inside]
+        yield no_brighter(lit, seen.read(top, bottom), near_clipped(clipped)[inside])
+
+
+class ClearedRows:
+    """A balanced mosaic without veil and streaks."""
+
+    def __init__(self, mosaic: Stream, painter: Painter, capture: Capture) -> None:
+        self._source, self._painter, self._capture = mosaic.rows(), painter, capture
+        self._sites = sample_sites(capture.cfa)
+        self._gains = mosaic.gains
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Give (1, h, w)."""
+        return self._source.shape
+
+    def read(self, top: int, bottom: int) -> Rows:
+        """Give rows top..bottom as (1, rows, w) float32, a new array."""
+        height = self.shape[1]
+        above = max(top // BLOCK_PX * BLOCK_PX - DOUBT_MARGIN_PX, 0)
+        below = min(-(-bottom // BLOCK_PX) * BLOCK_PX + DOUBT_MARGIN_PX, height)
+        rows: FloatArray = self._source.read(above, below)[0].copy()
+        self._multiply(rows, [1 / gain for gain in self._gains])
+        clipped = self._capture.saturated_rows(above, below)
+        self._painter.clear(rows, clipped, above, self._sites)
+        self._multiply(rows, self._gains)
+        return np.asarray(rows[None, top - above : bottom - above])
+
+    def _multiply(self, rows: FloatArray, factors: Sequence[float]) -> None:
+        """Multiply the samples of every colour by a factor of its own, in place."""
+        for places, factor in zip(self._sites, factors, strict=True):
+            for y, x in places:
+                rows[y::PITCH_PX, x::PITCH_PX] *= np.float32(factor)
+
+
+def _painter(
+    job: Job,
+    looked_at: tuple[str, str],
+    notes: list[str],
+    *,
+    least_samples: int = MANY_SAMPLES,
+) -> Painter:
     """Find the lights; what only the search needs is let go."""
     cells, kernels = _cells(job, *looked_at), _kernels(job)
-    recovery = recover(cells, kernels, lambda: check_cancelled(job.cancel))
+    recovery = recover(
+        cells, kernels, lambda: check_cancelled(job.cancel), least_samples=least_samples
+    )
     notes[:] = recovery.notes
     job.sections["hdr"] = recovery.to_json()
     return Painter(recovery, _to_output(job))

@@ -35,7 +35,7 @@ from camkit.runtime.plan.laws import broken_laws, front_end
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
-from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, unstabilise
+from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, stabilise, unstabilise
 
 METHODS: Final = ("net",)
 TRIM_SHARE: Final = 0.7
@@ -117,6 +117,12 @@ def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
     if sensor.type == "spad":
         return noise
     return familiar_noise(noise, [entry.read_noise_e for entry in sensor.noise])
+
+
+def _white(noise: NoiseModel, scale: float) -> FloatArray:
+    """Return the stabilised value of white in every channel."""
+    channels = len(noise.shot)
+    return stabilise(np.ones((channels, 1, 1), np.float32), noise, scale=scale)[:, 0, 0]
 
 
 class _NetworkStage:
@@ -219,7 +225,8 @@ class _NetworkStage:
         planes, masks = _parted(taken)
         stand_in = self._stand_in(planes)
         noise = self._noise(planes[-1], len(facts.outputs))
-        self._keeper = self._light_keeper(stand_in, masked=bool(masks))
+        white = _white(noise, entry.scale) if entry.keeps_white and noise is not None else None
+        self._keeper = self._light_keeper(stand_in, masked=bool(masks), white=white)
         self._guard = TileGuard(
             fallback=job.options.on_unsafe == "fallback",
             stand_in=stand_in,
@@ -242,7 +249,9 @@ class _NetworkStage:
             bands = self._linear(bands, noise)
         return self._split(bands, planes[-1], [port.channels for port in facts.outputs])
 
-    def _light_keeper(self, stand_in: slice | None, *, masked: bool) -> LightKeeper | None:
+    def _light_keeper(
+        self, stand_in: slice | None, *, masked: bool, white: FloatArray | None
+    ) -> LightKeeper | None:
         """Return what is done behind the network; None for nothing.
 
         Raises:
@@ -258,7 +267,7 @@ class _NetworkStage:
             return None
         behind_bank = front_end(entry, self._job.setup.stages) is not None
         measured = entry.transform == "stabilise" and behind_bank
-        if not measured and options.strength == 1:
+        if not measured and options.strength == 1 and white is None:
             return None
         return LightKeeper(
             front=stand_in,
@@ -267,6 +276,7 @@ class _NetworkStage:
             measured=measured,
             strength=options.strength,
             scale=entry.scale,
+            white=white,
         )
 
     def _counted(self, bands: Iterator[FloatArray], keeper: LightKeeper) -> Iterator[FloatArray]:

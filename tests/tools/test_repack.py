@@ -7,10 +7,12 @@ import pytest
 
 from camkit.bundle.golden import golden_from_bytes
 from camkit.bundle.light_bound import LightBound
+from camkit.bundle.manifest import planes_of
 from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
-from camkit.bundle.stages import Network, Undistort, Wiener
-from camkit.errors import ParityError
+from camkit.bundle.stages import Demosaic, Highlights, Network, Undistort, Wiener
+from camkit.errors import ContractError, ParityError
 from camkit.runtime.proof.check import CheckReport, Layer
+from tests.hdr_bundle import write_hdr_bundle
 from tools import repack
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example-1.0.camkit"
@@ -71,3 +73,17 @@ def test_undistortion_without_rings_is_stated_and_proved(
     stages = [m.stage(Undistort) for m in (before, after)]
     assert [stage.overshoot for stage in stages if stage is not None] == ["kept", "limited"]
     assert after.version != before.version
+
+
+def test_streaks_are_taken_from_the_mosaic_where_lights_are_sought(tmp_path: Path) -> None:
+    """Colours that lights are put into are made as those that they are held against."""
+    manifest = write_hdr_bundle(tmp_path).manifest
+    made = repack._changed(manifest, repack._lights_from_samples(manifest))
+    lights, colours = made.stage(Highlights), made.stage(Demosaic)
+    assert lights is not None
+    assert colours is not None
+    assert lights.takes == ("rgb", "balanced")
+    assert colours.method == lights.method == "quality"
+    assert planes_of(made.stages, made.parts) == manifest.planes
+    with pytest.raises(ContractError, match="seeks no lights in the colours of a mosaic"):
+        repack._lights_from_samples(open_bundle(EXAMPLE).manifest)

@@ -9,6 +9,7 @@
 - `glare_twin`, `glare_bundle`, `glare_table`: streaks of a windshield, the bundle that removes
   them, and what that gains
 - `tables`: optics and networks beside each other, tables 5.4 and 5.5 of the thesis; with `table`
+- `residue`: errors beside lamps, tints at their rims, networks over the solve
 - `depths`, `moving_lamp`, `speed` (its captures: `speed_captures`): scenes refocused on, a bracket
   beside a snapshot, seconds against what clipped; `record`: what their numbers were measured with
 """

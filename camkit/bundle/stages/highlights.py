@@ -5,20 +5,45 @@ from typing import Literal
 
 from camkit.bundle.entry import Word
 from camkit.bundle.plane import Plane
-from camkit.bundle.sensor import RGB
-from camkit.bundle.stages.entry import JoinError, Parts, StageEntry, one_linear
+from camkit.bundle.sensor import MOSAIC, RGB
+from camkit.bundle.stages.entry import (
+    JoinError,
+    Parts,
+    StageEntry,
+    need_count,
+    need_domain,
+    one_linear,
+)
 
 
 class Highlights(StageEntry):
-    """Clipped lights found from their streaks, streaks and veil taken away (format 2.2)."""
+    """Clipped lights found from their streaks, streaks and veil taken away (format 2.2).
+
+    Where it takes the mosaic beside its colours (format 2.8), streaks are taken from the samples,
+    as far as they are known, and these are made colours anew; rims have colours of their own.
+
+    Attributes:
+        method: Of that demosaic.
+    """
 
     type: Literal["highlights"] = "highlights"
     takes: tuple[Word, ...] = ("rgb",)
     gives: tuple[Word, ...] = ("lit",)
+    method: Literal["fast", "quality"] = "quality"
+
+    @property
+    def from_samples(self) -> bool:
+        """Return whether streaks are taken from the samples of the mosaic."""
+        return len(self.takes) > 1
 
     def join(self, taken: Sequence[Plane], parts: Parts) -> tuple[Plane, ...]:
         """Give the plane as taken; its lights may lie far above white."""
-        plane = one_linear(taken)
+        need_count(taken, 1, 2)
+        plane = one_linear(taken[:1])
+        if len(taken) > 1:
+            need_domain(taken[1], "linear")
+            if taken[1].channels != MOSAIC or taken[1].grid != plane.grid:
+                raise JoinError("beside its colours it takes their mosaic")
         if plane.channels != RGB:
             raise JoinError("it takes red, green and blue")
         if not plane.grid.warped or plane.grid.pitch_ratio != 1:

@@ -41,6 +41,8 @@ class Network(StageEntry):
             so it need not run there (format 2.2); None for one that acts everywhere.
         light: How far the local mean of its output may leave that of its last plane (format 2.8);
             None for one that may move light, as before.
+        keeps_white: Whether its output is at least its last plane, or white where that is brighter
+            (format 2.8): no lamp ends darker than what is known before the network.
     """
 
     stands_in: ClassVar[int] = 1
@@ -53,6 +55,7 @@ class Network(StageEntry):
     most_light: Positive = 16.0
     lights_px: Annotated[int, Field(ge=1, le=1024)] | None = None
     light: LightBound | None = None
+    keeps_white: bool = False
 
     @property
     def extra_reach_px(self) -> int:
@@ -76,7 +79,7 @@ class Network(StageEntry):
         for size, facts in sizes.items():
             _check_ports(size, facts.inputs, taken)
         outputs = _outputs(sizes)
-        if self.light is not None:
+        if self.light is not None or self.keeps_white:
             self._check_bound(taken[-1], outputs)
         if self.transform == "stabilise":
             for port in outputs:

@@ -25,7 +25,8 @@ from camkit.models_def.training.sample import Sample, SampleLayout
 from camkit.streaks.cells import cells_of, sample_sites
 from camkit.streaks.kernels import StreakKernels, streak_kernels
 from camkit.streaks.painting import Painter
-from camkit.streaks.recovery import recover
+from camkit.streaks.recovery import Recovery, recover
+from camkit.streaks.rims import near_clipped, no_brighter
 
 LAYOUT: Final = SampleLayout(
     inputs=(Port(name="rgb", channels=3), Port(name="lit", channels=3)),
@@ -34,6 +35,8 @@ LAYOUT: Final = SampleLayout(
 """What the networks take and give. What streaks leave behind points every way alike, so samples
 may turn."""
 LIGHT_CANDIDATES: Final = 4
+DEMOSAIC: Final = "fast"
+"""Of captures and of pictures whose streaks were taken from the mosaic."""
 
 Generator = np.random.Generator
 
@@ -100,10 +103,10 @@ class HdrCamera:
         blurred = spread_light(sharp, self._dense)[inside]
         sensor = self.recipe.sensor
         raw, clipped = expose(blurred, self.gains, sensor, iso, rng)
-        rgb = develop(raw, self.gains, sensor.cfa)
-        lit = rgb.copy()
         cells = cells_of(raw[None], clipped[None], self._kernels.sites)
-        Painter(recover(cells, self._kernels), self._to_rec709).paint(lit, 0, self.gains)
+        found = recover(cells, self._kernels, least_samples=1)
+        rgb = develop(raw, self.gains, sensor.cfa)
+        lit = self._lit(raw, rgb, clipped, found)
         return Shot(
             rgb=rgb,
             lit=lit,
@@ -111,6 +114,21 @@ class HdrCamera:
             clipped=clipped,
             noise=sensor.noise_at(iso).with_gains(self.gains),
         )
+
+    def _lit(
+        self, raw: FloatArray, rgb: FloatArray, clipped: NDArray[np.bool_], found: Recovery
+    ) -> FloatArray:
+        """Put lights in, as the stage `highlights` does that is given the mosaic."""
+        painter, cfa = Painter(found, self._to_rec709), self.recipe.sensor.cfa
+        if found.blind:
+            lit = rgb.copy()
+            painter.paint(lit, 0, self.gains)
+            return lit
+        cleared = raw.copy()
+        painter.clear(cleared, clipped, 0, self._kernels.sites)
+        planes = develop(cleared, self.gains, cfa)
+        lit = painter.light_up(planes, clipped, 0, self.gains)
+        return no_brighter(lit, rgb, near_clipped(clipped))
 
 
 def spread_light(sharp: Tensor, kernels: FloatArray) -> Tensor:

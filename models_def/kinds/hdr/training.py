@@ -28,7 +28,13 @@ from camkit.models_def.kinds.hdr.recipe import (
     samples_digest,
     to_hdr_recipe,
 )
-from camkit.models_def.kinds.hdr.samples import LAYOUT, HdrCamera, draw_corner, sample_of
+from camkit.models_def.kinds.hdr.samples import (
+    DEMOSAIC,
+    LAYOUT,
+    HdrCamera,
+    draw_corner,
+    sample_of,
+)
 from camkit.models_def.kinds.hdr.scenes import LightSource, exposed, open_lights
 from camkit.models_def.kinds.hdr.thesis.fitter import FITTING
 from camkit.models_def.kinds.hdr.thesis.networks import THESIS_NAMES, build_thesis_network
@@ -93,13 +99,14 @@ class HdrTraining:
                 Linearise(),
                 Repair(),
                 WhiteBalance(),
-                Demosaic(method="fast"),
-                Highlights(),
+                Demosaic(method=DEMOSAIC),
+                Highlights(takes=("rgb", "balanced"), method=DEMOSAIC),
                 Network(
                     role=ROLES[0],
                     takes=("rgb", "lit"),
                     scale=recipe.scale,
                     lights_px=_lights_px(recipe),
+                    keeps_white=True,
                 ),
                 Illumination(takes=("clean",)),
                 Undistort(overshoot="limited"),

@@ -29,12 +29,14 @@ from camkit.runtime.capture import Capture
 from camkit.runtime.job.walker import Walk
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
+from camkit.runtime.signal.demosaic import apply_gains, demosaic
 from camkit.runtime.stages import highlights
 from camkit.streaks.cells import cells_of, sample_sites
 from camkit.streaks.kernels import streak_kernels
 from camkit.streaks.painting import Painter
 from camkit.streaks.recovery import Recovery, recover
-from tests.hdr_bundle import DEEP_MM, SIZE_PX, write_hdr_bundle
+from camkit.streaks.rims import MOST_OVER, near_clipped, no_brighter
+from tests.hdr_bundle import DEEP_MM, SIZE_PX, hdr_stages_from_samples, write_hdr_bundle
 from tests.job_factory import made_job, start, stream_of
 from tests.streak_factory import blurred, captured, star, star_kernels, street, with_lamps
 
@@ -350,3 +352,93 @@ def test_its_seconds_grow_with_the_picture(camera: Bundle, light: FloatArray) ->
     large = replace(small, height_px=4000, width_px=6000)
     found = [highlights.seconds(_entry(camera), s, Work(), speed) for s in (small, large)]
     assert found == pytest.approx([0.1 * highlights.REST_SHARE, 2.4 * highlights.REST_SHARE])
+
+
+# ------------------------------------------------------------------ streaks from the samples
+
+
+@pytest.fixture(scope="module")
+def sampled(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    """Give the camera whose streaks are taken from its mosaic."""
+    folder = tmp_path_factory.mktemp("sampled")
+    return write_hdr_bundle(folder, stages=hdr_stages_from_samples(), format_version="2.8")
+
+
+def test_bands_threads_and_memory_change_no_bit_of_cleared_samples(
+    sampled: Bundle, light: FloatArray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capture = _mosaic(light)
+    whole = start(sampled, capture, threads=1).fill()
+    for choices in ({"threads": 2}, {"threads": 1, "max_mem_bytes": 400_000_000}):
+        np.testing.assert_array_equal(start(sampled, capture, **choices).fill(), whole)
+    for rows in (14, 34):
+        monkeypatch.setattr(highlights, "BAND_ROWS", rows)
+        np.testing.assert_array_equal(start(sampled, capture).fill(), whole)
+
+
+def test_cleared_samples_are_those_of_the_whole_mosaic(sampled: Bundle, light: FloatArray) -> None:
+    """The slow twin: the whole mosaic cleared, demosaicked, lit."""
+    capture = _mosaic(light)
+    sensor, sites = sampled.manifest.sensor, sample_sites("RGGB")
+    assert sensor.type == "bayer"
+    samples, over = capture.linear_rows(0, HEIGHT), capture.saturated_rows(0, HEIGHT)
+    dense = color_kernels(sampled.psf, *sensor.response_arrays()).at(0, 0)
+    kernels = streak_kernels(dense, sites, sampled.streaks.reach_px)
+    found = recover(cells_of(samples[None], over[None], sites), kernels, least_samples=1)
+    painter = Painter(found, rec709_from_camera(np.array(sensor.color_matrix)))
+    cleared = samples.copy()
+    painter.clear(cleared, over, 0, sites)
+    apply_gains(cleared, "RGGB", GAINS)
+    lit = painter.light_up(demosaic(cleared, "RGGB", "quality"), over, 0, GAINS)
+    wanted = no_brighter(lit, _plane(capture, sampled, "rgb"), near_clipped(over))
+    got = _plane(capture, sampled, "lit")
+    np.testing.assert_allclose(got, wanted, rtol=1e-5, atol=1e-6)
+
+
+def test_streaks_taken_from_samples_leave_less_than_those_taken_from_colours(
+    sampled: Bundle, camera: Bundle, light: FloatArray
+) -> None:
+    """Away from lamps, whose blur stays: in the mean, and at the worst."""
+    scene = with_lamps(street(HEIGHT, WIDTH), LAMPS)
+    y, x = np.indices((HEIGHT, WIDTH))
+    away = np.min([np.hypot(y - top, x - left) for top, left, _, _ in LAMPS], axis=0) > 8
+    gains, capture = np.array(GAINS)[:, None, None], _mosaic(light)
+    ours, theirs = (
+        np.abs(_plane(capture, bundle, "lit") / gains - scene)[:, away]
+        for bundle in (sampled, camera)
+    )
+    assert ours.mean() < 0.96 * theirs.mean()
+    assert ours.max() < 0.8 * theirs.max()
+
+
+def test_away_from_lights_nothing_is_brighter_than_it_was_seen(
+    sampled: Bundle, light: FloatArray
+) -> None:
+    """Networks act where it is, and are left out where nothing clipped."""
+    capture = _mosaic(light)
+    lit, rgb = (_plane(capture, sampled, name) for name in ("lit", "rgb"))
+    far = ~near_clipped(capture.saturated_rows(0, HEIGHT))
+    assert far.mean() > 0.5
+    assert (lit <= MOST_OVER * np.maximum(rgb, 0) + 1e-6)[:, far].all()
+
+
+def test_planes_that_come_as_such_are_painted_as_ever(
+    sampled: Bundle, camera: Bundle, light: FloatArray
+) -> None:
+    capture = _planes(light)
+    got, wanted = (_plane(capture, bundle, "lit") for bundle in (sampled, camera))
+    np.testing.assert_array_equal(got, wanted)
+
+
+def test_lights_that_cannot_be_told_are_neutral_behind_samples_too(sampled: Bundle) -> None:
+    scene = street(HEIGHT, WIDTH)
+    scene[:, :, WIDTH // 2 :] = 6 / np.array(GAINS, np.float32)[:, None, None]
+    burnt = _plane(_mosaic(blurred(scene, star())), sampled, "lit")[:, 8:-8, WIDTH // 2 + 8 : -8]
+    assert burnt.min() > 1
+    assert np.ptp(burnt, axis=0).max() < 0.1 * burnt.max()
+
+
+def test_developed_and_too_small_captures_take_the_colours(sampled: Bundle) -> None:
+    capture = _mosaic(np.full((3, 3, 40), 0.3, np.float32))
+    developed = start(sampled, capture, assume="centre", method="develop").fill()
+    np.testing.assert_array_equal(start(sampled, capture, assume="centre").fill(), developed)

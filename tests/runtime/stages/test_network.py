@@ -226,23 +226,26 @@ def test_where_no_plane_stands_in_a_bad_tile_is_refused_without_a_hint(tmp_path:
         assert "--on-unsafe" not in str(caught.value)
 
 
+def _multiplying(gain: float) -> bytes:
+    """Give the small network of one plane, its output multiplied."""
+    import onnx
+    from onnx import numpy_helper
+
+    model = onnx.load_from_string(finer_network(1, 1, scale=1))
+    for tensor in model.graph.initializer:
+        if tensor.name == "tail.weight":
+            scaled = np.float32(gain) * numpy_helper.to_array(tensor)
+            tensor.CopyFrom(numpy_helper.from_array(scaled, tensor.name))
+    return bytes(model.SerializeToString(deterministic=True))
+
+
 @pytest.mark.parametrize(("transform", "believed"), [("none", 300.0), ("stabilise", 300.0**2)])
 def test_how_much_light_is_believed_is_told_by_the_bundle(
     tmp_path: Path, transform: str, believed: float
 ) -> None:
     """HDR gives 256 times the light of its tile; the square root stands before the bound."""
     port = Port(name="a", channels=1)
-    data = finer_network(1, 1, scale=1)
-    gain = 300.0
-    import onnx
-    from onnx import numpy_helper
-
-    model = onnx.load_from_string(data)
-    for tensor in model.graph.initializer:
-        if tensor.name == "tail.weight":
-            scaled = np.float32(gain) * numpy_helper.to_array(tensor)
-            tensor.CopyFrom(numpy_helper.from_array(scaled, tensor.name))
-    data = model.SerializeToString(deterministic=True)
+    data = _multiplying(300.0)
     for most_light, sound in ((16.0, False), (2.5 * believed, True)):
         stages = (
             Linearise(gives=("light",)),
@@ -265,6 +268,40 @@ def test_how_much_light_is_believed_is_told_by_the_bundle(
         else:
             with pytest.raises(ContractError, match="beyond"):
                 work.fill()
+
+
+def _dimmed(tmp_path: Path, gain: float, *, keeps_white: bool) -> Bundle:
+    """Give a camera of planes whose network gives so much more or less (stabilised)."""
+    port, data = Port(name="a", channels=1), _multiplying(gain)
+    stages = (
+        Linearise(gives=("light",)),
+        Network(takes=("light",), gives=("clean",), keeps_white=keeps_white),
+    )
+    return write_planes_bundle(
+        tmp_path,
+        stages,
+        sensor=planes_sensor(size_px=None),
+        networks={"restore": (facts_of(data, [port], [port]), data)},
+        format_version="2.8",
+    )
+
+
+def test_a_network_that_keeps_white_darkens_no_lamp_below_it(tmp_path: Path) -> None:
+    """What lies below white stays at least as bright, what exceeds it may be lowered to white."""
+    light = made_planes(samples=np.tile(np.array([0.2, 0.9, 1.5, 40], np.float32), (1, 64, 24)))
+    dark = start(_dimmed(tmp_path, 0.01, keeps_white=False), light).fill()
+    assert dark.max() < 0.2
+    got = start(_dimmed(tmp_path, 0.01, keeps_white=True), light).fill()
+    np.testing.assert_allclose(got[0, :, :4], np.tile([0.2, 0.9, 1.0, 1.0], (64, 1)), rtol=1e-3)
+
+
+def test_what_a_network_that_keeps_white_adds_stays(tmp_path: Path) -> None:
+    light = made_planes(samples=np.full((1, 64, 96), 0.5, np.float32))
+    free, kept = (
+        start(_dimmed(tmp_path, 1.2, keeps_white=keeps), light).fill() for keeps in (False, True)
+    )
+    np.testing.assert_allclose(kept, np.maximum(free, 0.5), rtol=1e-5)
+    assert free.max() > 0.6
 
 
 # ------------------------------------------------------------------------------- envelope

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import torch
 
-from camkit.bundle.stages import Highlights, Network
+from camkit.bundle.stages import Demosaic, Highlights, Network
 from camkit.models_def.kinds.hdr import validation
 from camkit.models_def.kinds.hdr.material import HdrMaterial
 from camkit.models_def.kinds.hdr.recipe import HdrRecipe
-from camkit.models_def.kinds.hdr.samples import LAYOUT, sample_of
+from camkit.models_def.kinds.hdr.samples import DEMOSAIC, LAYOUT, sample_of
 from camkit.models_def.kinds.hdr.training import PART
 from camkit.models_def.kinds.hdr.validation import MOST_DB, HdrJudge
 from camkit.models_def.training.checkpoint import load_network, read_checkpoint
@@ -56,6 +56,12 @@ def test_the_stages_are_physics_and_then_the_network(tiny: HdrRecipe) -> None:
     network = design.stages[kinds.index(Network)]
     assert isinstance(network, Network)
     assert (network.role, network.takes, network.scale) == (ROLE, ("rgb", "lit"), tiny.scale)
+    lights, colours = (design.stages[kinds.index(kind)] for kind in (Highlights, Demosaic))
+    assert isinstance(lights, Highlights)
+    assert isinstance(colours, Demosaic)
+    assert lights.from_samples
+    assert network.keeps_white
+    assert lights.method == colours.method == DEMOSAIC
     assert design.object_distance_mm == tiny.object_distance_mm
     assert set(PART.camera_parts) >= {"sensor", "plate"}
 
