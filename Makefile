@@ -10,8 +10,8 @@ SOURCES := camkit runtime export models_def tests tools setup.py
 .PHONY: demo test test-slow fuzz check format docs clean
 
 demo: $(RUNTIME_STAMP)  ## main job on the demo capture, runtime only (no torch)
-	$(VENV)/bin/python -m tools.demo --out-dir out
 	$(VENV)/bin/python -m tools.hdr.gallery --out-dir out
+	$(VENV)/bin/python -m tools.demo --out-dir out
 
 test: check  ## set-up with everything, gate, tests with branch coverage
 	$(DEV)/bin/python -m coverage erase

@@ -21,6 +21,7 @@ A file here is a command; a folder holds what commands are made of.
     rooms               modules that know one camera only, and lines of code
 
     capture/            simulated captures, for the tools that judge pictures
+    pictures/           captions of the demo's pictures
     comparison/         parts of `quality`
     plan/               parts of `plan_report`
     design/             parts of the tools around a design

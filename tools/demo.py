@@ -2,8 +2,9 @@
 
     python -m tools.demo --out-dir out
 
-Confetti fills a quarter of the sensor, from the axis to a corner; a photograph lies half way out.
-Leaves confetti.dng and .exr, photo.dng and .png, their sidecars, and before_after.png.
+A photograph lies half way out; confetti fills a quarter of the sensor, from the axis to a corner.
+Leaves photo.dng and .png, confetti.dng and .exr, their sidecars, and before_after.png: crops at
+100 % with captions, as developed, behind the filter, behind the network, and the truth.
 """
 
 import argparse
@@ -14,7 +15,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,13 +35,28 @@ from camkit.runtime.twin.simulate import (
 )
 from camkit.scenes import procedural_scene
 from tools.capture.simulated import rec709_of
+from tools.pictures.captions import write_captioned
 
 CROP_PX = 384
+MARGIN_PX = 96
+"""What is processed around a crop, so that its borders look as they do in the whole picture."""
+DETAIL = 3
+DETAIL_AT = (0.56, 0.5)
+"""Top and left of what is shown `DETAIL` times as large, as shares of the photograph's crop."""
 BORDER_PX = 32
 EXPOSURE = 0.5
 FIELDS = (0.0, 0.25, 0.5, 0.75, 0.95)
 PHOTO = Path(__file__).parent / "scenes" / "coffee.png"
 """600x400, by Rachel Michetti, CC0; see scenes/README.md."""
+TITLES = {
+    "photo": "A photograph (Rachel Michetti, CC0), crop at 100 %",
+    "confetti": "Synthetic confetti, crop at 100 %",
+}
+HEADING = (
+    "{bundle.name} {bundle.version}, ISO {iso:g}: what the lens gives and what camkit makes of it\n"
+    "Simulated captures. developed: as the lens saw it; filter: Wiener, without the network; "
+    "truth: the sharp scene.\nPSNR in dB of sRGB values against the truth, before undistortion."
+)
 
 
 def main() -> None:
@@ -77,8 +92,10 @@ def main() -> None:
     print(flush=True)
     for name, suffix in (("confetti", "exr"), ("photo", "png")):
         _process(out_dir / f"{name}.dng", arguments.bundle, out_dir, suffix)
-    _show_quality(taken, arguments.bundle, arguments.iso, out_dir / "before_after.png")
+    picture = out_dir / "before_after.png"
+    _show_quality(taken, arguments.bundle, arguments.iso, picture)
     print(f"all of it in {time.perf_counter() - began:.0f} s")
+    print(f"Open {picture} first.")
 
 
 def _photograph(
@@ -122,30 +139,41 @@ def _process(capture: Path, bundle: str, out_dir: Path, suffix: str) -> None:
 def _show_quality(taken: dict[str, Simulation], name: str, iso: float, picture: Path) -> None:
     """Compare crops with the sharp scenes, in sensor geometry."""
     bundle = open_bundle(find_bundle(name))
+    network = camkit.load(name, undistort=False)
     methods = {
-        "Wiener": camkit.load(name, method="wiener", undistort=False),
-        "network": camkit.load(name, undistort=False),
+        "filter": camkit.load(name, method="wiener", undistort=False),
+        f"network {network.size}": network,
     }
-    heads = ("as taken", *methods)
+    heads = ("developed", *methods)
     print("\nPSNR in dB against the sharp scene, on sRGB values, before undistortion")
     print(f"{'scene':<10}{'distance from axis':<20}" + "".join(f"{head:>10}" for head in heads))
     print(f"{'':<10}{'share of half field':<20}" + f"{'dB':>10}" * len(heads))
-    rows = []
-    crops = [("confetti", field) for field in FIELDS] + [("photo", None)]
-    for scene, field in crops:
+    rows: dict[str, dict[str, FloatArray]] = {}
+    for scene, field in (("photo", 0.5), *(("confetti", field) for field in FIELDS)):
         simulation = taken[scene]
         height, width = simulation.samples.shape
-        share = 0.5 if field is None else field
-        x, y = (int((side - CROP_PX) * share) // 2 * 2 for side in (width, height))
-        tiles = _crop(simulation, bundle, methods, (x, y), iso)
-        *made, sharp = tiles
-        place = "half way" if field is None else f"{field:.2f}"
-        numbers = "".join(f"{_psnr(tile, sharp):10.2f}" for tile in made)
-        print(f"{scene:<10}{place:<20}{numbers}")
-        rows.append(np.concatenate(tiles, axis=2))
-    sheet = np.concatenate(rows, axis=1).transpose(1, 2, 0)[..., ::-1]
-    cv2.imwrite(str(picture), (np.clip(sheet, 0, 1) * 255 + 0.5).astype(np.uint8))
-    print(f"\n{picture}: columns {', '.join(heads)}, sharp scene; rows as in the table")
+        # the photograph lies half way out, and its middle is shown
+        x, y = (int((side - CROP_PX) * field) // 2 * 2 for side in (width, height))
+        *made, sharp = _crop(simulation, bundle, methods, (x, y), iso)
+        decibels = [_psnr(tile, sharp) for tile in made]
+        print(f"{scene:<10}{field:<20.2f}" + "".join(f"{value:10.2f}" for value in decibels))
+        captions = [f"{head}: {value:.2f} dB" for head, value in zip(heads, decibels, strict=True)]
+        tiles = dict(zip((*captions, "truth"), (*made, sharp), strict=True))
+        place = f"{100 * field:.0f} % of the way from the axis to the corner"
+        rows[f"{TITLES[scene]}, {place}"] = tiles
+        if scene == "photo":
+            enlarged = zip((*heads, "truth"), map(_detail, tiles.values()), strict=True)
+            rows[f"Part of the same, {DETAIL} times as large"] = dict(enlarged)
+    write_captioned(picture, HEADING.format(bundle=bundle.manifest, iso=iso), rows)
+    print(f"\n{picture}: columns {', '.join(heads)}, truth; rows as in the table")
+
+
+def _detail(tile: FloatArray) -> FloatArray:
+    """Return a part of a square crop, enlarged to its size; pixels stay squares."""
+    side = tile.shape[1] // DETAIL
+    top, left = (int(share * tile.shape[1]) for share in DETAIL_AT)
+    part = tile[:, top : top + side, left : left + side]
+    return part.repeat(DETAIL, axis=1).repeat(DETAIL, axis=2)
 
 
 def _crop(
@@ -155,22 +183,24 @@ def _crop(
     corner: tuple[int, int],
     iso: float,
 ) -> list[FloatArray]:
-    """Give a crop as taken, by every method, and sharp; (3, CROP_PX, CROP_PX), sRGB values."""
+    """Return a crop as taken, by every method, and sharp; (3, CROP_PX, CROP_PX), sRGB values."""
     x, y = corner
-    cut = np.s_[..., y : y + CROP_PX, x : x + CROP_PX]
-    mosaic = np.ascontiguousarray(simulation.samples[cut])
-    left, top = (
-        int(first + more) for first, more in zip(simulation.window.origin_px, corner, strict=True)
-    )
+    left, top = (max(first - MARGIN_PX, 0) for first in corner)
+    around = np.s_[top : y + CROP_PX + MARGIN_PX, left : x + CROP_PX + MARGIN_PX]
+    shown = np.s_[:, y - top : y - top + CROP_PX, x - left : x - left + CROP_PX]
+    mosaic = np.ascontiguousarray(simulation.samples[around])
+    x0, y0 = (int(v) for v in simulation.window.origin_px)
     red, green, blue = simulation.white_balance
-    tiles = [encode_srgb(_seen(mosaic, simulation, bundle, left, top))]
+    pictures = [_seen(mosaic, simulation, bundle, x0 + left, y0 + top)]
     for pipeline in methods.values():
         image = pipeline.process_array(
-            mosaic, iso=iso, white_balance=(red, green, blue), origin_px=(left, top)
+            mosaic, iso=iso, white_balance=(red, green, blue), origin_px=(x0 + left, y0 + top)
         )
-        tiles.append(encode_srgb(image))
+        pictures.append(image)
+    sharp = simulation.clean[..., y : y + CROP_PX, x : x + CROP_PX]
     matrix = rec709_of(_mosaic_sensor(bundle))
-    return [*tiles, encode_srgb(apply_matrix(matrix, simulation.clean[cut]))]
+    tiles = (*(picture[shown] for picture in pictures), apply_matrix(matrix, sharp))
+    return [encode_srgb(tile) for tile in tiles]
 
 
 def _seen(
@@ -178,7 +208,8 @@ def _seen(
 ) -> FloatArray:
     """Give a crop demosaicked, white-balanced and without vignetting: what the lens saw."""
     sensor = _mosaic_sensor(bundle)
-    window = replace(simulation.window, size_px=(CROP_PX, CROP_PX), origin_px=(float(x), float(y)))
+    height, width = mosaic.shape
+    window = replace(simulation.window, size_px=(width, height), origin_px=(float(x), float(y)))
     signal = mosaic.astype(np.float32) - np.float32(sensor.black_level)
     signal /= np.float32(sensor.white_level - sensor.black_level)
     planes = demosaic(signal, sensor.cfa)

@@ -2,9 +2,10 @@
 
     python -m tools.hdr.gallery --out-dir out [--bundle streak-hdr]
 
-Leaves night.dng and night.exr with its sidecar; night.png, rows as developed, by physics, with the
-network and as it was, columns at 0, -4 and -8 EV; streaks.png, the PSF of red, green and blue; and,
-where torch is installed, the plate with its masks in a folder `plate`.
+Leaves night.dng and night.exr with its sidecar; night.png with captions, columns as developed, by
+physics, with the network and the truth, rows of the frame at 0 and -4 EV and of its brightest light
+at 0, -4 and -8 EV; streaks.png, the PSF of red, green and blue; and, where torch is installed, the
+plate with its masks in a folder `plate`.
 """
 
 import argparse
@@ -14,7 +15,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-import cv2
 import numpy as np
 
 import camkit
@@ -29,12 +29,21 @@ from camkit.runtime.twin.simulate import SimulationOptions, photograph, write_ca
 from camkit.runtime.twin.truth import ideal_picture
 from camkit.scenes import named_scene
 from camkit.scenes.saturation import CEILING, with_exposure
+from tools.pictures.captions import write_captioned
 
 SCENE: Final = "night:8"
 SIDES_PX: Final = (512, 768)
 SHARE: Final = 0.015
-STOPS: Final = (0, -4, -8)
+STOPS: Final = (0, -4)
+STOPS_OF_DETAIL: Final = (0, -4, -8)
+DETAIL: Final = 4
 DECADES: Final = 6.0
+HEADING: Final = (
+    "{camera}: a synthetic night in one exposure, {share:.1%} of it brighter than the sensor "
+    "can count\nSimulated capture. developed: streaks of the plate included; physics: lights read "
+    "from their streaks; network: physics, then network {size};\n"
+    "truth: the scene. PSNR of the frame in dB of linear light up to {ceiling:g} times white."
+)
 
 
 def main() -> None:
@@ -63,20 +72,29 @@ def show_gallery(name: str, out_dir: Path) -> None:
     dng = out_dir / "night.dng"
     write_capture(dng, shot, sensor, bundle.manifest.name)
     camkit.process(dng, bundle=name, out_dir=out_dir, overwrite=True)
+    network = camkit.load(name)
     pictures = {
-        "as developed": camkit.load(None).process(dng).image,
-        "by physics": camkit.load(name, method="physics").process(dng).image,
-        "with the network": camkit.load(name).process(dng).image,
-        "as it was": ideal_picture(shot, bundle),
+        "developed": camkit.load(None).process(dng).image,
+        "physics": camkit.load(name, method="physics").process(dng).image,
+        "network": network.process(dng).image,
     }
-    truth = pictures["as it was"]
+    truth = ideal_picture(shot, bundle)
     print(f"{dng}: {SCENE}, {SHARE:.1%} of the scene above white; linear PSNR at 2^8 times white")
+    columns = {}
     for title, picture in pictures.items():
-        if picture is not truth:
-            print(f"  {title:<18}{_psnr_db(picture, truth):6.2f} dB")
-    _write(out_dir / "night.png", _sheet(list(pictures.values())))
-    _write(out_dir / "streaks.png", _psf_sheet(bundle))
-    print(f"{out_dir / 'night.png'}: rows {', '.join(pictures)}; columns {STOPS} EV")
+        decibels = _psnr_db(picture, truth)
+        print(f"  {title:<18}{decibels:6.2f} dB")
+        columns[f"{title}: {decibels:.2f} dB"] = picture
+    columns["truth"] = truth
+    camera = f"{bundle.manifest.name} {bundle.manifest.version}"
+    heading = HEADING.format(camera=camera, share=SHARE, size=network.size, ceiling=CEILING)
+    write_captioned(out_dir / "night.png", heading, night_rows(columns))
+    write_captioned(
+        out_dir / "streaks.png",
+        f"{camera}: what the sensor sees of a point on the axis",
+        {f"PSF by colour, logarithmic over {DECADES:g} decades": _kernels(bundle)},
+    )
+    print(f"{out_dir / 'night.png'}: columns {', '.join(pictures)}, truth")
     if "plate.toml" in bundle.names:
         _draw_plate(name, out_dir / "plate")
 
@@ -97,31 +115,40 @@ def _psnr_db(picture: FloatArray, truth: FloatArray) -> float:
     return float(10 * np.log10(CEILING**2 / np.mean(np.square(gap, dtype=np.float64))))
 
 
-def _sheet(pictures: list[FloatArray]) -> FloatArray:
-    rows = [
-        np.concatenate([encode_srgb(p * np.float32(2.0**stop)) for stop in STOPS], axis=2)
-        for p in pictures
-    ]
-    return np.concatenate(rows, axis=1)
+def night_rows(columns: dict[str, FloatArray]) -> dict[str, dict[str, FloatArray]]:
+    """Return the frame at `STOPS`, then its brightest light at `STOPS_OF_DETAIL`."""
+    truth = columns["truth"]
+    _, height, width = truth.shape
+    y, x = np.unravel_index(np.argmax(truth.sum(axis=0)), (height, width))
+    top = int(np.clip(y - height // DETAIL // 2, 0, height - height // DETAIL))
+    left = int(np.clip(x - width // DETAIL // 2, 0, width - width // DETAIL))
+    part = np.s_[:, top : top + height // DETAIL, left : left + width // DETAIL]
+    details = {
+        name.partition(":")[0]: picture[part].repeat(DETAIL, axis=1).repeat(DETAIL, axis=2)
+        for name, picture in columns.items()
+    }
+    frames = {f"The frame at 100 %, {stop} EV": _darker(columns, stop) for stop in STOPS}
+    return frames | {
+        f"Its brightest light, {DETAIL} times as large, {stop} EV": _darker(details, stop)
+        for stop in STOPS_OF_DETAIL
+    }
 
 
-def _psf_sheet(bundle: Bundle) -> FloatArray:
-    """Give the kernels of the colours side by side, over `DECADES` decades."""
+def _darker(pictures: dict[str, FloatArray], stop: int) -> dict[str, FloatArray]:
+    return {n: encode_srgb(p * np.float32(2.0**stop)) for n, p in pictures.items()}
+
+
+def _kernels(bundle: Bundle) -> dict[str, FloatArray]:
+    """Return the kernel of every colour on the axis in grey, over `DECADES` decades."""
     sensor = bundle.manifest.sensor
     assert sensor.type == "bayer"
     kernels = color_kernels(bundle.psf, *sensor.response_arrays()).at(0.0, 0.0)
     shown = 1 + np.log10(np.maximum(kernels / kernels.max(), 10.0**-DECADES)) / DECADES
-    tiles = np.zeros((3, kernels.shape[1], 3 * kernels.shape[2]), np.float32)
-    for colour in range(3):
-        left = colour * kernels.shape[2]
-        tiles[colour, :, left : left + kernels.shape[2]] = shown[colour]
-    return tiles
-
-
-def _write(path: Path, picture: FloatArray) -> None:
-    pixels = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)
-    if not cv2.imwrite(str(path), pixels.transpose(1, 2, 0)[..., ::-1]):
-        raise OSError(f"cannot write {path}")
+    names = (f"{colour}, {shown.shape[1]} px wide" for colour in ("red", "green", "blue"))
+    return {
+        name: np.broadcast_to(kernel, (3, *kernel.shape))
+        for name, kernel in zip(names, shown, strict=True)
+    }
 
 
 if __name__ == "__main__":

@@ -1,0 +1,77 @@
+"""Rows of pictures in one PNG, pixel for pixel, with a caption over each."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import FloatArray
+from camkit.report.figure import new_figure, to_png
+
+GAP_PX: Final = 6
+LEAST_TEXT_PX: Final = 12
+TEXT_SHARE: Final = 1 / 24
+"""Size of the text as a share of a picture's width: 16 px over pictures of 384 px."""
+
+Line = tuple[int, int, str, str]
+"""Left and top in pixels, the text, its weight."""
+
+
+def write_captioned(path: Path, heading: str, rows: Mapping[str, Mapping[str, FloatArray]]) -> None:
+    """Write rows of pictures under a heading; text lies in white strips, never on a picture.
+
+    Args:
+        path: PNG.
+        heading: Text above all rows; may hold line breaks.
+        rows: Title -> caption -> (3, h, w) sRGB values in 0..1, all of one size.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    _, height, width = next(iter(next(iter(rows.values())).values())).shape
+    line_px = 2 * text_px(width)
+    lines: list[Line] = [
+        (0, number * line_px, text, "bold") for number, text in enumerate(heading.splitlines())
+    ]
+    top = len(lines) * line_px
+    tiles = []
+    for title, row in rows.items():
+        lines.append((0, top, title, "bold"))
+        for column, (caption, picture) in enumerate(row.items()):
+            left = column * (width + GAP_PX)
+            lines.append((left, top + line_px, caption, "normal"))
+            tiles.append((left, top + 2 * line_px, picture))
+        top += 2 * line_px + height
+    page = _draw_text(lines, top, max(map(len, rows.values())) * (width + GAP_PX), text_px(width))
+    for left, upper, picture in tiles:
+        pixels = (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8).transpose(1, 2, 0)
+        page[upper : upper + height, left : left + width] = pixels[..., ::-1]
+    if not cv2.imwrite(str(path), page):
+        raise OSError(f"cannot write {path}")
+
+
+def text_px(width_px: int) -> int:
+    """Return the size of the text over pictures of a width; a line takes twice that."""
+    return max(int(width_px * TEXT_SHARE), LEAST_TEXT_PX)
+
+
+def _draw_text(lines: Sequence[Line], height: int, width: int, size_px: int) -> NDArray[np.uint8]:
+    """Return a white page (height, width, 3), BGR, with lines of text."""
+    figure = new_figure(1, 1)
+    figure.set_layout_engine("none")
+    # half a pixel more, since sizes in inches are cut to whole pixels
+    figure.set_size_inches((width + 0.5) / figure.dpi, (height + 0.5) / figure.dpi)
+    for left, top, text, weight in lines:
+        figure.text(
+            (left + size_px / 4) / width,
+            1 - (top + size_px) / height,
+            text,
+            fontsize=size_px * 72 / figure.dpi,
+            fontweight=weight,
+            verticalalignment="center",
+        )
+    encoded = np.frombuffer(to_png(figure), np.uint8)
+    return np.asarray(cv2.imdecode(encoded, cv2.IMREAD_COLOR), np.uint8)
