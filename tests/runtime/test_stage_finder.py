@@ -40,8 +40,8 @@ def test_there_are_no_modules_that_no_bundle_can_list() -> None:
     assert set(entries.__all__) >= {entry.__name__ for entry in get_args(UNION)}
 
 
-def test_no_two_stages_have_a_method_of_one_name_and_share_the_depth_alone() -> None:
-    for what, shared in (("METHODS", set()), ("OPTIONS", {"depth_m"})):
+def test_no_two_stages_have_a_method_of_one_name_and_few_options_are_shared() -> None:
+    for what, shared in (("METHODS", set()), ("OPTIONS", {"depth_m", "demosaic"})):
         named = [name for type_ in TYPES for name in getattr(stage_module(type_), what)]
         assert {name for name in named if named.count(name) > 1} == shared, what
 
