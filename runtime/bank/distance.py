@@ -51,6 +51,8 @@ POWERS: Final = tuple(10.0 ** (np.arange(9) * 0.67 - 5))
 POWER_AT: Final = 0.03
 STEPS: Final = 17
 """Distances that are tried, evenly in 1 / distance."""
+KEPT_STEPS: Final = 4
+"""Steps whose kernels are kept, since neighbouring blocks share them."""
 TEMPER: Final = 0.02
 NEIGHBOURS: Final = (1.0, 1.0, 1.0)
 """Weights of the blocks beside a block, along rows and columns."""
@@ -118,7 +120,7 @@ class KernelsByDistance:
         self.weights: FloatGrid = np.stack(hats, axis=1)
         """(step, depth): the share of every depth in the kernels of a step."""
         self._kernels = tuple(kernels)
-        self.of = lru_cache(maxsize=4)(self._of)
+        self.of = lru_cache(maxsize=KEPT_STEPS)(self._of)
         """Gives the `FieldKernels` of a step."""
 
     def step_of(self, nearness: float) -> int:

@@ -1,5 +1,6 @@
 """The Wiener bank, or a classical method on its blocks."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
@@ -21,7 +22,13 @@ from camkit.runtime.bank.blocks import (
     cut_block_px,
     lay_spans,
 )
-from camkit.runtime.bank.distance import CELL_PX, KernelsByDistance, KernelsOfScene, find_nearness
+from camkit.runtime.bank.distance import (
+    CELL_PX,
+    KEPT_STEPS,
+    KernelsByDistance,
+    KernelsOfScene,
+    find_nearness,
+)
 from camkit.runtime.bank.lights import fitted_px, light_share
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
 from camkit.runtime.content import LIGHT_PX
@@ -113,6 +120,10 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
         BYTES_PER_BLOCK_ROW * block_px * job.capture.width,
         block_bytes(block_px, len(bundle.manifest.sensor.channels), threads=threads),
     )
+    if _finds_distance(entry, bundle, job.options):
+        fields, depths, _, *sides = bundle.psf.kernels.shape
+        colours = len(bundle.manifest.sensor.channels)
+        held += 4 * fields * colours * math.prod(sides) * (depths + KEPT_STEPS)
     return StageWork(run=run, held_bytes=held)
 
 
