@@ -90,7 +90,7 @@ def hdr_stages() -> tuple[Stage, ...]:
 
 
 def hdr_stages_from_samples() -> tuple[Stage, ...]:
-    """Give the usual stages, of which streaks are taken from the mosaic (format 2.8)."""
+    """Return the usual stages, of which streaks are taken from the mosaic (format 2.8)."""
     changes: dict[type[Stage], dict[str, Any]] = {
         Demosaic: {"method": "quality"},
         Highlights: {"takes": ("rgb", "balanced")},

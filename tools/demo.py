@@ -39,7 +39,7 @@ from tools.pictures.captions import write_captioned
 
 CROP_PX = 384
 MARGIN_PX = 96
-"""What is processed around a crop, so that its borders look as they do in the whole picture."""
+"""Margin that is processed around a crop: its borders look as in the whole picture then."""
 DETAIL = 3
 DETAIL_AT = (0.56, 0.5)
 """Top and left of what is shown `DETAIL` times as large, as shares of the photograph's crop."""

@@ -114,7 +114,7 @@ class Painter:
         return out
 
     def _thrown(self, colour: int, top: int, shape: tuple[int, ...]) -> FloatArray:
-        """Give veil and streaks of rows of pixels (rows, w)."""
+        """Return veil and streaks of rows of pixels (rows, w)."""
         pitch_px, offset_px = self._veil_grid
         veil = self._veil[colour]
         under = rows_of_cells(veil, pitch_px, offset_px[colour], top, shape[0], shape[1])
@@ -123,7 +123,7 @@ class Painter:
         return under
 
     def _lit_within(self, top: int, rows: int) -> tuple[slice, tuple[Index, Index]]:
-        """Give which lit pixels lie in rows, and where."""
+        """Return which lit pixels lie in rows, and where."""
         lit = self._lit
         first, last = np.searchsorted(lit.rows, [top, top + rows])
         return slice(first, last), (lit.rows[first:last] - top, lit.columns[first:last])

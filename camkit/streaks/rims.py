@@ -27,7 +27,7 @@ LIT_PX: Final = 3
 MOST_OVER: Final = 1.15
 """Times what was seen: veil and streaks are taken away, and the core is made the whole."""
 AROUND_PX: Final = 4
-"""What lies around a pixel reaches so far."""
+"""Reach of what lies around a pixel."""
 SIGMA_PX: Final = 2.0
 MARGIN_PX: Final = AROUND_PX + 2
 _TINY: Final = 1e-6

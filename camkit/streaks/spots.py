@@ -119,7 +119,7 @@ def _region_pixels(region: Region, cells: Cells) -> LitPixels:
 
 
 def _excess(light: FloatArray, numbers: Index) -> FloatArray:
-    """Give what the place of every pixel exceeds white by, mean over its pixels."""
+    """Return what the place of every pixel exceeds white by, mean over its pixels."""
     pixels = np.maximum(np.bincount(numbers), 1)
     over = [np.bincount(numbers, np.maximum(plane - 1, 0)) / pixels for plane in light]
     return np.asarray(over, np.float32)[:, numbers]

@@ -69,10 +69,10 @@ class KernelChoice(Protocol):
     """Several kernels of a camera, one of them for every place of a capture."""
 
     def number_at(self, x_px: float, y_px: float) -> int:
-        """Give the number of the kernels that a pixel position of the capture has."""
+        """Return the number of the kernels that a pixel position of the capture has."""
 
     def kernels_of(self, number: int) -> FieldKernels:
-        """Give the kernels of a number."""
+        """Return the kernels of a number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,11 +101,11 @@ class LocalPsf:
         return float(x_mm), float(y_mm)
 
     def number_at(self, x_px: float, y_px: float) -> int:
-        """Give which kernels of the choice a pixel position of the capture has."""
+        """Return the number of the kernels of the choice that a pixel position has."""
         return 0 if self.choice is None else self.choice.number_at(x_px, y_px)
 
     def kernels_of(self, number: int) -> FieldKernels:
-        """Give the kernels of a number."""
+        """Return the kernels of a number."""
         return self.kernels if self.choice is None else self.choice.kernels_of(number)
 
 
@@ -477,7 +477,7 @@ class _Place:
 
 
 _Numbered = tuple[int, tuple[float, float]]
-"""Which kernels a place has, and where it lies in mm."""
+"""Number of the kernels of a place, and its position in mm."""
 _Cut = tuple[FloatArray, NDArray[np.bool_] | None]
 
 

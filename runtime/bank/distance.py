@@ -1,4 +1,4 @@
-"""How far the scene is, found in the capture: the kernels of which distance explain it.
+"""The distance of the scene, found in the capture: that whose kernels explain it.
 
     capture in cells -> blocks -> spectra --+-> how probable, by distance --> with the neighbours
     kernels of every depth, in cells -------+                                     |
@@ -70,7 +70,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NearnessMap:
-    """How near the scene is, over a capture.
+    """The nearness of the scene, over a capture.
 
     Attributes:
         values: (rows, columns), 1 / distance in 1/mm.
@@ -83,7 +83,7 @@ class NearnessMap:
     step_px: tuple[float, float]
 
     def at(self, x_px: float, y_px: float) -> float:
-        """Give 1 / distance in 1/mm of a pixel position; linear between places."""
+        """Return 1 / distance in 1/mm of a pixel position; linear between places."""
         where = [
             [(at - first) / step]
             for at, first, step in zip((y_px, x_px), self.first_px, self.step_px, strict=True)
@@ -92,7 +92,7 @@ class NearnessMap:
         return float(found[0])
 
     def to_json(self) -> dict[str, float]:
-        """Give the distances in m that a sidecar keeps: the nearest, the usual and the farthest."""
+        """Return the distances in m that a sidecar keeps: nearest, usual and farthest."""
         far, middle, near = np.quantile(self.values, (0, 0.5, 1))
         return {
             name: float(1 / max(nearness, LEAST_NEARNESS)) / MM_PER_M
@@ -121,18 +121,18 @@ class KernelsByDistance:
         """(step, depth): the share of every depth in the kernels of a step."""
         self._kernels = tuple(kernels)
         self.of = lru_cache(maxsize=KEPT_STEPS)(self._of)
-        """Gives the `FieldKernels` of a step."""
+        """Cached: the `FieldKernels` of a step."""
 
     def step_of(self, nearness: float) -> int:
-        """Give the step nearest to 1 / distance in 1/mm."""
+        """Return the step nearest to 1 / distance in 1/mm."""
         return int(np.abs(self.nearness - nearness).argmin())
 
     def over(self, scene: NearnessMap) -> "KernelsOfScene":
-        """Give the kernels of the places of a capture, for a bank."""
+        """Return the kernels of the places of a capture, for a bank."""
         return KernelsOfScene(kernels=self, scene=scene)
 
     def in_cells(self) -> tuple[FieldKernels, ...]:
-        """Give the kernels of every depth as seen in cells."""
+        """Return the kernels of every depth as seen in cells."""
         return tuple(replace(k, kernels=_in_cells(k.kernels)) for k in self._kernels)
 
     def _of(self, step: int) -> FieldKernels:
@@ -151,11 +151,11 @@ class KernelsOfScene:
     scene: NearnessMap
 
     def number_at(self, x_px: float, y_px: float) -> int:
-        """Give the step of the distance at a pixel position of the capture."""
+        """Return the step of the distance at a pixel position of the capture."""
         return self.kernels.step_of(self.scene.at(x_px, y_px))
 
     def kernels_of(self, number: int) -> FieldKernels:
-        """Give the kernels of a step."""
+        """Return the kernels of a step."""
         return self.kernels.of(number)
 
 
@@ -169,7 +169,7 @@ def find_nearness(
     cfa: CfaPattern | None,
     threads: int = 1,
 ) -> NearnessMap:
-    """Find how near the scene is.
+    """Compute how near the scene is.
 
     Args:
         cells: (c, rows, columns) of `camkit.runtime.bank.cell_means.cell_means`, `CELL_PX` wide.
@@ -267,20 +267,20 @@ def _spectrum(cfa: CfaPattern | None, channels: int) -> _Spectrum:
 
 @lru_cache(maxsize=1)
 def _block_window() -> FloatArray:
-    """Give (b, b): Hann's window, of unit mean square."""
+    """Return (b, b): Hann's window, of unit mean square."""
     line = np.hanning(BLOCK_CELLS + 2)[1:-1]
     window = line[:, None] * line
     return np.asarray(window / np.sqrt(np.square(window).mean()), np.float32)
 
 
 def _laid(cells: int) -> NDArray[np.intp]:
-    """Give where the blocks begin along a side, evenly; the last ends where the cells end."""
+    """Return where the blocks begin along a side, evenly; the last ends where the cells end."""
     last = max(cells - BLOCK_CELLS, 0)
     return np.linspace(0, last, 1 + -(-last // BLOCK_CELLS)).round().astype(np.intp)
 
 
 def _filled(block: FloatArray) -> FloatArray:
-    """Give a block of full size, mirrored where the capture ends."""
+    """Return a block of full size, mirrored where the capture ends."""
     missing = [max(BLOCK_CELLS - side, 0) for side in block.shape[1:]]
     if not any(missing):
         return block
@@ -290,7 +290,7 @@ def _filled(block: FloatArray) -> FloatArray:
 def _likelihoods(
     block: FloatArray, otf: Complex, weights: FloatGrid, spectrum: _Spectrum, noise: NoiseModel
 ) -> FloatGrid:
-    """Give the logarithm of the probability of a block at every step, up to a constant.
+    """Return the logarithm of the probability of a block at every step, up to a constant.
 
     Args:
         block: (c, b, b) cells.
@@ -323,14 +323,14 @@ def _likelihoods(
 
 
 def _in_cells(kernels: FloatArray) -> FloatArray:
-    """Give (field, c, h, w) kernels in cells about their centre; each sums to 1."""
+    """Return (field, c, h, w) kernels in cells about their centre; each sums to 1."""
     down, across = (_gathering(side) for side in kernels.shape[-2:])
     cells = down @ kernels @ across.T
     return np.asarray(cells / cells.sum(axis=(-2, -1), keepdims=True), np.float32)
 
 
 def _gathering(side_px: int) -> FloatArray:
-    """Give (cells, pixels): the share of every pixel that falls into every cell of a block."""
+    """Return (cells, pixels): the share of every pixel that falls into every cell of a block."""
     reach_px = side_px // 2
     reach = min((reach_px + CELL_PX // 2) // CELL_PX + 1, (BLOCK_CELLS - 1) // 2)
     pixels = np.arange(-reach_px, side_px - reach_px)

@@ -14,7 +14,7 @@ from camkit.runtime.job.job import Job
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cells:
-    """What a capture shows in cells.
+    """A capture in cells.
 
     Attributes:
         means: (c, rows, columns) float32.
@@ -43,7 +43,7 @@ def cells_of(job: Job, takes: Sequence[str], cell_px: int) -> Cells:
 
 
 def _summed(job: Job, picture: str) -> str:
-    """Name the plane whose samples are summed: the mosaic, where nothing else was made of it."""
+    """Return the plane whose samples are summed: the mosaic, if nothing else was made of it."""
     giver = next((stage for stage in job.setup.stages if picture in stage.gives), None)
     mosaic = isinstance(giver, Demosaic) and job.capture.cfa is not None
     return giver.takes[0] if giver is not None and mosaic else picture

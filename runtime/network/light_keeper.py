@@ -89,7 +89,7 @@ class LightKeeper:
         return self.large / max(self.cells, 1)
 
     def _measure(self, front: FloatArray, output: FloatArray) -> None:
-        """Look at some rows of an output that stays as it is: where it matters it is everywhere."""
+        """Measure some rows of an output that stays as it is: where it matters it is everywhere."""
         height, width = (_floor(side) for side in output.shape[1:])
         for top in range(0, height, LOOK_EVERY * LOOK_ROWS):
             rows = np.s_[:, top : min(top + LOOK_ROWS, height), :width]

@@ -178,11 +178,11 @@ class ClearedRows:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Give (1, h, w)."""
+        """Return (1, h, w)."""
         return self._source.shape
 
     def read(self, top: int, bottom: int) -> Rows:
-        """Give rows top..bottom as (1, rows, w) float32, a new array."""
+        """Return rows top..bottom as (1, rows, w) float32, a new array."""
         height = self.shape[1]
         above = max(top // BLOCK_PX * BLOCK_PX - DOUBT_MARGIN_PX, 0)
         below = min(-(-bottom // BLOCK_PX) * BLOCK_PX + DOUBT_MARGIN_PX, height)

@@ -184,7 +184,7 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
 
 
 def _kernels(job: Job) -> Callable[[float | None], FieldKernels]:
-    """Give the function that gives the kernels of an object distance in mm; None for the mean."""
+    """Return the function that gives the kernels of an object distance in mm; None for the mean."""
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
@@ -202,7 +202,7 @@ def _kernels(job: Job) -> Callable[[float | None], FieldKernels]:
 
 
 def _finds_distance(entry: Wiener, bundle: Bundle, options: Options) -> bool:
-    """Tell whether the distance is found in the capture."""
+    """Return whether the distance is found in the capture."""
     several = bundle.psf.depths_mm.size > 1
     return entry.depth == ESTIMATED and options.depth_mm is None and several
 
@@ -213,7 +213,7 @@ def _by_distance(
     planes: Stream,
     kernels_at: Callable[[float | None], FieldKernels],
 ) -> KernelsOfScene | None:
-    """Find the distance of every part of the capture; None where it is told, or there is one."""
+    """Compute the distance of every part of the capture; None where it is told, or there is one."""
     if not _finds_distance(entry, job.known_bundle, job.options):
         return None
     depths_mm = job.known_bundle.psf.depths_mm

@@ -1,4 +1,4 @@
-"""What a camera for several distances gives at each of them: told the distance, and not told.
+"""A camera for several distances at each of them: told the distance, and not told.
 
     python -m tools.lens.distances trio-edof --before OLD.camkit --data DATA/test
 
@@ -23,7 +23,15 @@ import numpy as np
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.colorimetry import encode_srgb
 from camkit.report.fabricated_optics import fabricated_optics
-from camkit.report.quality import BORDER_PX, FABRICATION_SEEDS, Shot, expose, list_set, read_picture
+from camkit.report.quality import (
+    BORDER_PX,
+    FABRICATION_SEEDS,
+    Shot,
+    expose,
+    list_set,
+    psnr,
+    read_picture,
+)
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.twin.simulate import Simulation
@@ -57,7 +65,7 @@ class Way:
     told: bool = False
 
     def restore(self, simulation: Simulation, depth_mm: float) -> tuple[np.ndarray, float | None]:
-        """Give the picture, and the distance in m that was found."""
+        """Return the picture, and the distance in m that was found."""
         told = {"depth_m": depth_mm / MM_PER_M} if self.told else {}
         options = Options(undistort=False, threads=1, **self.options, **told)  # type: ignore[arg-type]
         pipeline = Pipeline(self.bundle, options)
@@ -151,8 +159,7 @@ def _shots(arguments: argparse.Namespace) -> Iterator[tuple[Shot, float, int | N
 
 def _psnr_db(picture: np.ndarray, sharp: np.ndarray) -> float:
     inner = np.s_[:, BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
-    error = np.clip(picture[inner], 0, 1) - np.clip(sharp[inner], 0, 1)
-    return round(float(-10 * np.log10(np.square(error).mean())), 3)
+    return round(psnr(*(np.clip(p[inner], 0, 1, dtype=np.float64) for p in (sharp, picture))), 3)
 
 
 def _table(rows: list[dict[str, Any]], names: list[str]) -> Iterator[str]:

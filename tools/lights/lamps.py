@@ -17,6 +17,7 @@ import numpy as np
 from camkit.bundle.reader import Bundle, find_bundle, open_bundle
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
+from camkit.report.quality import psnr
 from camkit.runtime.network.engine import available_threads
 from camkit.runtime.proof.laws.darkroom import Darkroom
 from camkit.runtime.twin.saturation import exposure_for_share
@@ -68,8 +69,8 @@ def numbers_of(picture: FloatArray, truth: FloatArray) -> tuple[float, float, fl
     white = truth.min(axis=0) >= 1
     darkest = picture.min(axis=0)[white]
     half, fifth = (100 * float(np.mean(darkest < below)) if white.any() else 0.0 for below in DARK)
-    gap = encode_srgb(np.clip(picture, 0, 1)) - encode_srgb(np.clip(truth, 0, 1))
-    return half, fifth, float(-10 * np.log10(np.mean(np.square(gap, dtype=np.float64)) + 1e-12))
+    shown = (encode_srgb(np.clip(p, 0, 1)).astype(np.float64) for p in (truth, picture))
+    return half, fifth, psnr(*shown)
 
 
 if __name__ == "__main__":

@@ -122,7 +122,7 @@ def _transfer(bank: PsfBank, height_mm: float, copy: int) -> Tensor:
 def _known(
     bank: PsfBank, height_mm: float, recipe: BayerRecipe, copy: int, error: float = 0.0
 ) -> Tensor:
-    """Give the transfer that a bank takes a copy's for; `error` is one of the nearness, in 1/m."""
+    """Return the transfer that a bank takes a copy's for; `error` is of the nearness, in 1/m."""
     told = told_depth(recipe, copy, error) if recipe.estimates_depth else None
     return to_otf(bank.frozen_kernels(0.0, height_mm, told), (GRID_PX, GRID_PX))
 

@@ -343,12 +343,12 @@ class BayerRecipe(Recipe):
 
     @property
     def estimates_depth(self) -> bool:
-        """Whether the bank of the camera finds the distance of the scene in the capture."""
+        """Return whether the bank of the camera finds the distance of the scene in the capture."""
         return self.wiener.depth == "estimated"
 
     @property
     def tells_depth(self) -> bool:
-        """Whether filters of samples have the kernels of one depth, at least of some."""
+        """Return whether filters of samples have the kernels of one depth, at least of some."""
         return self.estimates_depth or self.data.known_depth_share > 0
 
     def _check_hazy_depths(self) -> None:

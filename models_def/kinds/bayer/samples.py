@@ -196,7 +196,7 @@ def draw_exposure(rng: Generator, recipe: BayerRecipe, bank: PsfBank) -> Exposur
 
 
 def told_depth(recipe: BayerRecipe, copy: int, error: float = 0.0) -> float:
-    """Give the number of the depth that a filter is told of a copy.
+    """Return the number of the depth that a filter is told of a copy.
 
     Args:
         recipe: Its lens has several depths.

@@ -118,7 +118,7 @@ class HdrCamera:
     def _lit(
         self, raw: FloatArray, rgb: FloatArray, clipped: NDArray[np.bool_], found: Recovery
     ) -> FloatArray:
-        """Put lights in, as the stage `highlights` does that is given the mosaic."""
+        """Render lights in, as the stage `highlights` does that is given the mosaic."""
         painter, cfa = Painter(found, self._to_rec709), self.recipe.sensor.cfa
         if found.blind:
             lit = rgb.copy()

@@ -12,7 +12,7 @@ PATTERNS: tuple[CfaPattern, ...] = ("RGGB", "GBRG")
 
 
 def _arm(width_px: float, level: float = 0.2) -> FloatArray:
-    """Give a streak along the rows that is no different in any column."""
+    """Return a streak along the rows that is no different in any column."""
     y = np.arange(HEIGHT, dtype=np.float32)[:, None] - HEIGHT // 2
     return np.asarray(level * np.exp(-0.5 * (y / width_px) ** 2) + np.zeros(WIDTH), np.float32)
 

@@ -37,7 +37,7 @@ def test_a_lamp_keeps_its_colour_and_nothing_is_darkened() -> None:
 
 
 def _tinted() -> tuple[FloatArray, np.ndarray]:
-    """Give a green wall about a clipped square, pink where a demosaic mixes that in."""
+    """Return a green wall about a clipped square, pink where a demosaic mixes that in."""
     planes = np.full((3, SIDE, SIDE), 0.2, np.float32)
     planes *= np.array([1.0, 2.0, 0.5], np.float32)[:, None, None]
     clipped = np.zeros((SIDE, SIDE), np.bool_)

@@ -95,7 +95,7 @@ def test_a_black_level_of_zero_in_data_that_never_come_near_is_named():
 
 
 def veiled(offset_dn: int = 0) -> Capture:
-    """Give a photograph behind the tiny haze, and black that lies so much too low."""
+    """Return a photograph behind the tiny haze, and black that lies so much too low."""
     haze = tiny_haze().most_share
     sharp = photograph(light=1.6).astype(np.float64) - BLACK
     tones = sharp * np.tile(1 / COLOURS, (128, 160))

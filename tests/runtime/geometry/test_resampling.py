@@ -78,7 +78,7 @@ def test_without_a_limit_there_are_rings(kernel: Interpolation) -> None:
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_a_picture_without_lamps_keeps_every_bit(kernel: Interpolation) -> None:
-    """What overshoots white stays, since that keeps edges sharp."""
+    """Values that overshoot white stay, since that keeps edges sharp."""
     plane = cv2.GaussianBlur(np.random.default_rng(0).random(SIZE, np.float32), (0, 0), 0.7)
     plane[:, 20:] = np.minimum(plane[:, 20:] + 0.4, WHITE)
     where = maps((0.4, -0.3))

@@ -359,7 +359,7 @@ def test_its_seconds_grow_with_the_picture(camera: Bundle, light: FloatArray) ->
 
 @pytest.fixture(scope="module")
 def sampled(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    """Give the camera whose streaks are taken from its mosaic."""
+    """Return the camera whose streaks are taken from its mosaic."""
     folder = tmp_path_factory.mktemp("sampled")
     return write_hdr_bundle(folder, stages=hdr_stages_from_samples(), format_version="2.8")
 

@@ -227,7 +227,7 @@ def test_where_no_plane_stands_in_a_bad_tile_is_refused_without_a_hint(tmp_path:
 
 
 def _multiplying(gain: float) -> bytes:
-    """Give the small network of one plane, its output multiplied."""
+    """Return the small network of one plane, its output multiplied."""
     import onnx
     from onnx import numpy_helper
 
@@ -271,7 +271,7 @@ def test_how_much_light_is_believed_is_told_by_the_bundle(
 
 
 def _dimmed(tmp_path: Path, gain: float, *, keeps_white: bool) -> Bundle:
-    """Give a camera of planes whose network gives so much more or less (stabilised)."""
+    """Return a camera of planes whose network gives so much more or less (stabilised)."""
     port, data = Port(name="a", channels=1), _multiplying(gain)
     stages = (
         Linearise(gives=("light",)),
@@ -287,7 +287,7 @@ def _dimmed(tmp_path: Path, gain: float, *, keeps_white: bool) -> Bundle:
 
 
 def test_a_network_that_keeps_white_darkens_no_lamp_below_it(tmp_path: Path) -> None:
-    """What lies below white stays at least as bright, what exceeds it may be lowered to white."""
+    """Light below white stays at least as bright, light above it may be lowered to white."""
     light = made_planes(samples=np.tile(np.array([0.2, 0.9, 1.5, 40], np.float32), (1, 64, 24)))
     dark = start(_dimmed(tmp_path, 0.01, keeps_white=False), light).fill()
     assert dark.max() < 0.2
