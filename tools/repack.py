@@ -5,9 +5,10 @@ keeps its bytes. With `--clip-reach-px N` the Wiener bank explains clipped light
 surroundings alone: then golden outputs and activations are made anew, and the version is raised.
 With `--floor SHARE` pictures of photons have no black where light was counted; with
 `--light-spread SHARE` the light that networks behind a bank move is bounded by so much of the
-contrast between cells; with `--limited` undistortion leaves no rings around lamps; with
-`--streaks-from-samples` streaks are taken from the mosaic, and no network darkens a lamp. The laws
-of its pictures are measured and stated. The result proves itself before it gets its name.
+contrast between cells, and none darkens what is nearly white; with `--limited` undistortion leaves
+no rings around lamps; with `--streaks-from-samples` streaks are taken from the mosaic, and no
+network darkens a lamp. The laws of its pictures are measured and stated. The result proves itself
+before it gets its name.
 """
 
 import argparse
@@ -81,7 +82,7 @@ def repack(
             changes.append((SuperResolve, {"floor": floor}))
         if light_spread is not None:  # with the mask that a bound needs
             manifest = manifest.model_copy(update={"stages": bounded_stages(manifest, ENFORCE)})
-            changes.append((Network, {"light": LightBound(spread=light_spread)}))
+            changes.append((Network, {"light": LightBound(spread=light_spread, keeps_bright=True)}))
         if limited:
             changes.append((Undistort, {"overshoot": "limited"}))
         if from_samples:

@@ -5,8 +5,8 @@
 
 A network behind a bank adds detail to a picture whose local mean is right already. What its own
 local mean adds beyond what noise and an error of the kernels explain is taken back; beside clipped
-samples nothing is added at all. `camkit/runtime/network/light.py` and
-`camkit/models_def/networks/light.py` compute it.
+samples nothing is added at all, and what is nearly white is not darkened.
+`camkit/runtime/network/light.py` and `camkit/models_def/networks/light.py` compute it.
 """
 
 from typing import Annotated, Final
@@ -29,6 +29,10 @@ interpolation, one more by smoothing; the second row of a cell lies 9 from the f
 NEAR_PX: Final = (3, 5)
 """Distances from a clipped sample, along rows and columns: up to the first nothing that a network
 adds is kept, up to the second half of it."""
+BRIGHT: Final = 0.8
+"""Share of white that a pixel has in every colour where `keeps_bright` applies."""
+BRIGHT_NOISE: Final = 8.0
+"""By so many standard deviations of the noise such a pixel may become darker: the filter's grain."""
 MASK_REACH_PX: Final = BOUND_REACH_PX + NEAR_PX[1]
 """From a pixel to the farthest clipped sample that it depends on."""
 
@@ -49,11 +53,14 @@ class LightBound(Entry):
         spread: So much of the contrast between cells that noise does not explain: what an error of
             the kernels may have got wrong.
         light: Relative error of the light.
+        keeps_bright: Whether a pixel that the last plane has at `BRIGHT` of white or more in every
+            colour is darkened by `BRIGHT_NOISE` standard deviations of the noise at most.
     """
 
     noise: Annotated[float, Field(ge=0, le=1000)] = 0.0
     spread: Annotated[float, Field(ge=0, le=1000)] = 0.0
     light: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    keeps_bright: bool = False
 
     @property
     def admits_detail_alone(self) -> bool:
@@ -61,5 +68,5 @@ class LightBound(Entry):
         return self.noise == self.spread == self.light == 0
 
 
-USUAL_BOUND: Final = LightBound(noise=3.0, spread=0.3, light=0.03)
+USUAL_BOUND: Final = LightBound(noise=3.0, spread=0.3, light=0.03, keeps_bright=True)
 """The bound of networks that state none of their own."""

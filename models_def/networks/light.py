@@ -9,6 +9,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from camkit.bundle.light_bound import (
+    BRIGHT_NOISE,
     CELL_PX,
     CELLS_AVERAGED,
     NEAR_PX,
@@ -35,7 +36,13 @@ def keep_share(unknown: Tensor) -> Tensor:
 
 
 def bounded(
-    output: Tensor, front: Tensor, kept: Tensor | None, bound: LightBound, *, scale: float
+    output: Tensor,
+    front: Tensor,
+    kept: Tensor | None,
+    bound: LightBound,
+    *,
+    scale: float,
+    bright: Tensor,
 ) -> Tensor:
     """Return an output with the light taken back that exceeds the bound.
 
@@ -45,6 +52,7 @@ def bounded(
         kept: (b, 1, h, w) of `keep_share`; None for 1 everywhere.
         bound: Of the manifest.
         scale: Divisor of the stabilising transform.
+        bright: (b, c) stabilised value of `BRIGHT` in every channel.
     """
     output = functional.relu(output)
     both, more = output + front, output - front
@@ -60,7 +68,13 @@ def bounded(
         excess, scale_factor=CELL_PX, mode="bilinear", align_corners=False
     )
     restored = output - taken
-    return restored if kept is None else front + kept * (restored - front)
+    if kept is not None:
+        restored = front + kept * (restored - front)
+    if not bound.keeps_bright:
+        return restored
+    nearly_white = (front >= bright[:, :, None, None]).all(dim=1, keepdim=True)
+    least = front - BRIGHT_NOISE * 0.5 / scale
+    return torch.where(nearly_white, torch.maximum(restored, least), restored)
 
 
 def _means(planes: Tensor) -> Tensor:

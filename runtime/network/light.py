@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.light_bound import (
+    BRIGHT_NOISE,
     CELL_PX,
     CELLS_AVERAGED,
     NEAR_PX,
@@ -210,6 +211,34 @@ def take_back(
             if shares is not None:
                 share = shares[pixels] if shares.ndim == 2 else shares
                 _mix(rows, front[channel, pixels], share)
+
+
+def keep_bright(front: FloatArray, output: FloatArray, bright: FloatArray, *, scale: float) -> None:
+    """Keep an output, in place, from darkening what is nearly white in front of a network.
+
+    Args:
+        front: (c, h, w) float32, stabilised: the plane that the network improves on.
+        output: (c, h, w) float32, stabilised; changed.
+        bright: (c,) stabilised value of `BRIGHT` in every channel.
+        scale: Divisor of the stabilising transform; the noise there is 0.5 / scale.
+    """
+    margin = np.float32(BRIGHT_NOISE * 0.5 / scale)
+    height = front.shape[1]
+    for top in range(0, height, CELL_PX * _STEP_CELLS):
+        rows = np.s_[:, top : min(top + CELL_PX * _STEP_CELLS, height)]
+        nearly_white = _all_above(front[rows], bright)
+        if nearly_white.any():
+            np.maximum(output[rows], front[rows] - margin, out=output[rows], where=nearly_white)
+
+
+def _all_above(planes: FloatArray, levels: FloatArray) -> Mask:
+    """Return (h, w), where every channel reaches its level."""
+    reached = planes[0] >= levels[0]
+    for plane, level in zip(planes[1:], levels[1:], strict=True):
+        if not reached.any():
+            break
+        reached &= plane >= level
+    return reached
 
 
 def _mix(rows: FloatArray, front: FloatArray, shares: FloatArray) -> None:

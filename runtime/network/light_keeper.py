@@ -13,7 +13,7 @@ import numpy as np
 
 from camkit.bundle.light_bound import CELL_PX, USUAL_BOUND, LightBound
 from camkit.contracts import FloatArray
-from camkit.runtime.network.light import AddedLight, added_light, take_back
+from camkit.runtime.network.light import AddedLight, added_light, keep_bright, take_back
 
 LOOK_ROWS: Final = 32
 LOOK_EVERY: Final = 4
@@ -35,6 +35,7 @@ class LightKeeper:
         bound: What is taken back; None where the light is only measured.
         measured: Whether the light is measured; without it and a bound only `strength` counts.
         strength: How much of what the network adds is kept, 0..1.
+        bright: (c,) stabilised: what reaches it in every channel is not darkened; None for any.
         white: (c,) stabilised: no output is darker than what is given, or than this; None for any.
         scale: Divisor of the stabilising transform.
         cells: Cells seen so far.
@@ -48,6 +49,7 @@ class LightKeeper:
     measured: bool
     strength: float
     scale: float
+    bright: FloatArray | None = None
     white: FloatArray | None = None
     cells: int = 0
     unexplained: int = 0
@@ -74,6 +76,8 @@ class LightKeeper:
             self._measure(front, output)
         if excess is not None or kept is not None or self.strength != 1:
             take_back(front, output, kept, excess, strength=self.strength)
+        if self.bright is not None:
+            keep_bright(front, output, self.bright, scale=self.scale)
         if self.white is not None:
             least = np.minimum(front, self.white[:, None, None])
             np.maximum(output, least, out=output)

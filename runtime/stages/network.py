@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.facts import NetworkFacts
+from camkit.bundle.light_bound import BRIGHT
 from camkit.bundle.light_bound import CELL_PX as LIGHT_CELL_PX
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray, NoiseModel
@@ -119,10 +120,10 @@ def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
     return familiar_noise(noise, [entry.read_noise_e for entry in sensor.noise])
 
 
-def _white(noise: NoiseModel, scale: float) -> FloatArray:
-    """Return the stabilised value of white in every channel."""
-    channels = len(noise.shot)
-    return stabilise(np.ones((channels, 1, 1), np.float32), noise, scale=scale)[:, 0, 0]
+def _level(share: float, noise: NoiseModel, scale: float) -> FloatArray:
+    """Return the stabilised value of a share of white in every channel."""
+    light = np.full((len(noise.shot), 1, 1), share, np.float32)
+    return stabilise(light, noise, scale=scale)[:, 0, 0]
 
 
 class _NetworkStage:
@@ -225,8 +226,7 @@ class _NetworkStage:
         planes, masks = _parted(taken)
         stand_in = self._stand_in(planes)
         noise = self._noise(planes[-1], len(facts.outputs))
-        white = _white(noise, entry.scale) if entry.keeps_white and noise is not None else None
-        self._keeper = self._light_keeper(stand_in, masked=bool(masks), white=white)
+        self._keeper = self._light_keeper(stand_in, masked=bool(masks), noise=noise)
         self._guard = TileGuard(
             fallback=job.options.on_unsafe == "fallback",
             stand_in=stand_in,
@@ -250,7 +250,7 @@ class _NetworkStage:
         return self._split(bands, planes[-1], [port.channels for port in facts.outputs])
 
     def _light_keeper(
-        self, stand_in: slice | None, *, masked: bool, white: FloatArray | None
+        self, stand_in: slice | None, *, masked: bool, noise: NoiseModel | None
     ) -> LightKeeper | None:
         """Return what is done behind the network; None for nothing.
 
@@ -267,6 +267,11 @@ class _NetworkStage:
             return None
         behind_bank = front_end(entry, self._job.setup.stages) is not None
         measured = entry.transform == "stabilise" and behind_bank
+        white = bright = None
+        if noise is not None and entry.keeps_white:
+            white = _level(1, noise, entry.scale)
+        if noise is not None and entry.light is not None and entry.light.keeps_bright:
+            bright = _level(BRIGHT, noise, entry.scale)
         if not measured and options.strength == 1 and white is None:
             return None
         return LightKeeper(
@@ -276,6 +281,7 @@ class _NetworkStage:
             measured=measured,
             strength=options.strength,
             scale=entry.scale,
+            bright=bright,
             white=white,
         )
 

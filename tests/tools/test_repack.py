@@ -53,7 +53,7 @@ def test_a_bound_on_light_brings_its_mask_and_new_golden_pictures(tmp_path: Path
     repack.repack(EXAMPLE, new, light_spread=1.0)
     before, after = open_bundle(EXAMPLE), open_bundle(new)
     (network,) = after.manifest.stages_of(Network)
-    assert network.light == LightBound(spread=1.0)
+    assert network.light == LightBound(spread=1.0, keeps_bright=True)
     bank = after.manifest.stage(Wiener)
     assert bank is not None
     assert network.takes[-1] == bank.takes[-1], "the mask of what clipped"

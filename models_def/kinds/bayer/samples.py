@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.bundle.facts import Port
+from camkit.bundle.light_bound import BRIGHT
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
@@ -223,7 +224,9 @@ def finish_of(recipe: BayerRecipe) -> Finish | None:
     def finish(output: Tensor, batch: Batch) -> Tensor:
         front = batch.inputs["wiener"].to(output.device)
         kept = batch.masks[KEPT.name].to(output.device)
-        return bounded(output, front, kept, bound, scale=recipe.scale)
+        # without the noise of reading, which is little there
+        bright = BRIGHT**0.5 / batch.weight.to(output.device)
+        return bounded(output, front, kept, bound, scale=recipe.scale, bright=bright)
 
     return finish
 

@@ -33,6 +33,11 @@ class Law:
         """Whether the law is kept; what is no number breaks it."""
         return self.worst <= self.limit
 
+    @property
+    def excess(self) -> float:
+        """By how much more than is admitted; below 0 where the law is kept."""
+        return self.worst - self.limit
+
     def describe(self) -> str:
         """Return the law in words."""
         front = "" if self.front is None else f", front end {_text(self.front, self.unit)}"

@@ -97,9 +97,12 @@ class _Ranges:
 
 
 def _white(room: Darkroom, ranges: _Ranges) -> tuple[Law, ...]:
-    """Count what is white in the truth and dark in the picture, by size of lamps."""
+    """Count what is white in the truth and dark in the picture, by size of lamps.
+
+    As much as the front end has is admitted, and one pixel: of a small lamp that is more than 2 %.
+    """
     chart = lamp_chart()
-    worst: dict[str, tuple[float, float, float, str]] = {}
+    worst: dict[str, Law] = {}
     for place in ("middle", "corner"):
         seen = room.expose(chart.scene, place, iso=room.isos[0])
         ranges.add([seen])
@@ -109,24 +112,22 @@ def _white(room: Darkroom, ranges: _Ranges) -> tuple[Law, ...]:
             if not lit.any():
                 continue
             for law, (below, admitted) in DARK.items():
-                share, front = (
-                    float(np.mean(picture.min(axis=0)[lit] < below))
+                dark, front = (
+                    int(np.count_nonzero(picture.min(axis=0)[lit] < below))
                     for picture in (seen.network, seen.front)
                 )
-                limit = max(admitted, front)
-                found = (share - limit, share, front, f"{name}, {place}")
-                worst[law] = max(worst.get(law, found), found)
-    return tuple(
-        Law(
-            name=law,
-            worst=worst[law][1],
-            limit=max(admitted, worst[law][2]),
-            unit="%",
-            front=worst[law][2],
-            where=worst[law][3],
-        )
-        for law, (_, admitted) in DARK.items()
-    )
+                pixels = int(np.count_nonzero(lit))
+                found = Law(
+                    name=law,
+                    worst=dark / pixels,
+                    limit=max(admitted, (front + 1) / pixels),
+                    unit="%",
+                    front=front / pixels,
+                    where=f"{name}, {place}",
+                )
+                if law not in worst or found.excess > worst[law].excess:
+                    worst[law] = found
+    return tuple(worst.values())
 
 
 def _flat(room: Darkroom, ranges: _Ranges) -> Law:

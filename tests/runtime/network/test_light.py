@@ -14,7 +14,13 @@ from camkit.bundle.light_bound import (
 )
 from camkit.errors import ContractError
 from camkit.runtime.network import light
-from camkit.runtime.network.light import KeptRows, added_light, keep_share, take_back
+from camkit.runtime.network.light import (
+    KeptRows,
+    added_light,
+    keep_bright,
+    keep_share,
+    take_back,
+)
 from camkit.runtime.rows import ArrayRows
 
 SCALE = 64.0
@@ -195,3 +201,41 @@ def test_sides_that_are_no_whole_cells_are_refused() -> None:
     front, output = _window(9, 38, 56)
     with pytest.raises(ContractError, match="multiples of 4"):
         added_light(front, output, None, DETAIL, scale=SCALE)
+
+
+def test_what_is_nearly_white_in_every_colour_is_not_darkened_by_more_than_noise() -> None:
+    bright = np.array([0.9, 1.0, 1.1], np.float32)
+    front = np.broadcast_to(bright[:, None, None], (3, 6, 8)).copy()
+    front[1, :3] -= np.float32(1e-3)  # one colour short of it
+    front[:, 3:, 4:] += 1
+    output = np.zeros_like(front)
+    output[:, :, 7] = 3
+    made = output.copy()
+    keep_bright(front, made, bright, scale=SCALE)
+    np.testing.assert_array_equal(made[:, :3], output[:, :3])
+    np.testing.assert_allclose(made[:, 3:, :7], front[:, 3:, :7] - 8 * 0.5 / SCALE, rtol=1e-6)
+    np.testing.assert_array_equal(made[:, :, 7], 3)
+
+
+def test_light_that_is_brightened_or_smoothed_within_noise_stays() -> None:
+    """Grain of the filter around white is still taken away."""
+    rng = np.random.default_rng(3)
+    bright = np.full(3, 0.9, np.float32)
+    front = (1 + 0.5 / SCALE * rng.standard_normal((3, 64, 64))).astype(np.float32)
+    output = np.ones_like(front)
+    made = output.copy()
+    keep_bright(front, made, bright, scale=SCALE)
+    np.testing.assert_array_equal(made, output)
+
+
+def test_nearly_white_is_judged_pixel_by_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So a window, a strip of rows and the whole have the same bits."""
+    front, output = _window(5)
+    bright = np.full(3, 0.8, np.float32)
+    whole = output.copy()
+    keep_bright(front, whole, bright, scale=SCALE)
+    assert (whole != output).any()
+    cut = output[:, 7:30, 5:50].copy()
+    monkeypatch.setattr(light, "_STEP_CELLS", 2)
+    keep_bright(front[:, 7:30, 5:50], cut, bright, scale=SCALE)
+    np.testing.assert_array_equal(cut, whole[:, 7:30, 5:50])
