@@ -7,14 +7,17 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.golden import IMAGE, GoldenArrays
+from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor, Sensor, SpadSensor
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray, depth_name
 from camkit.export.energy import energy_diameter_px, modulation
+from camkit.runtime.proof.laws.law import number_text
 from camkit.runtime.proof.laws.proof import Found
 
 BORDER_PX: Final = 16
+_LAWS: Final = "\n## Laws of a picture"
 _PLACES: Final = {"radial": "field heights", "uniform": "place", "grid": "places"}
 
 
@@ -36,7 +39,7 @@ def card_text(
     sensor, psf = manifest.sensor, bundle.psf
     depths = ", ".join(map(depth_name, psf.depths_mm))
     lines = [
-        f"# {manifest.name} {manifest.version}",
+        _title(manifest),
         "",
         f"Sensor {sensor.width_px}x{sensor.height_px} of {sensor.pixel_pitch_um} um, "
         f"{_seen_by(sensor)}. "
@@ -85,18 +88,35 @@ def laws_text(found: Found) -> str:
     """Write which laws of a picture its networks keep, to be put behind the card."""
     if isinstance(found, str):
         return f"\nLaws of a picture: {found}.\n"
-    lines = ["", "## Laws of a picture (`camkit check --level laws`)", ""]
+    lines = [f"{_LAWS} (`camkit check --level laws`)", ""]
     lines += ["| size | law | worst | admitted | front end | |", "|---|---|---|---|---|---|"]
     for size, laws in found.items():
         for law in laws:
-            front = "" if law.front is None else f"{law.front:.4g}"
+            front = "" if law.front is None else number_text(law.front, law.unit)
             kept = "kept" if law.kept else f"BROKEN: {law.where}"
-            unit = "" if law.unit == "%" else f" {law.unit}"
             lines.append(
-                f"| {size or ''} | {law.name.replace('_', ' ')} | {law.worst:.4g}{unit} | "
-                f"{law.limit:.4g}{unit} | {front} | {kept} |"
+                f"| {size or ''} | {law.name.replace('_', ' ')} | "
+                f"{number_text(law.worst, law.unit)} | {number_text(law.limit, law.unit)} | "
+                f"{front} | {kept} |"
             )
     return "\n".join([*lines, ""])
+
+
+def with_laws_text(card: str, manifest: Manifest, found: Found) -> str:
+    """Return a card that names another version of its bundle, and other laws.
+
+    Args:
+        card: Of the bundle as it was.
+        manifest: As it is now.
+        found: What was measured.
+    """
+    _, _, rest = card.partition("\n")
+    kept, _, _ = rest.partition(_LAWS)
+    return f"{_title(manifest)}\n{kept}{laws_text(found)}"
+
+
+def _title(manifest: Manifest) -> str:
+    return f"# {manifest.name} {manifest.version}"
 
 
 def _response(sensor: Sensor) -> list[str]:

@@ -20,7 +20,7 @@ from typing import Any
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.manifest import FORMAT_VERSION, Manifest
-from camkit.bundle.reader import GOLDEN, open_bundle
+from camkit.bundle.reader import CARD, GOLDEN, open_bundle
 from camkit.bundle.stages import (
     Demosaic,
     Highlights,
@@ -33,6 +33,7 @@ from camkit.bundle.stages import StageEntry as Stage
 from camkit.bundle.writer import write_bundle
 from camkit.errors import ContractError, ParityError
 from camkit.export.activations import with_activations
+from camkit.export.card import with_laws_text
 from camkit.export.golden_cases import add_outputs
 from camkit.runtime.plan.laws import ENFORCE, bounded_stages
 from camkit.runtime.proof.check import check_bundle
@@ -94,7 +95,10 @@ def repack(
             cases = {case.name: (case, golden[case.name]) for case in manifest.golden}
             members[GOLDEN] = golden_to_bytes(add_outputs(made, cases))
             manifest = manifest.model_copy(update={"networks": with_activations(made, cases)})
-        manifest = with_laws(manifest, measure_laws(write_bundle(trial, manifest, members)))
+        laws = measure_laws(write_bundle(trial, manifest, members))
+        manifest = with_laws(manifest, laws)
+        if CARD in members and manifest.laws is not None:
+            members[CARD] = with_laws_text(members[CARD].decode(), manifest, laws).encode()
         write_bundle(trial, manifest, members)
         report = check_bundle(trial, run=case_work, without=("laws",))
     if not report.passed:

@@ -134,7 +134,7 @@ class StatedLaw(Entry):
     Attributes:
         worst: The number.
         limit: What is admitted.
-        unit: Of both; % of shares.
+        unit: Of both; "share" for parts of 1, which the first bundles of 2.8 call "%".
         kept: Whether the law is kept.
     """
 

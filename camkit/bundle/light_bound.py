@@ -30,9 +30,11 @@ NEAR_PX: Final = (3, 5)
 """Distances from a clipped sample, along rows and columns: up to the first nothing that a network
 adds is kept, up to the second half of it."""
 BRIGHT: Final = 0.8
-"""Share of white that a pixel has in every colour where `keeps_bright` applies."""
+"""Share of white that a pixel has in every colour where it is not darkened at all."""
+BRIGHT_FROM: Final = 0.7
+"""Of the stabilised value of `BRIGHT`: below it a pixel may become as dark as it will."""
 BRIGHT_NOISE: Final = 8.0
-"""By so many standard deviations of the noise such a pixel may become darker: the filter's grain."""
+"""Standard deviations of the noise by which such a pixel may become darker: grain is removed."""
 MASK_REACH_PX: Final = BOUND_REACH_PX + NEAR_PX[1]
 """From a pixel to the farthest clipped sample that it depends on."""
 
@@ -53,8 +55,10 @@ class LightBound(Entry):
         spread: So much of the contrast between cells that noise does not explain: what an error of
             the kernels may have got wrong.
         light: Relative error of the light.
-        keeps_bright: Whether a pixel that the last plane has at `BRIGHT` of white or more in every
-            colour is darkened by `BRIGHT_NOISE` standard deviations of the noise at most.
+        keeps_bright: Whether what is nearly white in every colour is not darkened. With q the least
+            stabilised value over that of `BRIGHT`, among the colours of a pixel of the last plane,
+            its output is at least clip((q - BRIGHT_FROM) / (1 - BRIGHT_FROM), 0, 1) times that
+            plane, less `BRIGHT_NOISE` standard deviations of the noise.
     """
 
     noise: Annotated[float, Field(ge=0, le=1000)] = 0.0

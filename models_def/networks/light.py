@@ -9,6 +9,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from camkit.bundle.light_bound import (
+    BRIGHT_FROM,
     BRIGHT_NOISE,
     CELL_PX,
     CELLS_AVERAGED,
@@ -72,9 +73,9 @@ def bounded(
         restored = front + kept * (restored - front)
     if not bound.keeps_bright:
         return restored
-    nearly_white = (front >= bright[:, :, None, None]).all(dim=1, keepdim=True)
-    least = front - BRIGHT_NOISE * 0.5 / scale
-    return torch.where(nearly_white, torch.maximum(restored, least), restored)
+    white = (front / bright[:, :, None, None]).amin(dim=1, keepdim=True)
+    share = ((white - BRIGHT_FROM) / (1 - BRIGHT_FROM)).clamp(0, 1)
+    return torch.maximum(restored, share * front - BRIGHT_NOISE * 0.5 / scale)
 
 
 def _means(planes: Tensor) -> Tensor:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.light_bound import (
+    BRIGHT_FROM,
     BRIGHT_NOISE,
     CELL_PX,
     CELLS_AVERAGED,
@@ -218,7 +219,7 @@ def keep_bright(front: FloatArray, output: FloatArray, bright: FloatArray, *, sc
 
     Args:
         front: (c, h, w) float32, stabilised: the plane that the network improves on.
-        output: (c, h, w) float32, stabilised; changed.
+        output: (c, h, w) float32, stabilised, at least 0; changed.
         bright: (c,) stabilised value of `BRIGHT` in every channel.
         scale: Divisor of the stabilising transform; the noise there is 0.5 / scale.
     """
@@ -226,19 +227,25 @@ def keep_bright(front: FloatArray, output: FloatArray, bright: FloatArray, *, sc
     height = front.shape[1]
     for top in range(0, height, CELL_PX * _STEP_CELLS):
         rows = np.s_[:, top : min(top + CELL_PX * _STEP_CELLS, height)]
-        nearly_white = _all_above(front[rows], bright)
-        if nearly_white.any():
-            np.maximum(output[rows], front[rows] - margin, out=output[rows], where=nearly_white)
+        share = _bright_share(front[rows], bright)
+        if share is None:
+            continue
+        for before, after in zip(front[rows], output[rows], strict=True):
+            least = before * share
+            least -= margin
+            np.maximum(after, least, out=after)
 
 
-def _all_above(planes: FloatArray, levels: FloatArray) -> Mask:
-    """Return (h, w), where every channel reaches its level."""
-    reached = planes[0] >= levels[0]
-    for plane, level in zip(planes[1:], levels[1:], strict=True):
-        if not reached.any():
-            break
-        reached &= plane >= level
-    return reached
+def _bright_share(planes: FloatArray, bright: FloatArray) -> FloatArray | None:
+    """Return (h, w): the share of its value that a pixel keeps; None where none keeps any."""
+    least = planes[0] / bright[0]
+    for plane, level in zip(planes[1:], bright[1:], strict=True):
+        np.minimum(least, plane / level, out=least)
+    if least.max() <= BRIGHT_FROM:
+        return None
+    least -= np.float32(BRIGHT_FROM)
+    least *= np.float32(1 / (1 - BRIGHT_FROM))
+    return np.asarray(np.clip(least, 0, 1, out=least))
 
 
 def _mix(rows: FloatArray, front: FloatArray, shares: FloatArray) -> None:

@@ -49,6 +49,10 @@ OPTIONS: Final = (
 )
 NOTED_FRACTION: Final = 0.01
 """Of the picture; a network that moves much light in more of it is worth a note."""
+_CAUSES: Final = (
+    "Usual causes: the capture is of another camera or distance, or its black level or white "
+    "balance is wrong; --method wiener shows the picture without the network"
+)
 
 
 def prepare(entry: Network, job: Job) -> StageWork:
@@ -214,8 +218,8 @@ class _NetworkStage:
             f"the filter by more than {FAR:.0%}, which noise and lens errors do not explain"
         )
         if keeper.bound is not None:
-            return (f"{moved}; the filter's brightness was kept there",)
-        return (f"{moved}; --laws enforce keeps the filter's brightness there",)
+            return (f"{moved}; the filter's brightness was kept there. {_CAUSES}",)
+        return (f"{moved}; --laws enforce keeps the filter's brightness there. {_CAUSES}",)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
         """Give the outputs of the network."""

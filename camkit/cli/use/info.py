@@ -48,6 +48,8 @@ def info(
     if json_:
         say(json.dumps(facts))
         return
+    if facts.get("laws"):
+        facts["laws"] = _laws_text(facts["laws"])
     for line in _lines(facts, ""):
         say(line)
 
@@ -78,6 +80,21 @@ def _describe_bundle(file: str) -> dict[str, Any]:
         "sha256": bundle.sha256,
         "psf": _describe_psf(bundle),
         **manifest,
+    }
+
+
+def _laws_text(laws: dict[str, dict[str, Any]]) -> dict[str, dict[str, str]]:
+    """Return each law as one line: its worst number, what is admitted, whether it is kept."""
+    from camkit.bundle.facts import StatedLaw
+    from camkit.runtime.proof.laws.law import number_text
+
+    def line(law: StatedLaw) -> str:
+        worst, limit = (number_text(value, law.unit) for value in (law.worst, law.limit))
+        return f"{worst} (at most {limit}){'' if law.kept else ', BROKEN'}"
+
+    return {
+        size: {name: line(StatedLaw.model_validate(law)) for name, law in stated.items()}
+        for size, stated in laws.items()
     }
 
 

@@ -2,10 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from camkit.bundle.facts import StatedLaw
 from camkit.bundle.reader import Bundle
+
+SHARE: Final = "share"
+"""Unit of parts of 1; people read them in per cent."""
+_SHARES: Final = (SHARE, "%")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,12 +44,14 @@ class Law:
 
     def describe(self) -> str:
         """Return the law in words."""
-        front = "" if self.front is None else f", front end {_text(self.front, self.unit)}"
+        front = "" if self.front is None else f", front end {number_text(self.front, self.unit)}"
         where = f", {self.where}" if self.where and not self.kept else ""
         said = (
-            "" if self.kept else f" BROKEN (at most {_text(self.limit, self.unit)}{front}{where})"
+            ""
+            if self.kept
+            else f" BROKEN (at most {number_text(self.limit, self.unit)}{front}{where})"
         )
-        return f"{self.name.replace('_', ' ')} {_text(self.worst, self.unit)}{said}"
+        return f"{self.name.replace('_', ' ')} {number_text(self.worst, self.unit)}{said}"
 
     def stated(self) -> StatedLaw:
         """Return what a manifest states of it."""
@@ -73,5 +79,6 @@ Laws = Callable[[Bundle, str | None, int], tuple[Law, ...] | str]
 """(bundle, size of its networks, threads) -> laws; a text says why none can be held."""
 
 
-def _text(value: float, unit: str) -> str:
-    return f"{100 * value:.2f} %" if unit == "%" else f"{value:.3g} {unit}".rstrip()
+def number_text(value: float, unit: str) -> str:
+    """Return a number of a law with its unit, shares in per cent."""
+    return f"{100 * value:.2f} %" if unit in _SHARES else f"{value:.3g} {unit}".rstrip()

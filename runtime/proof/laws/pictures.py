@@ -18,7 +18,7 @@ from camkit.bundle.stages import Network
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.runtime.proof.laws.darkroom import PLACES, Darkroom, Exposed, reason_not_judged
-from camkit.runtime.proof.laws.law import Law
+from camkit.runtime.proof.laws.law import SHARE, Law
 from camkit.scenes.charts import lamp_chart, patch_chart
 from camkit.scenes.procedural import procedural_scene
 
@@ -121,7 +121,7 @@ def _white(room: Darkroom, ranges: _Ranges) -> tuple[Law, ...]:
                     name=law,
                     worst=dark / pixels,
                     limit=max(admitted, (front + 1) / pixels),
-                    unit="%",
+                    unit=SHARE,
                     front=front / pixels,
                     where=f"{name}, {place}",
                 )
@@ -149,7 +149,7 @@ def _flat(room: Darkroom, ranges: _Ranges) -> Law:
                     found = float(off - before), float(before), f"{name}, {place}, ISO {iso:g}"
                     worst = max(worst, found)
     more, before, where = worst
-    return Law(name="flat", worst=max(more, 0.0), limit=FLAT, unit="%", front=before, where=where)
+    return Law(name="flat", worst=max(more, 0.0), limit=FLAT, unit=SHARE, front=before, where=where)
 
 
 def _double(room: Darkroom) -> Law:
@@ -163,7 +163,7 @@ def _double(room: Darkroom) -> Law:
         _most_unlike(*(_blocks(getattr(seen, name)) for seen in pair))
         for name in ("light", "front_light")
     )
-    return Law(name="double", worst=made, limit=max(DOUBLE, front), unit="%", front=front)
+    return Law(name="double", worst=made, limit=max(DOUBLE, front), unit=SHARE, front=front)
 
 
 def _most_unlike(once: FloatArray, twice: FloatArray) -> float:

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from camkit.bundle.light_bound import (
     BOUND_REACH_PX,
+    BRIGHT_FROM,
     CELL_PX,
     MASK_REACH_PX,
     NEAR_PX,
@@ -206,7 +207,7 @@ def test_sides_that_are_no_whole_cells_are_refused() -> None:
 def test_what_is_nearly_white_in_every_colour_is_not_darkened_by_more_than_noise() -> None:
     bright = np.array([0.9, 1.0, 1.1], np.float32)
     front = np.broadcast_to(bright[:, None, None], (3, 6, 8)).copy()
-    front[1, :3] -= np.float32(1e-3)  # one colour short of it
+    front[1, :3] *= np.float32(BRIGHT_FROM)  # one colour is dark
     front[:, 3:, 4:] += 1
     output = np.zeros_like(front)
     output[:, :, 7] = 3
@@ -215,6 +216,19 @@ def test_what_is_nearly_white_in_every_colour_is_not_darkened_by_more_than_noise
     np.testing.assert_array_equal(made[:, :3], output[:, :3])
     np.testing.assert_allclose(made[:, 3:, :7], front[:, 3:, :7] - 8 * 0.5 / SCALE, rtol=1e-6)
     np.testing.assert_array_equal(made[:, :, 7], 3)
+
+
+def test_less_bright_pixels_may_become_darker_without_a_step() -> None:
+    """A step would leave a hatched pattern of pixels on either side of it."""
+    bright = np.ones(3, np.float32)
+    front = np.broadcast_to(np.linspace(0.5, 1.2, 200, dtype=np.float32), (3, 4, 200)).copy()
+    made = np.zeros_like(front)
+    keep_bright(front, made, bright, scale=1e6)
+    steps = np.diff(made[0, 0])
+    assert made[0, 0, 0] == 0
+    np.testing.assert_allclose(made[0, 0, -40:], front[0, 0, -40:], rtol=1e-4)
+    assert steps.min() >= 0
+    assert steps.max() < 6 * (front[0, 0, 1] - front[0, 0, 0])
 
 
 def test_light_that_is_brightened_or_smoothed_within_noise_stays() -> None:

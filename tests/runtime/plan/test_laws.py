@@ -14,7 +14,7 @@ from camkit.errors import BundleError, ContractError
 from camkit.runtime.options import Options
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.plan.laws import bounded_stages
-from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages
+from tests.bundle_factory import tiny_manifest, tiny_members, tiny_network, tiny_stages
 from tests.job_factory import made_mosaic
 
 NEW = ".".join(map(str, LIGHT_VERSION))
@@ -33,9 +33,10 @@ def _manifest(light: LightBound | None, version: str) -> Manifest:
     return tiny_manifest(stages=stages, planes=planes, format_version=version)
 
 
-def _bundle(folder: Path, light: LightBound | None, version: str) -> Bundle:
+def _bundle(folder: Path, light: LightBound | None, version: str, *, scale: float = 1.0) -> Bundle:
     path = folder / "tiny.camkit"
-    write_bundle(path, _manifest(light, version), tiny_members())
+    members = tiny_members() | {"network_m.onnx": tiny_network(scale=scale)}
+    write_bundle(path, _manifest(light, version), members)
     return open_bundle(path)
 
 
@@ -94,6 +95,28 @@ def test_tiles_equal_the_whole_behind_any_bound(
     np.testing.assert_array_equal(pictures[1], pictures[0])
     np.testing.assert_array_equal(pictures[2], pictures[0])
     assert len(set(fractions)) == 1
+
+
+def test_no_lamp_becomes_dark_where_the_front_end_has_it_bright(tmp_path: Path) -> None:
+    """Behind a network that changes any pixel, and a bound that admits that."""
+    samples = np.full((64, 96), 980, "u2")  # nearly white, not clipped
+    samples[:, ::7] = 600
+    wide = LightBound(noise=1000, light=1000)
+    bank, *made = (
+        Pipeline(_bundle(tmp_path, bound, NEW, scale=-8), Options(threads=1, method=method))
+        .start(made_mosaic(samples=samples))
+        .fill()
+        for method, bound in (
+            ("wiener", wide),
+            ("net", wide),
+            ("net", wide.model_copy(update={"keeps_bright": True})),
+        )
+    )
+    bright = bank.min(axis=0) > 1
+    darker = [(picture.sum(0) < 0.8 * bank.sum(0))[bright].mean() for picture in made]
+    assert bright.mean() > 0.1
+    assert darker[0] > 0.2
+    assert darker[1] < 1e-3
 
 
 def test_older_bundles_keep_their_bits_and_are_measured(tmp_path: Path) -> None:

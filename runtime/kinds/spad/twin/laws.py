@@ -17,7 +17,7 @@ from camkit.runtime.kinds.spad.finer.camera import FineCamera
 from camkit.runtime.kinds.spad.finer.pictures import SURE, finer_frames
 from camkit.runtime.kinds.spad.twin.counting import Disturbances, count_frames
 from camkit.runtime.kinds.spad.twin.simulate import fitted, luminance, seen_by
-from camkit.runtime.proof.laws.law import Law
+from camkit.runtime.proof.laws.law import SHARE, Law
 from camkit.scenes.named import named_scene
 
 PHOTONS: Final = (30.0, 300.0, 3000.0, 1e5)
@@ -80,7 +80,7 @@ def _even(camera: FineCamera, size: str | None) -> tuple[Law, Law]:
         if spread > uneven:
             uneven, where[1] = spread, f"{photons:g} photons of white"
     return (
-        Law(name="even_mean", worst=off, limit=EVEN, unit="%", where=where[0]),
+        Law(name="even_mean", worst=off, limit=EVEN, unit=SHARE, where=where[0]),
         Law(name="even_spread", worst=uneven, limit=UNEVEN, unit="times", where=where[1]),
     )
 
@@ -98,7 +98,7 @@ def _black(camera: FineCamera, size: str | None) -> Law:
             share = float(np.mean(made[lit] <= 0)) if lit.any() else 0.0
             if share > worst:
                 worst, where = share, f"{name}, {photons:g} photons of white"
-    return Law(name="black", worst=worst, limit=BLACK, unit="%", where=where)
+    return Law(name="black", worst=worst, limit=BLACK, unit=SHARE, where=where)
 
 
 def _all_around(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -118,7 +118,7 @@ def _double(camera: FineCamera, size: str | None) -> Law:
         for photons in (2e4, 4e4)
     )
     off = np.abs(twice - 2 * once) / (2 * once)
-    return Law(name="double", worst=float(np.quantile(off, 0.95)), limit=DOUBLE, unit="%")
+    return Law(name="double", worst=float(np.quantile(off, 0.95)), limit=DOUBLE, unit=SHARE)
 
 
 def _blocks(picture: FloatArray) -> FloatArray:

@@ -50,6 +50,14 @@ def test_numbers_that_fill_lines_are_cut_for_people_alone(camkit_command) -> Non
     assert len(str(stage)) > 3000
 
 
+def test_laws_of_a_picture_are_lines_for_people_and_shares_for_programs(camkit_command) -> None:
+    laws = json.loads(camkit_command("info", "duet", "--json").out)["laws"]
+    flat = laws["M"]["flat"]
+    assert 0 <= flat["worst"] < flat["limit"] == 0.01
+    text = camkit_command("info", "duet").out
+    assert f"    flat: {100 * flat['worst']:.2f} % (at most 1.00 %)\n" in text
+
+
 def test_a_capture_is_described_with_its_place_on_the_sensor(captures, camkit_command) -> None:
     facts = json.loads(camkit_command("info", "a.dng", "--json").out)
     assert (facts["width"], facts["height"], facts["cfa"]) == (96, 64, "RGGB")

@@ -15,8 +15,8 @@ from camkit.runtime.proof.laws import proof
 from camkit.runtime.proof.laws.law import Law
 from tests.bundle_factory import tiny_manifest, tiny_members, write_tiny_bundle
 
-GOOD = Law(name="double", worst=0.004, limit=0.01, unit="%")
-BAD = Law(name="flat", worst=0.05, limit=0.01, unit="%", front=0.002, where="corner")
+GOOD = Law(name="double", worst=0.004, limit=0.01, unit="share")
+BAD = Law(name="flat", worst=0.05, limit=0.01, unit="share", front=0.002, where="corner")
 
 
 @pytest.fixture
@@ -47,9 +47,9 @@ def test_a_law_that_is_broken_as_stated_passes_and_says_so(stated) -> None:  # t
 
 
 def test_a_law_that_is_broken_further_than_stated_fails(stated) -> None:  # type: ignore[no-untyped-def]
-    milder = StatedLaw(worst=0.02, limit=0.01, unit="%", kept=False)
+    milder = StatedLaw(worst=0.02, limit=0.01, unit="share", kept=False)
     assert stated({"M": {"flat": milder}}).status == "fail"
-    kept = StatedLaw(worst=0.005, limit=0.01, unit="%", kept=True)
+    kept = StatedLaw(worst=0.005, limit=0.01, unit="share", kept=True)
     assert stated({"M": {"flat": kept}}).status == "fail"
 
 
