@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from camkit.colorimetry import Matrix
 from camkit.contracts import FloatArray
-from camkit.streaks.cell_rows import rows_of_cells
+from camkit.streaks.cell_rows import Lattice
 from camkit.streaks.cells import COLOURS, PITCH_PX, Sites
 from camkit.streaks.doubt import settled
 from camkit.streaks.recovery import Recovery
-from camkit.streaks.rims import coloured_by_surroundings, in_own_colours
+from camkit.streaks.rims import colour_by_surroundings, in_own_colours
 from camkit.streaks.spots import lit_pixels
 from camkit.streaks.thrown import streaks_of
 
@@ -70,56 +70,68 @@ class Painter:
         """
         rows, width = planes.shape[1:]
         for colour, gain in enumerate(gains):
-            under = self._thrown(colour, top, (rows, width))
+            under = self._thrown(colour, Lattice(top=top), (rows, width))
             under *= np.float32(gain)
             planes[colour] -= under
             planes[colour] *= np.float32(1 / self._core[colour])
         self._put_lights(planes, top, gains)
 
-    def clear(self, samples: FloatArray, clipped: Mask, top: int, sites: Sequence[Sites]) -> None:
+    def clear(
+        self,
+        samples: FloatArray,
+        clipped: Mask,
+        top: int,
+        sites: Sequence[Sites],
+        gains: Sequence[float] = (1.0,) * COLOURS,
+    ) -> None:
         """Take veil and streaks from rows of a mosaic in place, with the doubt that they have.
 
         Args:
-            samples: (rows, w) float32, 1.0 = where samples clip; see `doubt.settled` for the rows.
+            samples: (rows, w) float32, multiplied by the gains; see `doubt.settled` for the rows.
             clipped: (rows, w).
             top: Number of the first row.
             sites: Of every colour in a cell of 2 px.
+            gains: Of the colours; without them 1.0 = where samples clip.
         """
-        thrown, core = np.empty_like(samples), np.empty_like(samples)
         for colour, places in enumerate(sites):
-            under = self._thrown(colour, top, samples.shape)
-            for y, x in places:
-                at = np.s_[y::PITCH_PX, x::PITCH_PX]
-                thrown[at] = under[at]
-                core[at] = self._core[colour]
-        samples[:] = settled(samples - thrown, thrown, clipped, sites) / core
+            at = [np.s_[y::PITCH_PX, x::PITCH_PX] for y, x in places]
+            lattices = [Lattice(top=top + y, left=x, step_px=PITCH_PX) for y, x in places]
+            thrown = [
+                self._thrown(colour, lattice, samples[there].shape)
+                for lattice, there in zip(lattices, at, strict=True)
+            ]
+            light = np.float32(1 / gains[colour])
+            rest = [samples[there] * light - under for there, under in zip(at, thrown, strict=True)]
+            made = settled(rest, thrown, [clipped[there] for there in at])
+            for there, found in zip(at, made, strict=True):
+                samples[there] = found * np.float32(gains[colour] / self._core[colour])
 
     def light_up(
         self, planes: FloatArray, clipped: Mask, top: int, gains: tuple[float, ...]
-    ) -> FloatArray:
-        """Return rows of a cleared picture with lights in colours of their own.
+    ) -> None:
+        """Put lights in colours of their own into rows of a cleared picture, in place.
 
         Args:
-            planes: As `paint`; see `rims.coloured_by_surroundings` for the rows.
+            planes: As `paint`; see `rims.colour_by_surroundings` for the rows.
             clipped: (rows, w): whose own sample clipped.
             top: Number of the first row.
             gains: Of the colours.
         """
-        lit = np.zeros(clipped.shape, np.bool_)
-        lit[self._lit_within(top, len(lit))[1]] = True
-        out = coloured_by_surroundings(planes, clipped, lit) if clipped.any() else planes
+        if clipped.any():
+            lit = np.zeros(clipped.shape, np.bool_)
+            lit[self._lit_within(top, len(lit))[1]] = True
+            colour_by_surroundings(planes, clipped, lit)
         # a demosaic may overshoot at an edge; noise alone reaches a little below black
-        np.maximum(out, np.array(gains, np.float32)[:, None, None] * -np.float32(DARKEST), out=out)
-        self._put_lights(out, top, gains, own_colours=True)
-        return out
+        for plane, gain in zip(planes, gains, strict=True):
+            np.maximum(plane, np.float32(-DARKEST * gain), out=plane)
+        self._put_lights(planes, top, gains, own_colours=True)
 
-    def _thrown(self, colour: int, top: int, shape: tuple[int, ...]) -> FloatArray:
-        """Return veil and streaks of rows of pixels (rows, w)."""
+    def _thrown(self, colour: int, lattice: Lattice, shape: tuple[int, ...]) -> FloatArray:
+        """Return veil and streaks at the pixels of a lattice (rows, columns)."""
         pitch_px, offset_px = self._veil_grid
-        veil = self._veil[colour]
-        under = rows_of_cells(veil, pitch_px, offset_px[colour], top, shape[0], shape[1])
+        under = lattice.cells(self._veil[colour], pitch_px, offset_px[colour], shape)
         for streaks in self._streaks:
-            streaks.add(under, colour, top)
+            streaks.add(under, colour, lattice)
         return under
 
     def _lit_within(self, top: int, rows: int) -> tuple[slice, tuple[Index, Index]]:

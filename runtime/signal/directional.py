@@ -75,10 +75,10 @@ def demosaic_tile(samples: FloatArray) -> FloatArray:
     tile = _Lattices(*(samples[y::2, x::2].copy() for y in (0, 1) for x in (0, 1)))
     green, weight = _green_less_own(tile)
     beside = [_sums_beside(plane) for plane in green]
-    less_blue = [_QUARTER * sums for sums in _red_less_blue(*beside, weight)]
+    less_blue = [_QUARTER * sums for sums in _red_less_blue(beside, weight)]
     green = _Colours(*map(_mean_of_three, green, map(_along_edges, beside, weight)))
     beside = [_sums_beside(plane) for plane in green]
-    less_blue = list(map(_mean_of_three, less_blue, _red_less_blue(*beside, weight)))
+    less_blue = list(map(_mean_of_three, less_blue, _red_less_blue(beside, weight)))
     return _planes(tile, green, beside, _Colours(*less_blue))
 
 
@@ -119,7 +119,8 @@ def _changes_around(bends: _Lattices, shapes: Sequence[tuple[int, int]], axis: i
     for bend, shape in zip(bends, shapes, strict=True):
         change = _part(bend, axis, 2) - _part(bend, axis, 0, -2)
         changes.append(_inner(np.abs(change, out=change), shape))
-    even, odd = _sums_of_five(*changes[:2], _ROW), _sums_of_five(*changes[2:], _ROW)
+    even = _sums_of_five(changes[0], changes[1], _ROW)
+    odd = _sums_of_five(changes[2], changes[3], _ROW)
     red, _ = _sums_of_five(even[0], odd[0], _COLUMN)
     _, blue = _sums_of_five(even[1], odd[1], _COLUMN)
     return _Colours(np.square(red, out=red), np.square(blue, out=blue))
@@ -139,9 +140,11 @@ def _share(part: FloatArray, rest: FloatArray) -> FloatArray:
     """Return the share of a part of the whole; half of nothing."""
     whole = part + rest
     if whole.all():
-        return np.divide(part, whole, out=part)
+        part /= whole
+        return part
     share = np.full_like(part, 0.5)
-    return np.divide(part, whole, out=share, where=whole > 0)
+    np.divide(part, whole, out=share, where=whole > 0)
+    return share
 
 
 def _sums_beside(plane: FloatArray) -> _Beside:
@@ -161,8 +164,9 @@ def _along_edges(green: _Beside, row_weight: FloatArray) -> FloatArray:
     return mixed
 
 
-def _red_less_blue(red: _Beside, blue: _Beside, row_weight: _Colours) -> list[FloatArray]:
+def _red_less_blue(beside: Sequence[_Beside], row_weight: _Colours) -> list[FloatArray]:
     """Return four times red less blue at red and at blue pixels, of green less each, doubled."""
+    red, blue = beside
     at_red_rows = _difference(blue.in_column, red.in_row)
     at_blue_rows = _difference(blue.in_row, red.in_column)
     return [
