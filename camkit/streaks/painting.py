@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.colorimetry import Matrix
+from camkit.colorimetry import Matrix, OutputColours
 from camkit.contracts import FloatArray
 from camkit.streaks.cell_rows import Lattice
 from camkit.streaks.cells import COLOURS, PITCH_PX, Sites
@@ -52,8 +52,7 @@ class Painter:
                 light is negative.
         """
         self._lit = lit_pixels(recovery)
-        self._to_output = to_output
-        self._from_output = np.asarray(np.linalg.inv(to_output), np.float64)
+        self._colours = OutputColours(to_output)
         self._veil = recovery.veil
         self._veil_grid = recovery.coarse.pitch_px, recovery.coarse.offset_px
         self._streaks = streaks_of(recovery, self._lit)
@@ -153,7 +152,7 @@ class Painter:
         if own_colours:
             there = in_own_colours(there, lit, self._lit.excess[:, which] * levels, levels)
         there = _untinted(there, lit)
-        planes[:, *at] = _visible(there, self._to_output, self._from_output)
+        planes[:, *at] = _visible(there, self._colours)
 
 
 def _untinted(light: FloatArray, lit: NDArray[np.bool_]) -> FloatArray:
@@ -174,18 +173,8 @@ def _untinted(light: FloatArray, lit: NDArray[np.bool_]) -> FloatArray:
     return out
 
 
-def _visible(light: FloatArray, to_output: Matrix, from_output: Matrix) -> FloatArray:
+def _visible(light: FloatArray, colours: OutputColours) -> FloatArray:
     """Raise colours that were sought apart to where the output has them; (3, n) light."""
-    seen = _turned(light, to_output)
+    seen = colours.of(light)
     least = np.float32(DIMMEST) * seen.max(axis=0)
-    short = (seen < least).any(axis=0) & (seen > 1).any(axis=0)
-    raised = np.maximum(seen[:, short], least[short])
-    out = light.copy()
-    out[:, short] = _turned(raised, from_output)
-    return out
-
-
-def _turned(light: FloatArray, matrix: Matrix) -> FloatArray:
-    """Multiply (3, n) light; a product of matrices may differ in a last bit with n."""
-    rows = matrix.astype(np.float32)
-    return np.stack([sum(a * plane for a, plane in zip(row, light, strict=True)) for row in rows])
+    return colours.raised(light, np.where((seen > 1).any(axis=0), least, np.float32(-np.inf)))

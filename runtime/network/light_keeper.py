@@ -14,6 +14,7 @@ import numpy as np
 from camkit.bundle.light_bound import CELL_PX, USUAL_BOUND, LightBound
 from camkit.contracts import FloatArray
 from camkit.runtime.network.light import AddedLight, added_light, take_back
+from camkit.runtime.network.white_keeper import WhiteKeeper
 
 LOOK_ROWS: Final = 32
 LOOK_EVERY: Final = 4
@@ -35,7 +36,7 @@ class LightKeeper:
         bound: What is taken back; None where the light is only measured.
         measured: Whether the light is measured; without it and a bound only `strength` counts.
         strength: How much of what the network adds is kept, 0..1.
-        white: (c,) stabilised: no output is darker than what is given, or than this; None for any.
+        white: Keeps lamps from ending darker than what is given, or than white; None for any.
         scale: Divisor of the stabilising transform.
         cells: Cells seen so far.
         unexplained: Of these, cells whose local mean left the usual bound.
@@ -48,7 +49,7 @@ class LightKeeper:
     measured: bool
     strength: float
     scale: float
-    white: FloatArray | None = None
+    white: WhiteKeeper | None = None
     cells: int = 0
     unexplained: int = 0
     large: int = 0
@@ -75,8 +76,7 @@ class LightKeeper:
         if excess is not None or kept is not None or self.strength != 1:
             take_back(front, output, kept, excess, strength=self.strength)
         if self.white is not None:
-            least = np.minimum(front, self.white[:, None, None])
-            np.maximum(output, least, out=output)
+            self.white.keep(output, front)
 
     @property
     def fallback_fraction(self) -> float:

@@ -13,12 +13,11 @@ import numpy as np
 
 from camkit.bundle.sensor import MOSAIC
 from camkit.bundle.stages import Highlights, Stage
-from camkit.colorimetry import Matrix, rec709_from_camera
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.cancel import check_cancelled
 from camkit.runtime.capture import Capture
-from camkit.runtime.color import recover_highlights
+from camkit.runtime.color import rec709_of_planes, recover_highlights
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
@@ -200,13 +199,7 @@ def _painter(
     )
     notes[:] = recovery.notes
     job.sections["hdr"] = recovery.to_json()
-    return Painter(recovery, _to_output(job))
-
-
-def _to_output(job: Job) -> Matrix:
-    """Give the matrix from balanced planes to Rec.709."""
-    matrix = job.color_matrix
-    return np.eye(COLOURS) if matrix is None else rec709_from_camera(matrix)
+    return Painter(recovery, rec709_of_planes(job.color_matrix))
 
 
 def _kernels(job: Job) -> StreakKernels:

@@ -11,6 +11,7 @@ from camkit.bundle.light_bound import CELL_PX as LIGHT_CELL_PX
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.color import rec709_of_planes
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
@@ -23,6 +24,7 @@ from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
 from camkit.runtime.network.light import FAR, KeptRows
 from camkit.runtime.network.light_keeper import LightKeeper
 from camkit.runtime.network.tiling import Run
+from camkit.runtime.network.white_keeper import WhiteKeeper, white_keeper
 from camkit.runtime.network.windows import (
     NetworkWindows,
     SizedNetwork,
@@ -35,7 +37,7 @@ from camkit.runtime.plan.laws import broken_laws, front_end
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
-from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, stabilise, unstabilise
+from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, unstabilise
 
 METHODS: Final = ("net",)
 TRIM_SHARE: Final = 0.7
@@ -117,12 +119,6 @@ def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
     if sensor.type == "spad":
         return noise
     return familiar_noise(noise, [entry.read_noise_e for entry in sensor.noise])
-
-
-def _white(noise: NoiseModel, scale: float) -> FloatArray:
-    """Return the stabilised value of white in every channel."""
-    channels = len(noise.shot)
-    return stabilise(np.ones((channels, 1, 1), np.float32), noise, scale=scale)[:, 0, 0]
 
 
 class _NetworkStage:
@@ -225,7 +221,9 @@ class _NetworkStage:
         planes, masks = _parted(taken)
         stand_in = self._stand_in(planes)
         noise = self._noise(planes[-1], len(facts.outputs))
-        white = _white(noise, entry.scale) if entry.keeps_white and noise is not None else None
+        white = None
+        if entry.keeps_white and noise is not None:
+            white = white_keeper(noise, entry.scale, rec709_of_planes(job.color_matrix))
         self._keeper = self._light_keeper(stand_in, masked=bool(masks), white=white)
         self._guard = TileGuard(
             fallback=job.options.on_unsafe == "fallback",
@@ -250,7 +248,7 @@ class _NetworkStage:
         return self._split(bands, planes[-1], [port.channels for port in facts.outputs])
 
     def _light_keeper(
-        self, stand_in: slice | None, *, masked: bool, white: FloatArray | None
+        self, stand_in: slice | None, *, masked: bool, white: WhiteKeeper | None
     ) -> LightKeeper | None:
         """Return what is done behind the network; None for nothing.
 
