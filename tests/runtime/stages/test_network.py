@@ -304,7 +304,7 @@ def test_a_network_that_raises_colours_apart_keeps_lamps_white_in_the_output(
     data, port = _multiplying(6, 0.01, 6), Port(name="a", channels=3)
     stages = (
         Linearise(gives=("light",)),
-        Network(takes=("light",), gives=("clean",), keeps_white=True),
+        Network(takes=("light",), gives=("clean",), keeps_white=True, most_light=4e3),
         Color(takes=("clean",)),
     )
     camera = write_planes_bundle(
