@@ -105,3 +105,38 @@ def apply_matrix(matrix: Matrix, planes: FloatArray) -> FloatArray:
     """Give matrix @ planes for (3, ...) float32 planes."""
     flat = matrix.astype(np.float32) @ planes.reshape(3, -1)
     return np.asarray(flat.reshape(planes.shape), dtype=np.float32)
+
+
+class OutputColours:
+    """Camera colours (3, n) as the output has them, and back; the way back is computed once."""
+
+    def __init__(self, to_output: Matrix) -> None:
+        """Invert the matrix.
+
+        Args:
+            to_output: (3, 3) from camera colours to those of the output.
+        """
+        self._there = to_output.astype(np.float32)
+        self._back = np.linalg.inv(to_output).astype(np.float32)
+
+    def of(self, light: FloatArray) -> FloatArray:
+        """Return light (3, n) in the colours of the output."""
+        return _turned(light, self._there)
+
+    def raised(self, light: FloatArray, least: FloatArray) -> FloatArray:
+        """Return camera colours (3, n) that are raised to a least light in those of the output.
+
+        Args:
+            light: Camera colours; those bright enough keep their bits.
+            least: (3, n) or (n,) in colours of the output.
+        """
+        seen = self.of(light)
+        short = (seen < least).any(axis=0)
+        out = light.copy()
+        out[:, short] = _turned(np.maximum(seen, least)[:, short], self._back)
+        return out
+
+
+def _turned(light: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Multiply (3, n) light; a product of matrices may differ in a last bit with n."""
+    return np.stack([sum(a * plane for a, plane in zip(row, light, strict=True)) for row in matrix])

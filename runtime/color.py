@@ -70,9 +70,7 @@ def color_stage(
     if output not in get_args(OutputColor):
         known = ", ".join(get_args(OutputColor))
         raise ContractError(f"colour must be one of {known}; got {output!r}")
-    to_rec709 = np.eye(3)
-    if color_matrix is not None:
-        to_rec709 = rec709_from_camera(color_matrix)
+    to_rec709 = rec709_of_planes(color_matrix)
     primaries: Primaries = REC709_PRIMARIES
     white, matrix = D65, to_rec709
     if output == "acescg":
@@ -83,6 +81,18 @@ def color_stage(
         matrix = np.eye(3)
     gain = 2.0**exposure_ev
     return ColorStage(space=output, matrix=matrix * gain, primaries=primaries, white=white)
+
+
+def rec709_of_planes(color_matrix: Matrix | None) -> Matrix:
+    """Return the (3, 3) matrix from white-balanced planes to linear Rec.709.
+
+    Args:
+        color_matrix: (3, 3) XYZ (D65) to camera; None for planes that are Rec.709 already.
+
+    Raises:
+        ContractError: If the matrix is singular.
+    """
+    return np.eye(3) if color_matrix is None else rec709_from_camera(color_matrix)
 
 
 def to_output(band: FloatArray, stage: ColorStage) -> FloatArray:

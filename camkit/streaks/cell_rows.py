@@ -1,8 +1,56 @@
-"""Rows of pixels from cells, linear between their middles."""
+"""Pixels from cells, linear between their middles: of every place or of a colour's samples."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from camkit.contracts import FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lattice:
+    """Pixels of a picture: every `step_px`-th in rows and columns.
+
+    Attributes:
+        top: Row of the first pixel.
+        left: Column of the first pixel.
+        step_px: Between pixels.
+    """
+
+    top: int = 0
+    left: int = 0
+    step_px: int = 1
+
+    def within(self, box: tuple[int, int, int, int], shape: tuple[int, ...]) -> tuple[slice, slice]:
+        """Return which pixels lie in a box (top, left, bottom, right) of the picture.
+
+        Args:
+            box: In pixels.
+            shape: Of the lattice, (rows, columns).
+        """
+        ends = (box[0], box[2], self.top, shape[0]), (box[1], box[3], self.left, shape[1])
+        rows, columns = (
+            slice(*(int(np.clip(-((start - end) // self.step_px), 0, many)) for end in (low, high)))
+            for low, high, start, many in ends
+        )
+        return rows, columns
+
+    def part(self, at: tuple[slice, slice]) -> "Lattice":
+        """Return some of the pixels."""
+        top, left = (self.step_px * pixels.start for pixels in at)
+        return Lattice(top=self.top + top, left=self.left + left, step_px=self.step_px)
+
+    def cells(
+        self,
+        field: FloatArray,
+        pitch_px: int,
+        offset_px: tuple[float, float],
+        shape: tuple[int, ...],
+    ) -> FloatArray:
+        """Return the light of cells at the pixels; see `rows_of_cells`."""
+        step = self.step_px
+        offset = (offset_px[0] - self.top) / step, (offset_px[1] - self.left) / step
+        return rows_of_cells(field, pitch_px // step, offset, 0, shape[0], shape[1])
 
 
 def rows_of_cells(

@@ -138,12 +138,22 @@ class Convolution:
 
     def gathered(self, image: FloatArray) -> FloatArray:
         """Give the transpose: for every place, what its light would meet in an image (h, w)."""
-        return self._filtered(image, self._transform.conj())
+        return self._filtered(image, self._turned)
+
+    @cached_property
+    def _turned(self) -> NDArray[np.complex64]:
+        """Return the transform of the kernel turned by half a turn."""
+        return self._transform.conj()
 
     def _filtered(self, image: FloatArray, transform: NDArray[np.complex64]) -> FloatArray:
-        whole = scipy.fft.irfft2(scipy.fft.rfft2(image, self._size) * transform, self._size)
-        height, width = self._shape
-        return np.asarray(whole[:height, :width], np.float32)
+        """Multiply the transform of an image; rows that are empty or not looked at are left out."""
+        (height, width), (rows, columns) = self._shape, self._size
+        across = scipy.fft.rfft(image, columns, axis=1)
+        whole = scipy.fft.fft(across, rows, axis=0, overwrite_x=True)
+        whole *= transform
+        there = scipy.fft.ifft(whole, axis=0, norm="forward", overwrite_x=True)[:height]
+        made = scipy.fft.irfft(there, columns, axis=1, norm="forward")
+        return np.asarray(made[:, :width] * np.float32(1 / (rows * columns)), np.float32)
 
 
 def _check_kernel(kernel: FloatArray) -> None:

@@ -206,13 +206,13 @@ def _weight(rest: FloatArray, scale: float) -> FloatArray:
 
 def gradient(image: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Give the differences of cells (h, w) down, (h - 1, w), and across, (h, w - 1)."""
-    return np.diff(image, axis=0), np.diff(image, axis=1)
+    return image[1:] - image[:-1], image[:, 1:] - image[:, :-1]
 
 
 def _divergence(y: FloatArray, x: FloatArray) -> FloatArray:
     """Give the transpose of the gradient."""
-    out = np.zeros((x.shape[0], y.shape[1]), np.float32)
-    out[1:] += y
+    out = np.empty((x.shape[0], y.shape[1]), np.float32)
+    out[0], out[1:] = 0, y
     out[:-1] -= y
     out[:, 1:] += x
     out[:, :-1] -= x

@@ -16,13 +16,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.colorimetry import Matrix
+from camkit.colorimetry import Matrix, OutputColours
 from camkit.contracts import FloatArray
-from camkit.streaks.cell_rows import rows_of_cells
+from camkit.streaks.cell_rows import Lattice
 from camkit.streaks.cells import COLOURS, PITCH_PX, Sites
 from camkit.streaks.doubt import settled
 from camkit.streaks.recovery import Recovery
-from camkit.streaks.rims import coloured_by_surroundings, in_own_colours
+from camkit.streaks.rims import colour_by_surroundings, in_own_colours
 from camkit.streaks.spots import lit_pixels
 from camkit.streaks.thrown import streaks_of
 
@@ -52,8 +52,7 @@ class Painter:
                 light is negative.
         """
         self._lit = lit_pixels(recovery)
-        self._to_output = to_output
-        self._from_output = np.asarray(np.linalg.inv(to_output), np.float64)
+        self._colours = OutputColours(to_output)
         self._veil = recovery.veil
         self._veil_grid = recovery.coarse.pitch_px, recovery.coarse.offset_px
         self._streaks = streaks_of(recovery, self._lit)
@@ -70,56 +69,68 @@ class Painter:
         """
         rows, width = planes.shape[1:]
         for colour, gain in enumerate(gains):
-            under = self._thrown(colour, top, (rows, width))
+            under = self._thrown(colour, Lattice(top=top), (rows, width))
             under *= np.float32(gain)
             planes[colour] -= under
             planes[colour] *= np.float32(1 / self._core[colour])
         self._put_lights(planes, top, gains)
 
-    def clear(self, samples: FloatArray, clipped: Mask, top: int, sites: Sequence[Sites]) -> None:
+    def clear(
+        self,
+        samples: FloatArray,
+        clipped: Mask,
+        top: int,
+        sites: Sequence[Sites],
+        gains: Sequence[float] = (1.0,) * COLOURS,
+    ) -> None:
         """Take veil and streaks from rows of a mosaic in place, with the doubt that they have.
 
         Args:
-            samples: (rows, w) float32, 1.0 = where samples clip; see `doubt.settled` for the rows.
+            samples: (rows, w) float32, multiplied by the gains; see `doubt.settled` for the rows.
             clipped: (rows, w).
             top: Number of the first row.
             sites: Of every colour in a cell of 2 px.
+            gains: Of the colours; without them 1.0 = where samples clip.
         """
-        thrown, core = np.empty_like(samples), np.empty_like(samples)
         for colour, places in enumerate(sites):
-            under = self._thrown(colour, top, samples.shape)
-            for y, x in places:
-                at = np.s_[y::PITCH_PX, x::PITCH_PX]
-                thrown[at] = under[at]
-                core[at] = self._core[colour]
-        samples[:] = settled(samples - thrown, thrown, clipped, sites) / core
+            at = [np.s_[y::PITCH_PX, x::PITCH_PX] for y, x in places]
+            lattices = [Lattice(top=top + y, left=x, step_px=PITCH_PX) for y, x in places]
+            thrown = [
+                self._thrown(colour, lattice, samples[there].shape)
+                for lattice, there in zip(lattices, at, strict=True)
+            ]
+            light = np.float32(1 / gains[colour])
+            rest = [samples[there] * light - under for there, under in zip(at, thrown, strict=True)]
+            made = settled(rest, thrown, [clipped[there] for there in at])
+            for there, found in zip(at, made, strict=True):
+                samples[there] = found * np.float32(gains[colour] / self._core[colour])
 
     def light_up(
         self, planes: FloatArray, clipped: Mask, top: int, gains: tuple[float, ...]
-    ) -> FloatArray:
-        """Return rows of a cleared picture with lights in colours of their own.
+    ) -> None:
+        """Put lights in colours of their own into rows of a cleared picture, in place.
 
         Args:
-            planes: As `paint`; see `rims.coloured_by_surroundings` for the rows.
+            planes: As `paint`; see `rims.colour_by_surroundings` for the rows.
             clipped: (rows, w): whose own sample clipped.
             top: Number of the first row.
             gains: Of the colours.
         """
-        lit = np.zeros(clipped.shape, np.bool_)
-        lit[self._lit_within(top, len(lit))[1]] = True
-        out = coloured_by_surroundings(planes, clipped, lit) if clipped.any() else planes
+        if clipped.any():
+            lit = np.zeros(clipped.shape, np.bool_)
+            lit[self._lit_within(top, len(lit))[1]] = True
+            colour_by_surroundings(planes, clipped, lit)
         # a demosaic may overshoot at an edge; noise alone reaches a little below black
-        np.maximum(out, np.array(gains, np.float32)[:, None, None] * -np.float32(DARKEST), out=out)
-        self._put_lights(out, top, gains, own_colours=True)
-        return out
+        for plane, gain in zip(planes, gains, strict=True):
+            np.maximum(plane, np.float32(-DARKEST * gain), out=plane)
+        self._put_lights(planes, top, gains, own_colours=True)
 
-    def _thrown(self, colour: int, top: int, shape: tuple[int, ...]) -> FloatArray:
-        """Return veil and streaks of rows of pixels (rows, w)."""
+    def _thrown(self, colour: int, lattice: Lattice, shape: tuple[int, ...]) -> FloatArray:
+        """Return veil and streaks at the pixels of a lattice (rows, columns)."""
         pitch_px, offset_px = self._veil_grid
-        veil = self._veil[colour]
-        under = rows_of_cells(veil, pitch_px, offset_px[colour], top, shape[0], shape[1])
+        under = lattice.cells(self._veil[colour], pitch_px, offset_px[colour], shape)
         for streaks in self._streaks:
-            streaks.add(under, colour, top)
+            streaks.add(under, colour, lattice)
         return under
 
     def _lit_within(self, top: int, rows: int) -> tuple[slice, tuple[Index, Index]]:
@@ -141,7 +152,7 @@ class Painter:
         if own_colours:
             there = in_own_colours(there, lit, self._lit.excess[:, which] * levels, levels)
         there = _untinted(there, lit)
-        planes[:, *at] = _visible(there, self._to_output, self._from_output)
+        planes[:, *at] = _visible(there, self._colours)
 
 
 def _untinted(light: FloatArray, lit: NDArray[np.bool_]) -> FloatArray:
@@ -162,18 +173,8 @@ def _untinted(light: FloatArray, lit: NDArray[np.bool_]) -> FloatArray:
     return out
 
 
-def _visible(light: FloatArray, to_output: Matrix, from_output: Matrix) -> FloatArray:
+def _visible(light: FloatArray, colours: OutputColours) -> FloatArray:
     """Raise colours that were sought apart to where the output has them; (3, n) light."""
-    seen = _turned(light, to_output)
+    seen = colours.of(light)
     least = np.float32(DIMMEST) * seen.max(axis=0)
-    short = (seen < least).any(axis=0) & (seen > 1).any(axis=0)
-    raised = np.maximum(seen[:, short], least[short])
-    out = light.copy()
-    out[:, short] = _turned(raised, from_output)
-    return out
-
-
-def _turned(light: FloatArray, matrix: Matrix) -> FloatArray:
-    """Multiply (3, n) light; a product of matrices may differ in a last bit with n."""
-    rows = matrix.astype(np.float32)
-    return np.stack([sum(a * plane for a, plane in zip(row, light, strict=True)) for row in rows])
+    return colours.raised(light, np.where((seen > 1).any(axis=0), least, np.float32(-np.inf)))

@@ -11,17 +11,17 @@ more than the other.
 from typing import Final
 
 import numpy as np
-import scipy.ndimage
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
+from camkit.streaks.shapes import widened
 
 PALE: Final = 0.3
 """Of white and of a lamp's mean, added to the colour of the lamp: faint ones are nearly white."""
 MOST_RAISED: Final = 2.0
 """A colour is raised to this many times itself."""
-MIXED_PX2: Final = 5
-"""Squared distance from a clipped sample within which a demosaic mixes it in."""
+MIXED_PX: Final = 2
+"""A demosaic mixes a clipped sample in so far along its row or column, and one pixel across."""
 LIT_PX: Final = 3
 """Along rows and columns: so far from clipped samples light may be put in and colours change."""
 MOST_OVER: Final = 1.15
@@ -54,14 +54,11 @@ def in_own_colours(
 
 def near_clipped(clipped: Mask) -> Mask:
     """Return which pixels (h, w) are so near to clipped samples that lights are put into them."""
-    square = np.ones((2 * LIT_PX + 1, 1), np.bool_)
-    return np.asarray(
-        scipy.ndimage.binary_dilation(scipy.ndimage.binary_dilation(clipped, square), square.T)
-    )
+    return widened(clipped, LIT_PX, LIT_PX)
 
 
-def no_brighter(lit: FloatArray, seen: FloatArray, near: Mask) -> FloatArray:
-    """Return a picture (3, h, w) that is hardly brighter than it was seen, away from lights.
+def no_brighter(lit: FloatArray, seen: FloatArray, near: Mask) -> None:
+    """Darken a picture (3, h, w) in place to hardly brighter than it was seen, away from lights.
 
     Networks act where it is brighter, and are left out where no sample clipped.
 
@@ -70,12 +67,15 @@ def no_brighter(lit: FloatArray, seen: FloatArray, near: Mask) -> FloatArray:
         seen: As captured.
         near: (h, w) of `near_clipped`.
     """
-    most = np.float32(MOST_OVER) * np.maximum(seen, 0)
-    return np.where(near, lit, np.minimum(lit, most))
+    far = ~near
+    for plane, before in zip(lit, seen, strict=True):
+        most = np.maximum(before, 0)
+        most *= np.float32(MOST_OVER)
+        np.minimum(plane, most, out=plane, where=far)
 
 
-def coloured_by_surroundings(planes: FloatArray, clipped: Mask, lit: Mask) -> FloatArray:
-    """Return a picture whose pixels beside clipped samples have the colour of what lies around.
+def colour_by_surroundings(planes: FloatArray, clipped: Mask, lit: Mask) -> None:
+    """Give pixels beside clipped samples the colour of what lies around, in place.
 
     Args:
         planes: (3, h, w) balanced, before lights are put in; rows within `MARGIN_PX` of a cut are
@@ -83,21 +83,19 @@ def coloured_by_surroundings(planes: FloatArray, clipped: Mask, lit: Mask) -> Fl
         clipped: (h, w): whose own sample clipped.
         lit: (h, w): which lights are put into.
     """
-    reach = int(MIXED_PX2**0.5)
-    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    mixed = scipy.ndimage.binary_dilation(clipped, y**2 + x**2 <= MIXED_PX2)
+    mixed = widened(clipped, MIXED_PX, 1) | widened(clipped, 1, MIXED_PX)
     rows, columns = np.nonzero(mixed & ~clipped & ~lit)
     own = planes[:, rows, columns]
     sums = np.zeros_like(own)
-    wide = np.pad(np.maximum(planes, 0), ((0, 0), *[(AROUND_PX, AROUND_PX)] * 2))
     known = np.pad(~mixed, AROUND_PX)
+    flat, places = planes.reshape(len(planes), -1), rows * planes.shape[2] + columns
     for down, right in np.ndindex(2 * AROUND_PX + 1, 2 * AROUND_PX + 1):
-        there = rows + down, columns + right
-        far = (down - AROUND_PX) ** 2 + (right - AROUND_PX) ** 2
-        weight = np.float32(np.exp(-0.5 * far / SIGMA_PX**2)) * known[there]
-        sums += weight * wide[:, *there]
+        y, x = down - AROUND_PX, right - AROUND_PX
+        weight = np.float32(np.exp(-0.5 * (y**2 + x**2) / SIGMA_PX**2))
+        weights = weight * known[rows + down, columns + right]
+        # what lies outside has no weight, whatever stands in its place
+        there = flat.take(places + (y * planes.shape[2] + x), axis=1, mode="clip")
+        sums += weights * np.maximum(there, 0, out=there)
     whole, bright = sums.sum(axis=0), np.maximum(own, 0).sum(axis=0)
-    out = planes.copy()
     coloured = sums / np.maximum(whole, _TINY) * bright
-    out[:, rows, columns] = np.where(whole > _TINY, coloured, own)
-    return out
+    planes[:, rows, columns] = np.where(whole > _TINY, coloured, own)

@@ -93,3 +93,16 @@ def _doubled(coarse: FloatArray, rows: int) -> FloatArray:
     if rows > out.shape[0]:
         out = np.concatenate([out, np.repeat(out[-1:], rows - out.shape[0], axis=0)])
     return out[:rows]
+
+
+def widened(plane: NDArray[Any], down: int, right: int) -> NDArray[Any]:
+    """Return the largest value so many rows and columns around, (h, w) numbers or a mask."""
+    out = plane
+    for axis, reach in enumerate((down, right)):
+        wide = out.copy()
+        for far in range(1, reach + 1):
+            for into, there in ((np.s_[far:], np.s_[:-far]), (np.s_[:-far], np.s_[far:])):
+                part = wide[into] if axis == 0 else wide[:, into]
+                np.maximum(part, out[there] if axis == 0 else out[:, there], out=part)
+        out = wide
+    return out

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.streaks.cell_rows import rows_of_cells
+from camkit.streaks.cell_rows import Lattice
 from camkit.streaks.cells import COLOURS, PITCH_PX
 from camkit.streaks.convolution import spreading
 from camkit.streaks.recovery import FINE_CELLS, Recovery, Region
@@ -32,8 +32,8 @@ Half = NDArray[np.float16]
 class Streaks(Protocol):
     """What the lights of a window throw beside themselves."""
 
-    def add(self, under: FloatArray, colour: int, top: int) -> None:
-        """Add it to rows (rows, w) of a picture, of which the first has the number `top`."""
+    def add(self, under: FloatArray, colour: int, lattice: Lattice) -> None:
+        """Add it to light (rows, columns) at the pixels of a lattice."""
         ...
 
 
@@ -86,15 +86,16 @@ class PixelStreaks:
             else:
                 self._planes.append(_half(spreading(kernel, there).spread(plane)))
 
-    def add(self, under: FloatArray, colour: int, top: int) -> None:
-        """Add them to rows of a picture."""
+    def add(self, under: FloatArray, colour: int, lattice: Lattice) -> None:
+        """Add them to light at the pixels of a lattice."""
         plane = self._planes[colour]
         if plane is None:
             return
-        first, last = max(self._top - top, 0), min(self._top + plane.shape[0] - top, len(under))
-        if first < last:
-            part = under[first:last, self._left : self._left + plane.shape[1]]
-            part += plane[first + top - self._top : last + top - self._top, : part.shape[1]]
+        bottom, right = self._top + plane.shape[0], self._left + plane.shape[1]
+        at = lattice.within((self._top, self._left, bottom, right), under.shape)
+        first, step, part = lattice.part(at), lattice.step_px, under[at]
+        there = plane[first.top - self._top :: step, first.left - self._left :: step]
+        part += there[: part.shape[0], : part.shape[1]]
 
 
 class CellStreaks:
@@ -116,19 +117,18 @@ class CellStreaks:
         self._window, self._offset_px = region.window, offset_px
         self._planes = {c: region.streaks[c] for c in colours if region.streaks[c].any()}
 
-    def add(self, under: FloatArray, colour: int, top: int) -> None:
-        """Add them to rows of a picture."""
-        window, offset = self._window, self._offset_px[colour]
-        first = max(PITCH_PX * window.top - 1 - top, 0)
-        last = min(PITCH_PX * window.bottom + 1 - top, under.shape[0])
-        if first >= last or colour not in self._planes:
+    def add(self, under: FloatArray, colour: int, lattice: Lattice) -> None:
+        """Add them to light at the pixels of a lattice."""
+        if colour not in self._planes:
             return
-        left = max(PITCH_PX * window.left - 1, 0)
-        right = min(PITCH_PX * window.right + 1, under.shape[1])
-        moved = offset[0] + PITCH_PX * window.top, offset[1] + PITCH_PX * window.left - left
-        under[first:last, left:right] += rows_of_cells(
-            self._planes[colour], PITCH_PX, moved, top + first, last - first, right - left
-        )
+        window, offset = self._window, self._offset_px[colour]
+        top, left = PITCH_PX * window.top, PITCH_PX * window.left
+        bottom, right = PITCH_PX * window.bottom + 1, PITCH_PX * window.right + 1
+        at = lattice.within((top - 1, left - 1, bottom, right), under.shape)
+        part = under[at]
+        if part.size:
+            moved = offset[0] + top, offset[1] + left
+            part += lattice.part(at).cells(self._planes[colour], PITCH_PX, moved, part.shape)
 
 
 def _shows(region: Region) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from camkit.bundle.light_bound import CELL_PX, USUAL_BOUND, LightBound
 from camkit.contracts import FloatArray
 from camkit.runtime.network.light import AddedLight, added_light, keep_bright, take_back
+from camkit.runtime.network.white_keeper import WhiteKeeper
 
 LOOK_ROWS: Final = 32
 LOOK_EVERY: Final = 4
@@ -36,7 +37,7 @@ class LightKeeper:
         measured: Whether the light is measured; without it and a bound only `strength` counts.
         strength: How much of what the network adds is kept, 0..1.
         bright: (c,) stabilised: what reaches it in every channel is not darkened; None for any.
-        white: (c,) stabilised: no output is darker than what is given, or than this; None for any.
+        white: Keeps lamps from ending darker than what is given, or than white; None for any.
         scale: Divisor of the stabilising transform.
         cells: Cells seen so far.
         unexplained: Of these, cells whose local mean left the usual bound.
@@ -50,7 +51,7 @@ class LightKeeper:
     strength: float
     scale: float
     bright: FloatArray | None = None
-    white: FloatArray | None = None
+    white: WhiteKeeper | None = None
     cells: int = 0
     unexplained: int = 0
     large: int = 0
@@ -79,8 +80,7 @@ class LightKeeper:
         if self.bright is not None:
             keep_bright(front, output, self.bright, scale=self.scale)
         if self.white is not None:
-            least = np.minimum(front, self.white[:, None, None])
-            np.maximum(output, least, out=output)
+            self.white.keep(output, front)
 
     @property
     def fallback_fraction(self) -> float:

@@ -5,8 +5,9 @@ quality  after Menon, Andriani and Calvagno 2007: green along edges, refined aft
          colour differences; in `camkit.runtime.signal.directional`.
 
 Both look at a bounded neighbourhood (`DEMOSAIC_MARGIN_PX`), so rows [t, b) demosaicked with that
-much context equal the same rows of the whole picture bit for bit. At the border the mosaic is
-mirrored about its outermost pixels (reflect 101), which keeps the CFA phase.
+much context equal the same rows of the whole picture bit for bit; with "quality" columns too. At
+the border the mosaic is mirrored about its outermost pixels (reflect 101), which keeps the CFA
+phase; a single row or column is repeated.
 
 The exact form of fast: out[c] at a pixel is the sum over the 5x5 neighbourhood of
 `MALVAR_KERNELS[name]` times the mosaic, name chosen by the pixel's own colour and the wanted one:
@@ -28,15 +29,21 @@ import numpy as np
 
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, cfa_channels
 from camkit.errors import ContractError
-from camkit.runtime.signal.directional import DIRECTIONAL_MARGIN_PX, demosaic_directional
+from camkit.runtime.signal.directional import DIRECTIONAL_REACH_PX, demosaic_tile
 
 DemosaicMethod = Literal["fast", "quality"]
 
 DEMOSAIC_MARGIN_PX: Final[dict[DemosaicMethod, int]] = {
     "fast": 2,
-    "quality": DIRECTIONAL_MARGIN_PX,
+    "quality": DIRECTIONAL_REACH_PX,
 }
-BAND_ROWS: Final[dict[DemosaicMethod, int]] = {"fast": 64, "quality": 128}
+TILE_PX: Final[dict[DemosaicMethod, tuple[int, int]]] = {
+    "fast": (64, 1 << 30),
+    "quality": (128, 512),
+}
+"""Rows and columns of what is demosaicked at once, which fits into the cache."""
+Box = tuple[int, int, int, int]
+"""(top, left, bottom, right) in pixels."""
 
 
 def _kernel(rows: list[list[float]]) -> FloatArray:
@@ -86,14 +93,28 @@ def demosaic(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod = "fast
     if method not in DEMOSAIC_MARGIN_PX:
         raise ContractError(f"demosaic must be fast or quality; got {method!r}")
     height, width = mosaic.shape
-    margin, step = DEMOSAIC_MARGIN_PX[method], BAND_ROWS[method]
-    planes = np.empty((3, height, width), dtype=np.float32)
-    # bands fit into the cache
-    for top in range(0, height, step):
-        bottom = min(top + step, height)
-        first, last = max(top - margin, 0), min(bottom + margin, height)
-        band = _demosaic_band(mosaic[first:last], shift_rows(cfa, first), method)
-        planes[:, top:bottom] = band[:, top - first : bottom - first]
+    return demosaic_part(mosaic, cfa, method, (0, 0, height, width))
+
+
+def demosaic_part(
+    mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod, box: Box
+) -> FloatArray:
+    """Return what `demosaic` makes of a part, (3, h, w) as `box`; the rest is looked at alone.
+
+    Args:
+        mosaic: As `demosaic`.
+        cfa: Letters of the 2x2 cell at pixel (0, 0).
+        method: "fast" or "quality".
+        box: (top, left, bottom, right) in pixels of the mosaic.
+    """
+    top, left, bottom, right = box
+    planes = np.empty((3, bottom - top, right - left), dtype=np.float32)
+    make = _malvar_tile if method == "fast" else _directional_tile
+    rows, columns = TILE_PX[method]
+    for y in range(top, bottom, rows):
+        for x in range(left, right, columns):
+            tile = y, x, min(y + rows, bottom), min(x + columns, right)
+            planes[:, y - top : tile[2] - top, x - left : tile[3] - left] = make(mosaic, cfa, tile)
     return planes
 
 
@@ -113,8 +134,33 @@ def shift_rows(cfa: CfaPattern, rows: int) -> CfaPattern:
     return next(pattern for pattern in CFA_PATTERNS if pattern == swapped)
 
 
-def _demosaic_band(mosaic: FloatArray, cfa: CfaPattern, method: DemosaicMethod) -> FloatArray:
-    return _malvar(mosaic, cfa) if method == "fast" else demosaic_directional(mosaic, cfa)
+def _directional_tile(mosaic: FloatArray, cfa: CfaPattern, box: Box) -> FloatArray:
+    """Return a tile by "quality": with its surroundings, from red pixels to red pixels."""
+    red = next((y, x) for y, row in enumerate(cfa_channels(cfa)) for x in (0, 1) if row[x] == 0)
+    first = [begin - (begin - place) % 2 for begin, place in zip(box[:2], red, strict=True)]
+    last = [end - 1 + (end - 1 - begin) % 2 for begin, end in zip(first, box[2:], strict=True)]
+    reach = DIRECTIONAL_REACH_PX
+    before = [max(reach - begin, 0) for begin in first]
+    after = [max(end + reach + 1 - side, 0) for end, side in zip(last, mosaic.shape, strict=True)]
+    there = [
+        slice(max(begin - reach, 0), end + reach + 1)
+        for begin, end in zip(first, last, strict=True)
+    ]
+    samples = cv2.copyMakeBorder(
+        mosaic[there[0], there[1]], before[0], after[0], before[1], after[1], cv2.BORDER_REFLECT_101
+    )
+    planes = demosaic_tile(np.asarray(samples, np.float32))
+    top, left = (begin - start for begin, start in zip(box[:2], first, strict=True))
+    return planes[:, top : top + box[2] - box[0], left : left + box[3] - box[1]]
+
+
+def _malvar_tile(mosaic: FloatArray, cfa: CfaPattern, box: Box) -> FloatArray:
+    """Return a tile by "fast", made of whole rows."""
+    top, left, bottom, right = box
+    margin = DEMOSAIC_MARGIN_PX["fast"]
+    first = max(top - margin, 0)
+    planes = _malvar(mosaic[first : bottom + margin], shift_rows(cfa, first))
+    return planes[:, top - first : bottom - first, left:right]
 
 
 def _malvar(mosaic: FloatArray, cfa: CfaPattern) -> FloatArray:

@@ -9,105 +9,221 @@ The order and the refinement are Menon's; the two directions are not chosen but 
 inverse square of the change, which leaves smooth regions free of false decisions. A scaled mosaic
 gives the scaled picture; nothing is clipped, negatives are kept.
 
+The samples of a mosaic lie on four lattices, each a quarter of the picture, and everything is
+computed on these. A tile begins and ends with a red pixel in both directions, so a lattice holds
+the `even` pixels of a line (one more) or the `odd` ones, and all planes have one middle. What is
+computed from neighbours is a little smaller than they are; `_inner` cuts planes to one size.
+
+    red             | green of red rows        even, even | even, odd
+    green of blue rows | blue                  odd, even  | odd, odd
+
 References: Menon, Andriani, Calvagno, "Demosaicing with directional filtering and a posteriori
 decision", IEEE Transactions on Image Processing 16(1), 2007. Pekkucuksen, Altunbasak, "Gradient
 based threshold free color filter array interpolation", ICIP 2010 (the weights).
 """
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from camkit.contracts import CfaPattern, FloatArray, cfa_channels
+from camkit.contracts import FloatArray
 
-# reach: green 2, its change 1, weights 2, red and blue 1 + 1, refinement 1 + 1 + 1
-DIRECTIONAL_MARGIN_PX: Final = 12
+# green 2, its change 1, weights 2, red and blue 1 + 1, refinement 1 + 1 + 1
+DIRECTIONAL_REACH_PX: Final = 10
 
-Mask = NDArray[np.bool_]
-
-_INTERPOLATE: Final = np.array([[-0.25, 0.5, 0.5, 0.5, -0.25]], dtype=np.float32)
-_CHANGE: Final = np.array([[-1.0, 0.0, 1.0]], dtype=np.float32)
-_MEAN2: Final = np.array([[0.5, 0.0, 0.5]], dtype=np.float32)
-_MEAN3: Final = np.full((1, 3), 1 / 3, dtype=np.float32)
-_SUPPORT: Final = np.ones((5, 5), dtype=np.float32)
+_COLUMN: Final = 0
+_ROW: Final = 1
+_QUARTER: Final = np.float32(0.25)
+_HALF: Final = np.float32(0.5)
+_THIRD: Final = np.float32(1 / 3)
 
 
-def demosaic_directional(mosaic: FloatArray, cfa: CfaPattern) -> FloatArray:
-    """Interpolate a (h, w) float32 mosaic to (3, h, w) along edges."""
-    colors = np.array(cfa_channels(cfa), dtype=np.uint8)
-    height, width = mosaic.shape
-    own = np.tile(colors, ((height + 1) // 2, (width + 1) // 2))[:height, :width]
-    green, row_weight = _green(mosaic, own == 1)
-    # the rows whose other colour is red; the others hold blue
-    red_row = np.resize((colors == 0).any(axis=1), height)[:, None]
-    planes = np.stack([np.where(own == 0, mosaic, 0), green, np.where(own == 2, mosaic, 0)])
-    _fill_at_green(planes, own, red_row)
-    _fill_at_opposite(planes, own, row_weight, _MEAN2)
-    _refine_green(planes, own, row_weight)
-    _fill_at_green(planes, own, red_row)
-    _fill_at_opposite(planes, own, row_weight, _MEAN3)
-    return planes
+class _Lattices(NamedTuple):
+    """A value of every pixel of a tile, one plane for each place in a cell."""
+
+    red: FloatArray
+    green_of_red: FloatArray
+    green_of_blue: FloatArray
+    blue: FloatArray
 
 
-def _filter(plane: FloatArray, kernel: FloatArray) -> FloatArray:
-    out = cv2.filter2D(plane, cv2.CV_32F, kernel, borderType=cv2.BORDER_REFLECT_101)
-    return np.asarray(out, dtype=np.float32)
+class _Colours(NamedTuple):
+    """A value of every red and of every blue pixel of a tile."""
+
+    red: FloatArray
+    blue: FloatArray
 
 
-def _column(kernel: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(kernel.T)
+class _Beside(NamedTuple):
+    """A value of the green pixels beside those of one colour: in their rows, in their columns."""
+
+    in_row: FloatArray
+    in_column: FloatArray
 
 
-def _along(plane: FloatArray, kernel: FloatArray, row_weight: FloatArray) -> FloatArray:
-    """Filter along rows and columns and mix by the weight of the rows."""
-    by_column = _filter(plane, _column(kernel))
-    mixed = _filter(plane, kernel)
-    mixed -= by_column
-    mixed *= row_weight
+def demosaic_tile(samples: FloatArray) -> FloatArray:
+    """Interpolate a tile of a mosaic along edges.
+
+    Args:
+        samples: (h, w) float32 with red pixels in all four corners, both sides odd and larger than
+            twice `DIRECTIONAL_REACH_PX`.
+
+    Returns:
+        (3, h - 2 reach, w - 2 reach) float32: the middle of the tile.
+    """
+    tile = _Lattices(*(samples[y::2, x::2].copy() for y in (0, 1) for x in (0, 1)))
+    green, weight = _green_less_own(tile)
+    beside = [_sums_beside(plane) for plane in green]
+    less_blue = [_QUARTER * sums for sums in _red_less_blue(beside, weight)]
+    green = _Colours(*map(_mean_of_three, green, map(_along_edges, beside, weight)))
+    beside = [_sums_beside(plane) for plane in green]
+    less_blue = list(map(_mean_of_three, less_blue, _red_less_blue(beside, weight)))
+    return _planes(tile, green, beside, _Colours(*less_blue))
+
+
+def _green_less_own(tile: _Lattices) -> tuple[_Colours, _Colours]:
+    """Return green less the sample of red and blue pixels, and the weight 0..1 of their rows."""
+    red, green_of_red, green_of_blue, blue = tile
+    red_row, red_column = _bends(green_of_red, red, _ROW), _bends(green_of_blue, red, _COLUMN)
+    blue_row, blue_column = _bends(green_of_blue, blue, _ROW), _bends(green_of_red, blue, _COLUMN)
+    # Pekkucuksen 2010, eq. (4) to (6): green less the other colour, whichever is interpolated
+    by_row = _Lattices(red_row[1], red_row[0], blue_row[0], blue_row[1])
+    by_column = _Lattices(red_column[1], blue_column[0], red_column[0], blue_column[1])
+    shapes = [(plane.shape[0] - 4, plane.shape[1] - 4) for plane in tile]
+    across = _changes_around(by_column, shapes, _COLUMN)
+    along = _changes_around(by_row, shapes, _ROW)
+    weight = _Colours(*map(_share, across, along))
+    beside = _Beside(red_row[0], red_column[0]), _Beside(blue_row[0], blue_column[0])
+    return _Colours(*(_QUARTER * sums for sums in map(_along_edges, beside, weight))), weight
+
+
+def _bends(green: FloatArray, other: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
+    """Return twice green less the other colour along their lines, one of them interpolated.
+
+    Returns:
+        At green pixels and at those of the other colour.
+    """
+    green_is_even = green.shape[axis] > other.shape[axis]
+    even, odd = (green, other) if green_is_even else (other, green)
+    first, last = _part(even, axis, 0, -1), _part(even, axis, 1)
+    before, after = (first - odd, last - odd) if green_is_even else (odd - first, odd - last)
+    at_odd = before + after
+    at_even = _part(after, axis, 0, -1) + _part(before, axis, 1)
+    return (at_even, at_odd) if green_is_even else (at_odd, at_even)
+
+
+def _changes_around(bends: _Lattices, shapes: Sequence[tuple[int, int]], axis: int) -> _Colours:
+    """Return the squares of the sums of changes along an axis in 5 x 5 pixels."""
+    changes = []
+    for bend, shape in zip(bends, shapes, strict=True):
+        change = _part(bend, axis, 2) - _part(bend, axis, 0, -2)
+        changes.append(_inner(np.abs(change, out=change), shape))
+    even = _sums_of_five(changes[0], changes[1], _ROW)
+    odd = _sums_of_five(changes[2], changes[3], _ROW)
+    red, _ = _sums_of_five(even[0], odd[0], _COLUMN)
+    _, blue = _sums_of_five(even[1], odd[1], _COLUMN)
+    return _Colours(np.square(red, out=red), np.square(blue, out=blue))
+
+
+def _sums_of_five(even: FloatArray, odd: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
+    """Return sums of five neighbours along an axis, about even pixels and about odd ones."""
+    twos = _part(even, axis, 0, -1) + odd
+    about_even = _part(twos, axis, 0, -1) + _part(twos, axis, 1)
+    about_even += _part(even, axis, 2)
+    about_odd = _part(twos, axis, 1, -1) + _part(twos, axis, 2)
+    about_odd += _part(odd, axis, 0, -2)
+    return about_even, about_odd
+
+
+def _share(part: FloatArray, rest: FloatArray) -> FloatArray:
+    """Return the share of a part of the whole; half of nothing."""
+    whole = part + rest
+    if whole.all():
+        part /= whole
+        return part
+    share = np.full_like(part, 0.5)
+    np.divide(part, whole, out=share, where=whole > 0)
+    return share
+
+
+def _sums_beside(plane: FloatArray) -> _Beside:
+    """Return sums of the two neighbours of one colour at the green pixels beside it."""
+    return _Beside(_pairs(plane, _ROW), _pairs(plane, _COLUMN))
+
+
+def _along_edges(green: _Beside, row_weight: FloatArray) -> FloatArray:
+    """Return sums of the two green neighbours of pixels, mixed by the weight of their rows."""
+    by_row, by_column = _pairs(green.in_row, _ROW), _pairs(green.in_column, _COLUMN)
+    planes = (by_row, by_column, row_weight)
+    height, width = (min(plane.shape[axis] for plane in planes) for axis in (0, 1))
+    by_row, by_column, weight = (_inner(plane, (height, width)) for plane in planes)
+    mixed = by_row - by_column
+    mixed *= weight
     mixed += by_column
     return mixed
 
 
-def _green(mosaic: FloatArray, at_green: Mask) -> tuple[FloatArray, FloatArray]:
-    """Give green everywhere and the weight 0..1 of the row direction."""
-    along_row = _filter(mosaic, _INTERPOLATE)
-    along_column = _filter(mosaic, _column(_INTERPOLATE))
-    # Pekkucuksen 2010, eq. (4) to (6): green minus the other colour, whichever is interpolated
-    sign = np.where(at_green, np.float32(1), np.float32(-1))
-    change_row = np.abs(_filter(sign * (mosaic - along_row), _CHANGE))
-    change_column = np.abs(_filter(sign * (mosaic - along_column), _column(_CHANGE)))
-    against_row = np.square(_filter(change_row, _SUPPORT))
-    row_weight = np.square(_filter(change_column, _SUPPORT))
-    total = against_row + row_weight
-    np.divide(row_weight, total, out=row_weight, where=total > 0)
-    row_weight[total == 0] = 0.5
-    mixed = along_column + row_weight * (along_row - along_column)
-    return np.where(at_green, mosaic, mixed), row_weight
+def _red_less_blue(beside: Sequence[_Beside], row_weight: _Colours) -> list[FloatArray]:
+    """Return four times red less blue at red and at blue pixels, of green less each, doubled."""
+    red, blue = beside
+    at_red_rows = _difference(blue.in_column, red.in_row)
+    at_blue_rows = _difference(blue.in_row, red.in_column)
+    return [
+        _along_edges(_Beside(at_red_rows, at_blue_rows), row_weight.red),
+        _along_edges(_Beside(at_blue_rows, at_red_rows), row_weight.blue),
+    ]
 
 
-def _fill_at_green(planes: FloatArray, own: NDArray[np.uint8], red_row: Mask) -> None:
-    """Fill red and blue at green pixels: mean colour difference of the two neighbours."""
-    at_green = own == 1
-    for color in (0, 2):
-        difference = np.where(own == color, planes[color] - planes[1], np.float32(0))
-        in_row = red_row if color == 0 else ~red_row
-        found = np.where(in_row, _filter(difference, _MEAN2), _filter(difference, _column(_MEAN2)))
-        np.copyto(planes[color], planes[1] + found, where=at_green)
+def _mean_of_three(own: FloatArray, neighbours: FloatArray) -> FloatArray:
+    """Return the mean of differences and of two neighbours each, of which the sum is doubled."""
+    mean = _HALF * neighbours
+    mean += _inner(own, mean.shape)
+    mean *= _THIRD
+    return mean
 
 
-def _fill_at_opposite(
-    planes: FloatArray, own: NDArray[np.uint8], row_weight: FloatArray, kernel: FloatArray
-) -> None:
-    """Fill red at blue and blue at red: the difference of the two, filtered along edges."""
-    found = _along(planes[0] - planes[2], kernel, row_weight)
-    np.copyto(planes[0], planes[2] + found, where=own == 2)
-    np.copyto(planes[2], planes[0] - found, where=own == 0)
+def _planes(
+    tile: _Lattices, green: _Colours, beside: Sequence[_Beside], less_blue: _Colours
+) -> FloatArray:
+    """Return the colours (3, h, w) of samples and of the differences beside them."""
+    height, width = (2 * side - 1 for side in less_blue.red.shape)
+    planes = np.empty((3, height, width), np.float32)
+    at = [np.s_[y::2, x::2] for y in (0, 1) for x in (0, 1)]
+    own = _Lattices(*(_inner(plane, planes[0][s].shape) for plane, s in zip(tile, at, strict=True)))
+    red, blue = beside
+    for place, samples, of_red, of_blue in (
+        (at[1], own.green_of_red, red.in_row, blue.in_column),
+        (at[2], own.green_of_blue, red.in_column, blue.in_row),
+    ):
+        planes[1][place] = samples
+        for colour, twice in ((0, of_red), (2, of_blue)):
+            planes[colour][place] = samples - _HALF * _inner(twice, samples.shape)
+    for place, samples, more in ((at[0], own.red, green.red), (at[3], own.blue, green.blue)):
+        planes[1][place] = samples + _inner(more, samples.shape)
+    planes[0][at[0]], planes[2][at[3]] = own.red, own.blue
+    planes[2][at[0]] = own.red - less_blue.red
+    planes[0][at[3]] = own.blue + _inner(less_blue.blue, own.blue.shape)
+    return planes
 
 
-def _refine_green(planes: FloatArray, own: NDArray[np.uint8], row_weight: FloatArray) -> None:
-    """Take green at red and blue from the difference smoothed along edges (Menon, section IV)."""
-    for color in (0, 2):
-        smooth = _along(planes[color] - planes[1], _MEAN3, row_weight)
-        np.copyto(planes[1], planes[color] - smooth, where=own == color)
+def _difference(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the difference of two planes where both are."""
+    shape = min(one.shape[0], other.shape[0]), min(one.shape[1], other.shape[1])
+    return np.asarray(_inner(one, shape) - _inner(other, shape))
+
+
+def _pairs(plane: FloatArray, axis: int) -> FloatArray:
+    """Return sums of neighbours along an axis: at the pixels between them."""
+    return np.asarray(_part(plane, axis, 0, -1) + _part(plane, axis, 1))
+
+
+def _part(plane: FloatArray, axis: int, first: int, end: int | None = None) -> FloatArray:
+    """Return a part of a plane along an axis."""
+    return plane[first:end] if axis == _COLUMN else plane[:, first:end]
+
+
+def _inner(plane: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return the middle of a plane."""
+    top, left = ((have - want) // 2 for have, want in zip(plane.shape, shape, strict=True))
+    return plane[top : top + shape[0], left : left + shape[1]]

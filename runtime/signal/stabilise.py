@@ -52,6 +52,12 @@ def stabilise(
     return np.asarray(np.sqrt(stable, out=stable))
 
 
+def stabilised_level(share: float, noise: NoiseModel, *, scale: float) -> FloatArray:
+    """Return (c, 1, 1): the stabilised value of a share of white in every channel."""
+    light = np.full((len(noise.shot), 1, 1), share, np.float32)
+    return stabilise(light, noise, scale=scale)
+
+
 def unstabilise(
     stable: FloatArray,
     noise: NoiseModel,

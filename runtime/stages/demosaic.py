@@ -18,7 +18,7 @@ from camkit.runtime.rows import Rows, RowSource
 from camkit.runtime.signal.demosaic import (
     DEMOSAIC_MARGIN_PX,
     DemosaicMethod,
-    demosaic,
+    demosaic_part,
     shift_rows,
 )
 
@@ -72,14 +72,13 @@ class ColorRows:
         margin, (_, height, width) = DEMOSAIC_MARGIN_PX[self._method], self.shape
         above, below = max(top - margin, 0), min(bottom + margin, height)
         mosaic = self._source.read(above, below)[0]
+        cfa = shift_rows(self._cfa, above)
         planes = np.empty((3, bottom - top, width), dtype=np.float32)
 
         def fill(first: int, last: int) -> None:
-            begin = max(top + first - margin, 0)
-            end = min(top + last + margin, height)
-            part = mosaic[begin - above : end - above]
-            made = demosaic(part, shift_rows(self._cfa, begin), self._method)
-            planes[:, first:last] = made[:, top + first - begin : top + last - begin]
+            rows = top - above + first, top - above + last
+            box = rows[0], 0, rows[1], width
+            planes[:, first:last] = demosaic_part(mosaic, cfa, self._method, box)
 
         run_slices(fill, bottom - top, threads=self._threads)
         return planes

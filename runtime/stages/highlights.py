@@ -13,19 +13,17 @@ import numpy as np
 
 from camkit.bundle.sensor import MOSAIC
 from camkit.bundle.stages import Highlights, Stage
-from camkit.colorimetry import Matrix, rec709_from_camera
-from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import color_kernels
 from camkit.runtime.cancel import check_cancelled
 from camkit.runtime.capture import Capture
-from camkit.runtime.color import recover_highlights
+from camkit.runtime.color import rec709_of_planes, recover_highlights
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
 from camkit.runtime.job.stream import Stream
 from camkit.runtime.plan.decision import Subject, Work
 from camkit.runtime.plan.speed import Speed
-from camkit.runtime.rows import Rows
+from camkit.runtime.rows import RollingRows, Rows
 from camkit.runtime.signal.demosaic import DemosaicMethod
 from camkit.runtime.stages.demosaic import ColorRows
 from camkit.streaks.cells import COLOURS, PITCH_PX, Cells, cells_of, sample_sites
@@ -46,6 +44,10 @@ FINE_BYTES_PER_PX: Final = 47
 KEPT_BYTES_PER_PX: Final = 17
 """Veil, streaks and the pixels of lights, of a picture of which nearly too much clipped."""
 BAND_ROWS: Final = 256
+CLEARED_ROWS: Final = 32 * BLOCK_PX
+"""Of a mosaic at once: neighbours to the number of `DOUBT_MARGIN_PX` are computed again."""
+LIT_ROWS: Final = 64
+"""Of a picture at once, in the cache."""
 REST_SHARE: Final = 0.4
 FRONT: Final = ("linearise", "repair")
 LEAST_PX: Final = 4
@@ -155,49 +157,32 @@ def _from_samples(
         return
     cfa, capture = job.capture.cfa, job.capture
     assert cfa is not None  # it is a mosaic
-    cleared = ClearedRows(mosaic, painter, capture)
+    cleared = RollingRows(mosaic.shape, _cleared(mosaic, painter, capture)).reader()
     source = ColorRows(cleared, cfa, method, threads=job.threads)
     seen, gains, height = picture.rows(), mosaic.gains, capture.height
     del picture, mosaic
-    for top in range(0, height, BAND_ROWS):
-        bottom = min(top + BAND_ROWS, height)
+    for top in range(0, height, LIT_ROWS):
+        bottom = min(top + LIT_ROWS, height)
         above, below = max(top - RIM_MARGIN_PX, 0), min(bottom + RIM_MARGIN_PX, height)
         planes, clipped = source.read(above, below), capture.saturated_rows(above, below)
+        painter.light_up(planes, clipped, above, gains)
         inside = np.s_[..., top - above : bottom - above, :]
-        lit = painter.light_up(planes, clipped, above, gains)[inside]
-        yield no_brighter(lit, seen.read(top, bottom), near_clipped(clipped)[inside])
+        lit, near = planes[inside], near_clipped(clipped)[inside]
+        no_brighter(lit, seen.read(top, bottom), near)
+        yield np.ascontiguousarray(lit)
 
 
-class ClearedRows:
-    """A balanced mosaic without veil and streaks."""
-
-    def __init__(self, mosaic: Stream, painter: Painter, capture: Capture) -> None:
-        self._source, self._painter, self._capture = mosaic.rows(), painter, capture
-        self._sites = sample_sites(capture.cfa)
-        self._gains = mosaic.gains
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Return (1, h, w)."""
-        return self._source.shape
-
-    def read(self, top: int, bottom: int) -> Rows:
-        """Return rows top..bottom as (1, rows, w) float32, a new array."""
-        height = self.shape[1]
-        above = max(top // BLOCK_PX * BLOCK_PX - DOUBT_MARGIN_PX, 0)
-        below = min(-(-bottom // BLOCK_PX) * BLOCK_PX + DOUBT_MARGIN_PX, height)
-        rows: FloatArray = self._source.read(above, below)[0].copy()
-        self._multiply(rows, [1 / gain for gain in self._gains])
-        clipped = self._capture.saturated_rows(above, below)
-        self._painter.clear(rows, clipped, above, self._sites)
-        self._multiply(rows, self._gains)
-        return np.asarray(rows[None, top - above : bottom - above])
-
-    def _multiply(self, rows: FloatArray, factors: Sequence[float]) -> None:
-        """Multiply the samples of every colour by a factor of its own, in place."""
-        for places, factor in zip(self._sites, factors, strict=True):
-            for y, x in places:
-                rows[y::PITCH_PX, x::PITCH_PX] *= np.float32(factor)
+def _cleared(mosaic: Stream, painter: Painter, capture: Capture) -> Iterator[Rows]:
+    """Yield the bands of a balanced mosaic without veil and streaks."""
+    source, sites, gains = mosaic.rows(), sample_sites(capture.cfa), mosaic.gains
+    del mosaic
+    for top in range(0, capture.height, CLEARED_ROWS):
+        bottom = min(top + CLEARED_ROWS, capture.height)
+        above = max(top - DOUBT_MARGIN_PX, 0)
+        below = min(-(-bottom // BLOCK_PX) * BLOCK_PX + DOUBT_MARGIN_PX, capture.height)
+        rows = source.read(above, below)[0].copy()
+        painter.clear(rows, capture.saturated_rows(above, below), above, sites, gains)
+        yield rows[None, top - above : bottom - above]
 
 
 def _painter(
@@ -214,13 +199,7 @@ def _painter(
     )
     notes[:] = recovery.notes
     job.sections["hdr"] = recovery.to_json()
-    return Painter(recovery, _to_output(job))
-
-
-def _to_output(job: Job) -> Matrix:
-    """Give the matrix from balanced planes to Rec.709."""
-    matrix = job.color_matrix
-    return np.eye(COLOURS) if matrix is None else rec709_from_camera(matrix)
+    return Painter(recovery, rec709_of_planes(job.color_matrix))
 
 
 def _kernels(job: Job) -> StreakKernels:

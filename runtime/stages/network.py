@@ -12,6 +12,7 @@ from camkit.bundle.light_bound import CELL_PX as LIGHT_CELL_PX
 from camkit.bundle.stages import Network
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.color import rec709_of_planes
 from camkit.runtime.content import CELL_PX
 from camkit.runtime.envelope import findings, observe, verdict
 from camkit.runtime.job.job import Job
@@ -24,6 +25,7 @@ from camkit.runtime.network.guard import TileGuard, light_bound, plain_bound
 from camkit.runtime.network.light import FAR, KeptRows
 from camkit.runtime.network.light_keeper import LightKeeper
 from camkit.runtime.network.tiling import Run
+from camkit.runtime.network.white_keeper import white_keeper
 from camkit.runtime.network.windows import (
     NetworkWindows,
     SizedNetwork,
@@ -36,7 +38,12 @@ from camkit.runtime.plan.laws import broken_laws, front_end
 from camkit.runtime.plan.speed import Speed
 from camkit.runtime.plan.ways import planned
 from camkit.runtime.rows import RowSource, changed_bands
-from camkit.runtime.signal.stabilise import StackedRows, familiar_noise, stabilise, unstabilise
+from camkit.runtime.signal.stabilise import (
+    StackedRows,
+    familiar_noise,
+    stabilised_level,
+    unstabilise,
+)
 
 METHODS: Final = ("net",)
 TRIM_SHARE: Final = 0.7
@@ -122,12 +129,6 @@ def _familiar_noise(job: Job, stream: Stream) -> NoiseModel:
     if sensor.type == "spad":
         return noise
     return familiar_noise(noise, [entry.read_noise_e for entry in sensor.noise])
-
-
-def _level(share: float, noise: NoiseModel, scale: float) -> FloatArray:
-    """Return the stabilised value of a share of white in every channel."""
-    light = np.full((len(noise.shot), 1, 1), share, np.float32)
-    return stabilise(light, noise, scale=scale)[:, 0, 0]
 
 
 class _NetworkStage:
@@ -273,9 +274,9 @@ class _NetworkStage:
         measured = entry.transform == "stabilise" and behind_bank
         white = bright = None
         if noise is not None and entry.keeps_white:
-            white = _level(1, noise, entry.scale)
+            white = white_keeper(noise, entry.scale, rec709_of_planes(self._job.color_matrix))
         if noise is not None and entry.light is not None and entry.light.keeps_bright:
-            bright = _level(BRIGHT, noise, entry.scale)
+            bright = stabilised_level(BRIGHT, noise, scale=entry.scale)[:, 0, 0]
         if not measured and options.strength == 1 and white is None:
             return None
         return LightKeeper(

@@ -42,7 +42,8 @@ class Network(StageEntry):
         light: How far the local mean of its output may leave that of its last plane (format 2.8);
             None for one that may move light, as before.
         keeps_white: Whether its output is at least its last plane, or white where that is brighter
-            (format 2.8): no lamp ends darker than what is known before the network.
+            (format 2.8): no lamp ends darker than what is known before the network, in the
+            colours of the camera and in those of the output.
     """
 
     stands_in: ClassVar[int] = 1

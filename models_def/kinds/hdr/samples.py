@@ -127,8 +127,9 @@ class HdrCamera:
         cleared = raw.copy()
         painter.clear(cleared, clipped, 0, self._kernels.sites)
         planes = develop(cleared, self.gains, cfa)
-        lit = painter.light_up(planes, clipped, 0, self.gains)
-        return no_brighter(lit, rgb, near_clipped(clipped))
+        painter.light_up(planes, clipped, 0, self.gains)
+        no_brighter(planes, rgb, near_clipped(clipped))
+        return planes
 
 
 def spread_light(sharp: Tensor, kernels: FloatArray) -> Tensor:

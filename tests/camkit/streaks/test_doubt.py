@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, FloatArray
-from camkit.streaks.cells import sample_sites
-from camkit.streaks.doubt import BLOCK_PX, MARGIN_PX, settled
+from camkit.streaks import doubt
+from camkit.streaks.cells import PITCH_PX, sample_sites
+from camkit.streaks.doubt import BLOCK_PX, MARGIN_PX, RUN, settled
 
 HEIGHT, WIDTH = 98, 131
 PATTERNS: tuple[CfaPattern, ...] = ("RGGB", "GBRG")
@@ -17,8 +19,21 @@ def _arm(width_px: float, level: float = 0.2) -> FloatArray:
     return np.asarray(level * np.exp(-0.5 * (y / width_px) ** 2) + np.zeros(WIDTH), np.float32)
 
 
-def _settled(rest: FloatArray, thrown: FloatArray, cfa: CfaPattern = "RGGB") -> FloatArray:
-    return settled(rest, thrown, np.zeros(rest.shape, np.bool_), sample_sites(cfa))
+def _settled(
+    rest: FloatArray,
+    thrown: FloatArray,
+    cfa: CfaPattern = "RGGB",
+    clipped: NDArray[np.bool_] | None = None,
+) -> FloatArray:
+    """Settle a mosaic colour by colour."""
+    out, over = rest.copy(), np.zeros(rest.shape, np.bool_) if clipped is None else clipped
+    for places in sample_sites(cfa):
+        at = [np.s_[y::PITCH_PX, x::PITCH_PX] for y, x in places]
+        light, under = ([plane[there] for there in at] for plane in (rest, thrown))
+        found = settled(light, under, [over[there] for there in at])
+        for there, samples in zip(at, found, strict=True):
+            out[there] = samples
+    return out
 
 
 @pytest.mark.parametrize("cfa", PATTERNS)
@@ -75,7 +90,7 @@ def test_clipped_samples_say_nothing_and_stay() -> None:
     rest, thrown = np.full((HEIGHT, WIDTH), 0.1, np.float32), _arm(2.0)
     clipped = np.zeros(rest.shape, np.bool_)
     clipped[40:60, 40:60] = True
-    got = settled(np.where(clipped, 1, rest), thrown, clipped, sample_sites("RGGB"))
+    got = _settled(np.where(clipped, np.float32(1), rest), thrown, clipped=clipped)
     np.testing.assert_array_equal(got[clipped], 1)
     np.testing.assert_allclose(got[~clipped], 0.1, atol=1e-6)
 
@@ -90,3 +105,17 @@ def test_a_cut_with_its_margin_has_the_bits_of_the_whole() -> None:
         below = min(-(-last // BLOCK_PX) * BLOCK_PX + MARGIN_PX, HEIGHT)
         part = _settled(rest[above:below], thrown[above:below])
         np.testing.assert_array_equal(part[first - above : last - above], whole[first:last])
+
+
+def test_columns_without_doubt_are_left_out_and_change_no_bit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(5)
+    sides = 64, 12 * RUN + 5
+    rest, thrown = (rng.uniform(0, 0.2, sides).astype(np.float32) for _ in range(2))
+    for quiet in (np.s_[:, : RUN + 3], np.s_[:, 4 * RUN : 9 * RUN]):
+        thrown[quiet] = 0
+    got = _settled(rest, thrown)
+    assert np.array_equal(got[:, 5 * RUN : 8 * RUN], rest[:, 5 * RUN : 8 * RUN])
+    monkeypatch.setattr(doubt, "RUN", 16 * RUN)
+    np.testing.assert_array_equal(got, _settled(rest, thrown))

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.streaks.rims import (
     AROUND_PX,
     MARGIN_PX,
     MOST_RAISED,
-    coloured_by_surroundings,
+    colour_by_surroundings,
     in_own_colours,
 )
 
@@ -47,9 +48,15 @@ def _tinted() -> tuple[FloatArray, np.ndarray]:
     return planes, clipped
 
 
+def _coloured(planes: FloatArray, clipped: NDArray[np.bool_], lit: NDArray[np.bool_]) -> FloatArray:
+    out = planes.copy()
+    colour_by_surroundings(out, clipped, lit)
+    return out
+
+
 def test_pixels_beside_clipped_samples_have_the_colour_of_what_lies_around() -> None:
     planes, clipped = _tinted()
-    got = coloured_by_surroundings(planes, clipped, clipped)
+    got = _coloured(planes, clipped, clipped)
     beside = np.zeros_like(clipped)
     beside[11:19, 11:19] = True
     beside &= ~clipped
@@ -60,29 +67,29 @@ def test_pixels_beside_clipped_samples_have_the_colour_of_what_lies_around() -> 
 
 def test_everything_else_keeps_its_bits() -> None:
     planes, clipped = _tinted()
-    got = coloured_by_surroundings(planes, clipped, clipped)
+    got = _coloured(planes, clipped, clipped)
     near = np.zeros_like(clipped)
     near[10:20, 10:20] = True
     np.testing.assert_array_equal(got[:, ~near], planes[:, ~near])
     np.testing.assert_array_equal(got[:, clipped], planes[:, clipped])
     every = np.ones_like(clipped)
-    np.testing.assert_array_equal(coloured_by_surroundings(planes, every, every), planes)
+    np.testing.assert_array_equal(_coloured(planes, every, every), planes)
 
 
 def test_where_nothing_else_was_seen_colours_stay() -> None:
     planes, clipped = np.full((3, 9, 9), 0.4, np.float32), np.ones((9, 9), np.bool_)
     planes[0] = 0.9
     clipped[4, 4] = False
-    np.testing.assert_array_equal(coloured_by_surroundings(planes, clipped, clipped), planes)
+    np.testing.assert_array_equal(_coloured(planes, clipped, clipped), planes)
 
 
 def test_a_cut_with_its_margin_has_the_bits_of_the_whole() -> None:
     rng = np.random.default_rng(4)
     planes = rng.uniform(-0.1, 1, (3, 60, 40)).astype(np.float32)
     clipped = rng.random((60, 40)) > 0.98
-    whole = coloured_by_surroundings(planes, clipped, clipped)
+    whole = _coloured(planes, clipped, clipped)
     assert (whole != planes).any()
     assert MARGIN_PX > AROUND_PX
     part = np.s_[20 - MARGIN_PX : 45 + MARGIN_PX]
-    got = coloured_by_surroundings(planes[:, part], clipped[part], clipped[part])
+    got = _coloured(planes[:, part], clipped[part], clipped[part])
     np.testing.assert_array_equal(got[:, MARGIN_PX:-MARGIN_PX], whole[:, 20:45])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.ndimage
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,6 +12,7 @@ from camkit.streaks.shapes import (
     pooled,
     rim_distance_px,
     upsampled,
+    widened,
     with_means,
 )
 
@@ -95,3 +97,15 @@ def test_no_light_appears_where_none_may_be(height: int, width: int, seed: int) 
     assert np.isfinite(light).all()
     assert (light[base == 0] == 0).all()
     assert light.shape == base.shape
+
+
+@pytest.mark.parametrize("reach", [(0, 0), (1, 1), (3, 3), (2, 1), (9, 0)])
+def test_a_widened_plane_has_the_largest_value_around(reach: tuple[int, int]) -> None:
+    rng = np.random.default_rng(2)
+    size = 2 * reach[0] + 1, 2 * reach[1] + 1
+    plane = rng.normal(0, 1, (7, 23)).astype(np.float32)
+    wanted = scipy.ndimage.maximum_filter(plane, size, mode="nearest")
+    np.testing.assert_array_equal(widened(plane, *reach), wanted)
+    mask = rng.random((7, 23)) > 0.95
+    spread = scipy.ndimage.binary_dilation(mask, np.ones(size, np.bool_))
+    np.testing.assert_array_equal(widened(mask, *reach), spread)

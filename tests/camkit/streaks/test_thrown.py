@@ -8,6 +8,7 @@ import scipy.signal
 
 from camkit.contracts import FloatArray
 from camkit.streaks import thrown
+from camkit.streaks.cell_rows import Lattice
 from camkit.streaks.cells import COLOURS
 from camkit.streaks.recovery import Recovery, recover
 from camkit.streaks.regions import Window
@@ -40,7 +41,7 @@ def _under(streaks: list[Streaks], size: tuple[int, int] = SIZE, rows: int = 100
     for top in range(0, size[0], rows):
         for colour, plane in enumerate(planes):
             for one in streaks:
-                one.add(plane[top : top + rows], colour, top)
+                one.add(plane[top : top + rows], colour, Lattice(top=top))
     return planes
 
 

@@ -371,8 +371,10 @@ def test_bands_threads_and_memory_change_no_bit_of_cleared_samples(
     whole = start(sampled, capture, threads=1).fill()
     for choices in ({"threads": 2}, {"threads": 1, "max_mem_bytes": 400_000_000}):
         np.testing.assert_array_equal(start(sampled, capture, **choices).fill(), whole)
-    for rows in (14, 34):
-        monkeypatch.setattr(highlights, "BAND_ROWS", rows)
+    for cells, cleared, lit in ((14, 8, 30), (34, 40, 7)):
+        monkeypatch.setattr(highlights, "BAND_ROWS", cells)
+        monkeypatch.setattr(highlights, "CLEARED_ROWS", cleared)
+        monkeypatch.setattr(highlights, "LIT_ROWS", lit)
         np.testing.assert_array_equal(start(sampled, capture).fill(), whole)
 
 
@@ -389,8 +391,9 @@ def test_cleared_samples_are_those_of_the_whole_mosaic(sampled: Bundle, light: F
     cleared = samples.copy()
     painter.clear(cleared, over, 0, sites)
     apply_gains(cleared, "RGGB", GAINS)
-    lit = painter.light_up(demosaic(cleared, "RGGB", "quality"), over, 0, GAINS)
-    wanted = no_brighter(lit, _plane(capture, sampled, "rgb"), near_clipped(over))
+    wanted = demosaic(cleared, "RGGB", "quality")
+    painter.light_up(wanted, over, 0, GAINS)
+    no_brighter(wanted, _plane(capture, sampled, "rgb"), near_clipped(over))
     got = _plane(capture, sampled, "lit")
     np.testing.assert_allclose(got, wanted, rtol=1e-5, atol=1e-6)
 

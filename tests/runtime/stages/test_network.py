@@ -226,15 +226,17 @@ def test_where_no_plane_stands_in_a_bad_tile_is_refused_without_a_hint(tmp_path:
         assert "--on-unsafe" not in str(caught.value)
 
 
-def _multiplying(gain: float) -> bytes:
-    """Return the small network of one plane, its output multiplied."""
+def _multiplying(*gains: float) -> bytes:
+    """Return the small network of as many planes, its outputs multiplied."""
     import onnx
     from onnx import numpy_helper
 
-    model = onnx.load_from_string(finer_network(1, 1, scale=1))
+    model = onnx.load_from_string(finer_network(len(gains), len(gains), scale=1))
     for tensor in model.graph.initializer:
         if tensor.name == "tail.weight":
-            scaled = np.float32(gain) * numpy_helper.to_array(tensor)
+            weight = numpy_helper.to_array(tensor)
+            outputs = np.repeat(np.float32(gains), len(weight) // len(gains))
+            scaled = outputs.reshape(-1, *[1] * (weight.ndim - 1)) * weight
             tensor.CopyFrom(numpy_helper.from_array(scaled, tensor.name))
     return bytes(model.SerializeToString(deterministic=True))
 
@@ -293,6 +295,32 @@ def test_a_network_that_keeps_white_darkens_no_lamp_below_it(tmp_path: Path) -> 
     assert dark.max() < 0.2
     got = start(_dimmed(tmp_path, 0.01, keeps_white=True), light).fill()
     np.testing.assert_allclose(got[0, :, :4], np.tile([0.2, 0.9, 1.0, 1.0], (64, 1)), rtol=1e-3)
+
+
+def test_a_network_that_raises_colours_apart_keeps_lamps_white_in_the_output(
+    tmp_path: Path,
+) -> None:
+    """Red and blue far above white take green away behind the colour matrix."""
+    data, port = _multiplying(6, 0.01, 6), Port(name="a", channels=3)
+    stages = (
+        Linearise(gives=("light",)),
+        Network(takes=("light",), gives=("clean",), keeps_white=True, most_light=4e3),
+        Color(takes=("clean",)),
+    )
+    camera = write_planes_bundle(
+        tmp_path,
+        stages,
+        sensor=planes_sensor(("R", "G", "B"), size_px=None),
+        networks={"restore": (facts_of(data, [port], [port]), data)},
+        products={"image": "picture"},
+        format_version="2.8",
+    )
+    matrix = np.array([[0.66, -0.18, -0.05], [-0.52, 1.3, 0.25], [-0.1, 0.17, 0.65]])
+    light = made_planes(samples=np.full((3, 64, 96), 2, np.float32), color_matrix=matrix)
+    shown, raw = (start(camera, light, color=color).fill() for color in ("rec709", "camera"))
+    assert raw.min() > 0.99
+    assert raw[0].max() > 2 * raw[1].min()
+    assert shown.min() > 0.99
 
 
 def test_what_a_network_that_keeps_white_adds_stays(tmp_path: Path) -> None:
