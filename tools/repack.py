@@ -6,7 +6,8 @@ surroundings alone: then golden outputs and activations are made anew, and the v
 With `--floor SHARE` pictures of photons have no black where light was counted; with
 `--light-spread SHARE` the light that networks behind a bank move is bounded by so much of the
 contrast between cells; with `--limited` undistortion leaves no rings around lamps; with
-`--streaks-from-samples` streaks are taken from the mosaic, and no network darkens a lamp. The laws
+`--streaks-from-samples` streaks are taken from the mosaic, and no network darkens a lamp; with
+`--psf FILE` the same lens has a PSF of other depths (`camkit freeze --depths-mm`). The laws
 of its pictures are measured and stated. The result proves itself before it gets its name.
 """
 
@@ -16,9 +17,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.manifest import FORMAT_VERSION, Manifest
+from camkit.bundle.optics import PSF
+from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import GOLDEN, open_bundle
 from camkit.bundle.stages import (
     Demosaic,
@@ -30,6 +35,7 @@ from camkit.bundle.stages import (
 )
 from camkit.bundle.stages import StageEntry as Stage
 from camkit.bundle.writer import write_bundle
+from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, ParityError
 from camkit.export.activations import with_activations
 from camkit.export.golden_cases import add_outputs
@@ -50,6 +56,7 @@ def repack(
     light_spread: float | None = None,
     limited: bool = False,
     from_samples: bool = False,
+    psf: Path | None = None,
 ) -> int:
     """Write one bundle anew; give its bytes.
 
@@ -61,9 +68,11 @@ def repack(
         light_spread: Of the bound on networks behind a bank; None leaves it as it is.
         limited: Limit the overshoot of undistortion.
         from_samples: Whether streaks of lights are taken from the samples of the mosaic.
+        psf: PSF that the same lens was frozen into anew; None leaves the old one.
 
     Raises:
         BundleError: If the old one is damaged.
+        ContractError: If the PSF is of another lens.
         ParityError: If the new one fails its check; nothing is written then.
     """
     bundle = open_bundle(old)
@@ -86,7 +95,9 @@ def repack(
             changes.append((Undistort, {"overshoot": "limited"}))
         if from_samples:
             changes += _lights_from_samples(manifest)
-        if changes:
+        if psf is not None:
+            members[PSF] = psf_to_bytes(_psf_of_same_lens(psf, bundle.psf))
+        if changes or psf is not None:
             manifest = _changed(manifest, changes)
             made = write_bundle(trial, manifest, members)
             golden = golden_from_bytes(members[GOLDEN])
@@ -119,6 +130,19 @@ def _lights_from_samples(manifest: Manifest) -> list[Change]:
     ]
 
 
+def _psf_of_same_lens(path: Path, old: FrozenPsf) -> FrozenPsf:
+    """Return the PSF of a file.
+
+    Raises:
+        ContractError: If its distortion, which no two lenses share, is not that of the old one.
+    """
+    new = read_psf(path)
+    bent, before = new.distortion.coefficients, old.distortion.coefficients
+    if bent.shape != before.shape or not np.allclose(bent, before, rtol=1e-9):
+        raise ContractError(f"{path} was frozen from another lens than the bundle's: train anew")
+    return new
+
+
 def _changed(manifest: Manifest, changes: Sequence[Change]) -> Manifest:
     """Return the manifest with changed stages, as the next minor version of the bundle."""
     stages = tuple(
@@ -141,6 +165,7 @@ def main() -> None:
     parser.add_argument("--light-spread", type=float)
     parser.add_argument("--limited", action="store_true")
     parser.add_argument("--streaks-from-samples", action="store_true")
+    parser.add_argument("--psf", type=Path)
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
     after = repack(
@@ -151,6 +176,7 @@ def main() -> None:
         light_spread=arguments.light_spread,
         limited=arguments.limited,
         from_samples=arguments.streaks_from_samples,
+        psf=arguments.psf,
     )
     print(f"{arguments.out}: {after} bytes, before {before}")
 
