@@ -7,8 +7,9 @@ With `--floor SHARE` pictures of photons have no black where light was counted; 
 `--light-spread SHARE` the light that networks behind a bank move is bounded by so much of the
 contrast between cells, and none darkens what is nearly white; with `--limited` undistortion leaves
 no rings around lamps; with `--streaks-from-samples` streaks are taken from the mosaic, and no
-network darkens a lamp. The laws of its pictures are measured and stated. The result proves itself
-before it gets its name.
+network darkens a lamp; with `--psf FILE` the same lens has a PSF of other depths (`camkit freeze
+--depths-mm`). The laws of its pictures are measured and stated. The result proves itself before it
+gets its name.
 """
 
 import argparse
@@ -17,9 +18,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from camkit.bundle.golden import golden_from_bytes, golden_to_bytes
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.manifest import FORMAT_VERSION, Manifest
+from camkit.bundle.optics import PSF
+from camkit.bundle.psf_file import psf_to_bytes, read_psf
 from camkit.bundle.reader import CARD, GOLDEN, open_bundle
 from camkit.bundle.stages import (
     Demosaic,
@@ -31,6 +36,7 @@ from camkit.bundle.stages import (
 )
 from camkit.bundle.stages import StageEntry as Stage
 from camkit.bundle.writer import write_bundle
+from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, ParityError
 from camkit.export.activations import with_activations
 from camkit.export.card import with_laws_text
@@ -52,6 +58,7 @@ def repack(
     light_spread: float | None = None,
     limited: bool = False,
     from_samples: bool = False,
+    psf: Path | None = None,
 ) -> int:
     """Write one bundle anew; give its bytes.
 
@@ -63,9 +70,11 @@ def repack(
         light_spread: Of the bound on networks behind a bank; None leaves it as it is.
         limited: Limit the overshoot of undistortion.
         from_samples: Whether streaks of lights are taken from the samples of the mosaic.
+        psf: PSF that the same lens was frozen into anew; None leaves the old one.
 
     Raises:
         BundleError: If the old one is damaged.
+        ContractError: If the PSF is of another lens.
         ParityError: If the new one fails its check; nothing is written then.
     """
     bundle = open_bundle(old)
@@ -76,19 +85,15 @@ def repack(
     manifest = bundle.manifest.model_copy(update=newest)
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.camkit"
-        changes: list[Change] = []
-        if clip_reach_px is not None:
-            changes.append((Wiener, {"clip_reach_px": clip_reach_px}))
-        if floor is not None:
-            changes.append((SuperResolve, {"floor": floor}))
+        changes = _simple_changes(clip_reach_px, floor, limited=limited)
         if light_spread is not None:  # with the mask that a bound needs
             manifest = manifest.model_copy(update={"stages": bounded_stages(manifest, ENFORCE)})
             changes.append((Network, {"light": LightBound(spread=light_spread, keeps_bright=True)}))
-        if limited:
-            changes.append((Undistort, {"overshoot": "limited"}))
         if from_samples:
             changes += _lights_from_samples(manifest)
-        if changes:
+        if psf is not None:
+            members[PSF] = psf_to_bytes(_psf_of_same_lens(psf, bundle.psf))
+        if changes or psf is not None:
             manifest = _changed(manifest, changes)
             made = write_bundle(trial, manifest, members)
             golden = golden_from_bytes(members[GOLDEN])
@@ -107,6 +112,20 @@ def repack(
     return new.stat().st_size
 
 
+def _simple_changes(
+    clip_reach_px: int | None, floor: float | None, *, limited: bool
+) -> list[Change]:
+    """Return the changes that set one number of one stage."""
+    changes: list[Change] = []
+    if clip_reach_px is not None:
+        changes.append((Wiener, {"clip_reach_px": clip_reach_px}))
+    if floor is not None:
+        changes.append((SuperResolve, {"floor": floor}))
+    if limited:
+        changes.append((Undistort, {"overshoot": "limited"}))
+    return changes
+
+
 def _lights_from_samples(manifest: Manifest) -> list[Change]:
     """Return the changes by which lights are given the mosaic of their colours, and stay white.
 
@@ -122,6 +141,19 @@ def _lights_from_samples(manifest: Manifest) -> list[Change]:
         (Highlights, {"takes": (lights.takes[0], colours.takes[0])}),
         (Network, {"keeps_white": True}),
     ]
+
+
+def _psf_of_same_lens(path: Path, old: FrozenPsf) -> FrozenPsf:
+    """Return the PSF of a file.
+
+    Raises:
+        ContractError: If its distortion, which no two lenses share, is not that of the old one.
+    """
+    new = read_psf(path)
+    bent, before = new.distortion.coefficients, old.distortion.coefficients
+    if bent.shape != before.shape or not np.allclose(bent, before, rtol=1e-9):
+        raise ContractError(f"{path} was frozen from another lens than the bundle's: train anew")
+    return new
 
 
 def _changed(manifest: Manifest, changes: Sequence[Change]) -> Manifest:
@@ -146,6 +178,7 @@ def main() -> None:
     parser.add_argument("--light-spread", type=float)
     parser.add_argument("--limited", action="store_true")
     parser.add_argument("--streaks-from-samples", action="store_true")
+    parser.add_argument("--psf", type=Path)
     arguments = parser.parse_args()
     before = arguments.old.stat().st_size
     after = repack(
@@ -156,6 +189,7 @@ def main() -> None:
         light_spread=arguments.light_spread,
         limited=arguments.limited,
         from_samples=arguments.streaks_from_samples,
+        psf=arguments.psf,
     )
     print(f"{arguments.out}: {after} bytes, before {before}")
 

@@ -12,15 +12,18 @@ and a little light of each colour's own, seen through the kernels of one distanc
 
 and what kernels cannot promise has the power MISTRUST s F. A lens blurs its colours differently at
 every distance, in size and in place, so colours that share their light tell the distance, even
-where no edge is sharp. Y is Gaussian and its covariance a diagonal one plus one of rank one, so
-its probability has a closed form. The power s is the likeliest of a few.
+where no edge is sharp. The covariance of Y is a diagonal one plus one of rank one, so its
+probability has a closed form. It is that of Student's distribution: a scene has frequencies that no
+single s foresees, and kernels have zeros where another lens of the series has none; behind
+Gaussian light a few such frequencies outvoted all others. The power s is the likeliest of a few.
 
 Probabilities of neighbouring blocks are multiplied, since most scenes are smooth in depth, and
-tempered, since no scene is Gaussian. What is given is the mean of 1 / distance, in which defocus
-is linear.
+tempered, since neighbouring frequencies are no witnesses of their own. Those of neighbouring steps
+are multiplied too: kernels between known depths are mixtures, whose zeros are filled, so they err
+less than kernels of a single depth where both are wrong. The result is the mean of 1 / distance, in
+which defocus is linear; NaN where the odds are even.
 """
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -32,9 +35,10 @@ from numpy.typing import NDArray
 
 from camkit.contracts import CfaPattern, FloatArray, NoiseModel, cfa_channels
 from camkit.runtime.bank.blocks import to_otf
+from camkit.runtime.bank.cell_means import cell_count
+from camkit.runtime.bank.kernels_by_distance import KernelsByDistance, NearnessMap
 from camkit.runtime.bank.psf import FieldKernels, FloatGrid
 from camkit.runtime.geometry.sensor_window import SensorWindow
-from camkit.units import MM_PER_M
 
 CELL_PX: Final = 4
 BLOCK_CELLS: Final = 96
@@ -44,16 +48,18 @@ EVERY: Final = 3
 """One in so many frequencies: the window of a block blurs its spectrum anyway."""
 CORNER_FREQUENCY: Final = 1 / 512
 EXPONENT: Final = 2.7
-OWN: Final = 2.0
+OWN: Final = 15.0
 MISTRUST: Final = 0.002
+FREEDOM: Final = 1.0
+"""Degrees of freedom of Student's distribution."""
 POWERS: Final = tuple(10.0 ** (np.arange(9) * 0.67 - 5))
 """Powers s at a frequency of `POWER_AT`, over the squared level."""
 POWER_AT: Final = 0.03
-STEPS: Final = 17
-"""Distances that are tried, evenly in 1 / distance."""
-KEPT_STEPS: Final = 4
-"""Steps whose kernels are kept, since neighbouring blocks share them."""
-TEMPER: Final = 0.02
+TEMPER: Final = 0.06
+BESIDE: Final = (0.25, 0.5, 0.25)
+"""Weights of the steps beside a step: every other one may be of a known depth."""
+EVEN_ODDS: Final = 0.5
+"""Spread over the steps, in that of even odds, from which on nothing tells the distance."""
 NEIGHBOURS: Final = (1.0, 1.0, 1.0)
 """Weights of the blocks beside a block, along rows and columns."""
 EVERYWHERE: Final = 0.1
@@ -61,102 +67,9 @@ EVERYWHERE: Final = 0.1
 CLIPPED_SHARE: Final = 0.005
 """A block with more clipped cells is not asked."""
 DARK: Final = 1e-6
-LEAST_NEARNESS: Final = 1e-9
-"""In 1/mm; scenes that are farther count as 1000 km away."""
 
 Complex = NDArray[np.complex64]
 Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NearnessMap:
-    """The nearness of the scene, over a capture.
-
-    Attributes:
-        values: (rows, columns), 1 / distance in 1/mm.
-        first_px: Where the first lies, along rows and columns.
-        step_px: How far neighbours are apart, likewise.
-    """
-
-    values: FloatGrid
-    first_px: tuple[float, float]
-    step_px: tuple[float, float]
-
-    def at(self, x_px: float, y_px: float) -> float:
-        """Return 1 / distance in 1/mm of a pixel position; linear between places."""
-        where = [
-            [(at - first) / step]
-            for at, first, step in zip((y_px, x_px), self.first_px, self.step_px, strict=True)
-        ]
-        found = scipy.ndimage.map_coordinates(self.values, where, order=1, mode="nearest")
-        return float(found[0])
-
-    def to_json(self) -> dict[str, float]:
-        """Return the distances in m that a sidecar keeps: nearest, usual and farthest."""
-        far, middle, near = np.quantile(self.values, (0, 0.5, 1))
-        return {
-            name: float(1 / max(nearness, LEAST_NEARNESS)) / MM_PER_M
-            for name, nearness in (("nearest_m", near), ("median_m", middle), ("farthest_m", far))
-        }
-
-
-class KernelsByDistance:
-    """The kernels of a camera at as many distances as are told apart.
-
-    Kernels are linear in 1 / distance between the depths that are known, as
-    `camkit.contracts.depth_weights` has them.
-    """
-
-    def __init__(self, depths_mm: FloatGrid, kernels: Sequence[FieldKernels]) -> None:
-        """Take what is known.
-
-        Args:
-            depths_mm: (depth,), increasing; inf is allowed.
-            kernels: Of every depth, of one shape.
-        """
-        known = 1 / np.asarray(depths_mm, np.float64)
-        self.nearness: FloatGrid = np.linspace(known[-1], known[0], STEPS)
-        hats = [np.interp(self.nearness, known[::-1], unit) for unit in np.eye(known.size)[::-1]]
-        self.weights: FloatGrid = np.stack(hats, axis=1)
-        """(step, depth): the share of every depth in the kernels of a step."""
-        self._kernels = tuple(kernels)
-        self.of = lru_cache(maxsize=KEPT_STEPS)(self._of)
-        """Cached: the `FieldKernels` of a step."""
-
-    def step_of(self, nearness: float) -> int:
-        """Return the step nearest to 1 / distance in 1/mm."""
-        return int(np.abs(self.nearness - nearness).argmin())
-
-    def over(self, scene: NearnessMap) -> "KernelsOfScene":
-        """Return the kernels of the places of a capture, for a bank."""
-        return KernelsOfScene(kernels=self, scene=scene)
-
-    def in_cells(self) -> tuple[FieldKernels, ...]:
-        """Return the kernels of every depth as seen in cells."""
-        return tuple(replace(k, kernels=_in_cells(k.kernels)) for k in self._kernels)
-
-    def _of(self, step: int) -> FieldKernels:
-        used = [(w, k) for w, k in zip(self.weights[step], self._kernels, strict=True) if w > 0]
-        if len(used) == 1:
-            return used[0][1]
-        mixed = sum(np.float32(weight) * kernels.kernels for weight, kernels in used)
-        return replace(used[0][1], kernels=np.asarray(mixed, np.float32))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KernelsOfScene:
-    """The kernels of a scene; a `camkit.runtime.bank.blocks.KernelChoice`."""
-
-    kernels: KernelsByDistance
-    scene: NearnessMap
-
-    def number_at(self, x_px: float, y_px: float) -> int:
-        """Return the step of the distance at a pixel position of the capture."""
-        return self.kernels.step_of(self.scene.at(x_px, y_px))
-
-    def kernels_of(self, number: int) -> FieldKernels:
-        """Return the kernels of a step."""
-        return self.kernels.of(number)
 
 
 def find_nearness(
@@ -181,17 +94,17 @@ def find_nearness(
         threads: Blocks looked at at a time; no influence on what is found.
 
     Returns:
-        Where nothing tells the distance, the middle of what is known.
+        NaN where nothing tells the distance.
     """
     spectrum = _spectrum(cfa, len(cells))
-    coarse = kernels.in_cells()
+    coarse = _coarse(kernels)
     rows, columns = (_laid(side) for side in cells.shape[1:])
 
     def look(place: tuple[int, int]) -> FloatGrid:
         top, left = place
         part = np.s_[:, top : top + BLOCK_CELLS, left : left + BLOCK_CELLS]
         if clipped[part].any(axis=0).mean() > CLIPPED_SHARE:
-            return np.zeros(STEPS)
+            return np.zeros(kernels.nearness.size)
         at_mm = window.to_mm(*(CELL_PX * (at + BLOCK_CELLS / 2) - 0.5 for at in (left, top)))
         transfers = [to_otf(k.at(*map(float, at_mm)), BLOCK_CELLS) for k in coarse]
         otf = spectrum.of(np.stack(transfers))
@@ -199,18 +112,44 @@ def find_nearness(
 
     with ThreadPoolExecutor(threads) as pool:
         found = list(pool.map(look, ((top, left) for top in rows for left in columns)))
-    likely = np.array(found).reshape(len(rows), len(columns), STEPS)
-    everywhere = EVERYWHERE * likely.mean(axis=(0, 1))
-    for axis in (0, 1):
-        likely = scipy.ndimage.convolve1d(likely, NEIGHBOURS, axis=axis, mode="constant")
-    likely += everywhere
-    odds = np.exp(TEMPER * (likely - likely.max(axis=-1, keepdims=True)))
-    values = (odds * kernels.nearness).sum(axis=-1) / odds.sum(axis=-1)
+    likely = np.array(found).reshape(len(rows), len(columns), kernels.nearness.size)
     middles = [CELL_PX * (starts[0] + BLOCK_CELLS / 2) - 0.5 for starts in (rows, columns)]
     steps = [CELL_PX * float(s[-1] - s[0]) / max(len(s) - 1, 1) or 1.0 for s in (rows, columns)]
     return NearnessMap(
-        values=values, first_px=(middles[0], middles[1]), step_px=(steps[0], steps[1])
+        values=_means(likely, kernels.nearness),
+        first_px=(middles[0], middles[1]),
+        step_px=(steps[0], steps[1]),
     )
+
+
+def search_blocks(size_px: tuple[int, int]) -> int:
+    """Return how many blocks of a capture of (height, width) are asked."""
+    rows, columns = (len(_laid(cell_count(side, CELL_PX))) for side in size_px)
+    return rows * columns
+
+
+def _means(likely: FloatGrid, nearness: FloatGrid) -> FloatGrid:
+    """Return (rows, columns): the mean nearness of every block; NaN where the odds are even.
+
+    Args:
+        likely: (rows, columns, step) logarithms of probabilities, of every block alone.
+        nearness: (step,).
+    """
+    everywhere = EVERYWHERE * likely.mean(axis=(0, 1))
+    for axis in (0, 1):
+        likely = scipy.ndimage.convolve1d(likely, NEIGHBOURS, axis=axis, mode="constant")
+    likely = scipy.ndimage.convolve1d(likely + everywhere, BESIDE, axis=-1, mode="nearest")
+    odds = np.exp(TEMPER * (likely - likely.max(axis=-1, keepdims=True)))
+    odds /= odds.sum(axis=-1, keepdims=True)
+    means = odds @ nearness
+    spread = np.sqrt((odds * np.square(nearness - means[..., None])).sum(axis=-1))
+    return np.where(spread < EVEN_ODDS * nearness.std(), means, np.nan)
+
+
+@lru_cache(maxsize=1)
+def _coarse(kernels: KernelsByDistance) -> tuple[FieldKernels, ...]:
+    """Return the kernels of every depth as seen in cells; kept for the next capture."""
+    return tuple(replace(k, kernels=_in_cells(k.kernels)) for k in kernels.known)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -317,6 +256,7 @@ def _likelihoods(
         joint = (crossed * inverse).sum(axis=1)
         misfit = (squared * inverse).sum(axis=1)
         misfit -= (np.square(joint.real) + np.square(joint.imag)) * fall / shared
+        misfit = (FREEDOM + len(block)) * np.log1p(misfit / FREEDOM)
         misfit += np.log(alone).sum(axis=1) + np.log(shared)
         best = np.maximum(best, -(misfit @ spectrum.weight).astype(np.float64))
     return np.asarray(best - best.max())

@@ -1,8 +1,9 @@
 """The Wiener bank, or a classical method on its blocks."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -22,12 +23,12 @@ from camkit.runtime.bank.blocks import (
     cut_block_px,
     lay_spans,
 )
-from camkit.runtime.bank.distance import (
-    CELL_PX,
+from camkit.runtime.bank.distance import CELL_PX, find_nearness, search_blocks
+from camkit.runtime.bank.kernels_by_distance import (
     KEPT_STEPS,
+    MEAN,
     KernelsByDistance,
     KernelsOfScene,
-    find_nearness,
 )
 from camkit.runtime.bank.lights import fitted_px, light_share
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
@@ -53,9 +54,16 @@ FOLLOWS: Final = "noise and level of every block, hence the ISO"
 ESTIMATED: Final = "estimated"
 KERNEL_BLOCKS: Final = 3.2
 """A kernel of another place with its transform, in blocks that are only filtered (measured)."""
-FOUND_SHARE: Final = 1.0
-"""Finding the distance, in what everything but bank and network takes (measured: about 1.5
-CPU-seconds at 24 megapixels)."""
+KEPT_CAMERAS: Final = 1
+"""Cameras whose kernels of all distances are kept, since its next capture needs them too."""
+CELLS_SHARE: Final = 0.6
+"""Reading a capture in cells, in what everything but bank and network takes (measured: 0.05
+CPU-seconds per megapixel)."""
+SEARCH_BLOCKS: Final = 2.2
+"""Asking a block for its distance, in blocks that are filtered (measured: 4.6 CPU-milliseconds)."""
+KERNELS_SHARE: Final = 0.1
+"""Making the kernels of all distances, per million samples of the PSF, likewise (measured: 0.08
+CPU-seconds for 12 million)."""
 LIGHTS_AT_LEAST: Final = 1 / 7
 """Of explaining a block as a whole, what it costs however small the windows (two transforms)."""
 PLANES_HELD: Final = 5
@@ -109,6 +117,10 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
     if job.options.unit is not None and FOCUS in job.options.unit.facts:
         job.record[FOCUS] = job.options.focus_um
 
+    def warnings() -> tuple[str, ...]:
+        found = job.kept.get(_nearness_key(entry))
+        return () if found is None else (found.describe(),)
+
     def run(taken: Sequence[Stream]) -> tuple[Stream, ...]:
         return (replace(taken[0].with_bands(_restored(entry, job, taken)), noise_rise=None),)
 
@@ -123,8 +135,9 @@ def prepare(entry: Wiener, job: Job) -> StageWork:
     if _finds_distance(entry, bundle, job.options):
         fields, depths, _, *sides = bundle.psf.kernels.shape
         colours = len(bundle.manifest.sensor.channels)
-        held += 4 * fields * colours * math.prod(sides) * (depths + KEPT_STEPS)
-    return StageWork(run=run, held_bytes=held)
+        # those of all depths once more in cells are smaller than one
+        held += 4 * fields * colours * math.prod(sides) * (depths + KEPT_STEPS + 1)
+    return StageWork(run=run, held_bytes=held, warnings=warnings)
 
 
 def _restored(entry: Wiener, job: Job, taken: Sequence[Stream]) -> Iterator[Rows]:
@@ -164,12 +177,14 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     bundle = job.known_bundle
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
-    kernels_at = _kernels(job)
-    local = LocalPsf(
-        kernels=kernels_at(job.options.depth_mm),
-        window=job.window_of(planes.plane),
-        choice=_by_distance(entry, job, planes, kernels_at),
-    )
+    camera = bundle, job.options.focus_um, job.placement.kernel_scale
+    window = job.window_of(planes.plane)
+    if _finds_distance(entry, bundle, job.options):
+        by_distance = _kernels_by_distance(*camera)
+        scene = _scene_kernels(entry, job, planes, by_distance)
+        local = LocalPsf(kernels=by_distance.of(MEAN), window=window, choice=scene)
+    else:
+        local = LocalPsf(kernels=_kernels(bundle, job.options.depth_mm, *camera[1:]), window=window)
     method = job.work.method if job.work.method in METHODS else METHODS[0]
     noise = job.noise.with_gains(planes.gains)
     if entry.together is not None and method == METHODS[0]:
@@ -183,22 +198,25 @@ def make_bank(entry: Wiener, job: Job, planes: Stream) -> BlockBank:
     return restoration_bank(local, cut, noise, method=method, threads=job.threads)
 
 
-def _kernels(job: Job) -> Callable[[float | None], FieldKernels]:
-    """Return the function that gives the kernels of an object distance in mm; None for the mean."""
-    bundle = job.known_bundle
+def _kernels(bundle: Bundle, depth_mm: float | None, focus_um: float, scale: float) -> FieldKernels:
+    """Return the kernels of an object distance; None for the mean."""
     sensor = bundle.manifest.sensor
     assert sensor.type != "spad"  # a spad's counts never join a bank
+    return color_kernels(
+        bundle.psf,
+        *sensor.response_arrays(),
+        depth_mm=depth_mm,
+        focus_um=focus_um,
+        share=bundle.haze.core_share if bundle.manifest.has_haze else None,
+    ).scaled(scale)
 
-    def kernels_at(depth_mm: float | None) -> FieldKernels:
-        return color_kernels(
-            bundle.psf,
-            *sensor.response_arrays(),
-            depth_mm=depth_mm,
-            focus_um=job.options.focus_um,
-            share=bundle.haze.core_share if bundle.manifest.has_haze else None,
-        ).scaled(job.placement.kernel_scale)
 
-    return kernels_at
+@lru_cache(maxsize=KEPT_CAMERAS)
+def _kernels_by_distance(bundle: Bundle, focus_um: float, scale: float) -> KernelsByDistance:
+    """Return the kernels of all distances; the same ones to all captures of a camera."""
+    depths_mm = bundle.psf.depths_mm
+    kernels = [_kernels(bundle, float(depth_mm), focus_um, scale) for depth_mm in depths_mm]
+    return KernelsByDistance(depths_mm, kernels)
 
 
 def _finds_distance(entry: Wiener, bundle: Bundle, options: Options) -> bool:
@@ -207,18 +225,11 @@ def _finds_distance(entry: Wiener, bundle: Bundle, options: Options) -> bool:
     return entry.depth == ESTIMATED and options.depth_mm is None and several
 
 
-def _by_distance(
-    entry: Wiener,
-    job: Job,
-    planes: Stream,
-    kernels_at: Callable[[float | None], FieldKernels],
-) -> KernelsOfScene | None:
-    """Compute the distance of every part of the capture; None where it is told, or there is one."""
-    if not _finds_distance(entry, job.known_bundle, job.options):
-        return None
-    depths_mm = job.known_bundle.psf.depths_mm
-    kernels = KernelsByDistance(depths_mm, [kernels_at(float(d)) for d in depths_mm])
-    key = "nearness", entry.takes
+def _scene_kernels(
+    entry: Wiener, job: Job, planes: Stream, kernels: KernelsByDistance
+) -> KernelsOfScene:
+    """Compute the distance of every part of the capture, and return the kernels of it."""
+    key = _nearness_key(entry)
     if (found := job.kept.get(key)) is None:
         seen = cells_of(job, entry.takes, CELL_PX)
         found = job.kept[key] = find_nearness(
@@ -232,6 +243,11 @@ def _by_distance(
         )
     job.sections["distance"] = found.to_json()
     return kernels.over(found)
+
+
+def _nearness_key(entry: Wiener) -> tuple[str, tuple[str, ...]]:
+    """Return the key of what was found of the distance, among what is kept of a capture."""
+    return "nearness", entry.takes
 
 
 def _plain(job: Job) -> PlainBlock | None:
@@ -260,8 +276,17 @@ def seconds(entry: Wiener, subject: Subject, work: Work, speed: Speed) -> float:
         test = plain_blocks(work.labels, reach)
         if test is not None:
             blocks *= [[not test(row, column) for column in columns] for row in rows]
-    found_s = FOUND_SHARE * subject.megapixels * speed.rest_s_per_mp if finds else 0.0
+    found_s = _search_seconds(subject, speed) if finds else 0.0
     return float(blocks.sum()) / speed.threads + found_s
+
+
+def _search_seconds(subject: Subject, speed: Speed) -> float:
+    """Return the seconds of finding the distance; the first capture pays for the kernels."""
+    kept = _kernels_by_distance.cache_info().currsize > 0
+    made_mp = 0.0 if kept else KERNELS_SHARE * subject.bundle.psf.kernels.size / 1e6
+    rest_mp = CELLS_SHARE * subject.megapixels + made_mp
+    blocks = search_blocks((subject.height_px, subject.width_px))
+    return rest_mp * speed.rest_s_per_mp + SEARCH_BLOCKS * blocks * speed.block_s / speed.threads
 
 
 def _kernel_share(subject: Subject, columns: Sequence[Span]) -> float:

@@ -1,5 +1,6 @@
 """A bundle of format 1.0 is written anew in 2.0: the same members, the same pictures."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from camkit.bundle.golden import golden_from_bytes
 from camkit.bundle.light_bound import LightBound
 from camkit.bundle.manifest import planes_of
+from camkit.bundle.optics import PSF
+from camkit.bundle.psf_file import write_psf
 from camkit.bundle.reader import GOLDEN, MANIFEST, open_bundle
 from camkit.bundle.stages import Demosaic, Highlights, Network, Undistort, Wiener
 from camkit.errors import ContractError, ParityError
@@ -73,6 +76,40 @@ def test_undistortion_without_rings_is_stated_and_proved(
     stages = [m.stage(Undistort) for m in (before, after)]
     assert [stage.overshoot for stage in stages if stage is not None] == ["kept", "limited"]
     assert after.version != before.version
+
+
+def test_the_same_lens_gets_a_psf_of_more_depths_and_keeps_its_networks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = open_bundle(EXAMPLE)
+    old = before.psf
+    deeper = replace(
+        old,
+        kernels=np.concatenate([np.roll(old.kernels, 1, axis=-1), old.kernels], axis=1),
+        depths_mm=np.array([1000.0, *old.depths_mm]),
+    )
+    frozen, new = tmp_path / "psf.safetensors", tmp_path / "new.camkit"
+    write_psf(frozen, deeper)
+    arguments = ["repack", str(EXAMPLE), "--psf", str(frozen), "-o", str(new)]
+    monkeypatch.setattr("sys.argv", arguments)
+    repack.main()
+    after = open_bundle(new)
+    np.testing.assert_array_equal(after.psf.depths_mm, deeper.depths_mm)
+    np.testing.assert_array_equal(after.psf.kernels, deeper.kernels)
+    assert after.manifest.version != before.manifest.version
+    for name in set(before.names) - {GOLDEN, MANIFEST, PSF}:
+        assert after.member(name) == before.member(name)
+    cases = [golden_from_bytes(bundle.member(GOLDEN)) for bundle in (before, after)]
+    assert any(not np.array_equal(cases[0][n].reference, cases[1][n].reference) for n in cases[0])
+
+
+def test_a_psf_of_another_lens_is_refused(tmp_path: Path) -> None:
+    old = open_bundle(EXAMPLE).psf
+    bent = replace(old.distortion, coefficients=old.distortion.coefficients * 1.01)
+    frozen = tmp_path / "psf.safetensors"
+    write_psf(frozen, replace(old, distortion=bent))
+    with pytest.raises(ContractError, match="was frozen from another lens"):
+        repack.repack(EXAMPLE, tmp_path / "new.camkit", psf=frozen)
 
 
 def test_streaks_are_taken_from_the_mosaic_where_lights_are_sought(tmp_path: Path) -> None:

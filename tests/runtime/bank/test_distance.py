@@ -6,17 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camkit.contracts import CfaPattern, FloatArray, NoiseModel, cfa_channels, depth_weights
+from camkit.contracts import CfaPattern, FloatArray, NoiseModel, cfa_channels
 from camkit.runtime.bank import distance
 from camkit.runtime.bank.blocks import to_otf
 from camkit.runtime.bank.cell_means import cell_means
-from camkit.runtime.bank.distance import (
-    CELL_PX,
-    STEPS,
-    KernelsByDistance,
-    NearnessMap,
-    find_nearness,
-)
+from camkit.runtime.bank.distance import CELL_PX, find_nearness
+from camkit.runtime.bank.kernels_by_distance import MEAN, KernelsByDistance, NearnessMap
 from camkit.runtime.bank.psf import FieldKernels
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.rows import ArrayRows
@@ -102,7 +97,7 @@ def test_two_distances_in_one_scene_are_told_apart() -> None:
     assert choice.number_at(1500, 400) < 5
 
 
-def test_likelihoods_are_those_of_a_gaussian_written_out() -> None:
+def test_likelihoods_are_those_of_students_distribution_written_out() -> None:
     rng = np.random.default_rng(2)
     block = rng.uniform(0.2, 0.4, (3, distance.BLOCK_CELLS, distance.BLOCK_CELLS)).astype(
         np.float32
@@ -115,7 +110,9 @@ def test_likelihoods_are_those_of_a_gaussian_written_out() -> None:
         fall=whole.fall[:4],
         moved=whole.moved[:, :4],
     )
-    otf = np.stack([few.of(to_otf(k.at(0, 0), distance.BLOCK_CELLS)) for k in KNOWN.in_cells()])
+    otf = np.stack(
+        [few.of(to_otf(k.at(0, 0), distance.BLOCK_CELLS)) for k in distance._coarse(KNOWN)]
+    )
     got = distance._likelihoods(block, otf, KNOWN.weights, few, NOISE)
 
     level = block.mean(axis=(1, 2), dtype=np.float64)
@@ -135,28 +132,32 @@ def test_likelihoods_are_those_of_a_gaussian_written_out() -> None:
                 )
                 y = seen[:, k]
                 misfit = (y.conj() @ np.linalg.solve(covariance, y)).real
-                total -= few.weight[k] * (misfit + np.linalg.slogdet(covariance)[1])
+                tail = (distance.FREEDOM + 3) * np.log1p(misfit / distance.FREEDOM)
+                total -= few.weight[k] * (tail + np.linalg.slogdet(covariance)[1])
             totals.append(total)
         wanted.append(max(totals))
     np.testing.assert_allclose(got, np.array(wanted) - max(wanted), atol=2e-2)
 
 
-def test_kernels_of_a_step_are_linear_in_nearness_and_keep_their_light() -> None:
-    for step, nearness in enumerate(KNOWN.nearness):
-        shares = depth_weights(DEPTHS_MM, 1 / nearness)
-        np.testing.assert_allclose(KNOWN.weights[step], shares, atol=1e-12)
-        mixed = sum(s * k.kernels for s, k in zip(shares, map(_kernels, DEPTHS_MM), strict=True))
-        np.testing.assert_allclose(KNOWN.of(step).kernels, mixed, atol=1e-7)
-    for coarse in KNOWN.in_cells():
+def test_kernels_in_cells_keep_their_light() -> None:
+    for coarse in distance._coarse(KNOWN):
         np.testing.assert_allclose(coarse.kernels.sum(axis=(-2, -1)), 1, atol=1e-6)
 
 
-def test_infinity_is_a_distance() -> None:
-    known = KernelsByDistance(np.array([1000.0, np.inf]), [_kernels(600.0), _kernels(2000.0)])
-    assert (known.nearness[0], known.nearness[-1]) == (0, 1e-3)
-    assert NearnessMap(values=np.zeros((1, 1)), first_px=(0, 0), step_px=(1, 1)).to_json()[
-        "farthest_m"
-    ] == pytest.approx(1e6)
+def test_a_wrong_kernel_of_a_known_depth_is_no_less_likely_than_the_mixtures_beside_it() -> None:
+    """A pure tone in the middle of the band, where one kernel is zero, outvotes no other."""
+    steps = KNOWN.nearness.size
+    jagged = np.where(np.arange(steps) % 2, 0.0, -40.0) - 20.0 * np.abs(np.arange(steps) - 8)
+    (mean,) = distance._means(jagged[None, None], KNOWN.nearness).ravel()
+    assert KNOWN.step_of(float(mean)) == 8
+
+
+def test_a_few_frequencies_that_no_power_foresees_do_not_decide() -> None:
+    planes = _blurred(_scene((512, 768), 11), KNOWN.of(8))
+    across = np.arange(768, dtype=np.float32)
+    grating = 0.15 * np.sin(2 * np.pi * 0.06 * across) * np.array([[[1.0]], [[-1.0]], [[0.3]]])
+    found = _found((planes + grating).astype(np.float32), CFA)
+    assert np.abs(found.values - KNOWN.nearness[8]).max() < 2 * np.diff(KNOWN.nearness)[0]
 
 
 def test_what_clipped_is_not_asked_and_its_neighbours_answer() -> None:
@@ -167,18 +168,32 @@ def test_what_clipped_is_not_asked_and_its_neighbours_answer() -> None:
     assert np.abs(found.values - KNOWN.nearness[12]).max() < 2 * np.diff(KNOWN.nearness)[0]
 
 
-def test_where_nothing_tells_the_distance_it_is_the_middle() -> None:
+def test_where_nothing_tells_the_distance_kernels_are_the_mean() -> None:
     everywhere = np.ones((1, 512, 512), np.bool_)
     found = _found(np.ones((3, 512, 512), np.float32), CFA, everywhere)
-    np.testing.assert_allclose(found.values, KNOWN.nearness.mean())
+    assert np.isnan(found.values).all()
+    assert KNOWN.over(found).number_at(100, 400) == MEAN
+
+
+def test_even_odds_tell_nothing_and_one_sided_odds_do() -> None:
+    even = np.zeros((1, 1, KNOWN.nearness.size))
+    assert np.isnan(distance._means(even, KNOWN.nearness)).all()
+    sided = even - 100.0 * np.arange(KNOWN.nearness.size)
+    np.testing.assert_allclose(distance._means(sided, KNOWN.nearness), KNOWN.nearness[0], rtol=0.02)
 
 
 @pytest.mark.parametrize("side", [(8, 8), (100, 60), (384, 1000)])
 def test_captures_of_any_size_have_a_distance(side: tuple[int, int]) -> None:
     found = _found(_scene(side, 6), CFA)
-    assert np.isfinite(found.values).all()
     for x_px, y_px in itertools.product((0, side[1] - 1), (0, side[0] - 1)):
-        assert 0 <= KNOWN.over(found).number_at(x_px, y_px) < STEPS
+        assert MEAN <= KNOWN.over(found).number_at(x_px, y_px) < KNOWN.nearness.size
+
+
+@pytest.mark.parametrize(
+    ("size_px", "blocks"), [((8, 8), 1), ((384, 384), 1), ((384, 390), 2), ((4000, 6000), 176)]
+)
+def test_blocks_that_are_asked_cover_the_capture(size_px: tuple[int, int], blocks: int) -> None:
+    assert distance.search_blocks(size_px) == blocks
 
 
 def test_threads_do_not_change_a_bit() -> None:

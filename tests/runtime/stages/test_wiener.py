@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,12 @@ from camkit.contracts import FloatArray, FrozenPsf, NoiseModel
 from camkit.errors import BundleError
 from camkit.runtime.bank.baselines import restoration_bank
 from camkit.runtime.bank.blocks import LocalPsf
-from camkit.runtime.bank.psf import color_kernels
+from camkit.runtime.bank.kernels_by_distance import NearnessMap
+from camkit.runtime.bank.psf import FieldKernels, color_kernels
+from camkit.runtime.capture import Capture
+from camkit.runtime.plan.decision import Work
+from camkit.runtime.plan.speed import Speed
+from camkit.runtime.stages import wiener
 from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from tests.bundle_factory import PITCH_UM
 from tests.deep_bundle import write_deep_bundle
@@ -92,33 +98,100 @@ def test_the_plan_says_whose_kernels_the_bank_has(
     assert start(deep, capture, depth_m=depth_m).record["depth"] == kernels
 
 
-def test_a_bank_that_finds_the_distance_has_its_kernels(tmp_path: Path) -> None:
+@pytest.fixture
+def finding(tmp_path: Path) -> Bundle:
+    """A bundle whose bank finds the distance."""
     deep = write_deep_bundle(tmp_path)
     entry = deep.manifest.stage(Wiener)
     assert entry is not None
     finds = entry.model_copy(update={"depth": "estimated"})
     stages = tuple(finds if stage == entry else stage for stage in deep.manifest.stages)
-    finding = replace(deep, manifest=deep.manifest.model_copy(update={"stages": stages}))
+    return replace(deep, manifest=deep.manifest.model_copy(update={"stages": stages}))
+
+
+def _seen(deep: Bundle) -> Capture:
     light = np.tile(texture(120, 160)[:1], (3, 2, 2))
-    seen = simulate(
-        light, deep.manifest.sensor, deep.psf, SimulationOptions(depth_mm=500.0, seed=1)
+    options = SimulationOptions(depth_mm=500.0, seed=1)
+    seen = simulate(light, deep.manifest.sensor, deep.psf, options)  # type: ignore[arg-type]
+    return made_mosaic(samples=seen.samples, origin_px=(0, 0), sensor_size_px=(320, 240))
+
+
+def test_a_bank_that_finds_the_distance_has_its_kernels(
+    finding: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = NearnessMap(values=np.full((1, 1), 1 / 500), first_px=(0, 0), step_px=(1, 1))
+    monkeypatch.setattr(wiener, "find_nearness", lambda *_, **__: found)
+    capture = _seen(finding)
+    made = start(finding, capture, method="wiener")
+    told = start(finding, capture, method="wiener", depth_m=0.5)
+    np.testing.assert_array_equal(made.fill(), told.fill())
+    assert made.record["depth"] == "estimated"
+    assert made.sections["distance"]["median_m"] == pytest.approx(0.5)
+    assert made.warnings[-1] == "distance found in the capture: 0.5 m"
+    assert "distance" not in told.sections
+
+
+def test_a_bank_that_finds_no_distance_has_mean_kernels(
+    finding: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = NearnessMap(values=np.full((1, 1), np.nan), first_px=(0, 0), step_px=(1, 1))
+    monkeypatch.setattr(wiener, "find_nearness", lambda *_, **__: nothing)
+    stages = tuple(
+        stage.model_copy(update={"depth": "mean"}) if isinstance(stage, Wiener) else stage
+        for stage in finding.manifest.stages
     )
-    capture = made_mosaic(samples=seen.samples, origin_px=(0, 0), sensor_size_px=(320, 240))
+    usual = replace(finding, manifest=finding.manifest.model_copy(update={"stages": stages}))
+    capture = _seen(finding)
+    untold, mean = (start(bundle, capture, method="wiener") for bundle in (finding, usual))
+    np.testing.assert_allclose(untold.fill(), mean.fill(), rtol=1e-3, atol=1e-4)
+    assert untold.sections["distance"] == {}
+    assert "nothing in the capture tells its distance" in untold.warnings[-1]
 
-    def restored(bundle: Bundle, **options: float) -> tuple[FloatArray, dict[str, object]]:
-        made = start(bundle, capture, method="wiener", **options)
-        picture = made.fill()
-        return picture, made.record | made.sections
 
-    found, said = restored(finding)
-    told, _ = restored(finding, depth_m=0.5)
-    mean, _ = restored(deep)
-    assert said["depth"] == "estimated"
-    assert said["distance"]["median_m"] < 0.6  # type: ignore[index]
-    assert np.abs(found - told).mean() < 0.5 * np.abs(mean - told).mean()
-    np.testing.assert_array_equal(told, restored(deep, depth_m=0.5)[0])
+def test_the_distance_of_a_capture_is_found_and_said(finding: Bundle) -> None:
+    made = start(finding, _seen(finding), method="wiener")
+    assert not made.warnings
+    made.fill()
+    assert "distance" in made.sections
+    assert "distance" in made.warnings[-1]
+
+
+def test_kernels_of_all_distances_are_made_for_the_first_capture_alone(
+    finding: Bundle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float | None] = []
+
+    def counted(*arguments: Any, depth_mm: float | None, **options: Any) -> FieldKernels:
+        asked.append(depth_mm)
+        return color_kernels(*arguments, depth_mm=depth_mm, **options)
+
+    monkeypatch.setattr(wiener, "color_kernels", counted)
+    pictures = [start(finding, _seen(finding), method="wiener").fill() for _ in range(2)]
+    assert asked == [500.0, 1000.0, 2000.0]
+    np.testing.assert_array_equal(*pictures)
+
+
+def test_the_plan_counts_the_search_and_the_kernels_of_all_distances(finding: Bundle) -> None:
+    """A small capture pays for whole blocks, the first one for the kernels too."""
+    speed = Speed(block_s=0.01, clipped_block_s=0.1, rest_s_per_mp=0.1, threads=1)
+    subject = start(finding, _seen(finding), method="wiener").job.subject
+    entry = finding.manifest.stage(Wiener)
+    assert subject is not None
+    assert entry is not None
+    told = replace(subject, options=replace(subject.options, depth_m=0.5))
+    wiener._kernels_by_distance.cache_clear()
+    first = wiener.seconds(entry, subject, Work(), speed)
+    start(finding, _seen(finding), method="wiener").fill()
+    second = wiener.seconds(entry, subject, Work(), speed)
+    samples = finding.psf.kernels.size
+    assert first - second == pytest.approx(wiener.KERNELS_SHARE * samples / 1e6 * 0.1)
+    least = wiener.seconds(entry, told, Work(), speed) + wiener.SEARCH_BLOCKS * speed.block_s
+    assert second > least
+
+
+def test_a_bank_that_finds_the_distance_needs_format_2_8(finding: Bundle, tmp_path: Path) -> None:
     older = finding.manifest.model_copy(update={"format_version": "2.7"})
-    members = {name: deep.member(name) for name in deep.names}
+    members = {name: finding.member(name) for name in finding.names}
     with pytest.raises(BundleError, match=r"finds the distance of the scene, which format 2.8"):
         write_bundle(tmp_path / "older.camkit", older, members)
 
