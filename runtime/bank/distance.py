@@ -64,8 +64,8 @@ NEIGHBOURS: Final = (1.0, 1.0, 1.0)
 """Weights of the blocks beside a block, along rows and columns."""
 EVERYWHERE: Final = 0.1
 """Weight of the mean of all blocks: it decides where neither a block nor its neighbours tell."""
-CLIPPED_SHARE: Final = 0.005
-"""A block with more clipped cells is not asked."""
+CLIPPED_SHARE: Final = 0.5
+"""A block with more clipped cells is not asked; with fewer, its halos and the rest still tell."""
 DARK: Final = 1e-6
 
 Complex = NDArray[np.complex64]

@@ -168,6 +168,15 @@ def test_what_clipped_is_not_asked_and_its_neighbours_answer() -> None:
     assert np.abs(found.values - KNOWN.nearness[12]).max() < 2 * np.diff(KNOWN.nearness)[0]
 
 
+def test_a_capture_with_clipped_highlights_tells_its_distance() -> None:
+    """A tenth of the samples clips, a few in every block."""
+    planes = _blurred(_scene((512, 768), 4), KNOWN.of(12))
+    white = np.quantile(planes[1], 0.9)
+    clipped = (planes >= white).any(axis=0, keepdims=True)
+    found = _found(np.minimum(planes, white).astype(np.float32), CFA, clipped)
+    assert np.abs(found.values - KNOWN.nearness[12]).max() < 2 * np.diff(KNOWN.nearness)[0]
+
+
 def test_where_nothing_tells_the_distance_kernels_are_the_mean() -> None:
     everywhere = np.ones((1, 512, 512), np.bool_)
     found = _found(np.ones((3, 512, 512), np.float32), CFA, everywhere)
