@@ -45,6 +45,9 @@ MOSAIC_RATIO: Final = 1.5
 """Differences of neighbours over those of next neighbours, along rows and columns, from which on
 single samples are taken for a mosaic; of pictures it is below 1, of noise 1."""
 _MOST_EIGHT: Final = 255
+_STEADY: Final = 0.5
+"""Share of what the sites of a cell differ by that is the same in every cell, of a mosaic; dithered
+pictures alternate too, but not always alike."""
 _TESTED_PX: Final = 1024
 _LINEAR_ROWS: Final = 256
 
@@ -119,16 +122,21 @@ def _grey_notes(path: Path, samples: NDArray[Any]) -> list[str]:
 
 
 def _is_mosaic(samples: NDArray[Any]) -> bool:
-    """Tell whether neighbours differ more than next neighbours do, both ways."""
-    top, left = (max(0, (side - _TESTED_PX) // 2) for side in samples.shape)
+    """Tell whether neighbours differ more than next neighbours do, both ways and always alike."""
+    top, left = (max(0, (side - _TESTED_PX) // 4 * 2) for side in samples.shape)
     middle = samples[top : top + _TESTED_PX, left : left + _TESTED_PX].astype(np.float32)
     if min(middle.shape) < 3:
         return False
     for plane in (middle, middle.T):
         near, next_ = (float(np.abs(plane[step:] - plane[:-step]).mean()) for step in (1, 2))
-        if not near > MOSAIC_RATIO * next_:
+        # a sensor's samples are never without noise, as those of a drawn checkerboard are
+        if not (next_ > 0 and near > MOSAIC_RATIO * next_):
             return False
-    return True
+    high, wide = (side // 2 * 2 for side in middle.shape)
+    cells = middle[:high, :wide].reshape(high // 2, 2, wide // 2, 2)
+    apart = cells - cells.mean(axis=(1, 3), keepdims=True)
+    steady = np.abs(apart.mean(axis=(0, 2))).mean()
+    return bool(steady > _STEADY * np.abs(apart).mean())
 
 
 def _linear_codes(decoded: Decoded) -> NDArray[np.uint16]:

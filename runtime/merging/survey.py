@@ -237,7 +237,9 @@ def _registered(like: Capture, frames: Sequence[Frame]) -> tuple[Capture, tuple[
             "whose windows say where they lie"
         )
     displays = {window.display for window in windows}
-    common = replace(windows[0], data=box, display=windows[0].display if len(displays) == 1 else box)
+    common = replace(
+        windows[0], data=box, display=windows[0].display if len(displays) == 1 else box
+    )
     wide, high = common.size_px
     note = (
         f"frames are registered by their data windows: {wide}x{high} px from ({box[0]}, {box[1]}) "

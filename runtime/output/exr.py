@@ -80,7 +80,10 @@ class ExrWriter(PictureWriter):
         same = window is not None and window.size_px == self.picture.file_size
         if window is None or not same or self.picture.orientation != UPRIGHT:
             return
-        for name, (x0, y0, x1, y1) in (("dataWindow", window.data), ("displayWindow", window.display)):
+        for name, (x0, y0, x1, y1) in (
+            ("dataWindow", window.data),
+            ("displayWindow", window.display),
+        ):
             header[name] = Imath.Box2i(Imath.V2i(x0, y0), Imath.V2i(x1, y1))
         header["pixelAspectRatio"] = window.pixel_aspect
 

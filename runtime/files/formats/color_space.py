@@ -120,9 +120,7 @@ def space_of_primaries(
     name: str, primaries: Primaries, curve: Curve, white: Chromaticity = D65
 ) -> ColorSpace:
     """Return the space of primaries and one curve."""
-    return ColorSpace(
-        name=name, curves=(curve,) * 3, to_rec709=matrix_to_rec709(primaries, white)
-    )
+    return ColorSpace(name=name, curves=(curve,) * 3, to_rec709=matrix_to_rec709(primaries, white))
 
 
 SRGB: Final = space_of_primaries("sRGB", REC709_PRIMARIES, srgb_curve)

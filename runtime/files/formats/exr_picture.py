@@ -272,6 +272,4 @@ def _space(chromaticities: Any) -> ColorSpace | None:
         raise DecodeError(f"EXR chromaticities are not believable: {points}") from error
     if not np.isfinite(matrix).all():
         raise DecodeError(f"EXR chromaticities are not believable: {points}")
-    return ColorSpace(
-        name="chromaticities", curves=(power_curve(1.0),) * 3, to_rec709=matrix
-    )
+    return ColorSpace(name="chromaticities", curves=(power_curve(1.0),) * 3, to_rec709=matrix)

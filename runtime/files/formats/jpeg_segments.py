@@ -114,6 +114,8 @@ def _check_kind(segment: Segment) -> None:
     if bits != 8:
         raise DecodeError(f"a JPEG of {bits} bits is not read; save it with 8 bits, or as PNG")
     if channels == 4:
-        raise DecodeError("a CMYK JPEG is not read, since its inks are not light; convert it to RGB")
+        raise DecodeError(
+            "a CMYK JPEG is not read, since its inks are not light; convert it to RGB"
+        )
     if channels not in (1, 3):
         raise DecodeError(f"a JPEG has 1 or 3 channels; got {channels}")

@@ -26,7 +26,9 @@ _OFFSETS, _LENGTHS, _ROWS_PER_STRIP = 273, 279, 278
 _TILE_WIDTH, _TILE_HEIGHT, _TILE_OFFSETS, _TILE_LENGTHS = 322, 323, 324, 325
 _FILL_ORDER: Final = 266
 _LOW_BITS_FIRST: Final = 2
-_REVERSED: Final = np.packbits(np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], 1)[:, ::-1], 1)
+_REVERSED: Final = np.packbits(
+    np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], 1)[:, ::-1], 1
+)
 
 Codec = Callable[[bytes], bytes]
 

@@ -100,7 +100,9 @@ def _of_profile(profile: bytes) -> StatedSpace:
 
 def _of_exif(exif: TiffTags) -> StatedSpace:
     stated = (exif.numbers(_COLOR_SPACE) or (None,))[0]
-    adobe = stated == _EXIF_ADOBE or (exif.interoperability == _ADOBE_INDEX and stated != _EXIF_SRGB)
+    adobe = stated == _EXIF_ADOBE or (
+        exif.interoperability == _ADOBE_INDEX and stated != _EXIF_SRGB
+    )
     return StatedSpace(space=color_space.ADOBE_RGB) if adobe else NOTHING
 
 

@@ -9,7 +9,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.colorimetry import D65, REC709_PRIMARIES, adapt_white, apply_matrix, rgb_to_xyz, white_xyz
+from camkit.colorimetry import (
+    D65,
+    REC709_PRIMARIES,
+    adapt_white,
+    apply_matrix,
+    rgb_to_xyz,
+    white_xyz,
+)
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.files.formats.icc_profile import PCS_WHITE
@@ -41,7 +48,9 @@ def to_grey_or_rgb(samples: NDArray[Any], page: TiffPage) -> tuple[NDArray[Any],
     notes = []
     if samples.shape[0] > page.colours:
         premultiplied = page.extra[:1] == (ASSOCIATED_ALPHA,)
-        notes.append("alpha channel dropped" + (", by which colours are multiplied" * premultiplied))
+        notes.append(
+            "alpha channel dropped" + (", by which colours are multiplied" * premultiplied)
+        )
     colours = samples[: page.colours]
     match page.photometric:
         case _ if page.photometric == MIN_IS_WHITE:
@@ -58,7 +67,9 @@ def _looked_up(indices: NDArray[Any], page: TiffPage) -> NDArray[np.uint8]:
     size = 1 << page.bits
     entries = page.numbers(_COLOR_MAP)
     if len(entries) != 3 * size:
-        raise DecodeError(f"a palette of {page.bits} bits has {3 * size} entries; got {len(entries)}")
+        raise DecodeError(
+            f"a palette of {page.bits} bits has {3 * size} entries; got {len(entries)}"
+        )
     table = np.array(entries).reshape(3, size)
     # some writers fill the 16 bits of an entry with 8
     eight = table >> 8 if table.max() > 255 else table

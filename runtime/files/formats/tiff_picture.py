@@ -1,12 +1,13 @@
 """The samples of a TIFF page.
 
-    plain RGB and grey of 8, 16 and 32 bits      OpenCV, which gives other kinds wrong in silence
-    planes, halves, doubles, alpha, MinIsWhite   tifffile, with imagecodecs where it is there
-    samples of 1 to 15 bits                      `packed_bits`
+plain RGB and grey of 8, 16 and 32 bits      OpenCV, which gives other kinds wrong in silence
+planes, halves, doubles, alpha, MinIsWhite   tifffile, with imagecodecs where it is there
+samples of 1 to 15 bits                      `packed_bits`
 """
 
 import contextlib
 import logging
+import lzma
 import struct
 import zlib
 from collections.abc import Iterator
@@ -34,7 +35,16 @@ _ORIENTATION: Final = 274
 _OPAQUE: Final = 255
 _INSIDE_TIFFFILE: Final = (
     *(ValueError, TypeError, KeyError, IndexError, NotImplementedError, RuntimeError),
-    *(struct.error, zlib.error, EOFError, OverflowError, ZeroDivisionError, AttributeError),
+    *(
+        struct.error,
+        zlib.error,
+        lzma.LZMAError,
+        EOFError,
+        ImportError,
+        OverflowError,
+        ZeroDivisionError,
+        AttributeError,
+    ),
 )
 """What tifffile and its codecs raise of files that are damaged or of a kind that they lack."""
 _COMPRESSIONS: Final = {
@@ -84,9 +94,7 @@ def decode_tiff(path: Path, tags: TiffTags) -> Decoded:
     if mapped is not None:
         planes = mapped if mapped.ndim == 2 else np.moveaxis(mapped, -1, 0)
         top = int(np.iinfo(planes.dtype).max)
-        return Decoded(
-            samples=planes, top=top, space=stated.space, doubt=stated.doubt, notes=notes
-        )
+        return Decoded(samples=planes, top=top, space=stated.space, doubt=stated.doubt, notes=notes)
     ready = _by_opencv(path, page)
     if ready is not None:
         samples, top = ready, _top(ready)
@@ -98,8 +106,12 @@ def decode_tiff(path: Path, tags: TiffTags) -> Decoded:
             return Decoded(samples=light, top=0, notes=notes)
         samples, more = to_grey_or_rgb(stored, page)
         is_code = np.issubdtype(samples.dtype, np.integer)
-        top = 0 if not is_code else 255 if samples.ndim == 3 and page.colours == 1 else (
-            (1 << page.bits) - 1
+        top = (
+            0
+            if not is_code
+            else 255
+            if samples.ndim == 3 and page.colours == 1
+            else ((1 << page.bits) - 1)
         )
     return Decoded(
         samples=samples, top=top, space=stated.space, doubt=stated.doubt, notes=(*notes, *more)
@@ -164,7 +176,7 @@ def _read(path: Path, page: TiffPage) -> NDArray[Any]:
         with _silent_tifffile():
             found = _read_by_tifffile(path, page)
     except _INSIDE_TIFFFILE as error:
-        if _EXTRA_PACKAGE in str(error):
+        if _EXTRA_PACKAGE in str(error) or isinstance(error, ImportError):
             name = _COMPRESSIONS.get(page.compression, f"compression {page.compression}")
             more = f" with predictor {page.predictor}" if page.predictor > 1 else ""
             raise DecodeError(

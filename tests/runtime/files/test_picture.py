@@ -123,7 +123,7 @@ def test_a_grey_jpeg_is_a_picture_and_no_mosaic(tmp_path):
     with pytest.raises(DecodeError, match=r"grey\.png is a JPEG, which no mosaic is"):
         read_mosaic(path, OPTIONS)
     capture = read_picture(path)
-    assert capture.linear_rows(0, 8) == pytest.approx(decode_srgb(np.float32(90 / 255)), abs=1e-5)
+    assert np.abs(capture.linear_rows(0, 8) - decode_srgb(np.float32(90 / 255))).max() < 1e-5
     assert "--mosaic" not in " ".join(capture.notes)
 
 
