@@ -14,7 +14,7 @@ def pack(rows, bits):
 
 
 def packed_segments(planes, bits, *, rows=None, tile=None):
-    """Return packed (16 bits: low byte first) strips, or tiles of (h, w), of (plane, h, w, sample)."""
+    """Return packed strips or tiles of (plane, h, w, sample); 16 bits with the low byte first."""
     _, high, wide, _ = planes.shape
     found = []
     for plane in planes:
@@ -89,8 +89,8 @@ def _directory(tags, start, following, order, pointer, count_code):
         if code in "su":
             data, count = bytes(values), len(values)
         else:
-            values = [0] if values is None else np.atleast_1d(values).tolist()
-            data, count = struct.pack(f"{order}{len(values)}{code}", *values), len(values)
+            each = [0] if values is None else np.atleast_1d(values).tolist()
+            data, count = struct.pack(f"{order}{len(each)}{code}", *each), len(each)
         entries += struct.pack(order + "HH" + pointer, tag, kinds[code], count)
         if len(data) <= room:
             entries += data.ljust(room, b"\0")

@@ -117,6 +117,8 @@ def _grey_notes(path: Path, samples: NDArray[Any]) -> list[str]:
             "expected a picture, got a single channel whose pixels alternate as those of a mosaic "
             f"do; {MOSAIC_ADVICE}"
         )
+    if np.issubdtype(samples.dtype, np.floating):
+        return ["single channel: taken as a grey picture"]
     counted = f"; {COUNTS_ADVICE}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
     return [f"single channel: taken as a grey picture; {MOSAIC_ADVICE}{counted}"]
 
@@ -202,8 +204,8 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
     samples, top = picture.decoded.samples, picture.decoded.top
     if samples.ndim != 2 or not top:
         raise DecodeError(
-            f"a headerless mosaic must have one 8- or 16-bit channel, or packed bits; got {samples.dtype} "
-            f"{samples.shape}; omit the mosaic options for an RGB picture"
+            "a headerless mosaic must have one 8- or 16-bit channel, or packed bits; got "
+            f"{samples.dtype} {samples.shape}; omit the mosaic options for an RGB picture"
         )
     if options.black_level is None or options.white_level is None:
         raise DecodeError(f"levels alone are for RAW files; {MOSAIC_ADVICE}")

@@ -3,7 +3,7 @@
 Its silent limits with TIFF (planes, packed bits, MinIsWhite, alpha) are met by `tiff_picture`.
 """
 
-from typing import Any
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ from camkit.runtime.files.formats.decoded import Decoded
 from camkit.runtime.files.formats.stated_space import NOTHING, StatedSpace
 from camkit.runtime.files.tiff_tags import TiffTags
 
-_SAMPLES = (np.uint8, np.uint16, np.float32)
+_SAMPLES: Final = (np.uint8, np.uint16, np.float32)
 
 
 def decode_picture(data: bytes, exif: TiffTags) -> Decoded:
@@ -28,7 +28,7 @@ def decode_picture(data: bytes, exif: TiffTags) -> Decoded:
     Raises:
         DecodeError: If it is damaged, cut off, or of a kind that is not read.
     """
-    stated, notes = NOTHING, []
+    stated, notes = NOTHING, list[str]()
     if data.startswith(radiance.MAGIC):
         radiance.check_header(data)
     elif data.startswith(jpeg_segments.MAGIC):
@@ -57,7 +57,7 @@ def decoded_samples(
     )
 
 
-def decode_array(data: bytes) -> NDArray[Any]:
+def decode_array(data: bytes | bytearray) -> NDArray[Any]:
     """Decode to (h, w) or (h, w, BGR[A]).
 
     Raises:

@@ -11,7 +11,7 @@ _MOST_CHUNKS: Final = 65_536
 
 
 def png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Return name and content of each chunk, as far as they can be followed; not those of pixels."""
+    """Return name and content of each chunk but those of pixels, as far as they can be followed."""
     at = len(MAGIC)
     for _ in range(_MOST_CHUNKS):
         length, name = int.from_bytes(data[at : at + 4]), data[at + 4 : at + 8]

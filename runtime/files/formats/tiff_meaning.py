@@ -1,7 +1,7 @@
 """Samples of a TIFF to grey or RGB, as its photometric interpretation says.
 
 References: TIFF 6.0, sections 4 (MinIsWhite), 5 (palettes), 18 (alpha), 23 (CIELab); CIE 15 (Lab);
-Adobe Photoshop TIFF technical notes (ICCLab). Lab without a WhitePoint is of D50, as libtiff has it.
+Adobe Photoshop TIFF technical notes (ICCLab). Lab without a WhitePoint is of D50, as in libtiff.
 """
 
 from typing import Any, Final

@@ -135,7 +135,7 @@ def _by_opencv(path: Path, page: TiffPage) -> NDArray[Any] | None:
     # the page becomes the first one
     struct.pack_into(order + ("Q" if is_big else "I"), data, 8 if is_big else 4, page.start)
     try:
-        samples, alpha = split_alpha(decode_array(bytes(data)))
+        samples, alpha = split_alpha(decode_array(data))
     except DecodeError:
         if page.compression in _WITHOUT_EXTRA:
             return None  # tifffile knows some that libtiff does not, and says what is wrong

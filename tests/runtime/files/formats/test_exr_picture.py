@@ -57,7 +57,7 @@ def deep(path, kind=OpenEXR.deepscanline):
         cells[at] = np.array([0.5, 0.25], np.float32)
     more = {"tiles": OpenEXR.TileDescription()} if kind == OpenEXR.deeptile else {}
     whole = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": kind} | more
-    return OpenEXR.Part(whole, {name: cells for name in "RGBZ"}, name="deep"), path
+    return OpenEXR.Part(whole, dict.fromkeys("RGBZ", cells), name="deep"), path
 
 
 @pytest.mark.parametrize("kind", [OpenEXR.deepscanline])
@@ -155,7 +155,9 @@ def test_chromaticities_of_zeros_are_told(tmp_path):
     assert np.array_equal(read_scene(path), PLANES)
 
 
-@pytest.mark.parametrize("points", [(0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.0), (0.3, 0.3) * 4])
+@pytest.mark.parametrize(
+    "points", [(0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.0), (0.3, 0.3) * 4]
+)
 def test_chromaticities_that_cannot_be_are_refused(tmp_path, points):
     path = write(tmp_path / "a.exr", rgb(), chromaticities=points)
     with pytest.raises(DecodeError, match="not believable"):
@@ -173,9 +175,7 @@ def test_luminance_and_chroma_become_colour(tmp_path, origin, step):
     chroma = {"RY": (planes[0] - y) / y, "BY": (planes[2] - y) / y}
     (x0, y0), float_ = origin, Imath.PixelType(Imath.PixelType.FLOAT)
     head = OpenEXR.Header(WIDE, HIGH)
-    head["dataWindow"] = Imath.Box2i(
-        Imath.V2i(x0, y0), Imath.V2i(x0 + WIDE - 1, y0 + HIGH - 1)
-    )
+    head["dataWindow"] = Imath.Box2i(Imath.V2i(x0, y0), Imath.V2i(x0 + WIDE - 1, y0 + HIGH - 1))
     head["channels"] = {"Y": Imath.Channel(float_)} | {
         name: Imath.Channel(float_, step, step) for name in chroma
     }

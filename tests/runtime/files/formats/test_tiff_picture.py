@@ -118,7 +118,7 @@ def test_planar_strips_that_are_too_short_are_refused(tmp_path, bits, deflate):
     tags, segments = packed_page(DEEP >> (16 - bits), bits, planar=True, deflate=deflate)
     short = [segments[0], segments[1][: len(segments[1]) // 2], segments[2]]
     path = write_tiff(tmp_path / "a.tif", [(tags, short)])
-    with pytest.raises(DecodeError, match="damaged|cut off|incomplete"):
+    with pytest.raises(DecodeError, match=r"damaged|cut off|incomplete"):
         read_picture(path)
 
 
@@ -159,7 +159,12 @@ def test_lab_becomes_the_colours_that_littlecms_gives(tmp_path, kind, bits):
     signed = lab ^ np.array([0, 128, 128], np.uint8)
     picture = Image.frombytes("LAB", (24, 24), signed.tobytes())
     way = ImageCms.buildTransform(
-        ImageCms.createProfile("LAB"), ImageCms.createProfile("sRGB"), "LAB", "RGB", 1, ImageCms.Flags.NOOPTIMIZE
+        ImageCms.createProfile("LAB"),
+        ImageCms.createProfile("sRGB"),
+        "LAB",
+        "RGB",
+        1,
+        ImageCms.Flags.NOOPTIMIZE,
     )
     expected = np.asarray(ImageCms.applyTransform(picture, way))
     stored = lab if kind == "ICCLab" else signed
