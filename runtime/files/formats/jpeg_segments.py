@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from camkit.errors import DecodeError
+from camkit.runtime.files.raw_checks import MAX_PIXELS
 
 MAGIC: Final = b"\xff\xd8"
 _MOST_SEGMENTS: Final = 65_536
@@ -21,6 +22,9 @@ _END: Final = 0xD9
 _FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _OF_SCANS: Final = frozenset({0xC4, 0xCC, *range(0xDA, 0xE0), *range(0xE0, 0xF0), 0xFE})
 """What may follow a scan: tables, the next scan, lines, restarts, applications, a comment."""
+_ARITHMETIC: Final = (0xC9, 0xCA)
+_MOST_PX_PER_BYTE: Final = 1024
+"""Huffman codes take a bit or more of every block of 8x8 samples."""
 _UNREAD: Final = {
     0xC3: "lossless",
     0xC5: "hierarchical",
@@ -74,7 +78,7 @@ def end_of_jpeg(data: bytes) -> int:
             break
         if segment.marker == _END:
             return segment.end
-        _check_kind(segment)
+        _check_kind(segment, len(data))
         at = segment.end
         if segment.marker == _START_OF_SCAN:
             found = _MARKER.search(data, at)
@@ -104,13 +108,17 @@ def _segment(data: bytes, at: int) -> Segment | None:
     return Segment(marker=marker, content=data[at + 4 : at + 2 + length], end=at + 2 + length)
 
 
-def _check_kind(segment: Segment) -> None:
+def _check_kind(segment: Segment, file_bytes: int) -> None:
     kind = _UNREAD.get(segment.marker)
     if kind is not None:
         raise DecodeError(f"a {kind} JPEG is not read; save it as baseline or progressive JPEG")
     if segment.marker not in _FRAMES or len(segment.content) < 6:
         return
     bits, channels = segment.content[0], segment.content[5]
+    high, wide = int.from_bytes(segment.content[1:3]), int.from_bytes(segment.content[3:5])
+    most = MAX_PIXELS if segment.marker in _ARITHMETIC else file_bytes * _MOST_PX_PER_BYTE
+    if high * wide > min(MAX_PIXELS, most):
+        raise DecodeError(f"the header claims {wide}x{high} pixels in {file_bytes} bytes")
     if bits != 8:
         raise DecodeError(f"a JPEG of {bits} bits is not read; save it with 8 bits, or as PNG")
     if channels == 4:

@@ -35,6 +35,7 @@ def decode_picture(data: bytes, exif: TiffTags) -> Decoded:
         data = data[: jpeg_segments.end_of_jpeg(data)]
         stated = stated_space.space_of_jpeg(data, exif)
     elif data.startswith(png_chunks.MAGIC):
+        png_chunks.check_png_size(data)
         stated = stated_space.space_of_png(data, exif)
         if any(name == b"acTL" for name, _ in png_chunks.png_chunks(data)):
             notes.append("an animated PNG: its first picture is read")

@@ -169,6 +169,10 @@ def _check(page: TiffPage, file_bytes: int) -> None:
         )
     if page.samples < page.colours:
         raise DecodeError(f"an RGB TIFF of {page.samples} samples per pixel is damaged")
+    if page.compression == PACK_BITS and page.predictor > 1:
+        raise DecodeError(
+            "a TIFF of PackBits with a predictor is not read: programs disagree on it"
+        )
     _check_numbers(page)
 
 

@@ -182,6 +182,20 @@ def test_an_exr_that_claims_too_much_is_refused_before_it_is_read(tmp_path):
         read_picture(tmp_path / "x.exr")
 
 
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_a_picture_that_claims_too_much_is_refused_before_it_is_decoded(tmp_path, suffix):
+    data = bytearray(cv2.imencode(suffix, np.zeros((16, 16, 3), np.uint8))[1].tobytes())
+    at = data.index(b"IHDR") + 4 if suffix == ".png" else data.index(b"\xff\xc0") + 5
+    data[at : at + 8 if suffix == ".png" else at + 4] = (
+        struct.pack(">II", 30_000, 30_000)
+        if suffix == ".png"
+        else struct.pack(">HH", 30_000, 30_000)
+    )
+    (tmp_path / f"x{suffix}").write_bytes(data)
+    with pytest.raises(DecodeError, match="claims 30000x30000 pixels"):
+        read_picture(tmp_path / f"x{suffix}")
+
+
 def test_a_missing_scene_is_a_decode_error(tmp_path):
     with pytest.raises(DecodeError, match="cannot read"):
         read_scene(tmp_path / "none.png")

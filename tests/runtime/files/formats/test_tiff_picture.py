@@ -233,6 +233,7 @@ def test_alpha_does_not_change_colours(tmp_path):
         ({339: ("H", [2, 2, 2])}, 3, 16, "signed integers"),
         ({339: ("H", [3, 3, 3])}, 3, 24, "floats of 24 bits"),
         ({339: ("H", [1, 1, 1])}, 3, 32, "integers of 32 bits"),
+        ({259: ("H", 32773), 317: ("H", 2)}, 3, 8, "PackBits with a predictor"),
         ({258: ("H", [5, 6, 5])}, 3, 8, r"samples of \[5, 6\] bits"),
     ],
 )
