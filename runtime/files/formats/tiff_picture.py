@@ -5,12 +5,10 @@ planes, halves, doubles, alpha, MinIsWhite   tifffile, with imagecodecs where it
 samples of 1 to 15 bits                      `packed_bits`
 """
 
-import contextlib
 import logging
 import lzma
 import struct
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,6 +26,9 @@ from camkit.runtime.files.formats.tiff_meaning import is_lab, light_of_lab, to_g
 from camkit.runtime.files.formats.tiff_page import TiffPage, picture_page
 from camkit.runtime.files.tiff_tags import TiffTags
 from camkit.runtime.geometry.turning import turn_back
+
+# what it logs of odd files must not reach the terminal
+logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 EXTRA: Final = "pip install 'camkit[tiff]'"
 _EXTRA_PACKAGE: Final = "imagecodecs"
@@ -69,7 +70,10 @@ _COMPRESSIONS: Final = {
     50002: "JPEG XL",
     52546: "JPEG XL",
 }
-_WITHOUT_EXTRA: Final = (
+_WITHOUT_  # what it logs of odd files must not reach the terminal
+logging.getLogger("tifffile").addHandler(logging.NullHandler())
+
+EXTRA: Final = (
     tiff_page.PLAIN,
     tiff_page.DEFLATE,
     tiff_page.OLD_DEFLATE,
@@ -173,8 +177,7 @@ def _read(path: Path, page: TiffPage) -> NDArray[Any]:
     if page.photometric == tiff_page.YCBCR:
         raise DecodeError("a YCbCr TIFF of this kind is not read; save it as RGB")
     try:
-        with _silent_tifffile():
-            found = _read_by_tifffile(path, page)
+        found = _read_by_tifffile(path, page)
     except _INSIDE_TIFFFILE as error:
         if _EXTRA_PACKAGE in str(error) or isinstance(error, ImportError):
             name = _COMPRESSIONS.get(page.compression, f"compression {page.compression}")
@@ -229,15 +232,3 @@ def _check_inflated(file: Any, page: Any) -> None:
         inflate.decompress(file.filehandle.read(length), most)
         if inflate.unconsumed_tail and inflate.decompress(inflate.unconsumed_tail, 1):
             raise DecodeError(f"a strip or tile holds more than its {most} bytes: it is damaged")
-
-
-@contextlib.contextmanager
-def _silent_tifffile() -> Iterator[None]:
-    """Keep what tifffile logs of odd files off the terminal."""
-    logger = logging.getLogger("tifffile")
-    level = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        logger.setLevel(level)
