@@ -70,10 +70,7 @@ _COMPRESSIONS: Final = {
     50002: "JPEG XL",
     52546: "JPEG XL",
 }
-_WITHOUT_  # what it logs of odd files must not reach the terminal
-logging.getLogger("tifffile").addHandler(logging.NullHandler())
-
-EXTRA: Final = (
+_WITHOUT_EXTRA: Final = (
     tiff_page.PLAIN,
     tiff_page.DEFLATE,
     tiff_page.OLD_DEFLATE,
