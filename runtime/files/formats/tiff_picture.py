@@ -197,7 +197,7 @@ def _read_by_tifffile(path: Path, page: TiffPage) -> NDArray[Any]:
         packed = page.kind != tiff_page.FLOAT and page.bits not in (8, 16)
         if packed:
             return read_packed(path, page, _codec(page))
-        if page.compression in (tiff_page.DEFLATE, tiff_page.OLD_DEFLATE):
+        if page.compression in (tiff_page.DEFLATE, tiff_page.OLD_DEFLATE, tiff_page.LZMA):
             _check_inflated(file, own)
         samples = own.asarray(maxworkers=1)
         planes, depth, high, wide, each = own.shaped
@@ -225,7 +225,14 @@ def _check_inflated(file: Any, page: Any) -> None:
     most = int(np.prod(page.chunks, dtype=np.int64)) * page.dtype.itemsize
     for offset, length in zip(page.dataoffsets, page.databytecounts, strict=True):
         file.filehandle.seek(offset)
-        inflate = zlib.decompressobj()
-        inflate.decompress(file.filehandle.read(length), most)
-        if inflate.unconsumed_tail and inflate.decompress(inflate.unconsumed_tail, 1):
+        data = file.filehandle.read(length)
+        if page.compression == tiff_page.LZMA:
+            unpack = lzma.LZMADecompressor()
+            unpack.decompress(data, most)
+            more = b"" if unpack.eof else unpack.decompress(b"", 1)
+        else:
+            inflate = zlib.decompressobj()
+            inflate.decompress(data, most)
+            more = inflate.decompress(inflate.unconsumed_tail, 1)
+        if more:
             raise DecodeError(f"a strip or tile holds more than its {most} bytes: it is damaged")

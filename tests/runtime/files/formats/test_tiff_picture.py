@@ -1,6 +1,7 @@
 """Sound TIFFs of unusual kinds are read rightly or refused by the name of their kind."""
 
 import importlib.util
+import lzma
 import zlib
 
 import cv2
@@ -260,10 +261,19 @@ def test_what_needs_imagecodecs_names_it(tmp_path, compression, name, bits):
         read_picture(path)
 
 
-def test_a_deflate_bomb_is_refused(tmp_path):
-    tags, segments = packed_page(DEEP, 16, planar=True, deflate=True)
-    bomb = zlib.compress(bytes(50_000_000))
-    path = write_tiff(tmp_path / "a.tif", [(tags, [bomb, *segments[1:]])])
+@pytest.mark.parametrize(
+    ("compression", "pack"), [(8, zlib.compress), (32946, zlib.compress), (34925, lzma.compress)]
+)
+@pytest.mark.parametrize("sound", [False, True])
+def test_strips_that_become_too_large_are_refused(tmp_path, compression, pack, sound):
+    tags, segments = packed_page(DEEP, 16, planar=True)
+    packed = [pack(segment) for segment in segments]
+    if not sound:
+        packed[0] = pack(bytes(50_000_000))
+    path = write_tiff(tmp_path / "a.tif", [(tags | {259: ("H", compression)}, packed)])
+    if sound:
+        assert np.array_equal(read_picture(path).samples, planes(DEEP))
+        return
     with pytest.raises(DecodeError, match="holds more than its"):
         read_picture(path)
 
