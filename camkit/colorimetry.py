@@ -32,8 +32,11 @@ def white_xyz(white: Chromaticity) -> Matrix:
 
 
 def rgb_to_xyz(primaries: tuple[Chromaticity, ...], white: Chromaticity) -> Matrix:
-    """Give the (3, 3) matrix from linear RGB to XYZ for the primaries and white point."""
-    columns = np.stack([white_xyz(p) for p in primaries], axis=1)
+    """Give the (3, 3) matrix from linear RGB to XYZ for the primaries and white point.
+
+    Primaries may lie outside all colours, with y of 0 as those of XYZ itself; the white may not.
+    """
+    columns = np.array([(x, y, 1.0 - x - y) for x, y in primaries]).T
     scale = np.linalg.solve(columns, white_xyz(white))
     return np.asarray(columns * scale)
 

@@ -16,6 +16,7 @@ from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract
 from camkit.errors import ContractError
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
+from camkit.runtime.picture_window import PictureWindow
 
 SATURATION_SHARE: Final = 0.99
 """A sample at this share of the white level is taken as clipped.
@@ -107,6 +108,7 @@ class Capture:
         camera: Make and model as people read it; empty if not stated.
         metadata: What the file says of its photograph, to be carried into pictures.
         sha256: Hash of the file; None for arrays.
+        window: Where the samples lie in a larger picture; None if the format knows no such thing.
         notes: What a person should know of this decode.
         decoder_peak_mb: Peak memory of the process that decoded; 0 where it was this one.
     """
@@ -128,6 +130,7 @@ class Capture:
     camera: str = ""
     metadata: Metadata = field(default_factory=Metadata)
     sha256: str | None = None
+    window: PictureWindow | None = None
     notes: tuple[str, ...] = ()
     decoder_peak_mb: float = field(default=0.0, compare=False)
 

@@ -22,6 +22,7 @@ from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
 
 FileFormat = Literal["exr", "tiff", "png", "jpeg", "dng"]
+OTHER_NAMES: Final[dict[str, FileFormat]] = {"jpg": "jpeg", "tif": "tiff"}
 LINEAR_FORMATS: Final = frozenset({"exr", "dng"})
 Status = Literal["ok", "failed", "skipped"]
 
@@ -33,7 +34,8 @@ class WriteOptions:
     Attributes:
         out_dir: Folder of pictures and sidecars, made if needed.
         keep_folders: Below it, the folders of the captures from what they have in common on.
-        format: exr, tiff, png, jpeg or dng; None for exr, and for no picture beside products.
+        format: exr, tiff (or tif), png, jpeg (or jpg) or dng; None for exr, and for no picture
+            beside products.
         linear: TIFF and PNG without the sRGB curve.
         jpeg_quality: Of JPEG, 1..100; None for 92.
         strip_metadata: Leave out what the capture says of camera, lens, date, exposure and place.
@@ -53,6 +55,8 @@ class WriteOptions:
     jobs: int = 1
 
     def __post_init__(self) -> None:
+        named = OTHER_NAMES.get(str(self.format), self.format)
+        object.__setattr__(self, "format", named)  # one name from here on
         if self.picture not in get_args(FileFormat):
             raise ContractError(
                 f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"

@@ -11,7 +11,6 @@ lone_pixels   hot or damaged pixels counted
 doubts        what of a decode is not likely, as notes
 white_level   white where the data contradict the file
 dng_checks    a DNG against itself and against LibRaw
-mapped_tiff   large plain TIFF files read in place
-radiance      the header of a Radiance HDR file
-picture       EXR, HDR, TIFF and PNG as captures or scenes
+formats       EXR, TIFF, PNG, JPEG and Radiance HDR decoded, and their colour spaces
+picture       pictures as captures or scenes
 """

@@ -7,6 +7,7 @@ References: Exif 2.32 (CIPA DC-008), 4.6; PNG, third edition, 11.3.4.5 (eXIf); I
 import math
 from typing import Final
 
+from camkit.runtime.files.formats import jpeg_segments, png_chunks
 from camkit.runtime.files.tiff_tags import TiffTags, tags_of_block
 from camkit.runtime.metadata import Metadata
 
@@ -32,43 +33,23 @@ ISO_IN_OTHER_TAG: Final = 65535
 LATITUDE_REF, LATITUDE, LONGITUDE_REF, LONGITUDE, ALTITUDE_REF, ALTITUDE = range(1, 7)
 BELOW_SEA_LEVEL: Final = 1
 
-_PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 _EXIF_PREFIX: Final = b"Exif\0\0"
-_MAX_CHUNKS: Final = 1024
+_APP1: Final = 0xE1
 _NO_TAGS: Final = TiffTags(directories=(), file_bytes=0)
 
 
 def exif_of_picture(data: bytes) -> TiffTags:
     """Give the EXIF tags of a PNG or JPEG; none where there are none or they cannot be found."""
-    if data.startswith(_PNG_SIGNATURE):
-        return tags_of_block(_png_block(data))
-    return tags_of_block(_jpeg_block(data)) if data.startswith(b"\xff\xd8") else _NO_TAGS
-
-
-def _png_block(data: bytes) -> bytes:
-    at = len(_PNG_SIGNATURE)
-    for _ in range(_MAX_CHUNKS):
-        length, name = int.from_bytes(data[at : at + 4]), data[at + 4 : at + 8]
-        if name == b"eXIf":
-            return data[at + 8 : at + 8 + length].removeprefix(_EXIF_PREFIX)
-        at += 12 + length
-        if at >= len(data):
-            break
-    return b""
-
-
-def _jpeg_block(data: bytes) -> bytes:
-    """Walk the segments before the first scan; APP1 that starts with Exif holds the block."""
-    at = 2
-    for _ in range(_MAX_CHUNKS):
-        marker, length = data[at : at + 2], int.from_bytes(data[at + 2 : at + 4])
-        if len(marker) < 2 or marker[0] != 0xFF or marker[1] == 0xDA or length < 2:
-            break
-        content = data[at + 4 : at + 2 + length]
-        if marker[1] == 0xE1 and content.startswith(_EXIF_PREFIX):
-            return content.removeprefix(_EXIF_PREFIX)
-        at += 2 + length
-    return b""
+    blocks = []
+    if data.startswith(png_chunks.MAGIC):
+        blocks = [content for name, content in png_chunks.png_chunks(data) if name == b"eXIf"]
+    elif data.startswith(jpeg_segments.MAGIC):
+        blocks = [
+            segment.content
+            for segment in jpeg_segments.header_segments(data)
+            if segment.marker == _APP1 and segment.content.startswith(_EXIF_PREFIX)
+        ]
+    return tags_of_block(blocks[0].removeprefix(_EXIF_PREFIX)) if blocks else _NO_TAGS
 
 
 def orientation_of(tags: TiffTags) -> int:

@@ -1,49 +1,38 @@
 """Read pictures: linear captures (EXR, 16-bit TIFF/PNG), headerless mosaics, sharp scenes.
 
-    read_picture      a capture that is already RGB (linear_rgb_v1)
+    read_picture      a capture that is already a picture (linear_rgb_v1)
     read_mosaic       a single-channel PNG or TIFF that is a Bayer mosaic
     read_scene        a sharp scene for the simulation, as linear Rec.709
     read_light        the same as light, which is never negative
+    read_scene_and_space  the same with the colour space that the file states
     read_orientation  how a file says that its samples are to be turned
 
-PNG, TIFF, JPEG and Radiance HDR are decoded by OpenCV, EXR by the OpenEXR package. Samples stay as
-they are stored; an EXIF orientation is told beside them.
+Samples stay as they are stored; an EXIF orientation is told beside them. The decoders of the
+formats lie in `camkit.runtime.files.formats`.
 """
 
-import contextlib
-import sys
-import threading
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.colorimetry import (
-    D65,
-    REC709_PRIMARIES,
-    Matrix,
-    adapt_white,
-    apply_matrix,
-    decode_srgb,
-    rgb_to_xyz,
-)
+from camkit.colorimetry import apply_matrix
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.files import radiance, raw_checks
+from camkit.runtime.files import raw_checks
 from camkit.runtime.files.exif_tags import exif_of_picture, metadata_of, orientation_of
-from camkit.runtime.files.exr_attributes import metadata_of_exr
-from camkit.runtime.files.mapped_tiff import map_plain_tiff
+from camkit.runtime.files.formats import exr_picture, jpeg_segments
+from camkit.runtime.files.formats.color_space import SRGB, ColorSpace, power_curve
+from camkit.runtime.files.formats.decoded import Decoded
+from camkit.runtime.files.formats.opencv_picture import decode_picture
+from camkit.runtime.files.formats.tiff_picture import decode_tiff
 from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 from camkit.runtime.files.white_level import check_said_white
-from camkit.runtime.geometry.turning import turn_back
 from camkit.runtime.metadata import Metadata
 
-EXR_MAGIC: Final = b"\x76\x2f\x31\x01"
-MAX_EXR_PIXELS_PER_BYTE: Final = 4096
 MOSAIC_ADVICE: Final = (
     "if it is a Bayer mosaic, say --mosaic RGGB --black-level N --white-level N "
     "(RGGB, BGGR, GRBG or GBRG at the top-left pixel)"
@@ -52,56 +41,56 @@ COUNTS_SUFFIXES: Final = (".tif", ".tiff")
 COUNTS_ADVICE: Final = "if it counts single photons, say --product intensity, or depth"
 FAINT: Final = 0.01
 """Negative samples up to this share of the brightest are noise."""
-_JPEG_MAGIC: Final = b"\xff\xd8"
-_CHROMATICITY_TOLERANCE: Final = 2e-3
-
-# OpenEXR.File prints its warnings; they must not land in stdout, which may carry JSON
-_exr_lock = threading.Lock()
+MOSAIC_RATIO: Final = 1.5
+"""Differences of neighbours over those of next neighbours, along rows and columns, from which on
+single samples are taken for a mosaic; of pictures it is below 1, of noise 1."""
+_MOST_EIGHT: Final = 255
+_STEADY: Final = 0.5
+"""Share of what the sites of a cell differ by that is the same in every cell, of a mosaic; dithered
+pictures alternate too, but not always alike."""
+_TESTED_PX: Final = 1024
+_LINEAR_ROWS: Final = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Picture:
-    """A decoded file: (h, w) or (channel, h, w) with channel 3, R, G, B, and its colour space."""
+    """A decoded file with what it says of its photograph."""
 
-    samples: NDArray[Any]
-    to_rec709: Matrix | None
-    notes: tuple[str, ...]
+    decoded: Decoded
     orientation: int = 1
     metadata: Metadata = field(default_factory=Metadata)
 
 
 def read_picture(path: Path, *, keep_codes: bool = False) -> Capture:
-    """Read an RGB picture as a linear capture.
+    """Read a picture as a linear capture; grey becomes three equal channels.
 
-    Float and 16-bit samples are taken as linear, 8-bit ones are decoded from sRGB unless their
-    codes are kept. NaN and infinite samples are kept and counted in the notes.
+    Float samples and those of more than 8 bits are taken as linear. Those of 8 bits are decoded
+    from the colour space that the file states, else from sRGB, unless their codes are kept. NaN and
+    infinite samples are kept and counted in the notes.
 
     Raises:
-        DecodeError: If the file is damaged or not an RGB picture.
+        DecodeError: If the file is damaged, of a kind that is not read, or a mosaic.
         OSError: If it cannot be read.
     """
     picture = _decode(path)
-    samples, notes = picture.samples, [*picture.notes]
-    if samples.ndim == 2 and _begins(path, _JPEG_MAGIC):
-        raise DecodeError("expected an RGB picture, got a grey JPEG; give it in colour")
-    if samples.ndim == 2 and not _begins(path, EXR_MAGIC):
-        counted = f"; {COUNTS_ADVICE}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
-        raise DecodeError(
-            f"expected an RGB picture, got a single channel; {MOSAIC_ADVICE}{counted}"
-        )
-    if samples.ndim == 2:
-        samples = np.broadcast_to(samples, (3, *samples.shape))
-    if picture.to_rec709 is not None:
-        notes.append("chromaticities of the file are not Rec.709; samples are taken as they are")
-    if samples.dtype == np.uint8 and not keep_codes:
-        notes.append("8-bit picture: decoded from sRGB; 16-bit linear files are more exact")
-        samples = np.round(_srgb_table(255) * 65535).astype(np.uint16)[samples]
+    decoded = picture.decoded
+    samples, notes = decoded.samples, [*decoded.notes]
+    if samples.ndim == 2 and not _begins(path, exr_picture.MAGIC):
+        notes += _grey_notes(path, samples)
     white = 1.0
-    if np.issubdtype(samples.dtype, np.integer):
-        white = float(np.iinfo(samples.dtype).max)
+    if 0 < decoded.top <= _MOST_EIGHT:
+        white = 255.0 if keep_codes else 65535.0
+        samples = _full_codes(decoded) if keep_codes else _linear_codes(decoded)
+        notes += _notes_on_eight(decoded, keep_codes=keep_codes)
+    elif decoded.top:
+        white = float(decoded.top)
     else:
         bad = int(samples.size - np.count_nonzero(np.isfinite(samples)))
         notes.extend([f"{bad} samples are NaN or infinite"] if bad else [])
+    if not 0 < decoded.top <= _MOST_EIGHT:
+        notes += _notes_on_linear(decoded)
+    if samples.ndim == 2:
+        samples = np.broadcast_to(samples, (3, *samples.shape))
     return Capture(
         samples=samples,
         cfa=None,
@@ -110,8 +99,92 @@ def read_picture(path: Path, *, keep_codes: bool = False) -> Capture:
         orientation=picture.orientation,
         camera=picture.metadata.camera,
         metadata=picture.metadata,
+        window=decoded.window,
         notes=tuple(notes),
     )
+
+
+def _grey_notes(path: Path, samples: NDArray[Any]) -> list[str]:
+    """Return notes on a single channel.
+
+    Raises:
+        DecodeError: If it is a mosaic, as its pixels show.
+    """
+    if _begins(path, jpeg_segments.MAGIC):
+        return []
+    if _is_mosaic(samples):
+        raise DecodeError(
+            "expected a picture, got a single channel whose pixels alternate as those of a mosaic "
+            f"do; {MOSAIC_ADVICE}"
+        )
+    if np.issubdtype(samples.dtype, np.floating):
+        return ["single channel: taken as a grey picture"]
+    counted = f"; {COUNTS_ADVICE}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
+    return [f"single channel: taken as a grey picture; {MOSAIC_ADVICE}{counted}"]
+
+
+def _is_mosaic(samples: NDArray[Any]) -> bool:
+    """Tell whether neighbours differ more than next neighbours do, both ways and always alike."""
+    top, left = (max(0, (side - _TESTED_PX) // 4 * 2) for side in samples.shape)
+    middle = samples[top : top + _TESTED_PX, left : left + _TESTED_PX].astype(np.float32)
+    if min(middle.shape) < 3:
+        return False
+    for plane in (middle, middle.T):
+        near, next_ = (float(np.abs(plane[step:] - plane[:-step]).mean()) for step in (1, 2))
+        # a sensor's samples are never without noise, as those of a drawn checkerboard are
+        if not (next_ > 0 and near > MOSAIC_RATIO * next_):
+            return False
+    high, wide = (side // 2 * 2 for side in middle.shape)
+    cells = middle[:high, :wide].reshape(high // 2, 2, wide // 2, 2)
+    apart = cells - cells.mean(axis=(1, 3), keepdims=True)
+    steady = np.abs(apart.mean(axis=(0, 2))).mean()
+    return bool(steady > _STEADY * np.abs(apart).mean())
+
+
+def _linear_codes(decoded: Decoded) -> NDArray[np.uint16]:
+    """Return light of codes of up to 8 bits in 16 bits, cut to 0..1."""
+    space, samples = decoded.space or SRGB, decoded.samples
+    found = np.empty(samples.shape, dtype=np.uint16)
+    for top in range(0, samples.shape[-2], _LINEAR_ROWS):
+        rows = np.s_[..., top : top + _LINEAR_ROWS, :]
+        light = space.light_of(samples[rows], decoded.top)
+        found[rows] = np.round(np.clip(light, 0, 1) * 65535)
+    return found
+
+
+def _full_codes(decoded: Decoded) -> NDArray[np.uint8]:
+    """Return codes of up to 8 bits in the whole range of 8."""
+    if decoded.top == _MOST_EIGHT:
+        return np.asarray(decoded.samples, dtype=np.uint8)
+    table = np.round(np.arange(decoded.top + 1) * (_MOST_EIGHT / decoded.top)).astype(np.uint8)
+    return np.asarray(table[decoded.samples])
+
+
+def _notes_on_eight(decoded: Decoded, *, keep_codes: bool) -> list[str]:
+    space, doubt = decoded.space, decoded.doubt
+    if doubt:
+        return [f"the file states {doubt}: codes are taken as sRGB"]
+    if space is not None and not space.is_srgb and keep_codes:
+        return [f"colour space {space.name!r} is not applied: codes are merged as they are"]
+    if keep_codes:
+        return []
+    name = "sRGB" if space is None or space.is_srgb else repr(space.name)
+    return [f"8-bit picture: decoded from {name}; 16-bit linear files are more exact"]
+
+
+def _notes_on_linear(decoded: Decoded) -> list[str]:
+    """Return notes on a stated space, of which samples that are taken as linear make no use."""
+    space, doubt = decoded.space, decoded.doubt
+    if decoded.window is not None:
+        return [exr_picture.NOT_REC709] if space is not None else []
+    if doubt:
+        return [f"the file states {doubt}: samples are taken as linear light"]
+    is_plain = space is None or (
+        space.tables is None and space.is_rec709 and space.has_curve(power_curve(1.0))
+    )
+    if is_plain or space is None:
+        return []
+    return [f"colour space {space.name!r} is not applied: samples are taken as linear light"]
 
 
 def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
@@ -122,24 +195,24 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
             options.
         OSError: If it cannot be read.
     """
-    if _begins(path, _JPEG_MAGIC):
+    if _begins(path, jpeg_segments.MAGIC):
         raise DecodeError(
             f"{path.name} is a JPEG, which no mosaic is: tones are coded and noise is lost; give "
             "RAW files, or a PNG or TIFF of the sensor's own samples"
         )
     picture = _decode(path)
-    samples = picture.samples
-    if samples.ndim != 2 or samples.dtype not in (np.uint8, np.uint16):
+    samples, top = picture.decoded.samples, picture.decoded.top
+    if samples.ndim != 2 or not top:
         raise DecodeError(
-            f"a headerless mosaic must have one 8- or 16-bit channel; got {samples.dtype} "
-            f"{samples.shape}; omit the mosaic options for an RGB picture"
+            "a headerless mosaic must have one 8- or 16-bit channel, or packed bits; got "
+            f"{samples.dtype} {samples.shape}; omit the mosaic options for an RGB picture"
         )
     if options.black_level is None or options.white_level is None:
         raise DecodeError(f"levels alone are for RAW files; {MOSAIC_ADVICE}")
     levels = raw_checks.Levels(
         black=np.full((2, 2), options.black_level, dtype=np.float32), white=options.white_level
     )
-    raw_checks.check_levels(levels, int(np.iinfo(samples.dtype).max))
+    raw_checks.check_levels(levels, top)
     check_said_white(samples, levels.white)
     return Capture(
         samples=samples,
@@ -149,36 +222,64 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
         orientation=picture.orientation,
         camera=picture.metadata.camera,
         metadata=picture.metadata,
-        notes=("headerless mosaic: pattern and levels as given",),
+        notes=("headerless mosaic: pattern and levels as given", *picture.decoded.notes),
     )
 
 
 def read_scene(path: Path) -> FloatArray:
-    """Read a sharp scene for the simulation.
-
-    8- and 16-bit files are sRGB, float files (EXR, HDR, float TIFF) are linear.
+    """Read a sharp scene for the simulation, as `read_scene_and_space`.
 
     Returns:
         (3, h, w) float32 linear Rec.709.
 
     Raises:
-        DecodeError: If the file is missing, damaged, or holds NaN or infinite samples; names it.
+        DecodeError: As `read_scene_and_space`.
+    """
+    return read_scene_and_space(path)[0]
+
+
+def read_scene_and_space(path: Path) -> tuple[FloatArray, ColorSpace]:
+    """Read a sharp scene, and the colour space that its file states; sRGB where it states none.
+
+    Integer samples are sRGB unless the file states another colour space, float ones (EXR, HDR,
+    float TIFF) are linear.
+
+    Returns:
+        (3, h, w) float32 linear Rec.709.
+
+    Raises:
+        DecodeError: If the file is missing, damaged, states a colour space that cannot be honoured,
+            or holds NaN or infinite samples; names it.
     """
     try:
-        picture = _decode(Path(path))
+        decoded = _decode(Path(path)).decoded
     except OSError as error:
         raise DecodeError(f"cannot read {path}: {error.strerror or error}") from error
     except DecodeError as error:
         raise DecodeError(f"{path}: {error}") from error
-    samples = picture.samples
-    if np.issubdtype(samples.dtype, np.integer):
-        samples = _srgb_table(int(np.iinfo(samples.dtype).max))[samples]
-    linear = np.asarray(samples, dtype=np.float32)
+    if decoded.doubt:
+        raise DecodeError(f"{path} states {decoded.doubt}; save it as sRGB")
+    if decoded.top:
+        linear = (decoded.space or SRGB).light_of(decoded.samples, decoded.top)
+    else:
+        linear = _light_of_floats(path, decoded)
     bad = int(linear.size - np.count_nonzero(np.isfinite(linear)))
     if bad:
         raise DecodeError(f"{path}: {bad} samples are NaN or infinite; a scene must be finite")
     planes = np.stack([linear] * 3) if linear.ndim == 2 else np.ascontiguousarray(linear)
-    return planes if picture.to_rec709 is None else apply_matrix(picture.to_rec709, planes)
+    return planes, decoded.space or SRGB
+
+
+def _light_of_floats(path: Path, decoded: Decoded) -> FloatArray:
+    """Return float samples in Rec.709."""
+    linear, space = np.asarray(decoded.samples, dtype=np.float32), decoded.space
+    if space is None or space.is_srgb:
+        return linear
+    if space.tables is not None or not space.has_curve(power_curve(1.0)):
+        raise DecodeError(
+            f"{path} is of floats, but its colour space {space.name!r} is of codes; save 16 bits"
+        )
+    return linear if linear.ndim == 2 else apply_matrix(space.to_rec709, linear)
 
 
 def read_light(path: Path) -> FloatArray:
@@ -205,15 +306,10 @@ def read_orientation(path: Path) -> int:
     Raises:
         OSError: If it cannot be read.
     """
-    if _begins(path, EXR_MAGIC):
+    if _begins(path, exr_picture.MAGIC):
         return 1
     tags = read_tiff_tags(path)
     return orientation_of(tags if tags.directories else exif_of_picture(path.read_bytes()))
-
-
-def _srgb_table(top: int) -> FloatArray:
-    """Give the linear value of every sRGB code 0..top."""
-    return decode_srgb((np.arange(top + 1) / top).astype(np.float32))
 
 
 def _begins(path: Path, magic: bytes) -> bool:
@@ -222,116 +318,17 @@ def _begins(path: Path, magic: bytes) -> bool:
 
 
 def _decode(path: Path) -> _Picture:
-    if _begins(path, EXR_MAGIC):
-        return _decode_exr(path)
+    if _begins(path, exr_picture.MAGIC):
+        decoded, metadata = exr_picture.decode_exr(path)
+        return _Picture(decoded=decoded, metadata=metadata)
     tags = read_tiff_tags(path)
-    raw_checks.check_chunks_inside(tags)
-    mapped = map_plain_tiff(path)
-    if mapped is not None:
-        planes = mapped if mapped.ndim == 2 else np.moveaxis(mapped, -1, 0)
-        return _with_exif(_Picture(samples=planes, to_rec709=None, notes=()), tags)
+    if tags.directories:
+        raw_checks.check_chunks_inside(tags)
+        return _of_tags(decode_tiff(path, tags), tags)
     data = path.read_bytes()
-    if data.startswith(radiance.MAGIC):
-        radiance.check_header(data)
-    picture = _decode_by_opencv(data)
-    if not tags.directories:
-        return _with_exif(picture, exif_of_picture(data))
-    # OpenCV turns a TIFF upright, whatever it is asked for
-    stored = turn_back(picture.samples, orientation_of(tags))
-    return _with_exif(replace(picture, samples=np.ascontiguousarray(stored)), tags)
+    exif = exif_of_picture(data)
+    return _of_tags(decode_picture(data, exif), exif)
 
 
-def _with_exif(picture: _Picture, tags: TiffTags) -> _Picture:
-    return replace(picture, orientation=orientation_of(tags), metadata=metadata_of(tags))
-
-
-def _decode_by_opencv(data: bytes) -> _Picture:
-    # libjpeg fills what is missing with grey and only warns
-    if data.startswith(_JPEG_MAGIC) and b"\xff\xd9" not in data[-65536:]:
-        raise DecodeError("the JPEG has no end marker: it is cut off, copy it again")
-    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
-        decoded = (
-            cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-        )
-    except cv2.error as error:
-        raise DecodeError(f"the picture cannot be decoded: {error.err or error}") from error
-    finally:
-        cv2.utils.logging.setLogLevel(level)
-    if decoded is None:
-        raise DecodeError(
-            "the picture is damaged or of an unknown kind; expected EXR, PNG, TIFF, JPEG or HDR"
-        )
-    if decoded.dtype not in (np.uint8, np.uint16, np.float32):
-        raise DecodeError(f"samples must be 8-bit, 16-bit or float32; got {decoded.dtype}")
-    return _planes(np.asarray(decoded))
-
-
-def _planes(decoded: NDArray[Any]) -> _Picture:
-    """Turn OpenCV's (h, w, BGR[A]) into planes R, G, B; alpha is dropped with a note."""
-    if decoded.ndim == 2:
-        return _Picture(samples=decoded, to_rec709=None, notes=())
-    channels = decoded.shape[2]
-    if channels not in (3, 4):
-        raise DecodeError(f"expected 1, 3 or 4 channels; got {channels}")
-    planes = np.ascontiguousarray(decoded[..., 2::-1].transpose(2, 0, 1))
-    notes = ("alpha channel dropped",) if channels == 4 else ()
-    return _Picture(samples=planes, to_rec709=None, notes=notes)
-
-
-def _decode_exr(path: Path) -> _Picture:
-    """Read R, G, B, or a single Y, of the first part."""
-    import OpenEXR
-
-    # the package raises these three, depending on where the damage lies
-    damaged = (RuntimeError, ValueError, TypeError)
-    with _exr_lock, contextlib.redirect_stdout(sys.stderr):
-        try:
-            with OpenEXR.File(str(path), header_only=True) as file:
-                header = dict(file.header())  # the file empties its own on closing
-            (x0, y0), (x1, y1) = (np.asarray(corner).tolist() for corner in header["dataWindow"])
-            _check_exr_size(y1 - y0 + 1, x1 - x0 + 1, path.stat().st_size)
-            names = {channel.name for channel in header["channels"]}
-            wanted = next((w for w in ("RGB", "Y") if names.issuperset(w)), "")
-            if not wanted or {"RY", "BY"} & names:
-                raise DecodeError(f"expected EXR channels R, G, B or Y; got {sorted(names)}")
-            with OpenEXR.File(str(path), separate_channels=True) as file:
-                channels = file.channels()
-                planes = [np.asarray(channels[name].pixels) for name in wanted]
-        except (*damaged, KeyError) as error:
-            raise DecodeError(f"the EXR is damaged: {error}") from error
-    if any(plane.shape != (y1 - y0 + 1, x1 - x0 + 1) for plane in planes):
-        raise DecodeError(f"EXR channels differ in size: {[plane.shape for plane in planes]}")
-    samples = np.stack(planes).astype(np.float32)
-    return _Picture(
-        samples=samples if wanted == "RGB" else samples[0],
-        to_rec709=_to_rec709(header.get("chromaticities")),
-        notes=("alpha channel dropped",) if "A" in names else (),
-        metadata=metadata_of_exr(header),
-    )
-
-
-def _check_exr_size(height: int, width: int, file_bytes: int) -> None:
-    most = min(raw_checks.MAX_PIXELS, file_bytes * MAX_EXR_PIXELS_PER_BYTE)
-    if height < 1 or width < 1 or height * width > most:
-        raise DecodeError(f"the header claims {width}x{height} pixels in {file_bytes} bytes")
-
-
-def _to_rec709(chromaticities: Any) -> Matrix | None:
-    """Give the matrix from the file's primaries to Rec.709; None if they are Rec.709."""
-    if chromaticities is None:
-        return None
-    values = np.asarray(chromaticities, dtype=np.float64).ravel()
-    expected = np.array([*np.ravel(REC709_PRIMARIES), *D65])
-    # Primaries may be imaginary (the blue of ACES 2065-1 has y < 0); the white may not.
-    ys = values[1::2]
-    if values.shape != (8,) or not (np.isfinite(values).all() and ys.all() and ys[-1] > 0):
-        raise DecodeError(f"EXR chromaticities are not believable: {values.tolist()}")
-    if np.abs(values - expected).max() <= _CHROMATICITY_TOLERANCE:
-        return None
-    pairs = [(float(x), float(y)) for x, y in values.reshape(4, 2)]
-    try:
-        to_xyz = adapt_white(pairs[3], D65) @ rgb_to_xyz(tuple(pairs[:3]), pairs[3])
-    except np.linalg.LinAlgError as error:
-        raise DecodeError(f"EXR chromaticities are not believable: {values.tolist()}") from error
-    return np.asarray(np.linalg.inv(rgb_to_xyz(REC709_PRIMARIES, D65)) @ to_xyz)
+def _of_tags(decoded: Decoded, tags: TiffTags) -> _Picture:
+    return _Picture(decoded=decoded, orientation=orientation_of(tags), metadata=metadata_of(tags))

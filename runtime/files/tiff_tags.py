@@ -17,6 +17,8 @@ TagValue = tuple[float, ...] | bytes
 
 EXIF_POINTER: Final = 34665
 GPS_POINTER: Final = 34853
+INTEROPERABILITY_POINTER: Final = 40965
+INTEROPERABILITY_INDEX: Final = 1
 SUB_IFDS: Final = 330
 MAX_DIRECTORIES: Final = 64
 MAX_ENTRIES: Final = 4096
@@ -41,11 +43,14 @@ class TiffTags:
         directories: Tag number -> numbers, or bytes for text and opaque values.
         file_bytes: Size of the file.
         starts: Where each directory lies in the file.
+        interoperability: Index of Exif's interoperability, such as R03; empty if not stated. Its
+            directory is no other, since its numbers of tags are also those of places.
     """
 
     directories: tuple[Mapping[int, TagValue], ...]
     file_bytes: int
     starts: tuple[int, ...] = ()
+    interoperability: str = ""
 
     def numbers(self, tag: int) -> tuple[float, ...] | None:
         """Give the numbers of a tag from the first directory that has it."""
@@ -76,6 +81,7 @@ class _Reader:
     bytes_left: int = MAX_ALL_BYTES
     seen: set[int] = field(default_factory=set)
     found: dict[int, Mapping[int, TagValue]] = field(default_factory=dict)
+    interoperability: str = ""
 
     def unpack(self, code: str, offset: int) -> tuple[float, ...] | None:
         """Give numbers at an offset, or None where the file does not reach."""
@@ -98,6 +104,10 @@ class _Reader:
             self.found[at] = tags
             pointers = (SUB_IFDS, EXIF_POINTER, GPS_POINTER)
             children = [at for tag in pointers for at in _whole(tags.get(tag))]
+            for place in _whole(tags.get(INTEROPERABILITY_POINTER))[:1]:
+                index = self.directory(place)[0].get(INTEROPERABILITY_INDEX)
+                if isinstance(index, bytes):
+                    self.interoperability = index.split(b"\0")[0].decode("latin-1")
             pending = [*children[:MAX_DIRECTORIES], *pending, following]
 
     def directory(self, offset: int) -> tuple[dict[int, TagValue], int]:
@@ -166,7 +176,10 @@ def _read(file: BinaryIO, file_bytes: int) -> TiffTags:
     )
     reader.walk(first)
     return TiffTags(
-        directories=tuple(reader.found.values()), file_bytes=file_bytes, starts=tuple(reader.found)
+        directories=tuple(reader.found.values()),
+        file_bytes=file_bytes,
+        starts=tuple(reader.found),
+        interoperability=reader.interoperability,
     )
 
 

@@ -154,6 +154,7 @@ class Reconstruction:
             bundle=None if bundle is None else bundle.manifest.name,
             bundle_sha256=None if bundle is None else bundle.sha256,
             unit=self._setup.options.unit,
+            window=capture.window,
         )
 
     @property

@@ -20,7 +20,7 @@ from camkit.runtime.capture import SATURATION_SHARE, Capture
 from camkit.runtime.merging.average import Average, BoolArray, Exposed
 from camkit.runtime.merging.estimate import disagreement, estimate_response
 from camkit.runtime.merging.response import Response, ResponseName, srgb_response
-from camkit.runtime.merging.survey import Frame, Survey, read_frame
+from camkit.runtime.merging.survey import Frame, Survey, cropped, read_frame
 from camkit.runtime.signal.noise import fallback_noise, measure_noise
 
 BAND_ROWS: Final = 256
@@ -69,7 +69,7 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
         raise ContractError("a response is estimated from 8-bit pictures; say --response srgb")
     if wanted == "linear" or (wanted is None and codes is None):
         return None, ""
-    plain = srgb_response(int(np.iinfo(survey.like.samples.dtype).max) + 1)
+    plain = srgb_response(int(survey.like.white_level) + 1)
     if wanted == "srgb" or codes is None:
         return plain, ""
     try:
@@ -101,6 +101,7 @@ def merge(survey: Survey, response: Response | None, dark: DarkRows | None = Non
         capture = read_frame(frame.path, survey.mosaic)
         if capture.sha256 != frame.sha256:
             raise DecodeError(f"{frame.path.name} changed while it was read; merge again")
+        capture = cropped(capture, survey.like.window)
         if response is not None:
             expose: _Coded | _Linear = _Coded(response)
         else:

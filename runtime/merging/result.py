@@ -133,6 +133,7 @@ def _write_picture(
         camera=like.camera,
         metadata=replace(like.metadata, exposure_time_s=_stated(frame.time_s)),
         orientation=like.orientation,
+        window=like.window,
     )
     picture = PictureFormat(
         width=like.width,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.picture_window import PictureWindow, common_box
 from camkit.runtime.raw import is_picture, read_capture
 
 SAMPLED_PIXELS: Final = 20_000
@@ -34,6 +35,7 @@ class Frame:
         sha256: Hash of the file.
         noise: As the file states it.
         file_time_s: Exposure time as the file states it; None where it states none.
+        window: Where its pixels lie in a larger picture; None if not stated.
     """
 
     path: Path
@@ -41,6 +43,7 @@ class Frame:
     sha256: str | None
     noise: NoiseModel | None
     file_time_s: float | None = None
+    window: PictureWindow | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +52,8 @@ class Survey:
 
     Attributes:
         frames: From the longest to the shortest.
-        like: The longest frame without its pixels: kind, size, levels, colour.
+        like: The longest frame without its pixels: kind, size, levels, colour. Where frames lie at
+            different places of a larger picture, only what all of them hold counts.
         is_raw: Linear samples of a sensor, and not a picture.
         codes: (frame, 3, pixel) uint8 on a lattice; None where pictures are not of 8 bits.
         mosaic: What the caller said of a headerless mosaic or of levels.
@@ -111,6 +115,7 @@ def survey(
             sha256=capture.sha256,
             noise=capture.noise,
             file_time_s=told,
+            window=capture.window,
         )
         if found:
             check_alike(found[0][1], found[0][0].path, capture, path)
@@ -145,8 +150,11 @@ def check_alike(one: Capture, named: Path, other: Capture, path: Path) -> None:
     Raises:
         DecodeError: If it does.
     """
+    placed = one.window is not None and other.window is not None
+    aspects = [1.0 if c.window is None else c.window.pixel_aspect for c in (one, other)]
     for what, mine, its in (
-        ("size", (one.width, one.height), (other.width, other.height)),
+        *([] if placed else [("size", (one.width, one.height), (other.width, other.height))]),
+        ("shape of pixels", aspects[0], aspects[1]),
         ("mosaic", one.cfa, other.cfa),
         ("type of samples", one.samples.dtype.name, other.samples.dtype.name),
         ("white level", one.white_level, other.white_level),
@@ -199,7 +207,8 @@ def _joined(
     is_timed: bool,
 ) -> Survey:
     frames = tuple(frame for frame, _, _ in found)
-    like, is_raw = found[0][1], not is_picture(frames[0].path) or found[0][1].cfa is not None
+    like, registered = _registered(found[0][1], frames)
+    is_raw = not is_picture(frames[0].path) or like.cfa is not None
     lattices = [codes for _, _, codes in found if codes is not None]
     return Survey(
         frames=frames,
@@ -207,9 +216,47 @@ def _joined(
         is_raw=is_raw,
         codes=np.stack(lattices) if lattices else None,
         mosaic=mosaic,
-        notes=_notes([(frame.path, capture.notes) for frame, capture, _ in found]),
+        notes=(*_notes([(f.path, capture.notes) for f, capture, _ in found]), *registered),
         is_timed=is_timed,
     )
+
+
+def _registered(like: Capture, frames: Sequence[Frame]) -> tuple[Capture, tuple[str, ...]]:
+    """Return the longest frame as far as all frames reach, and a note where that is less.
+
+    Raises:
+        DecodeError: If frames share no place.
+    """
+    windows = [frame.window for frame in frames if frame.window is not None]
+    if len(windows) < len(frames) or len({window.data for window in windows}) == 1:
+        return like, ()
+    box = common_box([window.data for window in windows])
+    if box is None:
+        raise DecodeError(
+            "the data windows of the frames share no pixel; give frames of one scene, or EXRs "
+            "whose windows say where they lie"
+        )
+    displays = {window.display for window in windows}
+    common = replace(
+        windows[0], data=box, display=windows[0].display if len(displays) == 1 else box
+    )
+    wide, high = common.size_px
+    note = (
+        f"frames are registered by their data windows: {wide}x{high} px from ({box[0]}, {box[1]}) "
+        "lie in all of them"
+    )
+    return cropped(like, common), (note,)
+
+
+def cropped(capture: Capture, window: PictureWindow | None) -> Capture:
+    """Return the part of a capture that lies in a window; all of it where windows are unknown."""
+    own = capture.window
+    if own is None or window is None or own.data == window.data:
+        return capture
+    left, top = (window.data[n] - own.data[n] for n in (0, 1))
+    wide, high = window.size_px
+    samples = capture.samples[..., top : top + high, left : left + wide]
+    return replace(capture, samples=samples, window=window)
 
 
 def _notes(told: Sequence[tuple[Path, tuple[str, ...]]]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import OpenEXR
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.files.exr_attributes import exr_attributes
-from camkit.runtime.output.picture_writer import Codes, PictureFormat, PictureWriter
+from camkit.runtime.output.picture_writer import UPRIGHT, Codes, PictureFormat, PictureWriter
 
 HALF_MAX: Final = 65504.0
 COPY_ROWS: Final = 256
@@ -67,11 +67,25 @@ class ExrWriter(PictureWriter):
         header["compression"] = Imath.Compression(getattr(Imath.Compression, packing))
         header["channels"] = {c: Imath.Channel(Imath.PixelType(kind)) for c in "RGB"}
         point = Imath.point(0.0, 0.0)
+        self._place(header)
         header["chromaticities"] = Imath.Chromaticities(point, point, point, point)
         header["whiteLuminance"] = WHITE_LUMINANCE
         for name, value in exr_attributes(self.picture.origin.metadata).items():
             header[name] = value
         return OpenEXR.OutputFile(str(self.path), header)
+
+    def _place(self, header: Any) -> None:
+        """Put the pixels where those of the capture lie, as far as they are still the same."""
+        window = self.picture.origin.window
+        same = window is not None and window.size_px == self.picture.file_size
+        if window is None or not same or self.picture.orientation != UPRIGHT:
+            return
+        for name, (x0, y0, x1, y1) in (
+            ("dataWindow", window.data),
+            ("displayWindow", window.display),
+        ):
+            header[name] = Imath.Box2i(Imath.V2i(x0, y0), Imath.V2i(x1, y1))
+        header["pixelAspectRatio"] = window.pixel_aspect
 
     def _promote(self) -> None:
         _log.info("%s: values beyond half; written as float", self.path.name)

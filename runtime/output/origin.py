@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.runtime.metadata import Metadata
+from camkit.runtime.picture_window import PictureWindow
 from camkit.runtime.unit import Unit
 
 
@@ -23,6 +24,7 @@ class Origin:
         bundle: Name of the bundle; None where it was only developed.
         bundle_sha256: Its hash.
         unit: The camera body; None if not known.
+        window: Where the pixels of the capture lie in a larger picture; None if not stated.
     """
 
     camera: str = ""
@@ -33,6 +35,7 @@ class Origin:
     bundle: str | None = None
     bundle_sha256: str | None = None
     unit: Unit | None = None
+    window: PictureWindow | None = None
 
     def stripped(self) -> Self:
         """Give the same without what tells of photographer, camera, date and place.

@@ -36,7 +36,7 @@ def process(
     ] = False,
     format_: Annotated[
         str | None,
-        typer.Option("--format", help="exr, tiff, png, jpeg or dng. Default: exr."),
+        typer.Option("--format", help="exr, tiff, png, jpeg (jpg) or dng. Default: exr."),
     ] = None,
     jpeg_quality: Annotated[
         int | None, typer.Option(help="With --format jpeg: 1..100. Default: 92.")

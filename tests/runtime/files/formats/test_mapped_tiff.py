@@ -7,8 +7,9 @@ import pytest
 import tifffile
 
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.files import mapped_tiff, picture
-from camkit.runtime.files.mapped_tiff import map_plain_tiff
+from camkit.runtime.files import picture
+from camkit.runtime.files.formats import mapped_tiff, tiff_picture
+from camkit.runtime.files.formats.mapped_tiff import map_plain_tiff
 from camkit.runtime.machine.memory import mapping_of, release_pages
 
 RNG = np.random.default_rng(0)
@@ -59,7 +60,7 @@ def test_float_small_and_foreign_files_are_left_to_the_decoder(tmp_path: Path) -
 def both_ways(monkeypatch: pytest.MonkeyPatch, read: object, path: Path) -> list[Capture]:
     decoded = read(path)  # type: ignore[operator]
     monkeypatch.setattr(
-        picture, "map_plain_tiff", lambda p: mapped_tiff.map_plain_tiff(p, least_bytes=0)
+        tiff_picture, "map_plain_tiff", lambda p: mapped_tiff.map_plain_tiff(p, least_bytes=0)
     )
     return [decoded, read(path)]  # type: ignore[operator]
 

@@ -3,7 +3,7 @@
 import pytest
 
 from camkit.errors import DecodeError
-from camkit.runtime.files.radiance import check_header
+from camkit.runtime.files.formats.radiance import check_header
 
 HEADER = b"#?RADIANCE\nSOFTWARE=a\nEXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n"
 SAMPLES = bytes(64)

@@ -1,0 +1,195 @@
+"""The page of a TIFF that is the picture, and what its tags say of its samples.
+
+Cameras and scanners put a thumbnail first, as a page of its own or with the picture in its
+children. The picture is the largest page that is not marked as a reduced one or as a mask.
+
+References: TIFF 6.0, sections 3 to 9, 16, 18, 23; TIFF technical note 1 (SubIFDs); Adobe Photoshop
+TIFF technical notes (ICCLab, 16-bit Lab).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from camkit.errors import DecodeError
+from camkit.runtime.files.raw_checks import MAX_PIXELS
+from camkit.runtime.files.tiff_tags import TagValue, TiffTags
+
+MIN_IS_WHITE, MIN_IS_BLACK, RGB, PALETTE, YCBCR, CIE_LAB, ICC_LAB = 0, 1, 2, 3, 6, 8, 9
+UNSIGNED, SIGNED, FLOAT, UNDEFINED = 1, 2, 3, 4
+PLAIN, LZW, OLD_JPEG, JPEG, DEFLATE, PACK_BITS, OLD_DEFLATE = 1, 5, 6, 7, 8, 32773, 32946
+ASSOCIATED_ALPHA: Final = 1
+LZMA: Final = 34925
+READ: Final = (MIN_IS_WHITE, MIN_IS_BLACK, RGB, PALETTE, YCBCR, CIE_LAB, ICC_LAB)
+CHANNELS: Final = {MIN_IS_WHITE: 1, MIN_IS_BLACK: 1, PALETTE: 1}
+MOST_PX_PER_BYTE: Final = 8192
+"""Deflate packs 1032 bytes into one, each of up to 8 pixels."""
+
+_UNREAD_PHOTOMETRICS: Final = {
+    4: "a transparency mask",
+    5: "inks (CMYK)",
+    10: "ITU Lab",
+    32803: "a sensor's mosaic (CFA)",
+    32844: "LogL of SGI",
+    32845: "LogLuv of SGI",
+    34892: "linear RAW",
+    51177: "a depth map",
+}
+_REDUCED, _MASK = 1, 4
+_OLD_REDUCED: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TiffPage:
+    """One page.
+
+    Attributes:
+        start: Where its directory lies in the file.
+        tags: Its directory.
+        number: From 1, in the order of the file.
+    """
+
+    start: int
+    tags: Mapping[int, TagValue]
+    number: int
+
+    def numbers(self, tag: int, default: tuple[int, ...] = ()) -> tuple[int, ...]:
+        """Return whole numbers of a tag."""
+        value = self.tags.get(tag)
+        if value is None or isinstance(value, bytes):
+            return default
+        return tuple(int(n) if abs(n) < 1 << 40 else 0 for n in value)
+
+    def number_of(self, tag: int, default: int) -> int:
+        """Return the first number of a tag."""
+        return self.numbers(tag, (default,))[0]
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Return (width, height)."""
+        return self.number_of(256, 0), self.number_of(257, 0)
+
+    @property
+    def samples(self) -> int:
+        """Return the samples of a pixel."""
+        return self.number_of(277, 1)
+
+    @property
+    def bits(self) -> int:
+        """Return the bits of a sample."""
+        return self.number_of(258, 1)
+
+    @property
+    def kind(self) -> int:
+        """Return what kind of number a sample is: UNSIGNED, SIGNED, FLOAT."""
+        stated = self.number_of(339, UNSIGNED)
+        return UNSIGNED if stated == UNDEFINED else stated
+
+    @property
+    def compression(self) -> int:
+        """Return the number of its compression."""
+        return self.number_of(259, PLAIN)
+
+    @property
+    def predictor(self) -> int:
+        """Return the number of its predictor."""
+        return self.number_of(317, 1)
+
+    @property
+    def photometric(self) -> int:
+        """Return what samples stand for; where it is not stated, what their number tells."""
+        return self.number_of(262, RGB if self.samples >= 3 else MIN_IS_BLACK)
+
+    @property
+    def extra(self) -> tuple[int, ...]:
+        """Return what samples beyond the colours are."""
+        return self.numbers(338)
+
+    @property
+    def is_planar(self) -> bool:
+        """Tell whether each sample has a plane of its own."""
+        return self.number_of(284, 1) == 2 and self.samples > 1
+
+    @property
+    def colours(self) -> int:
+        """Return the samples that are colour: 1 or 3."""
+        is_triple = self.samples == 3 or (self.samples > 3 and not self.extra)
+        return 3 if is_triple else CHANNELS.get(self.photometric, 3)
+
+
+def picture_page(tags: TiffTags) -> tuple[TiffPage, tuple[str, ...]]:
+    """Return the page that is the picture, and notes on those that are not.
+
+    Raises:
+        DecodeError: If no page is one, or it is of a kind that is not read; names it.
+    """
+    places = zip(tags.starts, tags.directories, strict=True)
+    found = [(start, directory) for start, directory in places if {256, 257} <= directory.keys()]
+    pages = [
+        TiffPage(start=start, tags=directory, number=number)
+        for number, (start, directory) in enumerate(found, 1)
+    ]
+    if not pages:
+        raise DecodeError("the TIFF has no page with a size: it is damaged, copy it again")
+    full = [page for page in pages if not _is_beside(page)] or pages
+    chosen = max(full, key=lambda page: page.size_px[0] * page.size_px[1])
+    _check(chosen, tags.file_bytes)
+    notes = []
+    if chosen.number > 1:
+        wide, high = pages[0].size_px
+        notes.append(
+            f"page {chosen.number} is read, which is the picture; page 1 has {wide}x{high} px"
+        )
+    if len(full) > 1:
+        notes.append(f"one page is read; {len(full) - 1} more of the TIFF are not")
+    return chosen, tuple(notes)
+
+
+def _is_beside(page: TiffPage) -> bool:
+    """Tell whether a page is marked as a reduced one or as a mask."""
+    return bool(page.number_of(254, 0) & (_REDUCED | _MASK)) or page.number_of(255, 0) == (
+        _OLD_REDUCED
+    )
+
+
+def _check(page: TiffPage, file_bytes: int) -> None:
+    """Refuse what is not read, by its name."""
+    wide, high = page.size_px
+    if wide < 1 or high < 1 or wide * high > min(MAX_PIXELS, file_bytes * MOST_PX_PER_BYTE):
+        raise DecodeError(f"the header claims {wide}x{high} pixels in {file_bytes} bytes")
+    name = _UNREAD_PHOTOMETRICS.get(page.photometric)
+    if page.photometric not in READ:
+        name = name or f"photometric interpretation {page.photometric}"
+        raise DecodeError(f"a TIFF of {name} is not read; save it as grey or RGB")
+    bits = set(page.numbers(258))
+    if len(bits) > 1:
+        raise DecodeError(f"a TIFF of samples of {sorted(bits)} bits is not read; save 8 or 16")
+    if page.samples > page.colours + 1:
+        raise DecodeError(
+            f"a TIFF of {page.samples} samples per pixel is not read; expected 1 or 3, and alpha"
+        )
+    if page.samples < page.colours:
+        raise DecodeError(f"an RGB TIFF of {page.samples} samples per pixel is damaged")
+    if page.compression == PACK_BITS and page.predictor > 1:
+        raise DecodeError(
+            "a TIFF of PackBits with a predictor is not read: programs disagree on it"
+        )
+    _check_numbers(page)
+
+
+def _check_numbers(page: TiffPage) -> None:
+    kinds = {SIGNED: "signed integers", 5: "complex integers", 6: "complex floats"}
+    if page.photometric in (CIE_LAB, ICC_LAB):
+        if page.bits not in (8, 16) or page.kind == FLOAT:
+            raise DecodeError(f"a Lab TIFF of {page.bits} bits is not read; save 8 or 16")
+        return
+    if page.kind in kinds:
+        raise DecodeError(f"a TIFF of {kinds[page.kind]} is not read; save unsigned ones or floats")
+    if page.kind == FLOAT and page.bits not in (16, 32, 64):
+        raise DecodeError(f"a TIFF of floats of {page.bits} bits is not read; save 16 or 32")
+    if page.kind != FLOAT and not 1 <= page.bits <= 16:
+        raise DecodeError(f"a TIFF of integers of {page.bits} bits is not read; save 16, or floats")
+    if page.kind == FLOAT and page.photometric in (MIN_IS_WHITE, PALETTE, YCBCR):
+        raise DecodeError("a TIFF of floats is grey (MinIsBlack) or RGB; save it so")
+    if page.photometric == PALETTE and page.bits > 8:
+        raise DecodeError(f"a palette of {page.bits} bits is not read; save it as RGB")
