@@ -121,7 +121,7 @@ def test_notes_of_the_choice_are_said_on_stderr(camkit_command, tmp_path: Path) 
         (["long", "small"], ["--times", "1,2"], ExitCode.INPUT_FAILED, "differ in size"),
         (["long", "deep"], ["--times", "1,2"], ExitCode.INPUT_FAILED, "differ in type"),
         (["long", "nan"], ["--times", "1,2"], ExitCode.INPUT_FAILED, "1 samples are NaN"),
-        (["long", "yc"], ["--times", "1,2"], ExitCode.INPUT_FAILED, "expected EXR channels"),
+        (["long", "depth"], ["--times", "1,2"], ExitCode.INPUT_FAILED, "expected EXR channels"),
         (["long", "cut"], ["--times", "1,2"], ExitCode.INPUT_FAILED, "damaged"),
         (["long", "none"], ["--times", "1,2"], ExitCode.INPUT_FAILED, "none.png"),
         (["long", "middle"], ["--times", "1,2", "--response", "log"], ExitCode.USAGE, "linear, s"),
@@ -137,7 +137,7 @@ def test_bad_brackets_give_one_line_and_no_file(
         assert cv2.imwrite(str(tmp_path / f"{name}.png"), np.full((48, 64, 3), 9, np.uint16))
     plane = np.ones((48, 64), dtype=np.float32)
     _write_exr(tmp_path / "nan.exr", R=plane, G=plane, B=np.where(plane.cumsum() == 7, np.nan, 1).astype(np.float32).reshape(48, 64))  # noqa: E501 # fmt: skip
-    _write_exr(tmp_path / "yc.exr", Y=plane, RY=plane, BY=plane)
+    _write_exr(tmp_path / "depth.exr", Z=plane, ZBack=plane)
     (tmp_path / "cut.png").write_bytes((tmp_path / "long.png").read_bytes()[:300])
     found = {path.stem: path for path in tmp_path.glob("*.*")}
     named = [found.get(name, tmp_path / f"{name}.png") for name in files]
