@@ -16,7 +16,7 @@ from camkit.runtime.calibration.display.profile import (
 )
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.picture import read_orientation, read_picture, read_scene
-from camkit.runtime.files.regular_file import check_regular
+from camkit.regular_file import check_regular
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.raw import is_picture
 

@@ -2,6 +2,9 @@
 
 import io
 import math
+import struct
+import tokenize
+import warnings
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
@@ -16,10 +19,16 @@ from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.packed import member_bytes, opened_zip
+from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 HEADER_BYTES: Final = 20_000
 SMALL_BYTES: Final = 1_000_000
 SUFFIX: Final = ".npy"
+BROKEN_HEADER: Final = (
+    *(ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
+    *(RecursionError, MemoryError, EOFError, struct.error, tokenize.TokenError),
+)
+"""What numpy raises of headers that are damaged; it parses them as Python."""
 
 
 def open_npz(path: Path, hints: Hints) -> CountsFile:
@@ -34,7 +43,7 @@ def open_npz(path: Path, hints: Hints) -> CountsFile:
         small = {
             other: _array(archive, members[other], headers[other], SMALL_BYTES)
             for other, (shape, _, _) in headers.items()
-            if len(shape) <= 1 and members[other].file_size < SMALL_BYTES
+            if other in TABLE_OF and len(shape) <= 1 and members[other].file_size < SMALL_BYTES
         }
         values = _array(archive, members[name], headers[name], hints.max_bytes)
     return ArrayFile(path, values, hints, kind=KEYS.get(name), stated=stated_values(small))
@@ -79,17 +88,28 @@ def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
     """
     with archive.open(member) as file:
         start = io.BytesIO(file.read(HEADER_BYTES))
-    try:
-        version = npy.read_magic(start)
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, is_fortran, dtype = read(start)
-    except (ValueError, SyntaxError, TypeError) as error:
-        raise DecodeError(f"{member.filename} is no array: {error}") from error
+    shape, is_fortran, dtype = read_header(start, member.filename)
     if dtype.hasobject:
         raise DecodeError(
             f"{member.filename} holds pickled objects, which are never read; store numbers"
         )
     return shape, is_fortran, dtype
+
+
+def read_header(start: io.BytesIO, what: str) -> Header:
+    """Read shape, order and type of an array; what follows lies behind.
+
+    Raises:
+        DecodeError: If it is no header.
+    """
+    try:
+        version = npy.read_magic(start)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # headers of Python 2 are read as well
+            return read(start)
+    except BROKEN_HEADER as error:
+        raise DecodeError(f"{what} is no array: its header is damaged: {error}") from error
 
 
 def _array(
@@ -104,8 +124,7 @@ def _array(
     data = member_bytes(archive, member, max_bytes)
     count = math.prod(shape) if min(shape, default=1) >= 0 else -1
     start = io.BytesIO(bytes(data[:HEADER_BYTES]))
-    version = npy.read_magic(start)
-    (npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0)(start)
+    read_header(start, member.filename)
     if count < 0 or start.tell() + count * dtype.itemsize > member.file_size:
         raise DecodeError(
             f"{member.filename} says it is an array of {shape}, {dtype}, and has only "

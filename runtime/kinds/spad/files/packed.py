@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import IO, Final
 
 from camkit.errors import CamkitError, DecodeError
+from camkit.regular_file import check_regular
 
 MOST_UNPACKED: Final = 4_000_000_000
 """Bytes of one member."""
+MOST_MEMBERS: Final = 10_000
 PIECE: Final = 1 << 20
 LOCAL_HEADER: Final = 30
 BROKEN: Final = (
@@ -33,7 +35,10 @@ BROKEN: Final = (
 def opened_zip(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip; what is wrong with it inside the block is told as a `DecodeError`."""
     try:
+        check_regular(path)
         with zipfile.ZipFile(path) as archive:
+            if len(archive.infolist()) > MOST_MEMBERS:
+                raise DecodeError(f"{path.name} holds more than {MOST_MEMBERS} files")
             yield archive
     except CamkitError:
         raise
