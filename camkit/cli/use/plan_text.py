@@ -1,11 +1,12 @@
 """Plans of captures as JSON or as lines for people, for `plan` and `process --dry-run`."""
 
 import json
+import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.cli.say import say
-from camkit.errors import BundleError, CamkitError, ContractError
+from camkit.errors import BundleError, CamkitError, ContractError, unexpected
 
 if TYPE_CHECKING:
     from camkit.runtime.batch import Task
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options
     from camkit.runtime.pipeline import Pipeline
+
+logger = logging.getLogger(__name__)
 
 OVERWRITES: Final = "process would refuse to overwrite the capture itself: choose an --out-dir"
 
@@ -58,6 +61,10 @@ def print_plans(
             if bundle is not None and isinstance(error, BundleError):
                 raise
             facts |= {"status": "failed", "error": str(error)}
+            done = False
+        except Exception as error:  # noqa: BLE001 - one file never ends a batch
+            logger.debug("%s failed", task.source, exc_info=error)
+            facts |= {"status": "failed", "error": unexpected(error)}
             done = False
         say(json.dumps(facts) if as_json else "\n".join(plan_lines(facts)))
     return done

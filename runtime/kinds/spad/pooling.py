@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
 from camkit.runtime.kinds.spad.surroundings import LEAST_BACKGROUND, are_believed
@@ -152,6 +153,7 @@ class Squares:
         found = np.zeros((len(rows), bins), np.float32)
         for dy in range(-reach, reach + 1):
             for dx in range(-reach, reach + 1):
+                check_wish()
                 at = (y + dy, x + dx)
                 there = (at[0] >= 0) & (at[0] < height) & (at[1] >= 0) & (at[1] < width)
                 there[there] = self._sound[at[0][there], at[1][there]]
@@ -172,6 +174,7 @@ class Squares:
 def _shifted(values: FloatArray, step: int, axis: int) -> FloatArray:
     """Give what lies so many places before and after along an axis, together."""
     found = np.zeros_like(values)
+    check_wish()
     if step < values.shape[axis]:
         ahead = [slice(None)] * 3
         behind = [slice(None)] * 3

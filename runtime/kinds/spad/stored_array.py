@@ -1,14 +1,16 @@
 """Small arrays that a timing file names: a measured pulse, maps of dark counts and hot pixels."""
 
 import io
+import math
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.files.npy_header import read_header
+from camkit.side_file import read_side_bytes, read_side_text
 
 MOST_BYTES: Final = 64_000_000
 
@@ -26,12 +28,11 @@ def read_columns(path: Path, what: str) -> NDArray[np.float64]:
     Raises:
         ContractError: If it cannot be read so.
     """
-    data = _bytes(path, what)
+    text = read_side_text(path, what, most_bytes=MOST_BYTES).replace(",", " ")
     try:
-        text = data.decode("utf-8").replace(",", " ")
         rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
         found = np.array(rows, dtype=np.float64)
-    except (UnicodeDecodeError, ValueError) as error:
+    except ValueError as error:
         raise ContractError(f"{what} {path} must be lines of two numbers: {error}") from error
     if found.ndim != 2 or found.shape[1] != 2:
         raise ContractError(f"{what} {path} must be lines of two numbers")
@@ -44,22 +45,19 @@ def read_map(path: Path, what: str) -> NDArray[Any]:
     Raises:
         ContractError: If it is missing, no such file, larger than a map is, or not (h, w).
     """
-    data = io.BytesIO(_bytes(path, what))
+    data = io.BytesIO(read_side_bytes(path, what, most_bytes=MOST_BYTES))
     try:
-        found = npy.read_array(data, allow_pickle=False)
-    except (ValueError, EOFError, TypeError, SyntaxError) as error:
+        shape, is_fortran, dtype = read_header(data, path.name)
+        count = math.prod(shape)
+        left = len(data.getbuffer()) - data.tell()
+        if dtype.hasobject or not 0 <= count * dtype.itemsize <= left:
+            raise ValueError(f"{count} numbers of {dtype} are announced, {left} bytes are there")
+        flat = np.frombuffer(data.getbuffer(), dtype, count, data.tell())
+        found = flat.reshape(shape, order="F" if is_fortran else "C")
+    except (ValueError, DecodeError) as error:
         raise ContractError(f"{what} {path} must be an .npy file of numbers: {error}") from error
     if found.ndim != 2 or found.dtype.kind not in "biuf" or not np.isfinite(found).all():
         raise ContractError(
             f"{what} {path} must hold finite numbers (h, w); it holds {found.dtype} {found.shape}"
         )
     return np.asarray(found)
-
-
-def _bytes(path: Path, what: str) -> bytes:
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ContractError(f"{what} {path} has more than {MOST_BYTES // 10**6} MB")
-        return path.read_bytes()
-    except OSError as error:
-        raise ContractError(f"cannot read {what} {path}: {error.strerror or error}") from error

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from camkit.contracts import FloatArray
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
 
 LEAST_BACKGROUND: Final = 1e-3
@@ -97,6 +98,7 @@ def _gains(
     y, x = np.divmod(rows, width)
     found = np.zeros((len(rows), side, side))
     for dy in range(side):
+        check_wish()
         for dx in range(side):
             at_y, at_x = y + dy - reach, x + dx - reach
             there = (at_y >= 0) & (at_y < height) & (at_x >= 0) & (at_x < width)

@@ -96,7 +96,7 @@ def axes_of(path: Path, shape: Sequence[int], stated: str | None, usual: str | N
         example = "abcdefg"[: len(shape) - len("tyx")]
         raise ContractError(
             f"{path.name} holds an array of {shape}; expected time, rows and columns: name its "
-            f'axes and the place to take of each further one, [array] axes = '
+            f"axes and the place to take of each further one, [array] axes = "
             f'"{"".join(letter + "0" for letter in example)}tyx" or what it is, in a file for '
             "--timing"
         )
@@ -111,7 +111,11 @@ def axes_of(path: Path, shape: Sequence[int], stated: str | None, usual: str | N
         raise ContractError(
             f'[array] axes = "{text}" does not fit {path.name}, an array of {shape}: expected each '
             f"of the letters {'t, y, x' if len(shape) > 2 else 'y, x'} once, in its order"
-            + (', and for any other axis a letter with a place, such as "c0"' if _more(shape) else "")
+            + (
+                ', and for any other axis a letter with a place, such as "c0"'
+                if _more(shape)
+                else ""
+            )
         )
     return found
 

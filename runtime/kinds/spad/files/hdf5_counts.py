@@ -102,9 +102,7 @@ def _is_cube(item: Any) -> bool:
     return is_cells or (item.dtype.kind in "biuf" and not is_vector)
 
 
-def _cells(
-    path: Path, file: Any, cells: Any, told: dict[str, object], hints: Hints
-) -> CountsFile:
+def _cells(path: Path, file: Any, cells: Any, told: dict[str, object], hints: Hints) -> CountsFile:
     if cells.ndim != 2:
         raise DecodeError(f"{path.name}: cells of time stamps must be (rows, columns)")
     _check_pieces(path, cells.name, cells, hints)

@@ -2,33 +2,25 @@
 
 import io
 import math
-import struct
-import tokenize
-import warnings
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from camkit.errors import DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
+from camkit.runtime.kinds.spad.files.npy_header import Header, read_header
 from camkit.runtime.kinds.spad.files.packed import member_bytes, opened_zip
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 HEADER_BYTES: Final = 20_000
 SMALL_BYTES: Final = 1_000_000
 SUFFIX: Final = ".npy"
-BROKEN_HEADER: Final = (
-    *(ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
-    *(RecursionError, MemoryError, EOFError, struct.error, tokenize.TokenError),
-)
-"""What numpy raises of headers that are damaged; it parses them as Python."""
 
 
 def open_npz(path: Path, hints: Hints) -> CountsFile:
@@ -77,9 +69,6 @@ def read_npz(
         }
 
 
-Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
-
-
 def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
     """Give shape, order and type of an array.
 
@@ -94,22 +83,6 @@ def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
             f"{member.filename} holds pickled objects, which are never read; store numbers"
         )
     return shape, is_fortran, dtype
-
-
-def read_header(start: io.BytesIO, what: str) -> Header:
-    """Read shape, order and type of an array; what follows lies behind.
-
-    Raises:
-        DecodeError: If it is no header.
-    """
-    try:
-        version = npy.read_magic(start)
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # headers of Python 2 are read as well
-            return read(start)
-    except BROKEN_HEADER as error:
-        raise DecodeError(f"{what} is no array: its header is damaged: {error}") from error
 
 
 def _array(

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
@@ -106,6 +107,7 @@ def micro_times(records: NDArray[np.uint32], routing: int) -> Iterator[NDArray[n
 
 def _parts(records: NDArray[np.uint32]) -> Iterator[NDArray[np.uint32]]:
     for start in range(0, len(records), AT_ONCE):
+        check_wish()
         yield records[start : start + AT_ONCE]
 
 

@@ -90,9 +90,7 @@ def check_whole(path: Path, file: tifffile.TiffFile) -> None:
     in_series = sum(len(one) for one in file.series)
     is_mapped = all(one.dataoffset is not None for one in file.series)
     if found < announced or (not is_mapped and len(file.pages) != in_series):
-        raise DecodeError(
-            f"{path.name} is cut off: its pages are not those that it announces"
-        )
+        raise DecodeError(f"{path.name} is cut off: its pages are not those that it announces")
 
 
 def check_pages(path: Path, pages: Iterable[Any], max_bytes: int) -> None:
