@@ -33,8 +33,8 @@ def unexpected(error: Exception) -> str:
     """Return what to say of an error that nobody foresaw, as one line."""
     told = one_line(str(error))
     return (
-        f"unexpected {type(error).__name__}{': ' if told else ''}{told}; --debug shows where, please "
-        "report it with the file"
+        f"unexpected {type(error).__name__}{': ' if told else ''}{told}; please report it with the "
+        "file, --debug shows where"
     )
 
 

@@ -64,29 +64,29 @@ def read_side_toml(path: Path, what: str) -> dict[str, Any]:
     Raises:
         ContractError: As `read_side_bytes`; if it is no TOML, or is nested too deep.
     """
-    return parse_toml(read_side_text(path, what), f"{what} {path}")
+    data = read_side_bytes(path, what, most_bytes=MOST_TEXT_BYTES)
+    return parse_toml(data, f"{what} {path}")
 
 
-def parse_toml(text: str, what: str) -> dict[str, Any]:
+def parse_toml(data: bytes, what: str) -> dict[str, Any]:
     """Parse TOML.
 
     Args:
-        text: All of it.
+        data: UTF-8.
         what: What it is, for errors.
 
     Raises:
         ContractError: If it is no TOML, or is nested deeper than `MOST_DEPTH`.
     """
     too_deep = f"{what} is nested too deep; expected at most {MOST_DEPTH} levels"
-    if _DEEP_KEY.search(text):
-        raise ContractError(too_deep)
     try:
-        tables = tomllib.loads(text)
+        text = data.decode("utf-8")
+        tables = None if _DEEP_KEY.search(text) else tomllib.loads(text)
     except RecursionError as error:
         raise ContractError(too_deep) from error
     except ValueError as error:  # also of numbers that are no dates, or have thousands of digits
-        raise ContractError(f"{what} is not valid TOML: {error}") from error
-    if _is_deeper(tables, MOST_DEPTH):
+        raise ContractError(f"{what} is no TOML, or is not valid TOML: {error}") from error
+    if tables is None or _is_deeper(tables, MOST_DEPTH):
         raise ContractError(too_deep)
     return tables
 

@@ -36,10 +36,7 @@ def parse_table(data: bytes, what: str) -> dict[str, Any]:
     Raises:
         ContractError: If it is no TOML.
     """
-    try:
-        return parse_toml(data.decode("utf-8"), what)
-    except UnicodeDecodeError as error:
-        raise ContractError(f"{what} is not valid TOML: {error}") from error
+    return parse_toml(data, what)
 
 
 def section(where: str, kind: type[T], table: Any) -> T:

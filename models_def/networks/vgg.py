@@ -17,8 +17,8 @@ from safetensors.torch import load_file
 from torch import Tensor, nn
 
 from camkit.errors import ContractError, DecodeError
-from camkit.regular_file import check_regular
 from camkit.models_def.torch_file import load_torch
+from camkit.regular_file import check_regular
 
 MEAN: Final = (0.485, 0.456, 0.406)
 DEVIATION: Final = (0.229, 0.224, 0.225)

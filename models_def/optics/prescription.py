@@ -256,7 +256,7 @@ def parse_prescription(
     text: str, catalogues: Sequence[GlassCatalogue] = (), *, folder: Path | None = None
 ) -> Lens:
     """Read a lens from TOML text; see `read_prescription`."""
-    table = parse_toml(text, "the prescription")
+    table = parse_toml(text.encode(), "the prescription")
     _check_keys(table, allowed=_LENS_KEYS, needed={"name", "stop", "surface"}, where="the lens")
     kinds = [kind for kind in APERTURE_KINDS if kind in table]
     if len(kinds) != 1:

@@ -221,7 +221,6 @@ class PlaceBlur:
 
     def __call__(self, light: FloatArray) -> FloatArray:
         """Give the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
-
         check_wish()
 
         def some(first: int) -> NDArray[np.complex64]:

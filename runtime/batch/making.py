@@ -104,7 +104,7 @@ def try_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult | N
     except MemoryError as error:
         logger.debug("%s failed", task.source, exc_info=error)
         return FileResult.failure(task.source, named, f"not enough memory: {error}".rstrip(": "))
-    except Exception as error:  # noqa: BLE001 - one file never ends a batch
+    except Exception as error:
         logger.debug("%s failed", task.source, exc_info=error)
         return FileResult.failure(task.source, named, unexpected(error))
 

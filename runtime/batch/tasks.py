@@ -132,7 +132,7 @@ def _make_task(
     if chosen is None and refusal is None:
         try:
             chosen = (named_bundle if maker is None else maker.named)(source)
-        except Exception as error:  # noqa: BLE001 - one file never ends a batch
+        except Exception as error:
             logger.debug("%s failed", source, exc_info=error)
             refusal = f"cannot read {source}: {unexpected(error)}"
         else:

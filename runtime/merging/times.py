@@ -56,7 +56,7 @@ def _read_list(path: Path) -> dict[str, float]:
     try:
         text = read_side_text(path, "the list of times", most_bytes=MOST_LIST_BYTES)
     except ContractError as error:
-        raise DecodeError(str(error)) from error
+        raise DecodeError(f"{path} cannot be read as a list of times: {error}") from error
     listed: dict[str, float] = {}
     for number, line in enumerate(text.splitlines(), 1):
         words = line.partition(COMMENT)[0].split()

@@ -9,11 +9,10 @@ from camkit.cli.say import say
 from camkit.errors import BundleError, CamkitError, ContractError, unexpected
 
 if TYPE_CHECKING:
-    from camkit.runtime.batch import Task
+    from camkit.runtime.batch import Pipelines, Task
     from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options
-    from camkit.runtime.pipeline import Pipeline
 
 logger = logging.getLogger(__name__)
 
@@ -51,10 +50,7 @@ def print_plans(
     for task in tasks:
         facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
         try:
-            if task.refusal is not None:
-                raise ContractError(task.refusal)
-            pipeline = pipelines.get(task.bundle, task.source)
-            facts |= _planned(task, pipeline, write, headerless)
+            facts |= _planned(task, pipelines, write, headerless)
             if task.own:
                 facts["warnings"].append(OVERWRITES)
         except CamkitError as error:
@@ -62,7 +58,7 @@ def print_plans(
                 raise
             facts |= {"status": "failed", "error": str(error)}
             done = False
-        except Exception as error:  # noqa: BLE001 - one file never ends a batch
+        except Exception as error:
             logger.debug("%s failed", task.source, exc_info=error)
             facts |= {"status": "failed", "error": unexpected(error)}
             done = False
@@ -72,12 +68,15 @@ def print_plans(
 
 def _planned(
     task: "Task",
-    pipeline: "Pipeline",
+    pipelines: "Pipelines",
     write: "WriteOptions",
     headerless: "MosaicOptions | None",
 ) -> dict[str, Any]:
     from camkit.runtime.development import begin
 
+    if task.refusal is not None:
+        raise ContractError(task.refusal)
+    pipeline = pipelines.get(task.bundle, task.source)
     if pipeline.maker is not None:
         return {"status": "planned", "bundle": task.bundle, **pipeline.plan(task.source)}
     work = begin(pipeline, pipeline.read(task.source, headerless), write)

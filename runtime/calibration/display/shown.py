@@ -8,6 +8,7 @@ import numpy as np
 from camkit.colorimetry import D65, REC709_PRIMARIES, apply_matrix, rgb_to_xyz
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
+from camkit.regular_file import check_regular
 from camkit.runtime.calibration.display.profile import (
     ADOBE_RGB_GAMMA,
     ADOBE_RGB_PRIMARIES,
@@ -16,7 +17,6 @@ from camkit.runtime.calibration.display.profile import (
 )
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.picture import read_orientation, read_picture, read_scene
-from camkit.regular_file import check_regular
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.raw import is_picture
 

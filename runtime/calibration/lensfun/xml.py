@@ -28,7 +28,7 @@ def read_xml(path: Path) -> Element:
     try:
         data = read_side_bytes(path, "the lensfun database", most_bytes=MOST_BYTES)
     except ContractError as error:
-        raise DecodeError(str(error)) from error
+        raise DecodeError(f"{error} (no database is larger than {MOST_BYTES} bytes)") from error
     root = parse_xml(data, str(path))
     if root.tag != ROOT:
         raise DecodeError(f"{path} is no lensfun database: expected <{ROOT}>, got <{root.tag}>")

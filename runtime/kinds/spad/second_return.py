@@ -16,7 +16,8 @@ from camkit.contracts import FloatArray
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
-from camkit.runtime.kinds.spad.pooling import LEAST_BACKGROUND, Pooled, Squares, taken
+from camkit.runtime.kinds.spad.pooling import Pooled, Squares, taken
+from camkit.runtime.kinds.spad.surroundings import LEAST_BACKGROUND
 from camkit.runtime.kinds.spad.two_returns import TwoFitter, TwoReturns
 
 Arrays = dict[str, NDArray[Any]]

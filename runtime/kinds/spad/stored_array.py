@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kinds.spad.files.npy_header import read_header
-from camkit.side_file import read_side_bytes, read_side_text
+from camkit.runtime.kinds.spad.npy_header import BROKEN_HEADER, read_header
+from camkit.side_file import read_side_bytes
 
 MOST_BYTES: Final = 64_000_000
 
@@ -28,8 +29,9 @@ def read_columns(path: Path, what: str) -> NDArray[np.float64]:
     Raises:
         ContractError: If it cannot be read so.
     """
-    text = read_side_text(path, what, most_bytes=MOST_BYTES).replace(",", " ")
+    data = read_side_bytes(path, what, most_bytes=MOST_BYTES)
     try:
+        text = data.decode("utf-8").replace(",", " ")
         rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
         found = np.array(rows, dtype=np.float64)
     except ValueError as error:
@@ -45,19 +47,27 @@ def read_map(path: Path, what: str) -> NDArray[Any]:
     Raises:
         ContractError: If it is missing, no such file, larger than a map is, or not (h, w).
     """
-    data = io.BytesIO(read_side_bytes(path, what, most_bytes=MOST_BYTES))
+    data = read_side_bytes(path, what, most_bytes=MOST_BYTES)
     try:
-        shape, is_fortran, dtype = read_header(data, path.name)
-        count = math.prod(shape)
-        left = len(data.getbuffer()) - data.tell()
-        if dtype.hasobject or not 0 <= count * dtype.itemsize <= left:
-            raise ValueError(f"{count} numbers of {dtype} are announced, {left} bytes are there")
-        flat = np.frombuffer(data.getbuffer(), dtype, count, data.tell())
-        found = flat.reshape(shape, order="F" if is_fortran else "C")
-    except (ValueError, DecodeError) as error:
+        _check_announced(data, path.name)
+        found = npy.read_array(io.BytesIO(data), allow_pickle=False)
+    except (*BROKEN_HEADER, DecodeError) as error:
         raise ContractError(f"{what} {path} must be an .npy file of numbers: {error}") from error
     if found.ndim != 2 or found.dtype.kind not in "biuf" or not np.isfinite(found).all():
         raise ContractError(
             f"{what} {path} must hold finite numbers (h, w); it holds {found.dtype} {found.shape}"
         )
     return np.asarray(found)
+
+
+def _check_announced(data: bytes, name: str) -> None:
+    """Refuse an array that announces more than there is, before numpy makes room for it.
+
+    Raises:
+        DecodeError: Says what came.
+    """
+    shape, _, dtype = read_header(io.BytesIO(data), name)
+    if math.prod(shape) * dtype.itemsize > len(data):
+        raise DecodeError(
+            f"an array {shape} of {dtype} is announced, and there are {len(data)} bytes"
+        )

@@ -11,7 +11,7 @@ Where the reference does not reach, nothing is judged.
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""One of several channels, slices or frames: asked for by name, never summed or folded in silence."""
+"""One of several channels, slices or frames: asked for by name, never summed in silence."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,15 +1,11 @@
 """HDF5, and MATLAB 7.3, which is HDF5 with its axes the other way round; read by h5py."""
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from camkit.errors import CamkitError, DecodeError, UnsupportedError
+from camkit.runtime.kinds.spad.files.broken import BROKEN
 from camkit.runtime.kinds.spad.files.counts_file import EXTRA, CountsFile, Hints
-
-BROKEN: Final = (
-    *(OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, OverflowError),
-)
-"""What h5py raises of files that are damaged."""
 
 
 def open_hdf5(path: Path, hints: Hints, *, is_matlab: bool = False) -> CountsFile:

@@ -11,12 +11,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.errors import ContractError, DecodeError
+from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.axes import backwards
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
-from camkit.runtime.kinds.spad.files.hdf5 import BROKEN
+from camkit.runtime.kinds.spad.files.broken import BROKEN
 from camkit.runtime.kinds.spad.files.hdf5_tree import (
     Tree,
     check_readable,
@@ -113,6 +113,8 @@ def _cells(path: Path, file: Any, cells: Any, told: dict[str, object], hints: Hi
             items = [file[ref] for ref in cells[:, y]]
             _check_cells(path, items, hints)
             return [_cell(item) for item in items]
+        except CamkitError:
+            raise
         except BROKEN as error:
             raise DecodeError(f"{path.name} is damaged: {error}") from error
 

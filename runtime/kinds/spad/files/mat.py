@@ -62,7 +62,9 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     asked = [name for name in kinds if name == hints.key]
     name = chosen_name(path, asked or large, hints, "variables")
     most = TIMES * hints.max_bytes
-    size = bytes_of(path, {name}, most) if is_walked else _listed_bytes(*kinds[name])
+    size = 0 if kinds[name][1] == "cell" else _listed_bytes(*kinds[name])
+    if is_walked and size <= most:
+        size = bytes_of(path, {name}, most)
     if size > most:
         raise ContractError(
             f"{path.name}: {name} takes {size / 1e9:.3g} GB or more, and this version of MATLAB "

@@ -20,7 +20,8 @@ HEADER_BYTES: Final = 128
 MATRIX: Final = 14
 PACKED: Final = 15
 CELL: Final = 1
-STRUCTS: Final = frozenset({2, 3})
+OBJECT: Final = 3
+STRUCTS: Final = frozenset({2, OBJECT})
 NUMBER_BYTES: Final = {6: 8, 7: 4, 8: 1, 9: 1, 10: 2, 11: 2, 12: 4, 13: 4, 14: 8, 15: 8}
 """Class of an array of numbers -> bytes of one."""
 TEXT_TIMES: Final = 4
@@ -142,20 +143,19 @@ class _Walk:
         count = 1
         for side in sides:
             count *= max(side, 0)
+        if kind == CELL or kind in STRUCTS:
+            return self._inner(kind, count, depth)
+        own = OBJECT_BYTES + max(rest, 0) * TEXT_TIMES
         if kind in NUMBER_BYTES:
-            self._skip(max(rest, 0))
-            return self._counted(
-                OBJECT_BYTES + count * NUMBER_BYTES[kind] * (2 if flags & COMPLEX else 1)
-            )
-        if kind != CELL and kind not in STRUCTS:
-            self._skip(max(rest, 0))
-            return self._counted(OBJECT_BYTES + max(rest, 0) * TEXT_TIMES)
-        return self._inner(kind, count, depth)
+            own = OBJECT_BYTES + count * NUMBER_BYTES[kind] * (2 if flags & COMPLEX else 1)
+        self._counted(own)
+        self._skip(max(rest, 0))
+        return own
 
     def _inner(self, kind: int, count: int, depth: int) -> int:
         """Pass the arrays in a cell or a structure by."""
         total = self._counted(OBJECT_BYTES)
-        if kind == 3:
+        if kind == OBJECT:
             self._element()  # the class of an object
         if kind in STRUCTS:
             _, length = self._element()

@@ -3,7 +3,7 @@
 import lzma
 import math
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,8 +13,18 @@ from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 
 NAMES: Final = {
-    **{"T": "frame", "Z": "slice", "C": "channel", "H": "bin", "I": "page", "A": "angle"},
-    **{"P": "phase", "R": "tile", "E": "wavelength", "L": "exposure", "V": "event", "M": "mosaic"},
+    "T": "frame",
+    "Z": "slice",
+    "C": "channel",
+    "H": "bin",
+    "I": "page",
+    "A": "angle",
+    "P": "phase",
+    "R": "tile",
+    "E": "wavelength",
+    "L": "exposure",
+    "V": "event",
+    "M": "mosaic",
 }
 """Letter of an axis, as tifffile has it -> what its places are called."""
 TIMES: Final = "HT"
@@ -23,7 +33,7 @@ LONE: Final = frozenset("HTZIQ")
 """Letters of pages that are time where nothing else is: most programs know no other stack."""
 COUNTED: Final = "abcdefghijklmnopqrsuvwz"
 """Letters for axes that a file does not name."""
-_UNPACKERS: Final = {
+_UNPACKERS: Final[Mapping[int, Callable[[], Any]]] = {
     8: zlib.decompressobj,
     32946: zlib.decompressobj,
     34925: lzma.LZMADecompressor,
