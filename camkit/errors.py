@@ -29,6 +29,15 @@ def one_line(text: str) -> str:
     return shown if len(shown) <= _MOST_CHARACTERS else shown[: _MOST_CHARACTERS - 3] + "..."
 
 
+def unexpected(error: Exception) -> str:
+    """Return what to say of an error that nobody foresaw, as one line."""
+    told = one_line(str(error))
+    return (
+        f"unexpected {type(error).__name__}{': ' if told else ''}{told}; please report it with the "
+        "file, --debug shows where"
+    )
+
+
 class ContractError(CamkitError, ValueError):
     """An argument breaks the stated contract (shape, range, unknown option)."""
 

@@ -74,6 +74,7 @@ from camkit.runtime.proof.check import check_bundle
 from camkit.runtime.proof.golden_run import case_work
 from camkit.runtime.proof.haze import make_haze_golden
 from camkit.runtime.proof.laws.proof import measure_laws, with_laws
+from camkit.side_file import read_side_text
 
 PACKAGES: Final = ("camkit", "numpy", "scipy", "onnx", "onnxruntime", "torch", "onnxscript")
 LICENCE: Final = "CC-BY-4.0"
@@ -345,9 +346,9 @@ def _plan_entries(parts: Parts) -> dict[str, Threshold] | None:
     if parts.plan is None:
         return None
     try:
-        entries = json.loads(parts.plan.read_text(encoding="utf-8"))
+        entries = json.loads(read_side_text(parts.plan, "the calibration"))
         plan = {name: Threshold.model_validate(entry) for name, entry in entries.items()}
-    except (ValueError, AttributeError) as error:
+    except (ValueError, AttributeError, RecursionError) as error:
         raise ContractError(
             f"{parts.plan} is no calibration; make it with tools/plan_report.py calibrate"
         ) from error
@@ -358,5 +359,10 @@ def _plan_entries(parts: Parts) -> dict[str, Threshold] | None:
 def _freeze_facts(parts: Parts) -> dict[str, Any]:
     if parts.freeze is None:
         return {}
-    facts = json.loads(parts.freeze.read_text(encoding="utf-8"))
+    try:
+        facts = json.loads(read_side_text(parts.freeze, "the facts of freezing"))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ContractError(f"{parts.freeze} is no JSON of camkit freeze: {error}") from error
+    if not isinstance(facts, dict):
+        raise ContractError(f"{parts.freeze} is no JSON of camkit freeze: expected an object")
     return {k: v for k, v in facts.items() if isinstance(v, int | float | str)}

@@ -1,7 +1,6 @@
 """TOML tables turned into dataclasses; unknown, missing and wrong keys are errors naming them."""
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -9,6 +8,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from camkit.errors import ContractError
+from camkit.side_file import parse_toml, read_side_toml
 
 T = TypeVar("T")
 
@@ -23,11 +23,7 @@ def read_table(path: Path, what: str) -> dict[str, Any]:
     Raises:
         ContractError: If it is missing or no TOML.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ContractError(f"cannot read {what} {path}: {error.strerror}") from error
-    return parse_table(data, f"{what} {path}")
+    return read_side_toml(path, what)
 
 
 def parse_table(data: bytes, what: str) -> dict[str, Any]:
@@ -40,10 +36,7 @@ def parse_table(data: bytes, what: str) -> dict[str, Any]:
     Raises:
         ContractError: If it is no TOML.
     """
-    try:
-        return tomllib.loads(data.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ContractError(f"{what} is not valid TOML: {error}") from error
+    return parse_toml(data, what)
 
 
 def section(where: str, kind: type[T], table: Any) -> T:

@@ -7,7 +7,8 @@ from typing import Any, Final
 
 import torch
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
+from camkit.regular_file import check_regular
 
 _DAMAGED: Final = (
     pickle.UnpicklingError,
@@ -33,9 +34,12 @@ def load_torch(path: Path, what: str) -> Any:
         ContractError: If it is missing, or holds something else.
     """
     try:
+        check_regular(path)
         return torch.load(path, map_location="cpu", weights_only=True)
     except OSError as error:
         raise ContractError(f"cannot read {what} {path}: {error.strerror}") from error
+    except DecodeError as error:
+        raise ContractError(f"cannot read {what} {path}: {error}") from error
     except _DAMAGED as error:
         reason = (str(error).splitlines() or [""])[0]
         raise ContractError(

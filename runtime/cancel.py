@@ -95,6 +95,15 @@ def cancellable(cancel: Cancel | None) -> Iterator[None]:
         _WISH.reset(token)
 
 
+def check_wish() -> None:
+    """End the work if the caller of what this thread works at asked to stop; see `cancellable`.
+
+    Raises:
+        Cancelled: If so.
+    """
+    check_cancelled(current_wish())
+
+
 def current_wish() -> Cancel | None:
     """Give the wish that this thread works under."""
     return _WISH.get()

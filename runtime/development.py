@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, one_line
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.job.reconstruction import Reconstruction
@@ -125,7 +125,7 @@ class FileResult:
             input=source,
             output=None,
             status="failed",
-            error=error,
+            error=one_line(error),
             bundle=bundle,
             seconds={},
             peak_rss_mb=peak_rss_mb(),

@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError, DecodeError
+from camkit.regular_file import check_regular
 from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
 from camkit.runtime.files.decoder import given
 from camkit.runtime.files.in_memory import Source, stored
 from camkit.runtime.files.raw_tags import sensor_place
-from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.files.tiff_tags import read_tiff_tags
 
 __all__ = ["Capture", "MosaicOptions", "file_sha256", "is_picture", "named_bundle", "read_capture"]

@@ -15,7 +15,6 @@ import difflib
 import hashlib
 import json
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
@@ -26,6 +25,7 @@ from camkit.bundle.reader import PRESCRIPTION, Bundle
 from camkit.contracts import focus_weights
 from camkit.errors import ContractError
 from camkit.runtime.stage_finder import known_facts
+from camkit.side_file import read_side_toml
 
 FOCUS: Final = "focus_um"
 """How far the sensor lies from its nominal place, away from the lens."""
@@ -119,12 +119,7 @@ def read_unit(path: Path) -> Unit:
     Raises:
         ContractError: If the file cannot be read, or holds anything else.
     """
-    try:
-        table: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ContractError(f"cannot read the unit {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ContractError(f"{path} is no TOML: {error}") from error
+    table = read_side_toml(path, "the unit")
     if unknown := table.keys() - _KEYS:
         raise ContractError(f"{path}: unknown key(s) {', '.join(sorted(unknown))}")
     name, facts = table.get("name", path.stem), table.get("facts", {})

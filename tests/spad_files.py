@@ -56,7 +56,8 @@ def write_packed_tiff(path: Path, cube: np.ndarray) -> None:
 
 
 def write_ptu(path: Path, cube: np.ndarray) -> None:
-    ptufile.imwrite(path, np.ascontiguousarray(cube.transpose(1, 2, 0)), 25e-9, 20e-12)
+    period_s = 20e-12 * len(cube)
+    ptufile.imwrite(path, np.ascontiguousarray(cube.transpose(1, 2, 0)), period_s, 20e-12)
 
 
 def write_sdt(path: Path, cube: np.ndarray) -> None:

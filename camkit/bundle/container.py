@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Final
 
 from camkit.bundle.local_headers import check_local_headers
-from camkit.errors import BundleError
+from camkit.errors import BundleError, DecodeError
+from camkit.regular_file import check_regular
 
 MAX_BUNDLE_BYTES: Final = 128 * 2**20
 """Cap on the sum of the uncompressed members (and on the file itself): kernels of 7 fields and 3
@@ -104,10 +105,13 @@ def read_container(path: Path, *, max_bytes: int = MAX_BUNDLE_BYTES) -> Containe
         BundleError: See the list at the top of the module.
     """
     try:
+        check_regular(Path(path))
         with Path(path).open("rb") as stream:
             data = stream.read(max_bytes + 1)
     except OSError as error:
         raise BundleError(f"cannot read the bundle {path}: {error.strerror}") from error
+    except DecodeError as error:
+        raise BundleError(f"cannot read the bundle {path}: {error}") from error
     return container_from_bytes(data, what=str(path), max_bytes=max_bytes)
 
 

@@ -21,6 +21,7 @@ from safetensors.numpy import load, save
 from camkit.bundle.strict_json import read_json
 from camkit.contracts import FrozenPsf, RadialDistortion, Symmetry
 from camkit.errors import BundleError, ContractError
+from camkit.side_file import MOST_BYTES, read_side_bytes
 
 _AXES: Final = ("field_heights_mm", "depths_mm", "wavelengths_um", "relative_illumination")
 _SCALARS: Final = ("pixel_pitch_um", "distortion_radius_mm")
@@ -214,6 +215,6 @@ def read_optics_bytes(path: Path, *, what: str) -> bytes:
         BundleError: If it cannot be read.
     """
     try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise BundleError(f"cannot read the {what} {path}: {error.strerror}") from error
+        return read_side_bytes(Path(path), f"the {what}", most_bytes=MOST_BYTES)
+    except ContractError as error:
+        raise BundleError(str(error)) from error

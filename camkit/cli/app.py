@@ -25,7 +25,7 @@ from camkit.cli.judge.bench import bench
 from camkit.cli.judge.check import check
 from camkit.cli.judge.doctor import doctor
 from camkit.cli.judge.stress import stress
-from camkit.cli.say import say
+from camkit.cli.say import plain, say
 from camkit.cli.use.calibrate.app import calibrate_app
 from camkit.cli.use.info import info
 from camkit.cli.use.merge import merge
@@ -102,10 +102,17 @@ def run(arguments: Sequence[str]) -> int:
         return code
     except (CamkitError, OSError) as error:
         if debug:
-            traceback.print_exc()
+            say(traceback.format_exc(), err=True)
         say(f"camkit: {_one_line(error)}", err=True)
         return exit_code_of(error)
     return ExitCode.DONE
+
+
+class _PlainFormatter(logging.Formatter):
+    """Messages and tracebacks whose control characters are visible escapes."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return plain(super().format(record))
 
 
 @contextmanager
@@ -115,6 +122,7 @@ def _messages(*, shown: bool) -> Iterator[None]:
         yield
         return
     logger, handler = logging.getLogger("camkit"), logging.StreamHandler()
+    handler.setFormatter(_PlainFormatter())
     before = logger.level
     logger.addHandler(handler)
     logger.setLevel(logging.DEBUG)

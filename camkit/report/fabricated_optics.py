@@ -16,6 +16,7 @@ from camkit.bundle.reader import Bundle
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.runtime.twin.truth import light_sensor
+from camkit.side_file import read_side_text
 
 PRESCRIPTION: Final = "prescription.toml"
 MAX_SIDE_PX: Final = 161
@@ -87,7 +88,7 @@ def lens_text(bundle: Bundle, prescription: Path | None) -> str:
         ContractError: If there is neither.
     """
     if prescription is not None:
-        return prescription.read_text(encoding="utf-8")
+        return read_side_text(prescription, "the lens")
     if PRESCRIPTION not in bundle.names:
         raise ContractError(
             f"{bundle.path.name} holds no {PRESCRIPTION}, so its PSF cannot be traced afresh; "

@@ -16,8 +16,9 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file
 from torch import Tensor, nn
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
 from camkit.models_def.torch_file import load_torch
+from camkit.regular_file import check_regular
 
 MEAN: Final = (0.485, 0.456, 0.406)
 DEVIATION: Final = (0.229, 0.224, 0.225)
@@ -133,9 +134,12 @@ def file_digest(path: Path) -> str:
 def _read_tensors(path: Path) -> Mapping[str, Any]:
     try:
         if path.suffix == ".safetensors":
+            check_regular(path)
             return load_file(path)
     except OSError as error:
         raise ContractError(f"cannot read {path}: {error.strerror}") from error
+    except DecodeError as error:
+        raise ContractError(f"cannot read {path}: {error}") from error
     except SafetensorError as error:
         raise ContractError(f"{path} holds no plain tensors: {error}") from error
     table = load_torch(path, "file of weights")

@@ -5,7 +5,6 @@ Thickness and glass are those after a surface; the last thickness leads to the s
 """
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from camkit.models_def.optics.glass.material import Glass
 from camkit.models_def.optics.glass.table import glass_table, parse_glass_table
 from camkit.models_def.optics.grooves import Grooves, Profile, check_grooves, groove_facts
 from camkit.models_def.toml_table import key_line
+from camkit.side_file import parse_toml, read_side_text
 from camkit.units import to_degrees, to_radians
 
 ApertureKind = Literal["f_number", "entrance_pupil_diameter_mm", "stop_semi_diameter_mm"]
@@ -245,7 +245,7 @@ def read_prescription(path: Path, catalogues: Sequence[GlassCatalogue] = ()) -> 
         ContractError: If the file is not TOML, or a key is unknown, missing or of a wrong type.
         DecodeError: If a glass catalogue is damaged.
     """
-    text = path.read_text(encoding="utf-8")
+    text = read_side_text(path, "the lens")
     try:
         return parse_prescription(text, catalogues, folder=path.parent)
     except ContractError as error:
@@ -256,10 +256,7 @@ def parse_prescription(
     text: str, catalogues: Sequence[GlassCatalogue] = (), *, folder: Path | None = None
 ) -> Lens:
     """Read a lens from TOML text; see `read_prescription`."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ContractError(f"a prescription must be TOML; {error}") from error
+    table = parse_toml(text.encode(), "the prescription")
     _check_keys(table, allowed=_LENS_KEYS, needed={"name", "stop", "surface"}, where="the lens")
     kinds = [kind for kind in APERTURE_KINDS if kind in table]
     if len(kinds) != 1:

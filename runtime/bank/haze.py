@@ -289,7 +289,6 @@ def solve_coarse(
     terms: int,
     rounds: int,
     threads: int = 1,
-    between: Callable[[], None] = lambda: None,
 ) -> CoarseBand:
     """Find the scene in cells behind a capture in cells, and how the capture is cleared by it.
 
@@ -302,7 +301,9 @@ def solve_coarse(
         rounds: Of adding what a filter makes of what is left unexplained: that of the mean kernel,
             or where cores differ much, of the kernel of every place (`place_undo`).
         threads: Threads to compute with; no influence on the bits.
-        between: Called between the rounds; may raise to stop.
+
+    Raises:
+        Cancelled: If the caller of what this thread works at wished so.
     """
     laid = cell_window(window, kernels.cell_px, MARGIN_CELLS)
     inner = np.s_[MARGIN_CELLS:-MARGIN_CELLS, MARGIN_CELLS:-MARGIN_CELLS]
@@ -322,7 +323,6 @@ def solve_coarse(
             undo = PlaceBlur(filters[channel], nodes, threads=threads)
         scene = _mirrored(seen)
         for _ in range(rounds):
-            between()
             left = seen - blur(scene)[inner] / even
             np.maximum(left, 0, out=left, where=over)
             scene += undo(_mirrored(left))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.geometry.sensor_window import SensorWindow
 from camkit.runtime.machine.slices import run_parts
 
@@ -150,6 +151,7 @@ class NodeKernels:
         for place in self._places_mm:
             key = self._key(place)
             if key not in self._made:
+                check_wish()
                 self._made[key] = kernels.at(*key)
 
     def of(self, channel: int) -> FloatArray:
@@ -202,6 +204,7 @@ class PlaceBlur:
             )
         import scipy.fft
 
+        check_wish()
         height, width = nodes.near.shape[:2]
         self._size = height, width
         between = np.zeros((height, width, len(kernels)), np.float32)
@@ -218,6 +221,7 @@ class PlaceBlur:
 
     def __call__(self, light: FloatArray) -> FloatArray:
         """Give the blur (h, w) float32 of a picture (h, w); beyond it there is no light."""
+        check_wish()
 
         def some(first: int) -> NDArray[np.complex64]:
             total = np.zeros(self._spectra.shape[1:], np.complex64)
@@ -280,10 +284,12 @@ def few_kernels(kernels: FloatArray, terms: int) -> FewKernels:
     for _ in range(DOUBLINGS):
         if squares.shape[-1] < 2:
             break
+        check_wish()
         inside = squares[:, : squares.shape[1] // 2 * 2, : squares.shape[2] // 2 * 2]
         rows = inside[:, ::2] + inside[:, 1::2]
         squares = rows[..., ::2] + rows[..., 1::2]
         products += _products(squares)
+    check_wish()
     lengths, directions = np.linalg.eigh(products)
     kept = _whole_pairs(lengths[::-1], terms)
     weights = np.ascontiguousarray(directions[:, : -kept - 1 : -1], np.float32)

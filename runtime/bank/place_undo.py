@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.haze import Haze
+from camkit.runtime.cancel import check_wish
 
 MOST_OF_MEAN: Final = 2.0
 """Light of the fullest core over the mean core, up to which one filter serves all places."""
@@ -62,6 +63,7 @@ def undoing_kernels(kernels: FloatArray) -> FloatArray:
     kept = np.arange(wide) - wide // 2
     made = np.empty((len(kernels), wide, wide), np.float32)
     for kernel, filtered in zip(kernels, made, strict=True):
+        check_wish()
         laid = np.zeros((full, full))
         laid[np.ix_(place, place)] = kernel / max(float(kernel.sum()), 1e-12)
         spectrum: NDArray[np.complex128] = scipy.fft.rfft2(laid)

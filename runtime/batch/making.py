@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from camkit.errors import CamkitError, ContractError
+from camkit.errors import CamkitError, ContractError, unexpected
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task, state_of
 from camkit.runtime.cancel import Cancel, Cancelled
 from camkit.runtime.capture import MosaicOptions
@@ -104,6 +104,9 @@ def try_task(task: Task, pipelines: Pipelines, common: Common) -> FileResult | N
     except MemoryError as error:
         logger.debug("%s failed", task.source, exc_info=error)
         return FileResult.failure(task.source, named, f"not enough memory: {error}".rstrip(": "))
+    except Exception as error:
+        logger.debug("%s failed", task.source, exc_info=error)
+        return FileResult.failure(task.source, named, unexpected(error))
 
 
 def _make(task: Task, pipeline: Pipeline, common: Common) -> FileResult:

@@ -7,8 +7,8 @@ from typing import Final
 
 from camkit.errors import DecodeError
 from camkit.kinds import Kind, all_kinds
+from camkit.regular_file import check_regular
 from camkit.runtime.files.in_memory import FilePath
-from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.output.sidecar import read_sidecar
 
 RAW_SUFFIXES: Final = frozenset(

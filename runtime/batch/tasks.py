@@ -1,12 +1,13 @@
 """What is decided for every input before any work: its bundle, its picture, why it cannot be."""
 
+import logging
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, unexpected
 from camkit.kinds import Kind
 from camkit.runtime.batch.sources import refusal_of
 from camkit.runtime.development import WriteOptions
@@ -14,6 +15,8 @@ from camkit.runtime.kind import kind_without_bundle, runtime_part
 from camkit.runtime.maker import Maker
 from camkit.runtime.options import Options
 from camkit.runtime.raw import named_bundle
+
+logger = logging.getLogger(__name__)
 
 NO_BUNDLE: Final = "none"
 _NAMELESS: Final = "names no bundle; say --bundle NAME, or --bundle none"
@@ -127,9 +130,13 @@ def _make_task(
     refusal = refusal_of(source)
     chosen = bundle
     if chosen is None and refusal is None:
-        chosen = (named_bundle if maker is None else maker.named)(source)
-        if chosen is None:
-            refusal = f"{source} {_NAMELESS}"
+        try:
+            chosen = (named_bundle if maker is None else maker.named)(source)
+        except Exception as error:
+            logger.debug("%s failed", source, exc_info=error)
+            refusal = f"cannot read {source}: {unexpected(error)}"
+        else:
+            refusal = None if chosen is not None else f"{source} {_NAMELESS}"
     return Task(
         source=source,
         target=target,

@@ -1,6 +1,5 @@
 """What the commands of `camkit calibrate` wrote, read back: geometry, flat, tone, noise."""
 
-import tomllib
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
@@ -10,8 +9,9 @@ from pydantic import Field, ValidationError, model_validator
 from camkit.bundle.entry import Entry, NonNegative, Positive
 from camkit.bundle.optics import IlluminationEntry
 from camkit.bundle.sensor import IsoNoise
-from camkit.errors import DecodeError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.geometry.unfolded import MOST_FACTOR
+from camkit.side_file import read_side_toml
 
 Side = Annotated[int, Field(ge=2, le=100_000)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -163,8 +163,6 @@ def _read(path: Path, model: type[_T], command: str) -> _T:
 
 def _toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DecodeError(f"cannot read {path}: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        raise DecodeError(f"{path} is no TOML: {error}") from error
+        return read_side_toml(path, "the measured file")
+    except ContractError as error:
+        raise DecodeError(str(error)) from error

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from camkit.errors import ContractError, DecodeError
+from camkit.side_file import read_side_text
 
 COMMENT: Final = "#"
 MOST_LIST_BYTES: Final = 1 << 20
@@ -53,9 +54,8 @@ def _read_list(path: Path) -> dict[str, float]:
             f"got {str(path)!r}"
         )
     try:
-        with path.open("rb") as file:
-            text = file.read(MOST_LIST_BYTES).decode()
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_side_text(path, "the list of times", most_bytes=MOST_LIST_BYTES)
+    except ContractError as error:
         raise DecodeError(f"{path} cannot be read as a list of times: {error}") from error
     listed: dict[str, float] = {}
     for number, line in enumerate(text.splitlines(), 1):

@@ -3,6 +3,7 @@
 Every writer has a part file of its own, so two processes never write into one another's.
 """
 
+import hashlib
 import os
 import secrets
 from collections.abc import Iterator, Sequence
@@ -13,6 +14,8 @@ from typing import Final
 PART_SUFFIX: Final = ".part"
 MOST_NAME_BYTES: Final = 200
 """Of a file's name within that of its part; file systems allow 255 in all."""
+HASH_LETTERS: Final = 16
+"""Of the hash of the whole name, which tells names apart that begin alike."""
 
 
 def part_path(path: Path) -> Path:
@@ -36,8 +39,10 @@ def stale_parts(path: Path) -> list[Path]:
 
 
 def _part_prefix(path: Path) -> str:
-    name = os.fsencode(path.name).decode("utf-8", "backslashreplace")
-    return name.encode()[:MOST_NAME_BYTES].decode("utf-8", "ignore") + "."
+    whole = os.fsencode(path.name)
+    name = whole.decode("utf-8", "backslashreplace")
+    shown = name.encode()[:MOST_NAME_BYTES].decode("utf-8", "ignore")
+    return f"{shown}.{hashlib.sha256(whole).hexdigest()[:HASH_LETTERS]}."
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from camkit.runtime.bank.haze import (
     solve_coarse,
     solving_bytes,
 )
-from camkit.runtime.cancel import check_cancelled
+from camkit.runtime.cancel import cancellable
 from camkit.runtime.job.cells import cells_of
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
@@ -108,16 +108,16 @@ def coarse_band(entry: Dehaze, picture: Stream, job: Job) -> CoarseBand:
     """
     bundle = job.known_bundle
     seen = cells_of(job, entry.takes, entry.shrink)
-    return solve_coarse(
-        seen.means,
-        seen.clipped,
-        _kernels(bundle, job.options.depth_mm, job.placement.kernel_scale),
-        job.window_of(picture.plane),
-        terms=entry.terms,
-        rounds=entry.rounds,
-        threads=job.threads,
-        between=lambda: check_cancelled(job.cancel),
-    )
+    with cancellable(job.cancel):
+        return solve_coarse(
+            seen.means,
+            seen.clipped,
+            _kernels(bundle, job.options.depth_mm, job.placement.kernel_scale),
+            job.window_of(picture.plane),
+            terms=entry.terms,
+            rounds=entry.rounds,
+            threads=job.threads,
+        )
 
 
 @lru_cache(maxsize=KEPT_CAMERAS)

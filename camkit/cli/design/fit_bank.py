@@ -38,8 +38,9 @@ def fit_bank(
     )
     from camkit.models_def.training.kind import read_recipe
     from camkit.runtime.output.part_file import atomic_output
+    from camkit.side_file import read_side_text
 
-    plan, text = read_recipe(recipe), recipe.read_text(encoding="utf-8")
+    plan, text = read_recipe(recipe), read_side_text(recipe, "recipe")
     check_text(text)
     output.parent.mkdir(parents=True, exist_ok=True)
     found = bank_fitting_kind(plan.kind).fit(

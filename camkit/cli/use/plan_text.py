@@ -1,18 +1,20 @@
 """Plans of captures as JSON or as lines for people, for `plan` and `process --dry-run`."""
 
 import json
+import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.cli.say import say
-from camkit.errors import BundleError, CamkitError, ContractError
+from camkit.errors import BundleError, CamkitError, ContractError, unexpected
 
 if TYPE_CHECKING:
-    from camkit.runtime.batch import Task
+    from camkit.runtime.batch import Pipelines, Task
     from camkit.runtime.capture import MosaicOptions
     from camkit.runtime.development import WriteOptions
     from camkit.runtime.options import Options
-    from camkit.runtime.pipeline import Pipeline
+
+logger = logging.getLogger(__name__)
 
 OVERWRITES: Final = "process would refuse to overwrite the capture itself: choose an --out-dir"
 
@@ -48,10 +50,7 @@ def print_plans(
     for task in tasks:
         facts: dict[str, Any] = {"input": str(task.source), "output": str(task.target)}
         try:
-            if task.refusal is not None:
-                raise ContractError(task.refusal)
-            pipeline = pipelines.get(task.bundle, task.source)
-            facts |= _planned(task, pipeline, write, headerless)
+            facts |= _planned(task, pipelines, write, headerless)
             if task.own:
                 facts["warnings"].append(OVERWRITES)
         except CamkitError as error:
@@ -59,18 +58,25 @@ def print_plans(
                 raise
             facts |= {"status": "failed", "error": str(error)}
             done = False
+        except Exception as error:
+            logger.debug("%s failed", task.source, exc_info=error)
+            facts |= {"status": "failed", "error": unexpected(error)}
+            done = False
         say(json.dumps(facts) if as_json else "\n".join(plan_lines(facts)))
     return done
 
 
 def _planned(
     task: "Task",
-    pipeline: "Pipeline",
+    pipelines: "Pipelines",
     write: "WriteOptions",
     headerless: "MosaicOptions | None",
 ) -> dict[str, Any]:
     from camkit.runtime.development import begin
 
+    if task.refusal is not None:
+        raise ContractError(task.refusal)
+    pipeline = pipelines.get(task.bundle, task.source)
     if pipeline.maker is not None:
         return {"status": "planned", "bundle": task.bundle, **pipeline.plan(task.source)}
     work = begin(pipeline, pipeline.read(task.source, headerless), write)

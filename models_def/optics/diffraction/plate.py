@@ -46,6 +46,7 @@ from camkit.models_def.optics.diffraction.wave import PixelGrid, plate_psf
 from camkit.models_def.optics.glass.catalogue import find_glass
 from camkit.models_def.optics.glass.dispersion import refractive_index
 from camkit.models_def.toml_table import key_line, parse_table, read_table, section
+from camkit.side_file import read_side_bytes
 from camkit.units import UM_PER_MM
 
 PLATES: Final = Path(__file__).resolve().parents[2] / "plates"
@@ -218,12 +219,7 @@ def read_plate(path: Path) -> Plate:
     def beside(name: str) -> bytes:
         if Path(name).name != name:
             raise ContractError(f"plate {path}: heights lie beside it, not at {name!r}")
-        try:
-            return path.with_name(name).read_bytes()
-        except OSError as error:
-            raise ContractError(
-                f"cannot read the heights {path.with_name(name)}: {error.strerror}"
-            ) from error
+        return read_side_bytes(path.with_name(name), "the heights")
 
     return to_plate(read_table(path, "plate"), beside, what=str(path))
 

@@ -4,7 +4,8 @@ import codecs
 from pathlib import Path
 from typing import Final
 
-from camkit.errors import DecodeError
+from camkit.errors import ContractError, DecodeError
+from camkit.side_file import read_side_bytes
 
 MAX_BYTES: Final = 8_000_000
 """Catalogues are below 2 MB and lens files below 1 MB."""
@@ -16,10 +17,11 @@ def read_text(path: Path) -> str:
     Raises:
         DecodeError: If it is larger than `MAX_BYTES` or is not text.
     """
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise DecodeError(f"{path.name} has {size} bytes; such a file has at most {MAX_BYTES}")
-    return decode_text(path.read_bytes(), path.name)
+    try:
+        data = read_side_bytes(path, "the lens or glass file", most_bytes=MAX_BYTES)
+    except ContractError as error:
+        raise DecodeError(str(error)) from error
+    return decode_text(data, path.name)
 
 
 def decode_text(data: bytes, name: str) -> str:

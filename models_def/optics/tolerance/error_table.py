@@ -1,7 +1,6 @@
 """Tolerances from TOML: the table [tolerance] of a lens file, or of a file of its own."""
 
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +12,7 @@ from camkit.models_def.optics.tolerance.errors import (
     ErrorWidth,
     Tolerances,
 )
+from camkit.side_file import read_side_toml
 from camkit.units import to_radians
 
 TABLE: Final = "tolerance"
@@ -43,10 +43,7 @@ def read_tolerances(path: Path) -> Tolerances | None:
     Raises:
         ContractError: If the file is not TOML, or the table is wrong.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise ContractError(f"{path.name} must be TOML; {error}") from error
+    table = read_side_toml(path, "the lens")
     return parse_tolerances(table[TABLE]) if TABLE in table else None
 
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
+from camkit.regular_file import check_regular
 from camkit.runtime.files.formats.color_space import ADOBE_RGB, SRGB
 from camkit.runtime.files.picture import read_orientation, read_scene_and_space
-from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.geometry.turning import turn
 from camkit.runtime.raw import is_picture
 

@@ -7,7 +7,6 @@ Numbers of marks count the targets that have some, from 0.
 """
 
 import re
-import tomllib
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -25,6 +24,7 @@ from camkit.runtime.calibration.display.marks import NUMBERS, draw_word
 from camkit.runtime.calibration.display.screen import Place, Screen
 from camkit.runtime.calibration.display.shown import read_shown
 from camkit.runtime.calibration.geometry.board import Board
+from camkit.side_file import read_side_toml
 
 Kind = Literal["board", "grey", "colour", "picture"]
 Codes = NDArray[np.uint8]
@@ -138,18 +138,18 @@ class Targets:
         """
         path = folder / LIST
         try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
+            table = read_side_toml(path, "the list of targets")
+        except ContractError as error:
+            raise DecodeError(
+                f"{error}; --targets is a folder that camkit calibrate targets wrote"
+            ) from error
+        try:
             width, height = table["screen_px"]
             found = cls(
                 screen=Screen(width_px=int(width), height_px=int(height)),
                 board=Board.read(table["board"]),
                 targets=tuple(_target(one) for one in table["targets"]),
             )
-        except OSError as error:
-            raise DecodeError(
-                f"cannot read {path}: {error.strerror or error}; --targets is a folder that camkit "
-                "calibrate targets wrote"
-            ) from error
         except _NO_LIST as error:
             raise DecodeError(
                 f"{path} is no list of targets ({type(error).__name__}: {error}); write it with "

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
+from camkit.regular_file import check_regular
 from camkit.runtime.files.picture import read_scene
-from camkit.runtime.files.regular_file import check_regular
 from camkit.runtime.raw import is_picture, read_capture
 
 LEAST_SIDE_PX: Final = 48

@@ -8,7 +8,8 @@ from typing import Final
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from camkit.errors import DecodeError
+from camkit.errors import ContractError, DecodeError
+from camkit.side_file import read_side_bytes
 
 MOST_BYTES: Final = 2**24
 MOST_DEPTH: Final = 32
@@ -25,11 +26,9 @@ def read_xml(path: Path) -> Element:
             file of lensfun's.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise DecodeError(f"{path} is larger than {MOST_BYTES} bytes, so no lensfun database")
-        data = path.read_bytes()
-    except OSError as error:
-        raise DecodeError(f"cannot read {path}: {error.strerror}") from error
+        data = read_side_bytes(path, "the lensfun database", most_bytes=MOST_BYTES)
+    except ContractError as error:
+        raise DecodeError(f"{error} (no database is larger than {MOST_BYTES} bytes)") from error
     root = parse_xml(data, str(path))
     if root.tag != ROOT:
         raise DecodeError(f"{path} is no lensfun database: expected <{ROOT}>, got <{root.tag}>")

@@ -18,6 +18,7 @@ from camkit.runtime.files.tiff_tags import TagValue, TiffTags
 MIN_IS_WHITE, MIN_IS_BLACK, RGB, PALETTE, YCBCR, CIE_LAB, ICC_LAB = 0, 1, 2, 3, 6, 8, 9
 UNSIGNED, SIGNED, FLOAT, UNDEFINED = 1, 2, 3, 4
 PLAIN, LZW, OLD_JPEG, JPEG, DEFLATE, PACK_BITS, OLD_DEFLATE = 1, 5, 6, 7, 8, 32773, 32946
+LERC: Final = 34887
 ASSOCIATED_ALPHA: Final = 1
 LZMA: Final = 34925
 READ: Final = (MIN_IS_WHITE, MIN_IS_BLACK, RGB, PALETTE, YCBCR, CIE_LAB, ICC_LAB)
@@ -25,6 +26,7 @@ CHANNELS: Final = {MIN_IS_WHITE: 1, MIN_IS_BLACK: 1, PALETTE: 1}
 MOST_PX_PER_BYTE: Final = 8192
 """Deflate packs 1032 bytes into one, each of up to 8 pixels."""
 
+_WITHOUT_PREDICTOR: Final = {PACK_BITS: "PackBits", LERC: "LERC"}
 _UNREAD_PHOTOMETRICS: Final = {
     4: "a transparency mask",
     5: "inks (CMYK)",
@@ -170,10 +172,9 @@ def _check(page: TiffPage, file_bytes: int) -> None:
         )
     if page.samples < page.colours:
         raise DecodeError(f"an RGB TIFF of {page.samples} samples per pixel is damaged")
-    if page.compression == PACK_BITS and page.predictor > 1:
-        raise DecodeError(
-            "a TIFF of PackBits with a predictor is not read: programs disagree on it"
-        )
+    if page.compression in _WITHOUT_PREDICTOR and page.predictor > 1:
+        name = _WITHOUT_PREDICTOR[page.compression]
+        raise DecodeError(f"a TIFF of {name} with a predictor is not read: programs disagree on it")
     _check_numbers(page)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile
 from camkit.runtime.kinds.spad.pile_up import without_pile_up
 from camkit.runtime.kinds.spad.time_axis import Orientation, TimeAxis
@@ -60,12 +61,14 @@ class CorrectedRows:
             ContractError: If there are more counts than cycles.
         """
         counts = self._file.rows(top, bottom, self._edges)
+        check_wish()
         blind = np.zeros(counts.shape[:2], dtype=bool)
         worst = 0.0
         if self._cycles:
             flat, told = counts.reshape(-1, counts.shape[2]), blind.reshape(-1)
             size = max(1, AT_ONCE // counts.shape[2])
             for start in range(0, len(flat), size):
+                check_wish()
                 part = slice(start, start + size)
                 found = without_pile_up(flat[part], self._cycles, self._orientation)
                 flat[part], told[part] = found.counts, found.blind

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.bank import Bank, Scorer
 from camkit.runtime.kinds.spad.bound import information
 from camkit.runtime.kinds.spad.evidence import search_length
@@ -110,6 +111,7 @@ class Fitter:
         for _ in range(MOST_PASSES):
             wanted = _nearest_ratio(amplitude, background)
             for index in np.unique(wanted[wanted != used]):
+                check_wish()
                 rows = np.flatnonzero((wanted == index) & (used != index))
                 scores = self._scorer(int(index)).score(counts[rows], photons[rows])
                 template[rows], shift[rows], best[rows] = peak(scores)
@@ -218,8 +220,11 @@ def in_blocks(fit: Callable[[FloatArray], Fit], counts: FloatArray, bank: Bank) 
     """Fit some pixels after the other, so that little memory is needed in between."""
     of_pixel = 16 * bank.axis.bins + 12 * len(bank.mu_ps)
     size = max(1, min(MOST_AT_ONCE, BLOCK_BYTES // of_pixel))
-    starts = range(0, max(len(counts), 1), size)
-    return joined([fit(counts[start : start + size]) for start in starts])
+    parts = []
+    for start in range(0, max(len(counts), 1), size):
+        check_wish()
+        parts.append(fit(counts[start : start + size]))
+    return joined(parts)
 
 
 def joined(parts: Sequence[Fit]) -> Fit:

@@ -14,6 +14,7 @@ from scipy.ndimage import median_filter
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import check_wish
 
 TIMES: Final = 5.0
 """Above the neighbours' background."""
@@ -41,9 +42,11 @@ def find_hot(background: NDArray[np.float64], cube: FloatArray) -> NDArray[np.bo
     """
     bins = cube.shape[2]
     photons = cube.sum(axis=2, dtype=np.float64)
+    check_wish()
     usual = median_filter(background, size=AROUND, mode="mirror")
     cuts = np.linspace(0, bins, SPANS, endpoint=False).astype(int)
     spans = np.add.reduceat(cube, cuts, axis=2)
+    check_wish()
     at_all_times = np.partition(spans, FEW, axis=2)[..., FEW] * SPANS
     dark, expected = np.minimum(background * bins, at_all_times), usual * bins
     excess = dark - expected > SIGMAS * np.sqrt(np.maximum(expected, 1.0))
@@ -81,6 +84,7 @@ def painted_over(cube: NDArray[Any], hot: NDArray[np.bool_]) -> NDArray[Any]:
         raise ContractError("every pixel is hot: there is nothing to paint them over with")
     found = cube.copy()
     for y, x in np.argwhere(hot):
+        check_wish()
         reach = 1
         while True:
             rows = slice(max(0, y - reach), y + reach + 1)

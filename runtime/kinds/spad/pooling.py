@@ -3,10 +3,11 @@
     counts -> fit -> believed?  yes: done
                   `-> squares of 3, then of 5 pixels, each fitted anew, and
 
-a pixel takes what its square found only if its own photons speak for it: with the pulse that each
-pixel of the square would have on average, a s_k, over its background b, its gain, the sum over its
-photons of log(1 + a s_k / b) less a S, must exceed 0. Otherwise surfaces would grow over their
-edges.
+a pixel takes what its square found only if its own photons speak for it, and either those around it
+on all sides do too, or its own prove it (`camkit.runtime.kinds.spad.surroundings`). Photons speak
+by their gain: with the pulse that each pixel of the square would have on average, a s_k, over its
+background b, the sum of log(1 + a s_k / b) less a S. Otherwise surfaces would grow over their
+edges, for beside them every square holds a return.
 
 Who chooses a side wants every pixel to share: there it is enough that its own photons do not refute
 the square at a level of one in twenty, neither by their silence nor by speaking so much more for
@@ -22,8 +23,10 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
+from camkit.runtime.kinds.spad.surroundings import LEAST_BACKGROUND, are_believed
 
 Pool = Literal["auto", "1", "3", "5"]
 SIDES: Final[dict[str, tuple[int, ...]]] = {
@@ -38,8 +41,6 @@ SPARSE: Final = 0.1
 """Of all pixels: squares of fewer are summed one by one."""
 REFUTED: Final = 0.05
 """Chance at which a pixel's own photons refute the square that was chosen for it."""
-LEAST_BACKGROUND: Final = 1e-3
-"""Counts of a bin; no detector is darker for certain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +108,11 @@ def fit_pooled(
             new = _per_pixel(fit(square.counts(rows)), square.members[rows])
         good = new.evidence > threshold
         if side > 1 and pool == "auto":
-            good &= _gain(fitter, own[rows], new) > 0
+            near = np.flatnonzero(good)
+            good[near] = are_believed(
+                *(fitter, cube, sound, rows[near], taken(new, near), side),
+                rate=false_alarms / len(sides),
+            )
         elif side > 1:
             single = fit(own[rows]) if alone is None else taken(alone, rows)
             good &= ~_refute(fitter, own[rows], new, single)
@@ -148,6 +153,7 @@ class Squares:
         found = np.zeros((len(rows), bins), np.float32)
         for dy in range(-reach, reach + 1):
             for dx in range(-reach, reach + 1):
+                check_wish()
                 at = (y + dy, x + dx)
                 there = (at[0] >= 0) & (at[0] < height) & (at[1] >= 0) & (at[1] < width)
                 there[there] = self._sound[at[0][there], at[1][there]]
@@ -168,6 +174,7 @@ class Squares:
 def _shifted(values: FloatArray, step: int, axis: int) -> FloatArray:
     """Give what lies so many places before and after along an axis, together."""
     found = np.zeros_like(values)
+    check_wish()
     if step < values.shape[axis]:
         ahead = [slice(None)] * 3
         behind = [slice(None)] * 3

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
-from camkit.runtime.kinds.spad.pooling import LEAST_BACKGROUND, Pooled, Squares, taken
+from camkit.runtime.kinds.spad.pooling import Pooled, Squares, taken
+from camkit.runtime.kinds.spad.surroundings import LEAST_BACKGROUND
 from camkit.runtime.kinds.spad.two_returns import TwoFitter, TwoReturns
 
 Arrays = dict[str, NDArray[Any]]
@@ -58,13 +60,16 @@ class SecondReturns:
         valid = found["valid"].ravel()
         own = cube.reshape(-1, cube.shape[2])
         for side in np.unique(pooled.side[valid]):
+            check_wish()
             rows = np.flatnonzero(valid & (pooled.side == side))
             squares = None if side == 1 else Squares(cube, int(side), sound)
             counts = own[rows] if squares is None else squares.counts(rows)
             members = np.ones(len(rows)) if squares is None else squares.members[rows]
             one = _of_square(taken(pooled.fit, rows), members)
+            check_wish()
             asked = self._two.asks_for_second(counts, one)
             rows, members, one = rows[asked], members[asked], taken(one, np.flatnonzero(asked))
+            check_wish()
             two = self._two.fit(counts[asked], one)
             proved = two.evidence > threshold
             if side > 1:

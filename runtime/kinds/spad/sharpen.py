@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.bank import make_bank
 from camkit.runtime.kinds.spad.fit import Fit, Fitter
 from camkit.runtime.kinds.spad.hot_pixels import AROUND, check_map, find_hot, painted_over
@@ -144,12 +145,14 @@ class Sharpener:
             ContractError: If more than half of the pixels are hot.
         """
         if growth is not None:
+            check_wish()
             even = np.divide(cube, growth[:, :, None], dtype=np.float32)
             fitted = self.strip(even, hot=hot, blind=blind, core=core)
             # what was painted over is of the pixels around
             return times_photons(fitted, _painted(growth[core or slice(None)], fitted.hot[0]))
         shape, bins = cube.shape[:2], cube.shape[2]
         alone = self._fit(cube.reshape(-1, bins))
+        check_wish()
         photons = cube.sum(axis=2, dtype=np.float64)
         is_hot = np.zeros(shape, dtype=bool)
         if self.way.seek_hot:

@@ -1,6 +1,7 @@
 """Small arrays that a timing file names: a measured pulse, maps of dark counts and hot pixels."""
 
 import io
+import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -8,7 +9,9 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from camkit.errors import ContractError
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.npy_header import BROKEN_HEADER, read_header
+from camkit.side_file import read_side_bytes
 
 MOST_BYTES: Final = 64_000_000
 
@@ -26,12 +29,12 @@ def read_columns(path: Path, what: str) -> NDArray[np.float64]:
     Raises:
         ContractError: If it cannot be read so.
     """
-    data = _bytes(path, what)
+    data = read_side_bytes(path, what, most_bytes=MOST_BYTES)
     try:
         text = data.decode("utf-8").replace(",", " ")
         rows = [line.split() for line in text.splitlines() if line.strip() and line[0] != "#"]
         found = np.array(rows, dtype=np.float64)
-    except (UnicodeDecodeError, ValueError) as error:
+    except ValueError as error:
         raise ContractError(f"{what} {path} must be lines of two numbers: {error}") from error
     if found.ndim != 2 or found.shape[1] != 2:
         raise ContractError(f"{what} {path} must be lines of two numbers")
@@ -44,10 +47,11 @@ def read_map(path: Path, what: str) -> NDArray[Any]:
     Raises:
         ContractError: If it is missing, no such file, larger than a map is, or not (h, w).
     """
-    data = io.BytesIO(_bytes(path, what))
+    data = read_side_bytes(path, what, most_bytes=MOST_BYTES)
     try:
-        found = npy.read_array(data, allow_pickle=False)
-    except (ValueError, EOFError, TypeError, SyntaxError) as error:
+        _check_announced(data, path.name)
+        found = npy.read_array(io.BytesIO(data), allow_pickle=False)
+    except (*BROKEN_HEADER, DecodeError) as error:
         raise ContractError(f"{what} {path} must be an .npy file of numbers: {error}") from error
     if found.ndim != 2 or found.dtype.kind not in "biuf" or not np.isfinite(found).all():
         raise ContractError(
@@ -56,10 +60,14 @@ def read_map(path: Path, what: str) -> NDArray[Any]:
     return np.asarray(found)
 
 
-def _bytes(path: Path, what: str) -> bytes:
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ContractError(f"{what} {path} has more than {MOST_BYTES // 10**6} MB")
-        return path.read_bytes()
-    except OSError as error:
-        raise ContractError(f"cannot read {what} {path}: {error.strerror or error}") from error
+def _check_announced(data: bytes, name: str) -> None:
+    """Refuse an array that announces more than there is, before numpy makes room for it.
+
+    Raises:
+        DecodeError: Says what came.
+    """
+    shape, _, dtype = read_header(io.BytesIO(data), name)
+    if math.prod(shape) * dtype.itemsize > len(data):
+        raise DecodeError(
+            f"an array {shape} of {dtype} is announced, and there are {len(data)} bytes"
+        )

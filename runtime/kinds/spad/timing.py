@@ -12,7 +12,6 @@
 [correction]  offset_ps, dark (counts of a bin: a number, or an .npy map), hot (an .npy map)
 """
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -31,6 +30,7 @@ from camkit.runtime.kinds.spad.pulse import (
 )
 from camkit.runtime.kinds.spad.stored_array import read_columns, read_map
 from camkit.runtime.kinds.spad.time_axis import Orientation, TimeAxis
+from camkit.side_file import read_side_toml
 
 LIGHT_M_PER_PS: Final = 299_792_458e-12
 Positive = Annotated[float, Field(gt=0, lt=1e15)]
@@ -259,13 +259,7 @@ def read_timing(path: Path) -> Timing:
     Raises:
         ContractError: If it is missing, no TOML, or a name or value in it is none.
     """
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ContractError(f"cannot read timing {path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ContractError(f"timing {path} is not valid TOML: {error}") from error
-    return _checked(tables, path.parent, f"timing {path}")
+    return _checked(read_side_toml(path, "timing"), path.parent, f"timing {path}")
 
 
 def _plain(name: str, value: object) -> object:

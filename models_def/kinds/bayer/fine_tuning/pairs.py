@@ -9,10 +9,9 @@
 Where the reference does not reach, nothing is judged.
 """
 
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import cv2
 import numpy as np
@@ -37,6 +36,7 @@ from camkit.models_def.training.adversarial.judged import Mix
 from camkit.models_def.training.pictures import list_pictures, read_picture, to_linear
 from camkit.models_def.training.pool import cut_patch
 from camkit.models_def.training.sample import Batch, Sample
+from camkit.side_file import read_side_toml
 from camkit.units import to_mm
 
 SETTINGS: Final = "pairs.toml"
@@ -180,8 +180,8 @@ def read_capture(path: Path) -> FloatArray:
 
 def _read_settings(path: Path, recipe: BayerRecipe) -> PairSettings:
     try:
-        table: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
+        table = read_side_toml(path, "the settings of pairs")
+    except ContractError as error:
         raise ContractError(
             f"real pairs need {path} with iso and optionally white_balance: {error}"
         ) from error

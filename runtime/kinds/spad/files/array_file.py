@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
+from camkit.runtime.kinds.spad.files.axes import axes_of
 from camkit.runtime.kinds.spad.files.counts_file import (
     CountsFile,
     CountsKind,
     Hints,
-    axes_of,
     checked_bins,
     checked_counts,
     checked_size,
@@ -49,7 +49,7 @@ class ArrayFile(CountsFile):
 
         Args:
             path: Where it came from.
-            values: (t, y, x) in any order, or (y, x).
+            values: (t, y, x) in any order, or (y, x); further axes where the caller names them.
             hints: What the caller knows.
             kind: What it holds; None: times where it has three axes, else counts.
             usual: The axes that it has unless the caller says otherwise; None if that is not known.
@@ -65,15 +65,16 @@ class ArrayFile(CountsFile):
         self.assumed = assumed or {}
         if values.dtype.kind not in "biuf" or values.dtype.itemsize > 8:
             raise DecodeError(f"{path.name} holds {values.dtype}; expected numbers")
-        if len(values.shape) not in {2, 3}:
+        if len(values.shape) < 2:
             raise DecodeError(
                 f"{path.name} holds an array of {values.shape}; expected time, rows and columns, "
                 "or rows and columns"
             )
-        is_flat = len(values.shape) == 2
-        self.axes = self._axes = axes_of(path, values.shape, hints, "yx" if is_flat else usual)
+        usual = "yx" if len(values.shape) == 2 else usual
+        self._axes = axes_of(path, values.shape, hints.axes, usual)
+        self.axes, is_flat = self._axes.text, "t" not in self._axes.kept
         self._values = values
-        sizes = dict(zip(self._axes, values.shape, strict=True))
+        sizes = dict(zip(self._axes.letters, values.shape, strict=True))
         self.height, self.width = checked_size(path, sizes["y"], sizes["x"])
         self.kind = kind or ("counts" if is_flat else "histogram")
         pixels = self.height * self.width
@@ -82,15 +83,13 @@ class ArrayFile(CountsFile):
     def rows(self, top: int, bottom: int, edges: NDArray[np.float64] | None = None) -> FloatArray:
         """Read some rows; see `CountsFile`."""
         del edges
-        chosen = tuple(slice(top, bottom) if axis == "y" else slice(None) for axis in self._axes)
         try:
-            part = np.asarray(self._values[chosen])
+            part = np.asarray(self._values[self._axes.at_rows(top, bottom)])
         except (OSError, ValueError, RuntimeError) as error:
             raise DecodeError(f"{self.path.name} is damaged: {error}") from error
-        if "t" not in self._axes:
-            part, axes = part[..., None], self._axes + "t"
-        else:
-            axes = self._axes
+        axes = self._axes.kept
+        if "t" not in axes:
+            part, axes = part[..., None], axes + "t"
         return checked_counts(self.path, part.transpose([axes.index(a) for a in "yxt"]), top)
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
-from camkit.errors import ContractError, DecodeError
+from camkit.errors import DecodeError
 
 CountsKind = Literal["histogram", "counts", "stamps"]
 KEYS: Final[Mapping[str, CountsKind]] = {"histogram": "histogram", "counts": "counts"}
@@ -32,7 +32,7 @@ class Hints:
     """What the caller knows of a file.
 
     Attributes:
-        axes: Letters t, y, x in the order of the file's array, such as "yxt".
+        axes: Of the file's array in its order, such as "yxt"; see `Axes`.
         key: The variable, data set, channel or block to take.
         max_bytes: What may be held at once.
     """
@@ -54,8 +54,8 @@ class CountsFile(ABC):
         bins: Time bins, or frames; 0 for stamps.
         stated: What the file says of its times, by the names of the timing file.
         assumed: What is usual of such files; what anyone states goes before.
-        axes: Letters t, y, x in the order of the file's array, as a caller would state them; empty
-            where nobody can.
+        axes: Of the file's array in its order, as a caller would state them; empty where nobody
+            can.
     """
 
     path: Path
@@ -156,29 +156,3 @@ def checked_counts(path: Path, values: NDArray[Any], top: int) -> FloatArray:
             "expected whole numbers >= 0"
         )
     return found.copy() if np.shares_memory(found, values) else found
-
-
-def axes_of(path: Path, shape: tuple[int, ...], hints: Hints, usual: str | None) -> str:
-    """Give the axes of an array, letters t, y, x in its order.
-
-    Args:
-        path: The file, for errors.
-        shape: Of the array.
-        hints: What the caller knows.
-        usual: What such arrays have; None where that cannot be known.
-
-    Raises:
-        ContractError: If axes are stated that cannot be, or none are known.
-    """
-    axes = hints.axes if hints.axes is not None else usual
-    if axes is None:
-        raise ContractError(
-            f"{path.name} holds an array of {shape}: nothing says which axis is time; say [array] "
-            'axes = "yxt", "tyx" or what it is, in a file for --timing'
-        )
-    if sorted(axes) not in (sorted("tyx"), sorted("yx")) or len(axes) != len(shape):
-        raise ContractError(
-            f'[array] axes = "{axes}" does not fit {path.name}, an array of {shape}: expected each '
-            f"of the letters {'t, y, x' if len(shape) == 3 else 'y, x'} once, in its order"
-        )
-    return axes

@@ -1,5 +1,6 @@
 """MATLAB files: version 5 by scipy, version 7.3 as HDF5."""
 
+import math
 import struct
 import zlib
 from pathlib import Path
@@ -13,6 +14,7 @@ from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.hdf5 import open_hdf5
+from camkit.runtime.kinds.spad.files.mat_sizes import bytes_of, is_version_5
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 
@@ -21,7 +23,7 @@ USER_BLOCK: Final = 512
 """Bytes before the HDF5 of version 7.3."""
 BROKEN: Final = (
     *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
-    *(NotImplementedError, UnicodeDecodeError, MemoryError, struct.error, zlib.error),
+    *(NotImplementedError, UnicodeDecodeError, struct.error, zlib.error),
     *(AttributeError, UnboundLocalError, RuntimeError, scipy.io.matlab.MatReadError),
 )
 """What scipy raises of files that are damaged."""
@@ -35,6 +37,9 @@ BYTES_OF: Final = {
     "int32": 4,
     "uint32": 4,
 }
+PLAIN: Final = frozenset({*BYTES_OF, "double", "int64", "uint64", "char"})
+"""Classes of values that may state something of times."""
+SMALL_BYTES: Final = 1_000_000
 TIMES: Final = 3
 """Of max_bytes: version 5 is read whole."""
 
@@ -45,6 +50,9 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         head = file.read(USER_BLOCK + len(HDF5_MAGIC))
     if HDF5_MAGIC in (head[: len(HDF5_MAGIC)], head[USER_BLOCK:]):
         return open_hdf5(path, hints, is_matlab=True)
+    is_walked = is_version_5(path)
+    if is_walked:  # names and shapes of any length are refused before scipy reads them
+        bytes_of(path, (), 0)
     try:
         listed = scipy.io.whosmat(str(path), appendmat=False)
     except BROKEN as error:
@@ -53,14 +61,20 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     large = [name for name, (shape, kind) in kinds.items() if _may_be(name, shape, kind)]
     asked = [name for name in kinds if name == hints.key]
     name = chosen_name(path, asked or large, hints, "variables")
-    shape, kind = kinds[name]
-    size = int(np.prod(shape, dtype=np.float64)) * BYTES_OF.get(kind, 8)
-    if kind != "cell" and size > TIMES * hints.max_bytes:
+    most = TIMES * hints.max_bytes
+    size = 0 if kinds[name][1] == "cell" else _listed_bytes(*kinds[name])
+    if is_walked and size <= most:
+        size = bytes_of(path, {name}, most)
+    if size > most:
         raise ContractError(
-            f"{path.name}: {name} takes {size / 1e9:.1f} GB, and this version of MATLAB file can "
-            "only be read whole; save it with -v7.3, or raise --max-mem"
+            f"{path.name}: {name} takes {size / 1e9:.3g} GB or more, and this version of MATLAB "
+            "file can only be read whole; save it with -v7.3, or raise --max-mem"
         )
-    small = [n for n in kinds if n in TABLE_OF]
+    small = [
+        n
+        for n, (_, own) in kinds.items()
+        if n in TABLE_OF and own in PLAIN and _listed_bytes(*kinds[n]) <= SMALL_BYTES
+    ]
     try:
         found = scipy.io.loadmat(str(path), appendmat=False, variable_names=[name, *small])
         values, stated = found[name], stated_values({n: found[n] for n in small})
@@ -74,6 +88,11 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         )
     usual = "tyx" if name in KEYS else None
     return ArrayFile(path, values, hints, kind=KEYS.get(name), usual=usual, stated=stated)
+
+
+def _listed_bytes(shape: tuple[int, ...], kind: str) -> int:
+    """Return what an array of numbers takes."""
+    return math.prod(shape) * BYTES_OF.get(kind, 8)
 
 
 def _may_be(name: str, shape: tuple[int, ...], kind: str) -> bool:

@@ -7,7 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.errors import CamkitError
-from camkit.runtime.kinds.spad.files.hdf5 import BROKEN
+from camkit.runtime.kinds.spad.files.broken import BROKEN
+from camkit.runtime.kinds.spad.files.hdf5 import attribute_of
 from camkit.runtime.kinds.spad.files.npz import read_npz
 from camkit.runtime.kinds.spad.timing import read_timing, timing_beside
 
@@ -46,14 +47,8 @@ def _of_npz(path: Path) -> Any:
 
 
 def _of_hdf5(path: Path) -> Any:
-    import h5py
-
-    found: list[Any] = []
-    with h5py.File(path, "r") as file:
-        file.visititems(
-            lambda _, item: found.append(item.attrs[NAME]) if NAME in item.attrs else None
-        )
-    return found[0] if found else ""
+    found = attribute_of(path, NAME)
+    return "" if found is None else found
 
 
 _READERS: Final[Mapping[str, Callable[[Path], Any]]] = {

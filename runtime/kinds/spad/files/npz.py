@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from camkit.errors import DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
+from camkit.runtime.kinds.spad.npy_header import Header, read_header
 from camkit.runtime.kinds.spad.files.packed import member_bytes, opened_zip
+from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 HEADER_BYTES: Final = 20_000
 SMALL_BYTES: Final = 1_000_000
@@ -34,7 +35,7 @@ def open_npz(path: Path, hints: Hints) -> CountsFile:
         small = {
             other: _array(archive, members[other], headers[other], SMALL_BYTES)
             for other, (shape, _, _) in headers.items()
-            if len(shape) <= 1 and members[other].file_size < SMALL_BYTES
+            if other in TABLE_OF and len(shape) <= 1 and members[other].file_size < SMALL_BYTES
         }
         values = _array(archive, members[name], headers[name], hints.max_bytes)
     return ArrayFile(path, values, hints, kind=KEYS.get(name), stated=stated_values(small))
@@ -68,9 +69,6 @@ def read_npz(
         }
 
 
-Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
-
-
 def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
     """Give shape, order and type of an array.
 
@@ -79,12 +77,7 @@ def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Header:
     """
     with archive.open(member) as file:
         start = io.BytesIO(file.read(HEADER_BYTES))
-    try:
-        version = npy.read_magic(start)
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, is_fortran, dtype = read(start)
-    except (ValueError, SyntaxError, TypeError) as error:
-        raise DecodeError(f"{member.filename} is no array: {error}") from error
+    shape, is_fortran, dtype = read_header(start, member.filename)
     if dtype.hasobject:
         raise DecodeError(
             f"{member.filename} holds pickled objects, which are never read; store numbers"
@@ -104,8 +97,7 @@ def _array(
     data = member_bytes(archive, member, max_bytes)
     count = math.prod(shape) if min(shape, default=1) >= 0 else -1
     start = io.BytesIO(bytes(data[:HEADER_BYTES]))
-    version = npy.read_magic(start)
-    (npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0)(start)
+    read_header(start, member.filename)
     if count < 0 or start.tell() + count * dtype.itemsize > member.file_size:
         raise DecodeError(
             f"{member.filename} says it is an array of {shape}, {dtype}, and has only "

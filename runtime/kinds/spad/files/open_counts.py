@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from camkit.errors import DecodeError, UnsupportedError
-from camkit.runtime.files.regular_file import check_regular
+from camkit.regular_file import check_regular
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.hdf5 import open_hdf5
 from camkit.runtime.kinds.spad.files.mat import open_mat
@@ -54,3 +54,5 @@ def open_counts(path: Path, hints: Hints) -> CountsFile:
         return reader(path, hints)
     except OSError as error:
         raise DecodeError(f"cannot read {path.name}: {error.strerror or error}") from error
+    except MemoryError as error:
+        raise DecodeError(f"{path.name} takes more memory than there is") from error

@@ -11,9 +11,12 @@ from pathlib import Path
 from typing import IO, Final
 
 from camkit.errors import CamkitError, DecodeError
+from camkit.regular_file import check_regular
+from camkit.runtime.cancel import check_wish
 
 MOST_UNPACKED: Final = 4_000_000_000
 """Bytes of one member."""
+MOST_MEMBERS: Final = 10_000
 PIECE: Final = 1 << 20
 LOCAL_HEADER: Final = 30
 BROKEN: Final = (
@@ -33,7 +36,10 @@ BROKEN: Final = (
 def opened_zip(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip; what is wrong with it inside the block is told as a `DecodeError`."""
     try:
+        check_regular(path)
         with zipfile.ZipFile(path) as archive:
+            if len(archive.infolist()) > MOST_MEMBERS:
+                raise DecodeError(f"{path.name} holds more than {MOST_MEMBERS} files")
             yield archive
     except CamkitError:
         raise
@@ -65,7 +71,7 @@ def member_bytes(
         return memoryview(_mapped(Path(archive.filename), member))[_at(archive, member) :]
     with archive.open(member) as packed:
         if member.file_size <= max_bytes:
-            return memoryview(packed.read())
+            return memoryview(b"".join(_pieces(packed)))
         with tempfile.TemporaryFile() as file:
             return _spilled(packed, file)
 
@@ -87,8 +93,14 @@ def _at(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> int:
     return int(member.header_offset + LOCAL_HEADER + name + extra)
 
 
-def _spilled(packed: IO[bytes], file: IO[bytes]) -> mmap.mmap:
+def _pieces(packed: IO[bytes]) -> Iterator[bytes]:
     while piece := packed.read(PIECE):
+        check_wish()
+        yield piece
+
+
+def _spilled(packed: IO[bytes], file: IO[bytes]) -> mmap.mmap:
+    for piece in _pieces(packed):
         file.write(piece)
     file.flush()
     return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)

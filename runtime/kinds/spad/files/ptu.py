@@ -3,6 +3,7 @@
 import logging
 import struct
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
+from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
 
 BROKEN: Final = (
-    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError, MemoryError),
+    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
     *(NotImplementedError, UnicodeDecodeError, UnboundLocalError, ZeroDivisionError),
     *(AttributeError, RuntimeError, struct.error),
 )
@@ -63,31 +65,36 @@ def _check_whole(path: Path, file: Any) -> None:
 
 
 def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
-    """Give (y, x, t), all frames summed."""
+    """Return (y, x, t) of one channel and, of several frames, of one."""
     if not file.is_t3:
         raise DecodeError(f"{path.name} is no T3 measurement: it has no times within a cycle")
-    channels = len(file.active_channels)
-    channel = _channel(path, channels, hints)
-    size = float(np.prod(file.shape[1:], dtype=np.float64)) * COUNT_BYTES
+    active = [int(number) for number in file.active_channels]
+    numbers: dict[str, Sequence[int]] = {"channel": active}
+    if file.is_image:
+        numbers["frame"] = range(int(file.shape[0]))
+    place = chosen_places(path, numbers, hints.key, summed="frame")
+    bins = _bins(file)
+    size = float(np.prod(file.shape[1:-1], dtype=np.float64)) * bins * COUNT_BYTES
     size += int(file.number_records) * RECORD_BYTES
     if size > TIMES * hints.max_bytes:
         raise ContractError(
             f"{path.name}, {file.number_records} photons and markers, takes {size / 1e9:.3g} GB, "
             "and such files are read whole; raise --max-mem, or save its histograms as .h5 or .npz"
         )
+    channel = active[place["channel"]] - active[0]
     if not file.is_image:
-        found = np.asarray(file.decode_histogram(dtype="uint32"))
+        found = np.asarray(file.decode_histogram(dtype="uint32", dtime=bins))
         return np.asarray(found.reshape(-1, found.shape[-1])[channel])[None, None]
-    cube = np.asarray(file.decode_image(frame=-1, channel=channel, dtype="uint32"))
+    own = {"channel": channel, "dtime": bins, "dtype": "uint32"}
+    cube = np.asarray(file.decode_image(frame=place["frame"], **own))
     return cube.reshape(cube.shape[1], cube.shape[2], cube.shape[-1])
 
 
-def _channel(path: Path, count: int, hints: Hints) -> int:
-    known = [f"channel {number}" for number in range(count)]
-    if hints.key is None and count == 1:
-        return 0
-    if hints.key not in known:
-        raise ContractError(
-            f"{path.name} holds {', '.join(known)}; say which by [array] key in a file for --timing"
-        )
-    return known.index(hints.key)
+def _bins(file: Any) -> int:
+    """Return the bins of a laser period, empty ones at its end too.
+
+    A period is a whole number of bins but for the rounding of two floats, so it is rounded;
+    ptufile cuts off what no photon reached, and rounds down where it is asked for all.
+    """
+    period = round(float(file.global_resolution) / float(file.tcspc_resolution))
+    return max(int(file.number_bins), min(period, int(file.number_bins_max)))

@@ -1,23 +1,34 @@
 """SDT of Becker & Hickl: a histogram of every pixel, plain or in a zip."""
 
+import io
 import struct
 import tempfile
+import zipfile
+import zlib
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 import numpy as np
 
-from camkit.errors import ContractError, DecodeError, UnsupportedError
+from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
+from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.packed import PIECE, member_bytes, opened_zip
 
 BROKEN: Final = (
-    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError, MemoryError),
+    *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
+    *(zipfile.BadZipFile, zlib.error, RuntimeError),
     *(NotImplementedError, AssertionError, UnicodeDecodeError, AttributeError, struct.error),
 )
 """What sdtfile raises of files that are damaged."""
 PS_PER_S: Final = 1e12
+NEW_BLOCKS: Final = 15
+"""Revision from which on blocks may be longer than 4 GB."""
+MANY_BLOCKS: Final = 0x7FFF
+"""Number of blocks that says that it stands elsewhere."""
+TIMES: Final = 2
+"""Of max_bytes: such files are read whole."""
 
 
 def open_sdt(path: Path, hints: Hints) -> CountsFile:
@@ -50,11 +61,16 @@ def _open_plain(path: Path, plain: Path, hints: Hints) -> CountsFile:
     try:
         # a file that it opened itself it would leave open where it fails
         with plain.open("rb") as handle:
+            _check_size(path, handle, TIMES * hints.max_bytes)
             file = sdtfile.SdtFile(handle)
             blocks, times = list(file.data), list(file.times)
+    except CamkitError:
+        raise
     except BROKEN as error:
         raise DecodeError(f"{path.name} is damaged, or no SDT: {error}") from error
-    number = _block(path, len(blocks), hints)
+    if not blocks:
+        raise DecodeError(f"{path.name} holds no histograms")
+    number = chosen_places(path, {"block": range(len(blocks))}, hints.key)["block"]
     values, seconds = np.asarray(blocks[number]), np.asarray(times[number], dtype=np.float64)
     if values.ndim == 1:
         values = values[None]
@@ -74,14 +90,32 @@ def _open_plain(path: Path, plain: Path, hints: Hints) -> CountsFile:
     )
 
 
-def _block(path: Path, count: int, hints: Hints) -> int:
-    known = [f"block {number}" for number in range(count)]
-    if not known:
-        raise DecodeError(f"{path.name} holds no histograms")
-    if hints.key is None and count == 1:
-        return 0
-    if hints.key not in known:
-        raise ContractError(
-            f"{path.name} holds {', '.join(known)}; say which by [array] key in a file for --timing"
-        )
-    return known.index(hints.key)
+def _check_size(path: Path, file: IO[bytes], most_bytes: int) -> None:
+    """Refuse blocks that unpack to more than fits the memory: sdtfile reads all of them.
+
+    Raises:
+        ContractError: Says how much they take.
+    """
+    from sdtfile import sdtfile
+
+    header = np.fromfile(file, np.dtype(sdtfile.FILE_HEADER), 1)[0]
+    is_new = sdtfile.FileRevision(header["revision"]).revision >= NEW_BLOCKS
+    record = np.dtype(sdtfile.BLOCK_HEADER if is_new else sdtfile.BLOCK_HEADER_OLD)
+    count = int(header["no_of_data_blocks"])
+    count = int(header["reserved1"]) if count == MANY_BLOCKS else count
+    total, offset = 0, int(header["data_block_offs"])
+    for _ in range(count):
+        if total > most_bytes:
+            raise ContractError(
+                f"{path.name} takes {total / 1e9:.3g} GB or more, and such files are read whole; "
+                "raise --max-mem, or save its histograms as .h5 or .npz"
+            )
+        file.seek(offset)
+        block = np.fromfile(file, record, 1)[0]
+        start, offset = int(block["data_offs"]), int(block["next_block_offs"])
+        total += int(block["block_length"])
+        if sdtfile.BlockType(block["block_type"]).compress:
+            file.seek(start)
+            with zipfile.ZipFile(io.BytesIO(file.read(max(offset - start, 0)))) as packed:
+                total += packed.filelist[0].file_size
+    file.seek(0)

@@ -1,7 +1,7 @@
 """SPC of Becker & Hickl (SPC-130, SPC-150): one record of 32 bits for every photon.
 
     bits 0..11   macro time, in ticks of the clock, modulo 4096
-    bits 12..15  routing
+    bits 12..15  routing: which detector, the channel of what is read
     bits 16..27  ADC; the time within a cycle is 4095 - ADC, for the clock stops what a photon began
     bit 28       marker, 29 gap, 30 overflow of the macro time, 31 no photon
 
@@ -12,6 +12,7 @@ References: The bh TCSPC Handbook, FIFO data format of the SPC-130 and SPC-150 m
 """
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -19,13 +20,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from camkit.errors import DecodeError
+from camkit.errors import ContractError, DecodeError
+from camkit.runtime.cancel import check_wish
+from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
 
 RECORD_BYTES: Final = 4
 MACRO_TICKS: Final = 4096
 LAST_ADC: Final = 4095
+ROUTINGS: Final = 16
+MICRO_BYTES: Final = 4
+"""What a photon takes while the parts are put together."""
 MARKER: Final = np.uint32(1 << 28)
 OVERFLOW: Final = np.uint32(1 << 30)
 NO_PHOTON: Final = np.uint32(1 << 31)
@@ -57,7 +63,7 @@ def decode_spc(data: bytes) -> Photons:
     Raises:
         DecodeError: If it is not whole records, or has no header.
     """
-    records = _records(data)
+    records = checked_records(np.frombuffer(data, np.uint8))
     is_over, is_none = (records & OVERFLOW) > 0, (records & NO_PHOTON) > 0
     many = np.where(is_none, records & OVERFLOWS, 1)
     overflows = np.cumsum(np.where(is_over, many, 0).astype(np.int64))
@@ -66,26 +72,43 @@ def decode_spc(data: bytes) -> Photons:
     return Photons(
         macro=(own & 0xFFF).astype(np.int64) + MACRO_TICKS * overflows[is_photon],
         micro=_micro(own),
-        routing=((own >> 12) & 0xF).astype(np.uint8),
+        routing=_routing(own),
     )
 
 
-def micro_times(data: bytes) -> NDArray[np.uint16]:
-    """Give the time within the cycle of every photon of a stream; errors as of `decode_spc`."""
-    records = _records(data)
-    parts = [records[at : at + AT_ONCE] for at in range(0, len(records), AT_ONCE)]
-    found = [_micro(part[_are_photons(part)]) for part in parts]
-    return np.concatenate([*found, np.empty(0, np.uint16)])
+def checked_records(data: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """Return all records behind the header.
 
-
-def _records(data: bytes) -> NDArray[np.uint32]:
-    """Give all records behind the header."""
+    Raises:
+        DecodeError: If they are not whole, or there is no header.
+    """
     if len(data) < RECORD_BYTES or len(data) % RECORD_BYTES:
         raise DecodeError(f"{len(data)} bytes are no whole records of {RECORD_BYTES}")
-    records = np.frombuffer(data, dtype="<u4")
+    records = data.view("<u4")
     if not records[0] & NO_PHOTON:
         raise DecodeError("the first record is no header of an SPC-130 or SPC-150")
-    return records[1:]
+    return np.asarray(records[1:])
+
+
+def photons_of_routing(records: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """Return how many photons each detector has, (16,)."""
+    found = np.zeros(ROUTINGS, np.int64)
+    for part in _parts(records):
+        found += np.bincount(_routing(part[_are_photons(part)]), minlength=ROUTINGS)
+    return found
+
+
+def micro_times(records: NDArray[np.uint32], routing: int) -> Iterator[NDArray[np.uint16]]:
+    """Return the times within the cycle of a detector's photons, part by part."""
+    for part in _parts(records):
+        own = part[_are_photons(part)]
+        yield _micro(own[_routing(own) == routing])
+
+
+def _parts(records: NDArray[np.uint32]) -> Iterator[NDArray[np.uint32]]:
+    for start in range(0, len(records), AT_ONCE):
+        check_wish()
+        yield records[start : start + AT_ONCE]
 
 
 def _are_photons(records: NDArray[np.uint32]) -> NDArray[np.bool_]:
@@ -96,20 +119,33 @@ def _micro(photons: NDArray[np.uint32]) -> NDArray[np.uint16]:
     return np.asarray(LAST_ADC - ((photons >> 16) & 0xFFF), dtype=np.uint16)
 
 
+def _routing(photons: NDArray[np.uint32]) -> NDArray[np.uint8]:
+    return np.asarray((photons >> 12) & 0xF, dtype=np.uint8)
+
+
 def open_spc(path: Path, hints: Hints) -> CountsFile:
-    """Open a stream as the time stamps of one pixel; see `open_counts`."""
-    del hints
+    """Open a stream as the time stamps of one pixel of one detector; see `open_counts`."""
     try:
-        micro = micro_times(path.read_bytes())
-    except DecodeError as error:
+        records = checked_records(np.memmap(path, np.uint8, mode="r"))
+    except (DecodeError, ValueError) as error:
         raise DecodeError(f"{path.name} is damaged, or no SPC: {error}") from error
+    photons = photons_of_routing(records)
+    known = np.flatnonzero(photons).tolist() or [0]
+    routing = known[chosen_places(path, {"channel": known}, hints.key)["channel"]]
+    size = int(photons[routing]) * MICRO_BYTES
+    if size > hints.max_bytes:
+        raise ContractError(
+            f"{path.name}: the {photons[routing]} photons of channel {routing} take "
+            f"{size / 1e9:.3g} GB, more than fits the memory; raise --max-mem"
+        )
+    micro = np.concatenate([*micro_times(records, routing), np.empty(0, np.uint16)])
     step = _tac_step_ps(path.with_suffix(".set"))
     stated = {} if step is None else {"stamp_ps": step}
     return StampsFile(path, (1, 1), lambda _: [micro], stated=stated)
 
 
 def _tac_step_ps(path: Path) -> float | None:
-    """Give the step of the TAC from the set-up file beside a stream; None without one."""
+    """Return the step of the TAC from the set-up file beside a stream; None without one."""
     if not path.is_file():
         return None
     with path.open("rb") as file:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, CountsFile, checked_size
 
 AT_ONCE: Final = 500_000
@@ -66,6 +67,7 @@ class StampsFile(CountsFile):
         ends = np.cumsum([cell.size for cell in cells])
         begins = ends - [cell.size for cell in cells]
         for start in range(0, int(ends[-1]), AT_ONCE):
+            check_wish()
             end = min(start + AT_ONCE, int(ends[-1]))
             some = [
                 (x, cells[x][max(start - begins[x], 0) : end - begins[x]])

@@ -1,8 +1,11 @@
 """TIFF: a page of counts, or a stack whose pages are time."""
 
 import logging
+import lzma
+import math
 import struct
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,13 +15,16 @@ from numpy.typing import NDArray
 
 from camkit.errors import CamkitError, DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
+from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
 from camkit.runtime.kinds.spad.files.packed import MOST_UNPACKED
+from camkit.runtime.kinds.spad.files.tiff_pages import check_pages, check_whole, stack_axes
 
 BROKEN: Final = (
     *(tifffile.TiffFileError, ValueError, TypeError, KeyError, IndexError, OSError, EOFError),
-    *(RuntimeError, AttributeError, ZeroDivisionError, OverflowError, MemoryError, struct.error),
+    *(RuntimeError, AttributeError, ZeroDivisionError, OverflowError, struct.error),
     zlib.error,
+    lzma.LZMAError,
     ImportError,  # a packing that needs a library of its own
 )
 """What tifffile raises of files that are damaged, or packed in ways that it does not know."""
@@ -29,35 +35,58 @@ def open_tiff(path: Path, hints: Hints) -> CountsFile:
     """Open a TIFF; see `open_counts`."""
     try:
         with tifffile.TiffFile(path) as file:
-            values = _stack(path, file, hints)
+            axes, values = _stack(path, file, hints)
     except CamkitError:
         raise
     except BROKEN as error:
         raise DecodeError(f"{path.name} is damaged, or no TIFF of counts: {error}") from error
-    return ArrayFile(path, values, hints)
+    return ArrayFile(path, values, replace(hints, axes=axes))
 
 
-def _stack(path: Path, file: tifffile.TiffFile, hints: Hints) -> NDArray[Any]:
-    """Give all pages, mapped or unpacked to a file where they are large."""
-    pages = file.pages
-    first = pages[0]
-    shape, dtype = first.shape, first.dtype
+def _stack(path: Path, file: tifffile.TiffFile, hints: Hints) -> tuple[str | None, NDArray[Any]]:
+    """Return the axes and all pages, mapped or unpacked to a file where they are large."""
+    first = file.pages[0]
+    shape = first.shape
     if len(shape) != 2:
         raise DecodeError(
             f"{path.name} holds pages of {shape}; expected rows and columns of counts"
         )
-    series = file.series[0]
-    whole = series.shape if len(file.series) == 1 else (len(pages), *shape)
-    size = int(np.prod(whole, dtype=np.float64)) * np.dtype(dtype).itemsize
+    series, places = _series(path, file, hints)
+    if series is None and any(page.shape != shape for page in file.pages):
+        raise DecodeError(f"{path.name} holds pages of several sizes; expected one")
+    whole = (len(file.pages), *shape) if series is None else series.shape
+    size = math.prod(whole) * np.dtype(first.dtype).itemsize
     if size > MOST_UNPACKED:
         raise DecodeError(f"{path.name} unpacks to {size / 1e9:.1f} GB; store it as HDF5")
-    if len(file.series) > 1 and any(page.shape != shape for page in pages):
-        raise DecodeError(f"{path.name} holds pages of several sizes; expected one")
-    is_mapped = len(file.series) == 1 and series.dataoffset is not None
-    if is_mapped and series.dataoffset + size > path.stat().st_size:
-        raise DecodeError(f"{path.name} is cut off")
+    check_whole(path, file)
+    axes = hints.axes
+    if series is not None and axes is None:
+        axes = stack_axes(path, series.axes, series.shape, places)
+    if series is not None and series.dataoffset is not None:
+        if series.dataoffset + size > path.stat().st_size:
+            raise DecodeError(f"{path.name} is cut off")
+        return axes, np.memmap(path, series.dtype, "r", series.dataoffset, series.shape)
+    check_pages(path, file.pages if series is None else series, hints.max_bytes)
     out = "memmap" if size > hints.max_bytes else None
-    values = (
-        tifffile.memmap(path, mode="r") if is_mapped else file.asarray(key=slice(None), out=out)
-    )
-    return np.asarray(values).reshape(-1, *shape) if values.ndim != 2 else np.asarray(values)
+    if series is None:
+        found = file.asarray(key=slice(None), out=out, maxworkers=1)
+    else:
+        found = series.asarray(out=out, maxworkers=1)
+    return axes, np.asarray(found).reshape(whole)
+
+
+def _series(
+    path: Path, file: tifffile.TiffFile, hints: Hints
+) -> tuple[tifffile.TiffPageSeries | None, str | None]:
+    """Return the series that is meant, and what the key says of its places.
+
+    None stands for single pages that make up a stack, each a series of its own to tifffile.
+    """
+    series = file.series
+    if len(series) == 1:
+        return series[0], hints.key
+    if all(len(one) == 1 for one in series):
+        return None, hints.key
+    mine, *others = [part.strip() for part in (hints.key or "").split(",")]
+    place = chosen_places(path, {"series": range(len(series))}, mine or None)["series"]
+    return series[place], ", ".join(others) or None

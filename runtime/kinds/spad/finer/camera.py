@@ -19,7 +19,7 @@ from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import Sharpen, SuperResolve
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
-from camkit.runtime.cancel import Cancel
+from camkit.runtime.cancel import Cancel, check_cancelled
 from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
 from camkit.runtime.kinds.spad.finer.linear import Grid, LinearEstimate, linear_estimate
 from camkit.runtime.kinds.spad.finer.sampling import sampling_kernel
@@ -237,6 +237,7 @@ class FineCamera:
         count, height, width = frames.shape
         found = np.empty((count, scale * height, scale * width), np.float32)
         for frame, out in zip(frames, found, strict=True):
+            check_cancelled(cancel)
             planes = network_planes(frame, white, dark)[None]
             engine.run(planes, out[None, None], cancel=cancel)
         np.maximum(found, 0, out=found)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
 from camkit.contracts import FloatArray
+from camkit.runtime.cancel import current_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.finer.camera import FineCamera, white_of
 from camkit.runtime.kinds.spad.finer.linear import REACH
@@ -145,7 +146,9 @@ class FineSharpener:
         return FineDepth(found=replace(found, sigma_ps=sigma_ps), size=size, photons=photons)
 
     def _by_network(self, frames: FloatArray, size: str, dark: NDArray[np.floating]) -> FloatArray:
-        return self.camera.by_network(frames, size, white=white_of(frames), dark=np.asarray(dark))
+        return self.camera.by_network(
+            frames, size, white=white_of(frames), dark=np.asarray(dark), cancel=current_wish()
+        )
 
     def _proved(
         self,

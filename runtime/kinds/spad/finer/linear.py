@@ -21,6 +21,7 @@ from scipy.signal import convolve
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.finer.covariance import PictureCovariance
 
 REACH: Final = 3
@@ -83,6 +84,7 @@ class LinearEstimate:
         found = np.empty((count, height, scale, width, scale), np.float32)
         step = max(1, AT_ONCE // (height * width))
         for start in range(0, count, step):
+            check_wish()
             some = around[start : start + step].reshape(-1, SIDE * SIDE) @ table
             block = some.reshape(-1, height, width, scale, scale)
             found[start : start + step] = block.transpose(0, 1, 3, 2, 4)

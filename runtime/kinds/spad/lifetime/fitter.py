@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
+from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.evidence import threshold_for
 from camkit.runtime.kinds.spad.lifetime.decay import Decay, Floats, Shapes
 from camkit.runtime.kinds.spad.lifetime.starts import Starts
@@ -130,6 +131,7 @@ class LifetimeFitter:
         starts = self._starts
         found, most = np.empty((4, len(n))), np.full(len(n), -np.inf)
         for template in starts.best(counts):
+            check_wish()
             shares = starts.shares(template)
             a, b = _shared_out(n, shares)
             height = _height(n, a[:, None] * shares + b[:, None])
@@ -155,6 +157,7 @@ class LifetimeFitter:
         height = _height(counts, mean)
         going = np.arange(len(counts))
         for _ in range(STEPS):
+            check_wish()
             step = self._step(counts[going], mean, gradients, values[:, going])
             left, risen = np.arange(len(going)), np.zeros(len(going))
             for cut in range(CUTS):

@@ -11,6 +11,7 @@ from camkit.runtime.kinds.spad.pooling import Pool
 from camkit.runtime.kinds.spad.sharpen import METHODS, Method, Way
 from camkit.runtime.kinds.spad.timing import Timing, read_timing, timing_beside
 from camkit.runtime.options import DEFAULT_MAX_MEM_BYTES, Options
+from camkit.side_file import read_side_bytes
 
 Finer = Literal["net", "linear"]
 FINER: Final[tuple[Finer, ...]] = get_args(Finer)
@@ -94,10 +95,14 @@ def identity(options: Options, capture: Path) -> Mapping[str, Any]:
     if file is None:
         return {}
     files = [file, *read_timing(file).files]
-    return {
-        f"timing_{number}": hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
-        for number, file in enumerate(files)
-    }
+    return {f"timing_{number}": _digest(one) for number, one in enumerate(files)}
+
+
+def _digest(file: Path) -> str:
+    """Return a hash of a file; an empty text where none lies."""
+    if not file.is_file():
+        return ""
+    return hashlib.sha256(read_side_bytes(file, "the file")).hexdigest()
 
 
 def _timing_file(options: Options, capture: Path) -> Path | None:

@@ -10,7 +10,7 @@ KEPT_BYTES: Final = 260_000_000
 """What the process needs beside its rows."""
 BYTES_OF_COUNT: Final = 32
 """What a count of a strip takes, with all that is made of it in between."""
-MOST_COUNTS: Final = 24_000_000
+MOST_COUNTS: Final = 12_000_000
 """Of a strip: more rows at once make nothing faster."""
 
 

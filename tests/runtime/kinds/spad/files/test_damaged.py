@@ -242,7 +242,6 @@ def test_arrays_that_are_no_cubes_are_refused(tmp_path: Path) -> None:
     for name, array, told in (
         ("text", np.array([["a", "b"]]), "expected numbers"),
         ("complex", np.ones((9, 2, 2), complex), "expected numbers"),
-        ("four", np.ones((2, 2, 2, 2)), "expected time, rows and columns"),
         ("none", np.ones((9, 0, 3)), "holds 3x0 pixels"),
         ("no_time", np.ones((0, 2, 3)), "has no time bins"),
         ("line", np.ones(9), "holds no arrays"),

@@ -1,0 +1,200 @@
+"""How much memory a variable of a MATLAB 5 file takes, found before it is read.
+
+A file of some kilobytes may hold cells of gigabytes of zeros, packed, and cells in cells without an
+end. So every element of the variable is passed by in small pieces, and what it would unpack to is
+counted; nothing is kept.
+
+References: MathWorks, MAT-File Format, level 5.
+"""
+
+import struct
+import zlib
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Final
+
+from camkit.errors import DecodeError
+
+HEADER_BYTES: Final = 128
+MATRIX: Final = 14
+PACKED: Final = 15
+CELL: Final = 1
+OBJECT: Final = 3
+STRUCTS: Final = frozenset({2, OBJECT})
+NUMBER_BYTES: Final = {6: 8, 7: 4, 8: 1, 9: 1, 10: 2, 11: 2, 12: 4, 13: 4, 14: 8, 15: 8}
+"""Class of an array of numbers -> bytes of one."""
+TEXT_TIMES: Final = 4
+"""Of the bytes of anything else: text becomes UTF-32."""
+OBJECT_BYTES: Final = 200
+"""Of an array beside its numbers."""
+COMPLEX: Final = 0x800
+MOST_DEPTH: Final = 8
+PIECE: Final = 1 << 16
+
+
+def is_version_5(path: Path) -> bool:
+    """Return whether a file says that it is MATLAB 5."""
+    with path.open("rb") as file:
+        return file.read(HEADER_BYTES)[-4:] in (b"\x00\x01IM", b"\x01\x00MI")
+
+
+def bytes_of(path: Path, names: Collection[str], most_bytes: int) -> int:
+    """Return the memory that some variables of a MATLAB 5 file take together.
+
+    Args:
+        path: The file.
+        names: Of the variables.
+        most_bytes: Counting ends beyond.
+
+    Raises:
+        DecodeError: If it is cut off, or cells lie too deep in one another.
+    """
+    total = 0
+    with path.open("rb") as file:
+        end = "<" if file.read(HEADER_BYTES)[-2:] == b"IM" else ">"
+        while total <= most_bytes and len(tag := file.read(8)) == 8:
+            kind, size = struct.unpack(f"{end}II", tag)
+            begin = file.tell()
+            try:
+                if kind == PACKED:
+                    walk = _Walk(_Unpacked(file, size), end, most_bytes - total)
+                    kind, size = walk.tag()
+                else:
+                    walk = _Walk(_Plain(file), end, most_bytes - total)
+                if kind == MATRIX:
+                    total += walk.matrix(size, 0, names)
+            except (EOFError, zlib.error) as error:
+                raise DecodeError(f"{path.name} is damaged: {error}") from error
+            except _DeepError as error:
+                raise DecodeError(
+                    f"{path.name} nests cells or structures more than {MOST_DEPTH} deep"
+                ) from error
+            file.seek(begin + struct.unpack(f"{end}I", tag[4:])[0])
+    return total
+
+
+class _DeepError(Exception):
+    """Cells lie too deep in one another."""
+
+
+class _Plain:
+    """Bytes as they lie in the file."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, count: int) -> bytes:
+        return self._file.read(count)
+
+
+class _Unpacked:
+    """Bytes of a packed element, unpacked so many at once as are asked for."""
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        self._file, self._left, self._unpack = file, size, zlib.decompressobj()
+
+    def read(self, count: int) -> bytes:
+        found = b""
+        while len(found) < count and not self._unpack.eof:
+            packed = self._unpack.unconsumed_tail
+            if not packed:
+                packed = self._file.read(min(self._left, PIECE))
+                self._left -= len(packed)
+            more = self._unpack.decompress(packed, count - len(found))
+            if not more and not packed:
+                break
+            found += more
+        return found
+
+
+@dataclass(slots=True)
+class _Walk:
+    """A way past the elements of a variable.
+
+    Attributes:
+        source: Where bytes come from.
+        end: Order of bytes, as `struct` names it.
+        left: Bytes of memory that may still be counted.
+    """
+
+    source: _Plain | _Unpacked
+    end: str
+    left: int
+
+    def tag(self) -> tuple[int, int]:
+        """Read type and bytes of an element that is no small one."""
+        return struct.unpack(f"{self.end}II", self._read(8))
+
+    def matrix(self, size: int, depth: int, names: Collection[str] | None) -> int:
+        """Pass an array by; return what it takes, 0 for a variable that is not meant."""
+        if depth > MOST_DEPTH:
+            raise _DeepError
+        if size == 0:
+            return OBJECT_BYTES
+        (flags,) = struct.unpack(f"{self.end}8xI4x", self._read(16))
+        kind, start = flags & 0xFF, 16
+        shape_bytes, shape = self._element()
+        name_bytes, name = self._element()
+        rest = size - start - shape_bytes - name_bytes
+        if names is not None and name.decode("latin-1") not in names:
+            return 0
+        sides = struct.unpack(f"{self.end}{len(shape) // 4}i", shape[: len(shape) // 4 * 4])
+        count = 1
+        for side in sides:
+            count *= max(side, 0)
+        if kind == CELL or kind in STRUCTS:
+            return self._inner(kind, count, depth)
+        own = OBJECT_BYTES + max(rest, 0) * TEXT_TIMES
+        if kind in NUMBER_BYTES:
+            own = OBJECT_BYTES + count * NUMBER_BYTES[kind] * (2 if flags & COMPLEX else 1)
+        self._counted(own)
+        self._skip(max(rest, 0))
+        return own
+
+    def _inner(self, kind: int, count: int, depth: int) -> int:
+        """Pass the arrays in a cell or a structure by."""
+        total = self._counted(OBJECT_BYTES)
+        if kind == OBJECT:
+            self._element()  # the class of an object
+        if kind in STRUCTS:
+            _, length = self._element()
+            _, fields = self._element()
+            (wide,) = struct.unpack(f"{self.end}i", length[:4].ljust(4, b"\0"))
+            count *= len(fields) // max(wide, 1)
+        for _ in range(count):
+            kind, size = self.tag()
+            total += self._counted(8)
+            if kind == MATRIX:
+                total += self.matrix(size, depth + 1, None)
+            else:
+                self._skip(size)
+            if self.left < 0:
+                break
+        return total
+
+    def _counted(self, size: int) -> int:
+        self.left -= size
+        return size
+
+    def _element(self) -> tuple[int, bytes]:
+        """Read a short element whole; return how many bytes it took, and what it holds."""
+        head = self._read(8)
+        kind, size = struct.unpack(f"{self.end}II", head)
+        if kind >> 16:  # a small one: its bytes lie in the tag
+            return 8, head[4 : 4 + min(kind >> 16, 4)]
+        if size > PIECE * 16:
+            raise EOFError(f"a name or shape of {size} bytes")
+        padded = -(-size // 8) * 8
+        return 8 + padded, self._read(padded)[:size]
+
+    def _read(self, count: int) -> bytes:
+        found = self.source.read(count)
+        if len(found) < count:
+            raise EOFError("it is cut off")
+        return found
+
+    def _skip(self, count: int) -> None:
+        """Pass bytes by; beyond the memory there is no need to go on."""
+        while count > 0 and self.left >= 0:
+            count -= len(self._read(min(count, PIECE)))

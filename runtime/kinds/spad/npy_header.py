@@ -1,0 +1,36 @@
+"""The header of an array in numpy's format."""
+
+import io
+import struct
+import tokenize
+import warnings
+from typing import Any, Final
+
+import numpy as np
+from numpy.lib import format as npy
+
+from camkit.errors import DecodeError
+
+Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
+"""Shape, whether columns come first, type."""
+BROKEN_HEADER: Final = (
+    *(ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, OverflowError),
+    *(RecursionError, MemoryError, EOFError, struct.error, tokenize.TokenError),
+)
+"""What numpy raises of headers that are damaged; it parses them as Python."""
+
+
+def read_header(start: io.BytesIO, what: str) -> Header:
+    """Read shape, order and type of an array; what follows lies behind.
+
+    Raises:
+        DecodeError: If it is no header.
+    """
+    try:
+        version = npy.read_magic(start)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # headers of Python 2 are read as well
+            return read(start)
+    except BROKEN_HEADER as error:
+        raise DecodeError(f"{what} is no array: its header is damaged: {error}") from error

@@ -1,0 +1,64 @@
+"""Small files that unpack to gigabytes, or nest without an end, are refused in little memory."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.runtime.kinds.spad.files.bulky import BULKY
+
+CAP_BYTES = 400_000_000
+CHILD = """
+import resource, sys
+from pathlib import Path
+import h5py, numpy as np, scipy.io, tifffile
+from camkit.errors import CamkitError
+from camkit.runtime.kinds.spad.files.counts_file import Hints
+from camkit.runtime.kinds.spad.files.open_counts import open_counts
+held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (held + {cap},) * 2)
+try:
+    with open_counts(Path(sys.argv[1]), Hints(max_bytes={cap} // 4)) as file:
+        file.rows(0, 1, np.arange(11.0))
+except CamkitError as error:
+    print(type(error).__name__, error)
+else:
+    print("read")
+"""
+TOLD = {
+    "wide_texts.h5": "read",  # what states no times is never read
+    "wide_attribute.h5": "read",
+    "chunk_beyond_its_array.h5": "read",
+    "wide_text.npz": "read",
+    "large_chunk.h5": "packed in pieces of 1 GB",
+    "large_cells.h5": "time stamps of one row of pixels take 4 GB",
+    "cells_of_groups.h5": "a cell holds no array",
+    "deep_groups.h5": "nests groups more than 32 deep",
+    "group_in_itself.h5": "holds no data sets",
+    "deep_cells.mat": "more than 8 deep",
+    "long_name.mat": "is damaged",
+    "large_matrix.mat": "takes 0.5 GB or more",
+    "header_of_brackets.npz": "header is damaged",
+}
+SLOW = {"large_matrix.mat", "large_struct.mat"}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs a cap on memory")
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in SLOW else []) for n in BULKY]
+)
+def test_little_files_that_unpack_to_much_are_refused_in_one_line(
+    name: str, tmp_path: Path
+) -> None:
+    BULKY[name](tmp_path / name)
+    done = subprocess.run(  # noqa: S603 - our own code
+        [sys.executable, "-c", CHILD.format(cap=CAP_BYTES), str(tmp_path / name)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert TOLD.get(name, "or more, and this version of MATLAB") in done.stdout
+    assert done.stdout.count("\n") == 1
+    assert not done.stderr
