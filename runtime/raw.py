@@ -231,7 +231,7 @@ def _receive(child: subprocess.Popen[bytes]) -> Capture | None:
 def _receive_samples(pipe: IO[bytes], header: dict[str, Any]) -> NDArray[Any] | None:
     """Read the samples; None if the pipe ends early."""
     shape = tuple(int(n) for n in header["shape"])
-    dtype = np.dtype({"uint8": "u1", "uint16": "u2"}[header["dtype"]])
+    dtype = np.dtype({"uint8": "u1", "uint16": "u2", "float32": "f4"}[header["dtype"]])
     if len(shape) not in (2, 3) or min(shape) < 1 or math.prod(shape) > 3 * raw_checks.MAX_PIXELS:
         raise DecodeError(f"the decoder's answer makes no sense: samples {shape}")
     repeated = header["planes_sent"] == 1
