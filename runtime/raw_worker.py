@@ -28,11 +28,12 @@ from camkit.contracts import NoiseModel
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
 from camkit.runtime.files import raw_checks
+from camkit.runtime.files.dng.jpeg_frames import frame_doubt
 from camkit.runtime.files.dng.picture_tags import sensor_picture
 from camkit.runtime.files.dng.plain_capture import plain_decode
 from camkit.runtime.files.dng.plain_samples import check_readable, is_plain
 from camkit.runtime.files.libraw import NOTHING_SAID, decode_with_libraw
-from camkit.runtime.files.raw_decode import to_capture
+from camkit.runtime.files.raw_decode import noted, to_capture
 from camkit.runtime.files.tiff_tags import read_tiff_tags
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.metadata import Metadata
@@ -79,6 +80,8 @@ def _decoded(path: Path, said: MosaicOptions) -> Iterator[Capture]:
             return
         with _named_in_utf8(path) as name, rawpy.imread(name) as raw:
             decode = decode_with_libraw(raw, tags, picture, said)
+            if picture is not None:
+                decode = noted(decode, frame_doubt(path, picture))
             yield to_capture(decode, tags, picture, said)
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         text = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error

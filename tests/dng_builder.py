@@ -147,9 +147,7 @@ def _piece(
                   + [(0, 0)], mode="edge")  # fmt: skip
 
 
-def _packed(
-    part: NDArray[Any], depth: int, order: str, predictor: int, compression: int
-) -> bytes:
+def _packed(part: NDArray[Any], depth: int, order: str, predictor: int, compression: int) -> bytes:
     """Return the bytes of a piece."""
     octets = _octets(part, depth)  # (rows, columns * planes, bytes), the highest first
     stride = part.shape[2] * {34892: 2, 34893: 4, 34894: 2, 34895: 4}.get(predictor, 1)
@@ -177,7 +175,7 @@ def _octets(part: NDArray[Any], depth: int) -> NDArray[np.uint8]:
 
 
 def _float24(rows: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return the three bytes of DNG's float24: sign, 7 bits of exponent (bias 64), 16 of mantissa."""
+    """Return the bytes of DNG's float24: sign, 7 bits of exponent (bias 64), 16 of mantissa."""
     mantissa, exponent = np.frexp(np.abs(rows).astype(np.float64))
     whole = np.where(mantissa > 0, np.floor((2 * mantissa - 1) * 65536), 0).astype(np.uint32)
     power = np.where(mantissa > 0, exponent - 1 + 64, 0).astype(np.uint32)
@@ -194,8 +192,7 @@ def _file(tags: Mapping[int, TagSpec], pieces: Sequence[bytes], where: int, orde
         at += len(piece) + len(piece) % 2
     entries, values = b"", b""
     for number, spec in sorted(tags.items()):
-        spec = (spec[0], tuple(starts)) if number == where else spec
-        kind, data, count = _value(spec, order)
+        kind, data, count = _value((spec[0], tuple(starts)) if number == where else spec, order)
         if len(data) > 4:
             place = first + len(values)
             values += data + b"\0" * (-len(data) % 4)

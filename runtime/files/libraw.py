@@ -1,6 +1,6 @@
 """Decode a RAW file with LibRaw: the module that knows what rawpy gives.
 
-    size -> pattern -> levels -> samples, planes of what is no Bayer mosaic by LibRaw's own demosaic
+size -> pattern -> levels -> samples, planes of what is no Bayer mosaic by LibRaw's own demosaic
 """
 
 from typing import Any, Final

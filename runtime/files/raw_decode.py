@@ -1,7 +1,7 @@
 """A decoded RAW file, and what is checked and noted of it before it is a capture."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -54,6 +54,15 @@ class RawDecode:
     table_matrix: NDArray[np.float64] | None = None
     masked: Sequence[NDArray[Any]] = ()
     notes: Sequence[str] = field(default_factory=list)
+
+
+def noted(decode: RawDecode, doubt: str) -> RawDecode:
+    """Return a decode with a doubt about its header, if there is one, among its notes."""
+    return (
+        replace(decode, notes=[*decode.notes, f"{doubt}: the header is damaged"])
+        if doubt
+        else decode
+    )
 
 
 def to_capture(

@@ -1,6 +1,6 @@
 """What the tags of a DNG do to decoded samples: levels, black of every pixel, gains, and notes.
 
-    samples + tags -> black_map, masked_black, white_levels, field_gains -> Correction -> samples
+samples + tags -> black_map, masked_black, white_levels, field_gains -> Correction -> samples
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,6 @@ from camkit.runtime.files.dng.masked_areas import masked_black
 from camkit.runtime.files.dng.opcodes import field_gains
 from camkit.runtime.files.dng.picture_tags import DngPicture
 from camkit.runtime.files.raw_checks import Levels
-
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

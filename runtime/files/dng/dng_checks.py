@@ -196,7 +196,7 @@ def _check_black(picture: Directory, levels: Levels) -> None:
     stated = numbers_of(picture, BLACK)
     if not stated and BLACK_REPEAT in picture:
         raise DecodeError("the DNG lays out black levels but gives none; its header is damaged")
-    # LibRaw has the mean of the deltas, its own mean of the masked areas, a corner of large patterns
+    # LibRaw has means of deltas and masked areas, and a corner of large patterns
     if not stated or any(tag in picture for tag in (DELTA_H, DELTA_V, MASKED_AREAS)):
         return
     if (numbers_of(picture, BLACK_REPEAT) or (1, 1)) not in _CELLS:

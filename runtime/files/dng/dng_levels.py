@@ -59,7 +59,9 @@ class BlackMap:
         height, width, planes = len(self.rows), len(self.columns), self.pattern.shape[2]
         if not mosaic:
             rest = self.columns.mean() + self.rows.mean()
-            found = [_mean_of(self.pattern[..., p], height, width, (0, 0), 1) for p in range(planes)]
+            found = [
+                _mean_of(self.pattern[..., p], height, width, (0, 0), 1) for p in range(planes)
+            ]
             return np.array(found + rest, dtype=np.float32)
         cells = [
             [_mean_of(self.pattern[..., 0], height, width, (dy, dx), 2)
@@ -123,8 +125,8 @@ def _pattern(picture: DngPicture) -> tuple[Floats, list[str]]:
     if np.isfinite(values).all() and (values == values[0]).all():
         return np.full((1, 1, planes), values[0]), []
     return np.full((1, 1, planes), np.nanmean(values)), [
-        f"BlackLevel has {values.size} values for {rows}x{cols} pixels of {planes} sample(s), their "
-        "mean is taken: the header is damaged"
+        f"BlackLevel has {values.size} values for {rows}x{cols} pixels of {planes} sample(s), "
+        "their mean is taken: the header is damaged"
     ]
 
 

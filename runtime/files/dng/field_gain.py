@@ -1,8 +1,9 @@
 """Gains over the field that opcodes of a DNG ask for: lens shading undone.
 
-GainMap (opcode 9): bilinear between the points of a grid, clamped beyond them. Pixel centres lie at
-half numbers of the active area, whose height and width are 1. FixVignetteRadial (opcode 3): an even
-polynomial of the distance from the centre, 1 at the farthest corner. DNG specification 1.7.1, ch. 7.
+GainMap (opcode 9) is bilinear between the points of a grid and clamped beyond them; pixel centres
+lie at half numbers of the active area, whose height and width are 1. FixVignetteRadial (opcode 3)
+is an even polynomial of the distance from the centre, 1 at the farthest corner. DNG specification
+1.7.1, chapter 7.
 """
 
 import struct

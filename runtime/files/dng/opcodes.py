@@ -73,9 +73,7 @@ def field_gains(picture: DngPicture) -> tuple[FieldGains, list[str]]:
             notes.append(f"{' and '.join(names)} of {list_name} applied, gain up to {most:.2f}")
         if missing:
             notes.append(f"{list_name} is not applied: {', '.join(dict.fromkeys(missing))}")
-    found = FieldGains(
-        mosaic=tuple(gains["OpcodeList2"]), colours=tuple(gains["OpcodeList3"])
-    )
+    found = FieldGains(mosaic=tuple(gains["OpcodeList2"]), colours=tuple(gains["OpcodeList3"]))
     return found, notes
 
 

@@ -1,4 +1,4 @@
-"""A DNG whose samples are read without LibRaw, as a decode: area, pattern and levels from its tags."""
+"""A DNG whose samples are read without LibRaw: area, pattern and levels from its tags."""
 
 from pathlib import Path
 from typing import Any, Final
@@ -22,9 +22,7 @@ from camkit.runtime.files.tiff_tags import TiffTags
 LINEARIZATION: Final = 50712
 
 
-def plain_decode(
-    path: Path, tags: TiffTags, picture: DngPicture, said: MosaicOptions
-) -> RawDecode:
+def plain_decode(path: Path, tags: TiffTags, picture: DngPicture, said: MosaicOptions) -> RawDecode:
     """Read a float or deflated DNG.
 
     Args:
@@ -44,7 +42,7 @@ def plain_decode(
     whole = _linear(read_plain(path, picture), picture)
     top, left, bottom, right = picture.active_area
     visible = whole[top:bottom, left:right]
-    raw_checks.check_size(*visible.shape[:2], tags.file_bytes)
+    raw_checks.check_size(bottom - top, right - left, tags.file_bytes)
     notes = []
     samples: NDArray[Any]
     if cfa is not None:
@@ -93,6 +91,8 @@ def _linear(whole: NDArray[Any], picture: DngPicture) -> NDArray[Any]:
     table = np.array(numbers_of(picture.directory, LINEARIZATION))
     if not table.size or whole.dtype.kind == "f":
         return whole
-    if not (np.isfinite(table).all() and table.min() >= 0 and table.max() <= np.iinfo(np.uint16).max):
+    if not (
+        np.isfinite(table).all() and table.min() >= 0 and table.max() <= np.iinfo(np.uint16).max
+    ):
         raise DecodeError("the table that makes light of the samples is damaged")
-    return table.astype(np.uint16)[np.minimum(whole, table.size - 1)]
+    return np.asarray(table.astype(np.uint16)[np.minimum(whole, table.size - 1)])

@@ -91,13 +91,15 @@ def color_matrix(tags: TiffTags) -> tuple[Matrix, str | None] | None:
     one = min(found, key=lambda each: abs(each.kelvin - _D65_KELVIN))
     if abs(np.linalg.det(one.matrix)) < 1e-9:
         return None
-    source = f"EXIF light source {one.light}" if one.light else "a light that the file does not state"
+    source = (
+        f"EXIF light source {one.light}" if one.light else "a light that the file does not state"
+    )
     is_d65 = one.kelvin == _D65_KELVIN
     return one.matrix, None if is_d65 else f"colour matrix is for {source}, not D65"
 
 
 def neutral(tags: TiffTags) -> NDArray[np.float64] | None:
-    """Return the (3,) camera values of a grey in the light of the photograph; None if not stated."""
+    """Return (3,) camera values of a grey in the light of the photograph; None if not stated."""
     stated = np.array(tags.numbers(AS_SHOT_NEUTRAL) or ())
     if stated.shape == (3,) and np.isfinite(stated).all() and stated.min() > 0:
         return stated

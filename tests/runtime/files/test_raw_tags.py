@@ -1,7 +1,6 @@
 import json
 import math
 
-import numpy as np
 import pytest
 
 from camkit.contracts import NoiseModel
@@ -9,6 +8,7 @@ from camkit.runtime.files import raw_tags
 from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.raw_tags import SensorPlace
 from camkit.runtime.files.tiff_tags import TiffTags
+
 
 def tags_of(**values):
     directory = {int(name[1:]): value for name, value in values.items()}
