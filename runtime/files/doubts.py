@@ -3,6 +3,7 @@
     levels    samples above white, below black, far above black; masked pixels beside black
     pattern   two greens that disagree
     lost      samples that are 0 from the middle of a row on
+    tiles     an edge along the border of one (tile_edges)
     order     rows that go on shifted (row_order), rows of pure noise, rims without light
 
 `camkit.runtime.files.raw_checks` refuses what cannot be; this file only warns, since a photograph
@@ -21,6 +22,7 @@ from camkit.haze import Haze
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.raw_checks import Levels, Samples
 from camkit.runtime.files.row_order import order_doubt
+from camkit.runtime.files.tile_edges import TileGrid, tile_doubt
 
 ABOVE_WHITE: Final = 1.02
 ABOVE_WHITE_SHARE: Final = 2e-5
@@ -54,7 +56,11 @@ Cells = NDArray[np.float32]
 
 
 def find_doubts(
-    samples: Samples, levels: Levels, cfa: CfaPattern | None, masked: Sequence[Samples] = ()
+    samples: Samples,
+    levels: Levels,
+    cfa: CfaPattern | None,
+    masked: Sequence[Samples] = (),
+    grid: TileGrid | None = None,
 ) -> list[str]:
     """Say what makes a decode hard to believe; nothing for a sound photograph.
 
@@ -63,6 +69,7 @@ def find_doubts(
         levels: Black and white level of the same file.
         cfa: Pattern of a mosaic; None for planes.
         masked: Areas of the sensor that see no light, where the file has them.
+        grid: Tiles that the file stores, if it does.
     """
     if min(samples.shape[-2:]) < LEAST_SIDE_PX:
         return []
@@ -73,6 +80,7 @@ def find_doubts(
         _green_doubt(samples, levels, cfa),
         order_doubt(cells, _wraps(samples, levels, cfa)),
         _lost_doubt(samples, levels),
+        tile_doubt(cells, grid, (2 if cfa else 1, _column_step(samples, cfa))) if grid else "",
         _noise_doubt(cells),
         _edge_doubt(cells),
     )
@@ -202,10 +210,10 @@ def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
     cells: Cells
     if cfa is None:
         plane = samples[samples.shape[0] // 2]
-        cells = plane[:, :: max(1, plane.shape[1] // _CELL_COLUMNS)].astype(np.float32)
+        cells = plane[:, :: _column_step(samples, cfa)].astype(np.float32)
     else:
         height, width = (side // 2 * 2 for side in samples.shape)
-        step = 2 * max(1, width // 2 // _CELL_COLUMNS)
+        step = _column_step(samples, cfa)
         first, second = _green_places(cfa)
         cells = samples[first[0] : height : 2, first[1] : width : step].astype(np.float32)
         cells += samples[second[0] : height : 2, second[1] : width : step]
@@ -214,6 +222,12 @@ def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
     cells -= np.float32(black)
     cells *= np.float32(1 / (levels.white - black))
     return cells
+
+
+def _column_step(samples: Samples, cfa: CfaPattern | None) -> int:
+    """Return the pixels from one cell to the next in a row."""
+    pixels = 1 if cfa is None else 2
+    return pixels * max(1, samples.shape[-1] // pixels // _CELL_COLUMNS)
 
 
 def _wraps(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:

@@ -17,6 +17,7 @@ from camkit.runtime.files.dng.picture_tags import DngPicture
 from camkit.runtime.files.raw_decode import RawDecode, stated_orientation
 from camkit.runtime.files.raw_metadata import raw_metadata
 from camkit.runtime.files.tiff_tags import TiffTags
+from camkit.runtime.files.tile_edges import TileGrid
 
 # LibRaw's flip has three bits (1 mirror columns, 2 mirror rows, 4 transpose); EXIF counts 1..8
 FLIP_TO_EXIF: Final = {0: 1, 1: 2, 2: 4, 3: 3, 4: 5, 5: 8, 6: 6, 7: 7}
@@ -66,8 +67,15 @@ def decode_with_libraw(
         gains=(red, green, blue),
         table_matrix=np.array(raw.rgb_xyz_matrix, dtype=np.float64)[:3],
         masked=_masked(raw),
+        grid=_grid(picture, (sizes.top_margin, sizes.left_margin)),
         notes=notes,
     )
+
+
+def _grid(picture: DngPicture | None, first: tuple[int, int]) -> TileGrid | None:
+    if picture is None or not picture.tile_size:
+        return None
+    return TileGrid(size=picture.tile_size, first=first)
 
 
 def _with_tags(

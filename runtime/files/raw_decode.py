@@ -17,6 +17,7 @@ from camkit.runtime.files.doubts import find_doubts
 from camkit.runtime.files.lone_pixels import count_lone
 from camkit.runtime.files.raw_checks import Levels
 from camkit.runtime.files.tiff_tags import TiffTags
+from camkit.runtime.files.tile_edges import TileGrid
 from camkit.runtime.files.white_level import believable_white, check_said_white
 from camkit.runtime.metadata import Metadata
 
@@ -42,6 +43,7 @@ class RawDecode:
         gains: White balance that the decoder found, not checked; None for that of the tags.
         table_matrix: Colour matrix of a table of cameras; None where there is none.
         masked: Areas of the sensor that see no light.
+        grid: Tiles that the file stores.
         notes: What a person should know.
     """
 
@@ -53,6 +55,7 @@ class RawDecode:
     gains: tuple[float, float, float] | None = None
     table_matrix: NDArray[np.float64] | None = None
     masked: Sequence[NDArray[Any]] = ()
+    grid: TileGrid | None = None
     notes: Sequence[str] = field(default_factory=list)
 
 
@@ -131,7 +134,7 @@ def _judged(decode: RawDecode, bits: int, said: MosaicOptions, notes: list[str])
         raw_checks.check_content(samples, levels)
         seen, seen_levels = samples, levels
     _note_lone(seen, seen_levels, cfa, notes)
-    notes += find_doubts(seen, seen_levels, cfa, decode.masked)
+    notes += find_doubts(seen, seen_levels, cfa, decode.masked, decode.grid)
     return levels
 
 

@@ -84,6 +84,12 @@ class DngPicture:
         return self.compression == LOSSY_JPEG or (self.bits <= 8 and not self.is_float)
 
     @property
+    def tile_size(self) -> tuple[int, int] | None:
+        """Return height and width of the tiles; None for strips."""
+        tall, wide = int(first_of(self.directory, 323)), int(first_of(self.directory, 322))
+        return (tall, wide) if min(tall, wide) > 0 else None
+
+    @property
     def active_area(self) -> Rectangle:
         """Return the ActiveArea, or the whole picture where there is none that can be."""
         area = numbers_of(self.directory, 50829)
