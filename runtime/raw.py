@@ -12,6 +12,7 @@ import json
 import logging
 import math
 import os
+import re
 import subprocess
 import threading
 from dataclasses import dataclass, replace
@@ -45,6 +46,7 @@ _PICTURE_SUFFIXES: Final = frozenset({".jpg", ".jpeg", ".hdr", ".png", ".exr"})
 _TIFF_SUFFIXES: Final = frozenset({".tif", ".tiff"})
 _DNG_VERSION: Final = 50706
 _CFA_PHOTOMETRIC: Final = 32803
+_DAMAGE: Final = re.compile(r"corrupt|premature end|unexpected end", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,7 +182,8 @@ def _read_isolated(path: Path, limits: _Limits, said: MosaicOptions) -> Capture:
                 sha256 = file_sha256(path)
                 capture = _receive(child)
                 if capture is not None and child.wait() == 0:
-                    return replace(capture, sha256=sha256)
+                    notes = (*capture.notes, *_complaint(decoder.complaints))
+                    return replace(capture, sha256=sha256, notes=notes)
         finally:
             timer.cancel()
             child.kill()
@@ -194,10 +197,21 @@ def _expire(child: subprocess.Popen[bytes], expired: threading.Event) -> None:
     child.kill()
 
 
-def _death(code: int, complaints: IO[bytes]) -> str:
+def _complaint(complaints: IO[bytes]) -> list[str]:
+    """Return a note if LibRaw, or libjpeg in it, went on over damage with a word on stderr."""
+    lines = [line for line in _last_lines(complaints) if _DAMAGE.search(line)]
+    return [f"the decoder says {lines[-1][:120]!r}: the pixel data are damaged"] if lines else []
+
+
+def _last_lines(complaints: IO[bytes]) -> list[str]:
     complaints.seek(max(0, complaints.seek(0, os.SEEK_END) - 4096))
     lines = complaints.read().decode(errors="replace").strip().splitlines()
     logger.debug("decoder stderr: %s", lines)
+    return lines
+
+
+def _death(code: int, complaints: IO[bytes]) -> str:
+    lines = _last_lines(complaints)
     cause = f"signal {-code}" if code < 0 else f"exit code {code}"
     last = f" ({lines[-1][:200]})" if lines else ""
     return f"the decoder died with {cause}{last}; the file is damaged or LibRaw cannot handle it"
@@ -231,7 +245,7 @@ def _receive(child: subprocess.Popen[bytes]) -> Capture | None:
 def _receive_samples(pipe: IO[bytes], header: dict[str, Any]) -> NDArray[Any] | None:
     """Read the samples; None if the pipe ends early."""
     shape = tuple(int(n) for n in header["shape"])
-    dtype = np.dtype({"uint8": "u1", "uint16": "u2"}[header["dtype"]])
+    dtype = np.dtype({"uint8": "u1", "uint16": "u2", "float32": "f4"}[header["dtype"]])
     if len(shape) not in (2, 3) or min(shape) < 1 or math.prod(shape) > 3 * raw_checks.MAX_PIXELS:
         raise DecodeError(f"the decoder's answer makes no sense: samples {shape}")
     repeated = header["planes_sent"] == 1

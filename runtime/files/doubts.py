@@ -2,7 +2,9 @@
 
     levels    samples above white, below black, far above black; masked pixels beside black
     pattern   two greens that disagree
-    order     rows that go on shifted, rows of pure noise, rims without light
+    lost      samples that are 0 from the middle of a row on
+    tiles     an edge along the border of one (tile_edges)
+    order     rows that go on shifted (row_order), rows of pure noise, rims without light
 
 `camkit.runtime.files.raw_checks` refuses what cannot be; this file only warns, since a photograph
 may be odd. Every limit lies beyond what the sound RAW files at hand and simulated captures show.
@@ -19,6 +21,8 @@ from camkit.contracts import CfaPattern
 from camkit.haze import Haze
 from camkit.runtime.capture import Capture
 from camkit.runtime.files.raw_checks import Levels, Samples
+from camkit.runtime.files.row_order import order_doubt
+from camkit.runtime.files.tile_edges import TileGrid, tile_doubt
 
 ABOVE_WHITE: Final = 1.02
 ABOVE_WHITE_SHARE: Final = 2e-5
@@ -34,6 +38,8 @@ MASKED_SPREAD: Final = 0.01
 MASKED_OFFSET: Final = 0.005
 GREEN_OFFSET: Final = 0.15
 LEAST_GREEN: Final = 0.01
+LEAST_LIGHT: Final = 0.01
+LEAST_BREAK_PX: Final = 8
 LEAST_SIDE_PX: Final = 64
 """Smaller pictures show too little of themselves."""
 
@@ -41,17 +47,6 @@ _SAMPLED_ROWS: Final = 256
 _COLUMN_STEP: Final = 3
 _CELL_COLUMNS: Final = 1024
 _BAND_CELLS: Final = 32
-_JOINED: Final = 0.8
-_BROKEN: Final = 0.6
-_STRANGE: Final = 0.3
-_SCRAMBLED_SHARE: Final = 0.02
-_LEAST_RUN: Final = 3
-_LONGEST_GAP: Final = 4
-_SHIFT_MATCH: Final = 0.8
-_LEAST_SHIFT: Final = 0.02
-_SHIFT_GAIN: Final = 0.15
-_LEAST_ROW_CONTRAST: Final = 1e-3
-_SHIFT_ROWS: Final = 24
 _NOISE_RATIO: Final = 0.8
 _NOISE_LEVEL: Final = 0.05
 _DARK_EDGE_CELLS: Final = 4
@@ -61,7 +56,11 @@ Cells = NDArray[np.float32]
 
 
 def find_doubts(
-    samples: Samples, levels: Levels, cfa: CfaPattern | None, masked: Sequence[Samples] = ()
+    samples: Samples,
+    levels: Levels,
+    cfa: CfaPattern | None,
+    masked: Sequence[Samples] = (),
+    grid: TileGrid | None = None,
 ) -> list[str]:
     """Say what makes a decode hard to believe; nothing for a sound photograph.
 
@@ -70,6 +69,7 @@ def find_doubts(
         levels: Black and white level of the same file.
         cfa: Pattern of a mosaic; None for planes.
         masked: Areas of the sensor that see no light, where the file has them.
+        grid: Tiles that the file stores, if it does.
     """
     if min(samples.shape[-2:]) < LEAST_SIDE_PX:
         return []
@@ -78,7 +78,9 @@ def find_doubts(
         *_level_doubts(samples, levels),
         _masked_doubt(masked, levels),
         _green_doubt(samples, levels, cfa),
-        _order_doubt(cells) or _scramble_doubt(cells),
+        order_doubt(cells, _wraps(samples, levels, cfa)),
+        _lost_doubt(samples, levels),
+        tile_doubt(cells, grid, (2 if cfa else 1, _column_step(samples, cfa))) if grid else "",
         _noise_doubt(cells),
         _edge_doubt(cells),
     )
@@ -208,10 +210,10 @@ def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
     cells: Cells
     if cfa is None:
         plane = samples[samples.shape[0] // 2]
-        cells = plane[:, :: max(1, plane.shape[1] // _CELL_COLUMNS)].astype(np.float32)
+        cells = plane[:, :: _column_step(samples, cfa)].astype(np.float32)
     else:
         height, width = (side // 2 * 2 for side in samples.shape)
-        step = 2 * max(1, width // 2 // _CELL_COLUMNS)
+        step = _column_step(samples, cfa)
         first, second = _green_places(cfa)
         cells = samples[first[0] : height : 2, first[1] : width : step].astype(np.float32)
         cells += samples[second[0] : height : 2, second[1] : width : step]
@@ -222,84 +224,60 @@ def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
     return cells
 
 
+def _column_step(samples: Samples, cfa: CfaPattern | None) -> int:
+    """Return the pixels from one cell to the next in a row."""
+    pixels = 1 if cfa is None else 2
+    return pixels * max(1, samples.shape[-1] // pixels // _CELL_COLUMNS)
+
+
+def _wraps(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
+    """Return (h,) steps from the end of each row of cells to the next, between samples alike.
+
+    Where a stream broke, the end of a row and the next are neighbours in what was photographed;
+    those of a mosaic that are two samples apart then have one colour.
+    """
+    plane, apart = (samples, 2) if cfa is not None else (samples[len(samples) // 2], 1)
+    ends, starts = plane[:-1, -apart:].astype(np.float32), plane[1:, :apart].astype(np.float32)
+    steps = np.abs(starts - ends).mean(axis=1) / (levels.white - float(levels.black.mean()))
+    steps = np.concatenate([steps[:1], steps])
+    return steps if cfa is None else steps[: len(steps) // 2 * 2].reshape(-1, 2).mean(axis=1)
+
+
 def _green_places(cfa: CfaPattern) -> list[tuple[int, int]]:
     return [divmod(n, 2) for n, letter in enumerate(cfa) if letter == "G"]
 
 
-def _unit_rows(rows: Cells) -> Cells:
-    """Give rows of mean 0 and length 1, so that their products are correlations.
-
-    A row of next to no contrast stays short: it goes with none, for or against.
-    """
-    rows = rows - rows.mean(axis=1, keepdims=True)
-    length = np.sqrt(np.einsum("yx,yx->y", rows, rows))[:, None]
-    least = np.float32(_LEAST_ROW_CONTRAST * np.sqrt(rows.shape[1]))
-    unit: Cells = np.divide(rows, np.maximum(length, least), dtype=np.float32)
-    return unit
-
-
-def _order_doubt(cells: Cells) -> str:
-    """Find rows that go on at another place than the rows above them ended."""
-    for above, below in _gaps(cells):
-        shift = _shift(cells[above], cells[below])
-        # an edge along a whole row breaks off too, but what lies below it matches nowhere
-        if shift:
-            return (
-                f"from {below / len(cells):.0%} of the height on the rows are shifted by "
-                f"{shift / cells.shape[1]:.0%} of the width: the pixel data are damaged"
-            )
-    skewed = [_shift(cells[row], cells[row + 1]) for row in _spread(len(cells) - 1)]
-    usual = float(np.median(skewed))
-    if usual and np.count_nonzero(np.abs(np.array(skewed) - usual) <= 1) > len(skewed) // 2:
-        return (
-            f"every row is shifted by about {usual / cells.shape[1]:.1%} of the width against the "
-            "one above: the width or the pixel data are damaged"
-        )
+def _lost_doubt(samples: Samples, levels: Levels) -> str:
+    """Find rows of zeros that begin or end in the middle of a row of light: data that were lost."""
+    plane = samples if samples.ndim == 2 else samples[len(samples) // 2]
+    dark = np.flatnonzero(~plane.any(axis=1))
+    if not dark.size:
+        return ""
+    runs = np.split(dark, np.flatnonzero(np.diff(dark) > 1) + 1)
+    for run in runs:
+        above, below = plane[max(run[0] - 2, 0) : run[0]], plane[run[-1] + 1 : run[-1] + 3]
+        if _breaks_off(above, levels) or _breaks_off(below[::-1], levels):
+            return f"{run.size} rows and a part of one are 0: the pixel data are damaged"
     return ""
 
 
-def _scramble_doubt(cells: Cells) -> str:
-    """Find rows that are smooth along themselves and have nothing in common with the next."""
-    rows = _unit_rows(cells[:, :: max(1, cells.shape[1] // 512)])
-    alike = np.einsum("yx,yx->y", rows[:-1], rows[1:])
-    smooth = np.einsum("yx,yx->y", rows[:, :-1], rows[:, 1:]) > _JOINED
-    share = float(np.mean((alike < _STRANGE) & smooth[:-1] & smooth[1:]))
-    if share > _SCRAMBLED_SHARE:
-        return f"{share:.0%} of the rows do not go with the next: the pixel data are damaged"
-    return ""
+def _breaks_off(rows: Samples, levels: Levels) -> bool:
+    """Return whether one part of the last row is 0, and light both beside it and in the first.
 
-
-def _gaps(cells: Cells) -> list[tuple[int, int]]:
-    """Give (last row above, first row below) of gaps between rows that go together on both sides.
-
-    What lies in the gap may be a row of two parts, or a few rows of rubbish.
+    So a stream ends; an edge of what is photographed lies at other places in the next row.
     """
-    rows = _unit_rows(cells[:, :: max(1, cells.shape[1] // 512)])
-    joined = np.einsum("yx,yx->y", rows[:-1], rows[1:]) > _JOINED
-    ends = np.nonzero(np.diff(np.concatenate([[False], joined, [False]]).astype(np.int8)))[0]
-    runs = ends.reshape(-1, 2)
-    runs = runs[runs[:, 1] - runs[:, 0] >= _LEAST_RUN]
-    pairs = zip(runs[:-1, 1], runs[1:, 0], strict=True)
-    return [
-        (int(above), int(below))
-        for above, below in pairs
-        if below - above <= _LONGEST_GAP and float(rows[above] @ rows[below]) < _BROKEN
-    ]
-
-
-def _spread(count: int) -> list[int]:
-    return [int(n) for n in np.linspace(0, count - 1, _SHIFT_ROWS)]
-
-
-def _shift(above: NDArray[np.float32], below: NDArray[np.float32]) -> int:
-    """Give by how many cells a row matches the one above better than as it lies; 0 for no shift."""
-    one, two = _unit_rows(np.stack([above, below]))
-    match = np.fft.irfft(np.fft.rfft(two) * np.conj(np.fft.rfft(one)), one.size)
-    best = int(np.argmax(match))
-    clear = match[best] > max(_SHIFT_MATCH, float(one @ two) + _SHIFT_GAIN)
-    # a slanting edge moves by a little from row to row too
-    far = _LEAST_SHIFT * one.size < best < (1 - _LEAST_SHIFT) * one.size
-    return best if clear and far else 0
+    width = rows.shape[1]
+    if len(rows) < 2 or not rows[-1].any():
+        return False
+    lit = np.flatnonzero(rows[-1])
+    gaps = np.diff(np.append(lit, lit[0] + width))  # some cameras turn their rows
+    longest = int(np.argmax(gaps))
+    lost = np.zeros(width, dtype=bool)
+    lost[np.arange(lit[longest] + 1, lit[longest] + gaps[longest]) % width] = True
+    black = float(levels.black.mean())
+    least = black + LEAST_LIGHT * (levels.white - black)
+    sides = rows[-1][~lost], rows[0][lost]
+    return all(len(side) >= LEAST_BREAK_PX and float(np.median(side)) > least for side in sides)
 
 
 def _noise_doubt(cells: Cells) -> str:

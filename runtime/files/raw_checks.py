@@ -124,7 +124,7 @@ def check_pattern(letters: str) -> CfaPattern:
     raise DecodeError(f"CFA {letters!r} is not one of {', '.join(CFA_PATTERNS)}; header damaged?")
 
 
-def check_levels(levels: Levels, largest_possible: int = 65535) -> None:
+def check_levels(levels: Levels, largest_possible: float = 65535) -> None:
     """Refuse levels that are not ordered black < white <= the largest stored value.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What the tags of a RAW file say beyond LibRaw: noise profile, colour matrix, camkit's own.
+"""What the tags of a RAW file say beyond LibRaw: noise profile, place, camkit's own.
 
 Nothing here raises on odd values: a tag that is missing or not believable becomes None.
 Tag numbers and meanings: DNG specification 1.7, chapter 4; Exif 2.32, section 4.6.
@@ -17,23 +17,12 @@ from camkit.runtime.files.raw_checks import sensor_directories
 from camkit.runtime.files.tiff_tags import TiffTags
 from camkit.runtime.metadata import Metadata, clean_text
 
-MAX_FACTOR: Final = 1e3
-"""Of a colour matrix or a balance that a camera can have."""
-
 BITS_PER_SAMPLE: Final = 258
 IMAGE_DESCRIPTION: Final = 270
 UNIQUE_CAMERA_MODEL: Final = 50708
 CFA_PLANE_COLOR: Final = 50710
-COLOR_MATRICES: Final = ((50721, 50778), (50722, 50779))
-ANALOG_BALANCE: Final = 50727
 NOISE_PROFILE: Final = 51041
 
-# EXIF LightSource -> correlated colour temperature in kelvin (Exif 2.32, DNG 1.7)
-_ILLUMINANT_KELVIN: Final = {
-    1: 5500, 2: 3800, 3: 2856, 4: 5500, 9: 5500, 10: 6500, 11: 7500, 12: 6400, 13: 5050, 14: 4150,
-    15: 3525, 17: 2856, 18: 4874, 19: 6774, 20: 5503, 21: 6504, 22: 7504, 23: 5003, 24: 3200,
-}  # fmt: skip
-_D65_KELVIN: Final = 6504
 _BUNDLE_IN_MODEL: Final = re.compile(r"camkit ([A-Za-z0-9_.-]{1,64})")
 
 
@@ -94,34 +83,6 @@ def _pairs_by_color(
     if sorted(planes) != [0, 1, 2]:
         return None
     return pairs[[planes.index(c) for c in range(3)]]
-
-
-def color_matrix(tags: TiffTags) -> tuple[NDArray[np.float64], str | None] | None:
-    """Give the DNG colour matrix (XYZ to camera) whose light is nearest to D65, and a note.
-
-    Returns:
-        The (3, 3) matrix with AnalogBalance applied, and a note if its light is not D65; None if
-        the file has no believable matrix.
-    """
-    found = []
-    for matrix_tag, light_tag in COLOR_MATRICES:
-        values = tags.numbers(matrix_tag)
-        if values is None or len(values) != 9 or not (np.abs(values) < MAX_FACTOR).all():
-            continue
-        light = int((tags.numbers(light_tag) or (0,))[0])
-        kelvin = _ILLUMINANT_KELVIN.get(light, 0)
-        found.append((abs(kelvin - _D65_KELVIN), light, values))
-    if not found:
-        return None
-    distance, light, values = min(found, key=lambda item: item[0])
-    matrix = np.array(values, dtype=np.float64).reshape(3, 3)
-    balance = tags.numbers(ANALOG_BALANCE)
-    if balance is not None and len(balance) == 3 and min(balance) > 0 and max(balance) < MAX_FACTOR:
-        matrix = np.array(balance)[:, None] * matrix
-    if abs(np.linalg.det(matrix)) < 1e-9:
-        return None
-    source = f"EXIF light source {light}" if light else "a light that the file does not state"
-    return matrix, None if distance == 0 else f"colour matrix is for {source}, not D65"
 
 
 def sensor_place(tags: TiffTags) -> SensorPlace:

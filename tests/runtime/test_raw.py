@@ -178,7 +178,7 @@ def test_whatever_an_odd_file_raises_becomes_a_decode_error(scene, monkeypatch, 
     def fail(*_):
         raise error
 
-    monkeypatch.setattr(raw_worker, "_to_capture", fail)
+    monkeypatch.setattr(raw_worker, "to_capture", fail)
     with pytest.raises(DecodeError, match=r"makes no sense|more memory"):
         read_capture(scene[0], isolate=False)
 

@@ -8,7 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import DecodeError
-from camkit.runtime.files import dng_checks, raw_checks, raw_tags
+from camkit.runtime.files import raw_checks, raw_tags
+from camkit.runtime.files.dng import dng_checks, white_point
 from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.tiff_tags import TiffTags
 
@@ -65,7 +66,7 @@ def test_no_tags_end_in_anything_but_values_doubts_and_refusals(directories):
             check()
     assert all(doubt.endswith("damaged") for doubt in dng_checks.find_doubts(tags))
     assert raw_tags.sample_bits(tags) in range(17)
-    noise, matrix = raw_tags.noise_profile(tags, "RGGB"), raw_tags.color_matrix(tags)
+    noise, matrix = raw_tags.noise_profile(tags, "RGGB"), white_point.color_matrix(tags)
     assert noise is None or min(*noise.shot, *noise.read_variance) >= 0
     assert matrix is None or np.isfinite(matrix[0]).all()
     place = raw_tags.sensor_place(tags)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from camkit.bundle.reader import find_bundle, open_bundle
 from camkit.runtime.files.lone_pixels import MARGIN_PX, count_lone
 from camkit.runtime.files.raw_checks import Levels
-from camkit.runtime.raw_worker import LONE_NOTE_SHARE
+from camkit.runtime.files.raw_decode import LONE_NOTE_SHARE
 from camkit.runtime.twin.simulate import SimulationOptions, simulate
 from camkit.scenes import procedural_scene
 

@@ -1,7 +1,6 @@
 import json
 import math
 
-import numpy as np
 import pytest
 
 from camkit.contracts import NoiseModel
@@ -9,8 +8,6 @@ from camkit.runtime.files import raw_tags
 from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.raw_tags import SensorPlace
 from camkit.runtime.files.tiff_tags import TiffTags
-
-IDENTITY = (1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0)
 
 
 def tags_of(**values):
@@ -43,28 +40,6 @@ def test_four_noise_pairs_follow_the_cell():
 @pytest.mark.parametrize("values", [(1.0,), (1.0, -1.0), (math.nan, 1.0), (1.0, 1.0) * 2])
 def test_unbelievable_noise_is_none(values):
     assert raw_tags.noise_profile(tags_of(t51041=values), "RGGB") is None
-
-
-def test_the_matrix_nearest_to_daylight_is_taken():
-    warm = tuple(2 * v for v in IDENTITY)
-    tags = tags_of(t50721=warm, t50778=(17,), t50722=IDENTITY, t50779=(21,))
-    matrix, note = raw_tags.color_matrix(tags)
-    assert np.array_equal(matrix, np.eye(3))
-    assert note is None
-    matrix, note = raw_tags.color_matrix(tags_of(t50721=warm, t50778=(17,)))
-    assert np.array_equal(matrix, 2 * np.eye(3))
-    assert "light source 17" in note
-
-
-def test_analog_balance_scales_the_rows_of_the_matrix():
-    matrix, note = raw_tags.color_matrix(tags_of(t50721=IDENTITY, t50727=(2.0, 1.0, 3.0)))
-    assert np.array_equal(np.diag(matrix), [2, 1, 3])
-    assert "does not state" in note
-
-
-@pytest.mark.parametrize("values", [(1.0,) * 9, (math.nan,) * 9, (1.0,) * 8])
-def test_a_matrix_that_cannot_be_is_none(values):
-    assert raw_tags.color_matrix(tags_of(t50721=values)) is None
 
 
 def test_camera_is_the_unique_model_or_make_and_model():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from camkit.errors import DecodeError
-from camkit.runtime.files.dng_checks import check_dng, find_doubts, states_white_balance
+from camkit.runtime.files.dng.dng_checks import check_dng, find_doubts
 from camkit.runtime.files.raw_checks import Levels
 from camkit.runtime.files.tiff_tags import TiffTags
 
@@ -74,11 +74,6 @@ def test_other_files_are_left_alone():
     check({50717: (1,)}, remove=(50706,))
 
 
-def test_white_balance_is_stated_by_either_tag():
-    assert states_white_balance(TiffTags(directories=({50729: (0.3, 0.3)},), file_bytes=1))
-    assert not states_white_balance(TiffTags(directories=({},), file_bytes=1))
-
-
 def doubts(**change):
     directory = GOOD | {int(tag.removeprefix("t")): value for tag, value in change.items()}
     return find_doubts(TiffTags(directories=(directory,), file_bytes=20000))
@@ -98,6 +93,8 @@ def test_a_sound_layout_raises_no_doubt():
     assert doubts(t322=(48,), t323=(32,), t324=(1, 2, 3, 4)) == []
     assert doubts(t259=(34892,), t50712=(0, 100, 4000)) == []
     assert doubts(t50829=(4, 8, 60, 80), t50719=(2, 2), t50720=(68, 52)) == []
+    assert doubts(t50829=(3, 5, 60, 80), t50719=(1, 3), t50720=(67, 51)) == []
+    assert doubts(t256=(79,), t257=(59,), t279=(9322,)) == []
     assert find_doubts(TiffTags(directories=({256: (9,), 257: (7,)},), file_bytes=9)) == []
 
 
@@ -107,14 +104,12 @@ def test_a_sound_layout_raises_no_doubt():
         ({"t278": (20,), "t273": (8, 3208)}, "need 3 strip(s), there are 2"),
         ({"t322": (48,), "t323": (60,), "t324": (1, 2, 3)}, "need 2 tile(s), there are 3"),
         ({"t279": (9640,)}, "no whole number"),
-        ({"t256": (79,)}, "no whole cells"),
         ({"t50829": (4, 8, 61, 80)}, "active area (4, 8, 61, 80) leaves"),
         ({"t50829": (4, 8, 4, 80)}, "active area"),
         ({"t50829": (4, 8, 60, 80), "t50720": (73, 56)}, "crop (73, 56) at (0.0, 0.0) leaves"),
         ({"t50719": (20, 0), "t50720": (70, 60)}, "crop"),
         ({"t259": (34892,)}, "curve is missing"),
         ({"t322": (0,), "t323": (60,), "t324": (1,)}, "tile of 0x60 pixels holds nothing"),
-        ({"t50829": (3, 8, 60, 80)}, "active area of 72x57 pixels holds no whole cells"),
         ({"t50712": (0, 900, 100, 4095)}, "samples falls"),
         ({"t50717": (65536,)}, "white 65536 does not fit in 16 bits"),
         ({"t50712": (0, 100, 2000), "t50717": (4095,)}, "the table of the samples ends at 2000"),

@@ -6,7 +6,6 @@ compared (DNG specification 1.7, chapter 4; tags of the directory that holds the
 """
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Final
 
@@ -14,17 +13,27 @@ import numpy as np
 
 from camkit.contracts import CfaPattern
 from camkit.errors import DecodeError
+from camkit.runtime.files.dng.dng_levels import BLACK, BLACK_REPEAT, DELTA_H, DELTA_V, WHITE
+from camkit.runtime.files.dng.masked_areas import MASKED_AREAS
+from camkit.runtime.files.dng.opcodes import LISTS
+from camkit.runtime.files.dng.picture_tags import (
+    CFA,
+    LOSSY_JPEG,
+    Directory,
+    DngPicture,
+    first_of,
+    is_dng,
+    numbers_of,
+    sensor_picture,
+)
 from camkit.runtime.files.raw_checks import Levels, sensor_directories
-from camkit.runtime.files.tiff_tags import TagValue, TiffTags
+from camkit.runtime.files.tiff_tags import TiffTags
 
-DNG_VERSION: Final = 50706
 UNCOMPRESSED: Final = 1
-LOSSY_JPEG: Final = 34892
 LEVEL_TOLERANCE: Final = 1.0
 ROW_PADDING_BYTES: Final = 16
 MOST_BITS: Final = 64
 TABLE_TOLERANCE: Final = 0.1
-CFA: Final = 32803
 
 _BITS, _COMPRESSION, _SAMPLES, _SAMPLE_FORMAT = 258, 259, 277, 339
 _WIDTH, _HEIGHT, _STRIP_BYTES = 256, 257, 279
@@ -33,28 +42,7 @@ _CHUNKS: Final = (("strip", 273, 0, 278), ("tile", 324, 322, 323))
 _CROP_ORIGIN, _CROP_SIZE, _ACTIVE_AREA = 50719, 50720, 50829
 _CURVES: Final = (50712, 51008, 51009)  # LinearizationTable, OpcodeList1, OpcodeList2
 _CFA_REPEAT, _LINEARIZATION = 33421, 50712
-_BLACK_REPEAT, _BLACK, _BLACK_DELTAS, _WHITE = 50713, 50714, (50715, 50716), 50717
-_WHITE_BALANCES: Final = (50728, 50729)  # AsShotNeutral, AsShotWhiteXY
-
-Directory = Mapping[int, TagValue]
-
-
-def is_dng(tags: TiffTags) -> bool:
-    """Tell whether any directory carries DNGVersion."""
-    return any(DNG_VERSION in directory for directory in tags.directories)
-
-
-def states_white_balance(tags: TiffTags) -> bool:
-    """Tell whether a DNG states its white balance (LibRaw answers 1, 1, 1 if not)."""
-    return any(tags.numbers(tag) is not None for tag in _WHITE_BALANCES)
-
-
-def is_float(tags: TiffTags) -> bool:
-    """Tell whether the sensor picture of a DNG holds floating-point samples."""
-    return is_dng(tags) and any(
-        _first(directory, _SAMPLE_FORMAT, 1) == 3
-        for directory in sensor_directories(tags.directories)
-    )
+_CELLS: Final = ((1, 1), (1, 2), (2, 1), (2, 2))
 
 
 def check_dng(
@@ -76,12 +64,12 @@ def check_dng(
     """
     if not is_dng(tags):
         return
-    directories = [d for d in sensor_directories(tags.directories) if _numbers(d, _WIDTH)]
-    if not directories:
+    found = sensor_picture(tags)
+    if found is None:
         raise DecodeError("the DNG holds no sensor picture (CFA or LinearRaw); header damaged?")
-    picture = max(directories, key=lambda d: _first(d, _WIDTH) * _first(d, _HEIGHT))
-    _check_strip_bytes(picture)
-    if _numbers(picture, _CFA_REPEAT) == (2, 2) and cfa is None:
+    check_layout(found)
+    picture = found.directory
+    if numbers_of(picture, _CFA_REPEAT) == (2, 2) and cfa is None:
         raise DecodeError("the DNG states a 2x2 CFA, LibRaw found none; its header is damaged")
     if "black" not in said:
         _check_black(picture, levels)
@@ -89,9 +77,16 @@ def check_dng(
         _check_white(picture, levels)
 
 
+def unapplied(picture: DngPicture) -> list[str]:
+    """Return notes on tags that are left out where LibRaw demosaics a picture."""
+    names = {DELTA_V: "BlackLevelDeltaV", DELTA_H: "BlackLevelDeltaH"} | LISTS
+    left = [name for tag, name in names.items() if tag in picture.directory]
+    return [f"not applied behind LibRaw's own demosaic: {', '.join(left)}"] if left else []
+
+
 def find_doubts(tags: TiffTags) -> list[str]:
     """Say where the sensor picture of a DNG contradicts itself, or of any file has no data."""
-    directories = [d for d in sensor_directories(tags.directories) if _numbers(d, _WIDTH)]
+    directories = [d for d in sensor_directories(tags.directories) if numbers_of(d, _WIDTH)]
     found = [
         "the header does not say where the pixels of the mosaic lie"
         for picture in directories
@@ -108,10 +103,10 @@ def find_doubts(tags: TiffTags) -> list[str]:
 
 def _chunk_doubt(picture: Directory) -> str:
     """Compare the number of strips or tiles with the size (TIFF 6.0, sections 3 and 15)."""
-    width, height = _first(picture, _WIDTH), _first(picture, _HEIGHT)
+    width, height = first_of(picture, _WIDTH), first_of(picture, _HEIGHT)
     for noun, offsets_tag, wide_tag, high_tag in _CHUNKS:
-        count = len(_numbers(picture, offsets_tag))
-        wide, high = _first(picture, wide_tag, width), _first(picture, high_tag, height)
+        count = len(numbers_of(picture, offsets_tag))
+        wide, high = first_of(picture, wide_tag, width), first_of(picture, high_tag, height)
         if not count:
             continue
         if min(wide, high) < 1:
@@ -119,8 +114,8 @@ def _chunk_doubt(picture: Directory) -> str:
         needed = math.ceil(width / wide) * math.ceil(height / high)
         if count != needed:
             return f"{width:.0f}x{height:.0f} pixels need {needed} {noun}(s), there are {count}"
-    stated = sum(_numbers(picture, _STRIP_BYTES))
-    if _first(picture, _COMPRESSION) == UNCOMPRESSED and height and stated:
+    stated = sum(numbers_of(picture, _STRIP_BYTES))
+    if first_of(picture, _COMPRESSION) == UNCOMPRESSED and height and stated:
         rest = stated % height
         if min(rest, height - rest) > ROW_PADDING_BYTES:
             return f"{stated:.0f} bytes of pixels are no whole number for each of {height:.0f} rows"
@@ -129,19 +124,19 @@ def _chunk_doubt(picture: Directory) -> str:
 
 def _curve_doubt(picture: Directory) -> str:
     """See whether 8 bits of lossy JPEG come with the curve that makes light of them."""
-    lossy = _first(picture, _COMPRESSION) == LOSSY_JPEG
+    lossy = first_of(picture, _COMPRESSION) == LOSSY_JPEG
     return "" if not lossy or any(tag in picture for tag in _CURVES) else "its curve is missing"
 
 
 def _depth_doubt(picture: Directory) -> str:
     """See whether the bits of a mosaic hold its white; 8 may stand for more behind a curve."""
-    bits, white = _first(picture, _BITS), _first(picture, _WHITE)
+    bits, white = first_of(picture, _BITS), first_of(picture, WHITE)
     mosaic = picture.get(_PHOTOMETRIC) == (CFA,) and _LINEARIZATION not in picture
     if (
         mosaic
         and 8 < bits <= MOST_BITS
         and white >= 2**bits
-        and _first(picture, _SAMPLE_FORMAT, 1) == 1
+        and first_of(picture, _SAMPLE_FORMAT, 1) == 1
     ):
         return f"white {white:g} does not fit in {bits:.0f} bits"
     return ""
@@ -149,7 +144,7 @@ def _depth_doubt(picture: Directory) -> str:
 
 def _table_doubt(picture: Directory) -> str:
     """Compare white with the end of the table that makes light of the stored numbers."""
-    table, white = _numbers(picture, _LINEARIZATION), _first(picture, _WHITE)
+    table, white = numbers_of(picture, _LINEARIZATION), first_of(picture, WHITE)
     if any(after < before for before, after in pairwise(table)):
         return "the table that makes light of the samples falls"
     if not table or not white or abs(max(table) / white - 1) <= TABLE_TOLERANCE:
@@ -159,21 +154,17 @@ def _table_doubt(picture: Directory) -> str:
 
 def _area_doubt(picture: Directory) -> str:
     """See whether the active area lies in the picture and the crop in the active area."""
-    width, height = _first(picture, _WIDTH), _first(picture, _HEIGHT)
-    if _numbers(picture, _CFA_REPEAT) == (2, 2) and (width % 2 or height % 2):
-        return f"a mosaic of {width:.0f}x{height:.0f} pixels holds no whole cells"
-    samples = _first(picture, _SAMPLES, 1)
+    width, height = first_of(picture, _WIDTH), first_of(picture, _HEIGHT)
+    samples = first_of(picture, _SAMPLES, 1)
     if picture.get(_CFA_REPEAT) and samples != 1:
         return f"a mosaic has one sample in each pixel, not {samples:.0f}"
-    area = _numbers(picture, _ACTIVE_AREA)
+    area = numbers_of(picture, _ACTIVE_AREA)
     if len(area) == 4:
         top, left, bottom, right = area
         if not (0 <= top < bottom <= height and 0 <= left < right <= width):
             return f"the active area {area} leaves the {width:.0f}x{height:.0f} pixels"
         width, height = right - left, bottom - top
-        if _numbers(picture, _CFA_REPEAT) == (2, 2) and (width % 2 or height % 2):
-            return f"an active area of {width:.0f}x{height:.0f} pixels holds no whole cells"
-    origin, size = _numbers(picture, _CROP_ORIGIN) or (0.0, 0.0), _numbers(picture, _CROP_SIZE)
+    origin, size = numbers_of(picture, _CROP_ORIGIN) or (0.0, 0.0), numbers_of(picture, _CROP_SIZE)
     if len(origin) != 2 or len(size) != 2:
         return ""
     if min(size) < 1 or origin[0] + size[0] > width or origin[1] + size[1] > height:
@@ -181,23 +172,18 @@ def _area_doubt(picture: Directory) -> str:
     return ""
 
 
-def _numbers(directory: Directory, tag: int) -> tuple[float, ...]:
-    value = directory.get(tag)
-    return () if value is None or isinstance(value, bytes) else value
+def check_layout(found: DngPicture) -> None:
+    """Compare the strips of an uncompressed picture with its size.
 
-
-def _first(directory: Directory, tag: int, default: float = 0.0) -> float:
-    value = next(iter(_numbers(directory, tag)), default)
-    return value if math.isfinite(value) else default
-
-
-def _check_strip_bytes(picture: Directory) -> None:
-    """Compare the strips of an uncompressed picture with its size."""
-    stated = sum(_numbers(picture, _STRIP_BYTES))
-    if _first(picture, _COMPRESSION) != UNCOMPRESSED or not stated:
+    Raises:
+        DecodeError: If they hold another number of bytes.
+    """
+    picture = found.directory
+    stated = sum(numbers_of(picture, _STRIP_BYTES))
+    if first_of(picture, _COMPRESSION) != UNCOMPRESSED or not stated:
         return
-    rows = _first(picture, _HEIGHT)
-    row_bits = _first(picture, _WIDTH) * _first(picture, _SAMPLES, 1) * _first(picture, _BITS)
+    rows = first_of(picture, _HEIGHT)
+    row_bits = first_of(picture, _WIDTH) * first_of(picture, _SAMPLES, 1) * first_of(picture, _BITS)
     expected = rows * row_bits / 8
     if not expected - ROW_PADDING_BYTES <= stated <= expected + rows * ROW_PADDING_BYTES:
         raise DecodeError(
@@ -207,10 +193,13 @@ def _check_strip_bytes(picture: Directory) -> None:
 
 
 def _check_black(picture: Directory, levels: Levels) -> None:
-    stated = _numbers(picture, _BLACK)
-    if not stated and _BLACK_REPEAT in picture:
+    stated = numbers_of(picture, BLACK)
+    if not stated and BLACK_REPEAT in picture:
         raise DecodeError("the DNG lays out black levels but gives none; its header is damaged")
-    if not stated or any(tag in picture for tag in _BLACK_DELTAS):
+    # LibRaw has means of deltas and masked areas, and a corner of large patterns
+    if not stated or any(tag in picture for tag in (DELTA_H, DELTA_V, MASKED_AREAS)):
+        return
+    if (numbers_of(picture, BLACK_REPEAT) or (1, 1)) not in _CELLS:
         return
     found, said = float(np.mean(levels.black)), sum(stated) / len(stated)
     if not abs(said - found) <= LEVEL_TOLERANCE:
@@ -220,17 +209,17 @@ def _check_black(picture: Directory, levels: Levels) -> None:
 
 
 def _check_white(picture: Directory, levels: Levels) -> None:
-    bits = _first(picture, _BITS)
-    rescaled = bits <= 8 or _first(picture, _COMPRESSION) == LOSSY_JPEG
-    if rescaled or _first(picture, _SAMPLE_FORMAT, 1) != 1:
+    bits = first_of(picture, _BITS)
+    rescaled = bits <= 8 or first_of(picture, _COMPRESSION) == LOSSY_JPEG
+    if rescaled or first_of(picture, _SAMPLE_FORMAT, 1) != 1:
         return
-    stated = _numbers(picture, _WHITE)
+    stated = numbers_of(picture, WHITE)
     if stated and abs(max(stated) - levels.white) > LEVEL_TOLERANCE:
         raise DecodeError(
             f"the DNG states white {max(stated):g}, LibRaw found {levels.white:g}; "
             "its header is damaged"
         )
-    if not _numbers(picture, _LINEARIZATION) and levels.white > 2.0 ** min(bits, MOST_BITS) - 1:
+    if not numbers_of(picture, _LINEARIZATION) and levels.white > 2.0 ** min(bits, MOST_BITS) - 1:
         raise DecodeError(
             f"white level {levels.white:g} does not fit in the {bits:.0f} bits of the DNG; "
             "its header is damaged"

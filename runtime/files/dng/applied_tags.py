@@ -1,0 +1,101 @@
+"""What the tags of a DNG do to decoded samples: levels, black of every pixel, gains, and notes.
+
+samples + tags -> black_map, masked_black, white_levels, field_gains -> Correction -> samples
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camkit.contracts import CfaPattern
+from camkit.runtime.capture import MosaicOptions
+from camkit.runtime.files.dng.corrections import Correction
+from camkit.runtime.files.dng.dng_levels import BlackMap, black_map, white_levels
+from camkit.runtime.files.dng.masked_areas import masked_black
+from camkit.runtime.files.dng.opcodes import field_gains
+from camkit.runtime.files.dng.picture_tags import DngPicture
+from camkit.runtime.files.raw_checks import Levels
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenPixels:
+    """Visible samples of a DNG before its tags are applied.
+
+    Attributes:
+        samples: (h, w) mosaic or (plane, h, w); planes may be one seen several times.
+        cfa: Pattern at the first visible pixel; None for planes.
+        whole: (h, w) or (h, w, plane) of the whole sensor, masked pixels too.
+        first: Row and column of the first visible pixel on it.
+    """
+
+    samples: NDArray[Any]
+    cfa: CfaPattern | None
+    whole: NDArray[Any]
+    first: tuple[int, int]
+
+
+def apply_tags(
+    picture: DngPicture, seen: SeenPixels, said: MosaicOptions, decoded: Levels | None = None
+) -> tuple[NDArray[Any], Levels, list[str]]:
+    """Return samples and levels as the tags of the DNG ask for, and notes.
+
+    Args:
+        picture: The sensor picture.
+        seen: Its decoded samples.
+        said: Levels that the caller says in place of the file's.
+        decoded: Levels where the decoder made other numbers of the samples; None for the tags'.
+    """
+    top, left, bottom, right = picture.active_area
+    height, width = seen.samples.shape[-2:]
+    offset = seen.first[0] - top, seen.first[1] - left
+    if min(offset) < 0 or offset[0] + height > bottom - top or offset[1] + width > right - left:
+        offset = 0, 0  # LibRaw shows another area, as it does for some cameras
+    repeated = seen.samples.ndim == 3 and picture.planes == 1
+    samples = seen.samples[:1] if repeated else seen.samples
+    black, notes = _black(picture, seen, said, decoded, offset)
+    whites = white_levels(picture)
+    if decoded is not None:
+        whites = np.full(picture.planes, decoded.white, dtype=np.float32)
+    if said.white_level is not None:
+        whites = np.full_like(whites, said.white_level)
+    gains, asked = field_gains(picture)
+    correction = Correction(black=black, gains=gains, whites=whites, cfa=seen.cfa, offset=offset)
+    levels = Levels(black=black.mean(mosaic=seen.cfa is not None), white=float(whites.max()))
+    if correction and levels.black.max() < whites.min():
+        samples, levels = correction.apply(samples)
+    if repeated:
+        samples = np.broadcast_to(samples, seen.samples.shape)
+        levels = replace(levels, black=np.repeat(levels.black, len(samples)))
+    return samples, levels, notes + asked
+
+
+def _black(
+    picture: DngPicture,
+    seen: SeenPixels,
+    said: MosaicOptions,
+    decoded: Levels | None,
+    offset: tuple[int, int],
+) -> tuple[BlackMap, list[str]]:
+    """Return black of every pixel: said, as the decoder has it, measured, or as the tags state."""
+    height, width = seen.samples.shape[-2:]
+    flat = BlackMap(
+        pattern=np.zeros((1, 1, picture.planes)), columns=np.zeros(width), rows=np.zeros(height)
+    )
+    if said.black_level is not None:
+        return replace(flat, pattern=flat.pattern + said.black_level), []
+    if decoded is not None:
+        return replace(flat, pattern=_as_pattern(decoded.black, picture.planes)), []
+    black, notes = black_map(picture, (height, width), offset)
+    if not black.is_of_cells:
+        return black, notes
+    stated, white = black.mean(mosaic=seen.cfa is not None), float(white_levels(picture).max())
+    measured, more = masked_black(picture, seen.whole, stated, white, seen.first)
+    return replace(black, pattern=_as_pattern(measured, picture.planes)), notes + more
+
+
+def _as_pattern(black: NDArray[Any], planes: int) -> NDArray[np.float64]:
+    """Return (r, c, plane) of levels by cell, or by plane."""
+    levels = black.astype(np.float64)
+    return levels[..., None] if levels.ndim == 2 else levels[None, None, :planes]

@@ -1,0 +1,78 @@
+"""The size that the JPEG of a strip or tile states of itself, beside that of the header.
+
+LibRaw puts the samples of a JPEG where the header says, whatever their number. A lossless JPEG may
+fold the same number of samples into other columns and components (DNG specification 1.7.1, ch. 3).
+"""
+
+import math
+import struct
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from camkit.runtime.files.dng.picture_tags import LOSSY_JPEG, DngPicture, first_of, numbers_of
+
+LOSSLESS_JPEG: Final = 7
+MOST_CHUNKS: Final = 256
+_MOST_SEGMENTS: Final = 32
+_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_SCAN: Final = 0xDA
+
+
+def frame_doubt(path: Path, picture: DngPicture) -> str:
+    """Return which strip or tile holds another number of samples than it should; empty for none.
+
+    Args:
+        path: The file.
+        picture: Its sensor picture; of any compression.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    tags = picture.directory
+    if picture.compression not in (LOSSLESS_JPEG, LOSSY_JPEG):
+        return ""
+    tiled = 324 in tags
+    wide = int(first_of(tags, 322, picture.width)) if tiled else picture.width
+    tall = int(first_of(tags, 323 if tiled else 278, picture.height))
+    tall = tall if tiled else min(tall, picture.height)
+    if min(wide, tall) < 1:
+        return ""
+    offsets = numbers_of(tags, 324 if tiled else 273)
+    across = math.ceil(picture.width / wide)
+    with path.open("rb") as file:
+        for number, offset in enumerate(offsets[:MOST_CHUNKS]):
+            frame = _frame(file, int(offset))
+            top, left = number // across * tall, number % across * wide
+            # the last ones may be cut to the picture
+            sizes = {
+                rows * columns * picture.planes
+                for rows in (tall, picture.height - top)
+                for columns in (wide, picture.width - left)
+            }
+            if frame is not None and math.prod(frame) not in sizes:
+                height, width, planes = frame
+                return (
+                    f"a JPEG of {width}x{height} pixels and {planes} sample(s) lies in a strip or "
+                    f"tile of {wide}x{tall} and {picture.planes}"
+                )
+    return ""
+
+
+def _frame(file: BinaryIO, offset: int) -> tuple[int, int, int] | None:
+    """Return height, width and components of the JPEG at an offset; None if it states none."""
+    file.seek(offset)
+    if file.read(2) != b"\xff\xd8":
+        return None
+    for _ in range(_MOST_SEGMENTS):
+        head = file.read(4)
+        if len(head) < 4 or head[0] != 0xFF or head[1] == _SCAN:
+            return None
+        (length,) = struct.unpack(">H", head[2:])
+        if head[1] in _FRAMES:
+            body = file.read(6)
+            if len(body) < 6:
+                return None
+            _, height, width, planes = struct.unpack(">BHHB", body)
+            return height, width, planes
+        file.seek(max(length - 2, 0), 1)
+    return None
