@@ -21,6 +21,7 @@ from typing import IO, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.cancel import current_wish, watched
 from camkit.runtime.capture import Capture, MosaicOptions
@@ -99,7 +100,8 @@ def _read(
             return replace(capture, sha256=file_sha256(file))
         if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
-                f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit --mosaic"
+                f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit "
+                f"{option_text('cfa')}"
             )
         said = mosaic or MosaicOptions()
         if limits is not None:
@@ -156,8 +158,8 @@ def _read_picture(path: Path, mosaic: MosaicOptions | None, *, keep_codes: bool)
         return read_picture(path, keep_codes=keep_codes)
     if mosaic.cfa is None:
         raise ContractError(
-            f"{path.name} is a picture, levels are for RAW files; say --mosaic too if it is a "
-            "headerless mosaic"
+            f"{path.name} is a picture, levels are for RAW files; say {option_text('cfa')} too if "
+            "it is a headerless mosaic"
         )
     return read_mosaic(path, mosaic)
 

@@ -21,6 +21,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.colorimetry import (
     D65,
     REC709_PRIMARIES,
@@ -44,12 +45,7 @@ from camkit.runtime.metadata import Metadata
 
 EXR_MAGIC: Final = b"\x76\x2f\x31\x01"
 MAX_EXR_PIXELS_PER_BYTE: Final = 4096
-MOSAIC_ADVICE: Final = (
-    "if it is a Bayer mosaic, say --mosaic RGGB --black-level N --white-level N "
-    "(RGGB, BGGR, GRBG or GBRG at the top-left pixel)"
-)
 COUNTS_SUFFIXES: Final = (".tif", ".tiff")
-COUNTS_ADVICE: Final = "if it counts single photons, say --product intensity, or depth"
 FAINT: Final = 0.01
 """Negative samples up to this share of the brightest are noise."""
 _JPEG_MAGIC: Final = b"\xff\xd8"
@@ -85,9 +81,9 @@ def read_picture(path: Path, *, keep_codes: bool = False) -> Capture:
     if samples.ndim == 2 and _begins(path, _JPEG_MAGIC):
         raise DecodeError("expected an RGB picture, got a grey JPEG; give it in colour")
     if samples.ndim == 2 and not _begins(path, EXR_MAGIC):
-        counted = f"; {COUNTS_ADVICE}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
+        counted = f"; {_counts_advice()}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
         raise DecodeError(
-            f"expected an RGB picture, got a single channel; {MOSAIC_ADVICE}{counted}"
+            f"expected an RGB picture, got a single channel; {mosaic_advice()}{counted}"
         )
     if samples.ndim == 2:
         samples = np.broadcast_to(samples, (3, *samples.shape))
@@ -135,7 +131,7 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
             f"{samples.shape}; omit the mosaic options for an RGB picture"
         )
     if options.black_level is None or options.white_level is None:
-        raise DecodeError(f"levels alone are for RAW files; {MOSAIC_ADVICE}")
+        raise DecodeError(f"levels alone are for RAW files; {mosaic_advice()}")
     levels = raw_checks.Levels(
         black=np.full((2, 2), options.black_level, dtype=np.float32), white=options.white_level
     )
@@ -209,6 +205,19 @@ def read_orientation(path: Path) -> int:
         return 1
     tags = read_tiff_tags(path)
     return orientation_of(tags if tags.directories else exif_of_picture(path.read_bytes()))
+
+
+def mosaic_advice() -> str:
+    """Return what to say of a picture that may be a headerless mosaic."""
+    return (
+        f"if it is a Bayer mosaic, say {option_text('cfa', 'RGGB')} with "
+        f"{option_text('black_level')} and {option_text('white_level')} (RGGB, BGGR, GRBG or GBRG "
+        "at the top-left pixel)"
+    )
+
+
+def _counts_advice() -> str:
+    return f"if it counts single photons, say {option_text('product', 'intensity')}, or depth"
 
 
 def _srgb_table(top: int) -> FloatArray:

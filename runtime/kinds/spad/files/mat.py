@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 import scipy.io
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
@@ -58,7 +59,7 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     if kind != "cell" and size > TIMES * hints.max_bytes:
         raise ContractError(
             f"{path.name}: {name} takes {size / 1e9:.1f} GB, and this version of MATLAB file can "
-            "only be read whole; save it with -v7.3, or raise --max-mem"
+            f"only be read whole; save it with -v7.3, or raise {option_text('max_mem_bytes')}"
         )
     small = [n for n in kinds if n in TABLE_OF]
     try:

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
@@ -73,7 +74,8 @@ def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
     if size > TIMES * hints.max_bytes:
         raise ContractError(
             f"{path.name}, {file.number_records} photons and markers, takes {size / 1e9:.3g} GB, "
-            "and such files are read whole; raise --max-mem, or save its histograms as .h5 or .npz"
+            f"and such files are read whole; raise {option_text('max_mem_bytes')}, or save its "
+            "histograms as .h5 or .npz"
         )
     if not file.is_image:
         found = np.asarray(file.decode_histogram(dtype="uint32"))
@@ -88,6 +90,7 @@ def _channel(path: Path, count: int, hints: Hints) -> int:
         return 0
     if hints.key not in known:
         raise ContractError(
-            f"{path.name} holds {', '.join(known)}; say which by [array] key in a file for --timing"
+            f"{path.name} holds {', '.join(known)}; say which by [array] key in a file for "
+            f"{option_text('timing')}"
         )
     return known.index(hints.key)

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
@@ -82,6 +83,7 @@ def _block(path: Path, count: int, hints: Hints) -> int:
         return 0
     if hints.key not in known:
         raise ContractError(
-            f"{path.name} holds {', '.join(known)}; say which by [array] key in a file for --timing"
+            f"{path.name} holds {', '.join(known)}; say which by [array] key in a file for "
+            f"{option_text('timing')}"
         )
     return known.index(hints.key)
