@@ -12,6 +12,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.units import MM_PER_M
 
@@ -391,13 +392,14 @@ def focus_weights(shifts_um: NDArray[np.float64] | None, focus_um: float) -> NDA
         return np.concatenate([np.ones(1), np.zeros(shifts.size)])
     if not shifts.size:
         raise ContractError(
-            "the PSF knows the nominal focus alone, not that of a unit: freeze it with --focus-um "
-            "and export the bundle again, or leave the unit out"
+            "the PSF knows the nominal focus alone, not that of a unit: freeze it with "
+            f"{option_text('focus_um')} and export the bundle again, or leave the unit out"
         )
     if not shifts[0] <= focus_um <= shifts[-1]:
         raise ContractError(
             f"the PSF reaches from a focus of {shifts[0]:g} to {shifts[-1]:g} um; got "
-            f"{focus_um:g} um: freeze it with a larger --focus-um, or focus the camera anew"
+            f"{focus_um:g} um: freeze it with a larger {option_text('focus_um')}, or focus the "
+            "camera anew"
         )
     below = int((shifts < 0).sum())
     knots = np.insert(shifts, below, 0.0)

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray, FrozenPsf
 from camkit.errors import ContractError
 
@@ -131,4 +132,6 @@ class Haze:
                 f"{psf.pixel_pitch_um} um"
             )
         if psf.focus_um is not None:
-            raise ContractError("kernels of a moved sensor have no haze; freeze without --focus-um")
+            raise ContractError(
+                f"kernels of a moved sensor have no haze; freeze without {option_text('focus_um')}"
+            )

@@ -45,6 +45,7 @@ from camkit.bundle.reader import (
 from camkit.bundle.stages import Dehaze, Stage, Wiener
 from camkit.bundle.stages import Parts as KnownParts
 from camkit.bundle.writer import write_bundle
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, ParityError
 from camkit.export.card import card_text, laws_text, preview_png
@@ -208,7 +209,7 @@ def _optics(parts: Parts, recipe: Recipe, design: Design) -> FrozenOptics:
     if undone == (parts.haze is None):
         raise ContractError(
             f"the recipe {recipe.name} undoes a haze: make it with `camkit freeze --haze`, say "
-            "--haze"
+            f"{option_text('haze')}"
             if undone
             else f"the recipe {recipe.name} undoes no haze, but there is {parts.haze}: freeze the "
             "PSF without it, or keep the two in a folder of their own"
@@ -293,7 +294,7 @@ def _stress_members(parts: Parts, optics: FrozenOptics) -> dict[str, bytes]:
     if parts.stress_psf is None or optics.haze is None:
         raise ContractError(
             f"{parts.stress_haze} is the haze of kernels off the design point, for optics with a "
-            "haze; say --stress-psf too, or keep it in a folder of its own"
+            f"haze; say {option_text('stress_psf')} too, or keep it in a folder of its own"
         )
     stress = FrozenOptics(psf=read_psf(parts.stress_psf), haze=read_haze(parts.stress_haze))
     assert stress.haze is not None

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from camkit.bundle.reader import PLATE, PRESCRIPTION
+from camkit.caller import option_text
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.export.parts import Parts
@@ -140,5 +141,5 @@ def _check_plate(plate: Plate, psf: FrozenPsf, path: Path) -> None:
         raise ContractError(
             f"{path} was not frozen from the plate {plate.name}: {elsewhere:.1%} of the light lies "
             "elsewhere; freeze, train and export the same plate. A PSF that was measured has none: "
-            "say --plate none"
+            f"say {option_text('plate', 'none')}"
         )

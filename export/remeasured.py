@@ -38,6 +38,7 @@ from camkit.bundle.reader import (
 from camkit.bundle.sensor import BayerSensor, ChannelResponse, Extent, PlanesSensor
 from camkit.bundle.stages import Illumination, Parts, Wiener
 from camkit.bundle.writer import write_bundle
+from camkit.caller import option_text
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError, DecodeError, ParityError
 from camkit.export.activations import with_activations
@@ -115,15 +116,22 @@ def remeasured(
         ParityError: If it fails its check; nothing is written then.
     """
     if measured == Measured():
-        raise ContractError("nothing was measured: give --geometry, --flat, --noise or --psf")
+        raise ContractError(
+            f"nothing was measured: give {option_text('geometry')}, {option_text('flat')}, "
+            f"{option_text('noise')} or {option_text('psf')}"
+        )
     optics, name = bundle.manifest.optics, bundle.manifest.name
     if optics is None or bundle.manifest.sensor.extent is None:
         raise DecodeError(f"{name} states no optics or no size of its sensor, so no camera of it")
     if optics.type == "streaks" and measured != Measured(noise=measured.noise):
-        raise DecodeError(f"the optics of {name} write streaks; only --noise can be put into it")
+        raise DecodeError(
+            f"the optics of {name} write streaks; only {option_text('noise')} can be put into it"
+        )
     hazy = optics.type == "hazy_psf"
     if hazy and measured.psf is not None:
-        raise DecodeError(f"the haze of {name} belongs to its kernels; leave --psf out")
+        raise DecodeError(
+            f"the haze of {name} belongs to its kernels; leave {option_text('psf')} out"
+        )
     own = {name: bundle.member(name) for name in bundle.names if name not in OWN_NAMES}
     psf = bundle.psf if hazy or optics.type == "frozen_psf" else None
     haze = bundle.haze if hazy else None
@@ -281,7 +289,9 @@ def _put_flat(draft: _Draft, found: FlatFile) -> None:
         return
     assert draft.psf is not None
     if draft.psf.symmetry == "uniform":
-        raise DecodeError("kernels of one place hold no vignetting; leave --flat out")
+        raise DecodeError(
+            f"kernels of one place hold no vignetting; leave {option_text('flat')} out"
+        )
     light = entry.to_illumination()
     values = np.interp(draft.psf.field_heights_mm**2, light.heights_mm**2, light.light)
     draft.psf = replace(draft.psf, relative_illumination=values)

@@ -12,8 +12,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, InputContract, NoiseModel
 from camkit.errors import ContractError
+from camkit.runtime.field_types import check_fields
 from camkit.runtime.machine.memory import mapping_of
 from camkit.runtime.metadata import Metadata
 from camkit.runtime.picture_window import PictureWindow
@@ -65,12 +67,12 @@ class MosaicOptions:
     white_level: float | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         black, white = self.black_level, self.white_level
-        if self.cfa is not None and self.cfa not in CFA_PATTERNS:
-            raise ContractError(f"mosaic must be one of {CFA_PATTERNS}; got {self.cfa!r}")
         if self.cfa is not None and (black is None or white is None):
             raise ContractError(
-                "a headerless mosaic needs --mosaic, --black-level and --white-level"
+                f"a headerless mosaic needs {option_text('cfa')}, {option_text('black_level')} and "
+                f"{option_text('white_level')}"
             )
         lower = 0.0 if black is None else black
         if not 0 <= lower < (np.inf if white is None else white) or white == np.inf:

@@ -5,11 +5,13 @@ import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, Self, get_args
+from typing import Any, Final, Literal, Self
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, one_line
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import Capture, MosaicOptions
+from camkit.runtime.field_types import check_fields
 from camkit.runtime.job.reconstruction import Reconstruction
 from camkit.runtime.machine.memory import peak_rss_mb
 from camkit.runtime.network.tiling import Progress
@@ -17,11 +19,16 @@ from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY, PictureFormat
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, sidecar_text
-from camkit.runtime.output.writer import SUFFIXES, held_bytes, open_writer
+from camkit.runtime.output.tone_mapping import (
+    PREVIEW_BYTES,
+    PREVIEW_SUFFIX,
+    ToneMappedPreview,
+    preview_path,
+)
+from camkit.runtime.output.writer import SUFFIXES, FileFormat, held_bytes, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
 
-FileFormat = Literal["exr", "tiff", "png", "jpeg", "dng"]
 OTHER_NAMES: Final[dict[str, FileFormat]] = {"jpg": "jpeg", "tif": "tiff"}
 LINEAR_FORMATS: Final = frozenset({"exr", "dng"})
 Status = Literal["ok", "failed", "skipped"]
@@ -36,6 +43,7 @@ class WriteOptions:
         keep_folders: Below it, the folders of the captures from what they have in common on.
         format: exr, tiff (or tif), png, jpeg (or jpg) or dng; None for exr, and for no picture
             beside products.
+        preview: A small tone-mapped JPEG beside the picture, see `tone_mapping`.
         linear: TIFF and PNG without the sRGB curve.
         jpeg_quality: Of JPEG, 1..100; None for 92.
         strip_metadata: Leave out what the capture says of camera, lens, date, exposure and place.
@@ -47,6 +55,7 @@ class WriteOptions:
     out_dir: Path = Path()
     keep_folders: bool = False
     format: FileFormat | None = None
+    preview: bool = False
     linear: bool = False
     jpeg_quality: int | None = None
     strip_metadata: bool = False
@@ -57,14 +66,15 @@ class WriteOptions:
     def __post_init__(self) -> None:
         named = OTHER_NAMES.get(str(self.format), self.format)
         object.__setattr__(self, "format", named)  # one name from here on
-        if self.picture not in get_args(FileFormat):
-            raise ContractError(
-                f"format must be one of {', '.join(get_args(FileFormat))}; got {self.format!r}"
-            )
+        check_fields(self)
         if self.linear and self.picture in LINEAR_FORMATS:
-            raise ContractError(f"{self.picture} is always linear; leave --linear out")
+            raise ContractError(
+                f"{self.picture} is always linear; leave {option_text('linear')} out"
+            )
         if self.format == "jpeg" and self.linear:
-            raise ContractError("8 bits hold no linear light; say --format png or tiff")
+            raise ContractError(
+                f"8 bits hold no linear light; say {option_text('format')} png or tiff"
+            )
         if self.jpeg_quality is not None and self.format != "jpeg":
             raise ContractError(f"a quality is for JPEG; leave it out for {self.picture}")
         if not 1 <= self.quality <= 100:
@@ -173,6 +183,7 @@ def begin(
     """
     pixels, turned = capture.height * capture.width, capture.orientation
     reserved_bytes = held_bytes(write.picture, pixels=pixels, orientation=turned)
+    reserved_bytes += PREVIEW_BYTES * write.preview
     return pipeline.start(capture, progress=progress, cancel=cancel, reserved_bytes=reserved_bytes)
 
 
@@ -201,8 +212,9 @@ def develop_file(
     work = begin(pipeline, capture, write, progress=progress, cancel=cancel)
     # who asks for a time has had the machine timed; nobody else waits for it
     estimate = None if pipeline.options.max_seconds is None else work.explain()
-    with atomic_outputs(sidecar_path(target), target) as (proof, part):
-        write_s = _write_picture(part, work, write)
+    beside = (preview_path(target),) if write.preview else ()
+    with atomic_outputs(sidecar_path(target), target, *beside) as (proof, part, *parts):
+        write_s = _write_picture(part, work, write, *parts)
         output_sha256 = file_sha256(part)
         seconds = {"decode": decode_s, **work.seconds, "write": write_s}
         result = FileResult(
@@ -214,6 +226,7 @@ def develop_file(
             seconds=seconds,
             peak_rss_mb=max(peak_rss_mb(), decoded_mb),
             warnings=work.warnings,
+            beside=beside,
         )
         if estimate is not None:
             total_s = sum(seconds.values())
@@ -222,6 +235,7 @@ def develop_file(
             **result.to_json(),
             **identity_of(source, capture.sha256, pipeline, write, mosaic),
             "output_sha256": output_sha256,
+            "beside_sha256": dict(zip([PREVIEW_SUFFIX], map(file_sha256, parts), strict=False)),
             "plan": work.record,
             "clipped_fraction": work.clipped_fraction,
             "orientation": capture.orientation,
@@ -280,6 +294,7 @@ def identity_of(
     chosen["linear"] = write.linear
     chosen |= {"jpeg_quality": write.quality if write.format == "jpeg" else None}
     chosen |= {"strip_metadata": write.strip_metadata}
+    chosen |= {"preview": True} if write.preview else {}
     chosen["mosaic"] = None if mosaic is None else asdict(mosaic)
     chosen["of_kind"] = dict(pipeline.options.of_kind)
     if pipeline.maker is not None:
@@ -293,8 +308,10 @@ def identity_of(
     return dict(json.loads(json.dumps(identity)))
 
 
-def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> float:
-    """Stream the bands into the file; return the seconds for which the writer was waited for."""
+def _write_picture(
+    path: Path, work: Reconstruction, write: WriteOptions, preview_file: Path | None = None
+) -> float:
+    """Stream the bands into the files; return the seconds for which the writer was waited for."""
     _, height, width = work.shape
     picture = PictureFormat(
         width=width,
@@ -305,13 +322,17 @@ def _write_picture(path: Path, work: Reconstruction, write: WriteOptions) -> flo
         jpeg_quality=write.quality,
         origin=work.origin.stripped() if write.strip_metadata else work.origin,
     )
-    seconds = 0.0
+    seconds, preview = 0.0, ToneMappedPreview(height, width)
     with open_writer(path, write.picture, picture) as writer, BandQueue(writer) as queue:
         for band in work.bands():
             began = time.perf_counter()
+            if preview_file is not None:
+                preview.add(band)
             queue.write(band)
             seconds += time.perf_counter() - began
         began = time.perf_counter()
+    if preview_file is not None:
+        preview.write(preview_file, work.color, work.capture.orientation)
     return seconds + time.perf_counter() - began
 
 

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from camkit.bundle.manifest import Range
+from camkit.caller import option_text
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
@@ -129,7 +130,10 @@ def verdict(found: tuple[str, ...], bundle: str, on_unsafe: OnUnsafe) -> str | N
         return None
     text = f"outside the range in which bundle {bundle} was shown to help: {'; '.join(found)}"
     if on_unsafe == "fail":
-        raise ContractError(f"{text}; say --on-unsafe warn or fallback, or another --bundle")
+        raise ContractError(
+            f"{text}; say {option_text('on_unsafe', 'warn')} or fallback, or another "
+            f"{option_text('bundle')}"
+        )
     if on_unsafe == "fallback":
         return f"{text}; what came before the network is given in its place"
-    return f"{text}; --on-unsafe fallback gives what came before the network"
+    return f"{text}; {option_text('on_unsafe', 'fallback')} gives what came before the network"

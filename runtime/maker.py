@@ -14,11 +14,12 @@ from typing import Any, Final
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle
+from camkit.caller import option_list, option_text
 from camkit.errors import ContractError
 from camkit.kinds import Kind
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.network.tiling import Progress
-from camkit.runtime.options import Options, check_kind_options, flag_of, given_options
+from camkit.runtime.options import Options, check_kind_options, given_options
 
 Write = Callable[[Path], None]
 GENERAL: Final = frozenset({"max_mem_bytes", "threads", "method"})
@@ -79,7 +80,8 @@ class Made:
             if format_ not in self.pictures:
                 offered = ", ".join(sorted(self.pictures)) or "none"
                 raise ContractError(
-                    f"this product has no picture as {format_}; --format may be: {offered}"
+                    f"this product has no picture as {format_}; {option_text('format')} may be: "
+                    f"{offered}"
                 )
             suffix, write = self.pictures[format_]
             found[suffix] = write
@@ -142,13 +144,13 @@ class Maker:
             known |= self.with_bundle
         if foreign := [name for name in given_options(options) if name not in known]:
             raise ContractError(
-                f"{', '.join(map(flag_of, foreign))} means nothing to captures of the kind "
+                f"{option_list(foreign)} means nothing to captures of the kind "
                 f"{kind.name}; leave it out"
             )
         if options.method is not None and options.method not in self.methods:
             raise ContractError(
-                f"method must be one of {', '.join(self.methods)} for captures of the kind "
-                f"{kind.name}; got {options.method!r}"
+                f"{option_text('method')} must be one of {', '.join(self.methods)} for captures of "
+                f"the kind {kind.name}; got {options.method!r}"
             )
 
     def names(self, source: Path, options: Options, format_: str | None) -> tuple[str, ...]:
@@ -159,8 +161,8 @@ class Maker:
         """
         if format_ is not None and format_ not in self.formats:
             raise ContractError(
-                f"--format must be one of {', '.join(sorted(self.formats))} for such captures; "
-                f"got {format_}"
+                f"{option_text('format')} must be one of {', '.join(sorted(self.formats))} for "
+                f"such captures; got {format_}"
             )
         picture = () if format_ is None else (self.formats[format_],)
         stem = self.stem(source)

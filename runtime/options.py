@@ -1,13 +1,16 @@
 """What a caller may choose about a reconstruction, checked once."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, fields, replace
 from operator import index
+from os import PathLike
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal
 
+from camkit.caller import option_list, option_text
 from camkit.errors import ContractError
 from camkit.kinds import Kind, KindOption, all_kinds
+from camkit.runtime.field_types import check_fields, check_value
 from camkit.runtime.unit import Unit
 from camkit.units import MM_PER_M
 
@@ -20,19 +23,6 @@ Assumption = Literal["centre", "scale"]
 Quality = Literal["exact", "best", "adaptive", "draft"]
 OnUnsafe = Literal["warn", "fallback", "fail"]
 Laws = Literal["stated", "enforce"]
-_CHOICES: Final = {
-    "quality": Quality,
-    "mode": Mode,
-    "dtype": Dtype,
-    "provider": Provider,
-    "demosaic": DemosaicMethod,
-    "color": OutputColor,
-    "assume": Assumption,
-    "on_unsafe": OnUnsafe,
-    "laws": Laws,
-}
-"""Options that are one of several words."""
-
 DEFAULT_MAX_MEM_BYTES: Final = 930_000_000
 LEAST_MAX_MEM_BYTES: Final = 400_000_000
 
@@ -107,14 +97,15 @@ class Options:
     of_kind: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _check_of_kind(self.of_kind)
-        _check_words(self)
-        for name, most in (("seconds", self.max_seconds), ("error in dB", self.max_error_db)):
+        for name, most in (("max_seconds", self.max_seconds), ("max_error_db", self.max_error_db)):
             if most is not None and not 0 < most < 1e6:
-                raise ContractError(f"the most {name} must be > 0; got {most}")
+                raise ContractError(f"{option_text(name)} must be > 0; got {most}")
         if self.max_seconds is not None and self.quality != "exact":
             raise ContractError(
-                "--max-seconds finds the best quality that fits by itself; leave --quality out"
+                f"{option_text('max_seconds')} finds the best quality that fits by itself; leave "
+                f"{option_text('quality')} out"
             )
         _check_depth(self.depth_m)
         if not 0 <= self.strength <= 1:
@@ -171,17 +162,39 @@ def with_choices(options: Options, choices: Mapping[str, object]) -> Options:
     Raises:
         ContractError: If one is unknown, or cannot be what it was given.
     """
+    check_value("options", options, Options)
     own = kind_option_names()
-    unknown = set(choices) - set(Options.__dataclass_fields__) - set(own)
-    if unknown:
-        known = sorted({*Options.__dataclass_fields__, *own})
-        raise ContractError(
-            f"unknown option(s) {', '.join(sorted(unknown))}; known are {', '.join(known)}"
-        )
+    check_names(choices, {*plain_names(), *own})
     plain = {name: value for name, value in choices.items() if name not in own}
     of_kind = dict(options.of_kind)
-    of_kind |= {k: f"{v}" for k, v in choices.items() if k in own and v is not None}
+    of_kind |= {
+        name: _text_of(name, choices[name]) for name in own if choices.get(name) is not None
+    }
     return replace(options, **{"of_kind": tuple(sorted(of_kind.items())), **plain})  # type: ignore[arg-type]
+
+
+def plain_names() -> list[str]:
+    """Name the options of every camera."""
+    return [name for name in Options.__dataclass_fields__ if name != "of_kind"]
+
+
+def check_names(choices: Mapping[str, object], known: Set[str]) -> None:
+    """Refuse names that are no options.
+
+    Raises:
+        ContractError: Names them and those there are.
+    """
+    if unknown := sorted(set(choices) - known):
+        raise ContractError(
+            f"unknown option(s) {', '.join(unknown)}; known are {', '.join(sorted(known))}"
+        )
+
+
+def _text_of(name: str, value: object) -> str:
+    """Return what was chosen for an option of a kind as text."""
+    hint = str | PathLike if kind_option(name).is_file else str | int
+    check_value(name, value, hint)
+    return f"{value}"
 
 
 def _check_of_kind(of_kind: tuple[tuple[str, str], ...]) -> None:
@@ -220,7 +233,7 @@ def check_kind_options(options: Options, kind: Kind, where: str) -> None:
     if foreign := [name for name, _ in options.of_kind if name not in own]:
         makers = [k for k in all_kinds() if any(o.name == foreign[0] for o in k.options)]
         raise ContractError(
-            f"{', '.join(map(flag_of, foreign))} means nothing {where}: it is for cameras of the "
+            f"{option_list(foreign)} means nothing {where}: it is for cameras of the "
             f"kind {makers[0].name}; leave it out"
         )
 
@@ -241,25 +254,18 @@ def checked_origin(origin_px: Any) -> tuple[int, int]:
     except (TypeError, ValueError):
         x = y = -1
     if min(x, y) < 0:
-        raise ContractError(f"origin_px must be two whole numbers (x, y) >= 0; got {origin_px!r}")
+        raise ContractError(
+            f"{option_text('origin_px')} must be two whole numbers (x, y) >= 0; got {origin_px!r}"
+        )
     return x, y
 
 
 def _check_origin(origin_px: tuple[int, int] | None, assume: str | None) -> None:
     if origin_px is not None and checked_origin(origin_px) and assume is not None:
-        raise ContractError(f"origin_px and assume {assume} both say where a capture lies: choose")
-
-
-def _check_words(options: Options) -> None:
-    for name, kind in _CHOICES.items():
-        value = getattr(options, name)
-        if value is not None:
-            _check_choice(name, value, get_args(kind))
-
-
-def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ContractError(f"{name} must be one of {', '.join(choices)}; got {value!r}")
+        raise ContractError(
+            f"{option_text('origin_px')} and {option_text('assume', assume)} both say where a "
+            "capture lies: choose"
+        )
 
 
 def parse_memory(text: str) -> int:
@@ -275,18 +281,3 @@ def parse_memory(text: str) -> int:
         return int(float(number) * units[body[len(number) :]])
     except (ValueError, KeyError, OverflowError):
         raise ContractError(f"expected a memory size such as 2G or 900M; got {text!r}") from None
-
-
-FLAGS: Final = {
-    "white_balance": "--wb",
-    "exposure_ev": "--exposure",
-    "max_mem_bytes": "--max-mem",
-    "vignetting": "--no-vignetting",
-    "undistort": "--no-undistort",
-}
-"""Names that `camkit process` has for options where they differ from --name-of-the-field."""
-
-
-def flag_of(name: str) -> str:
-    """Name an option as `camkit process` does."""
-    return FLAGS.get(name, "--" + name.replace("_", "-"))

@@ -12,23 +12,27 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle, find_bundle, is_built_in, open_bundle
 from camkit.bundle.stages import Wiener
+from camkit.caller import option_list, option_text
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.kinds import Kind, find_kind
 from camkit.runtime.cancel import Cancel, cancellable
 from camkit.runtime.capture import Capture, MosaicOptions
-from camkit.runtime.files.in_memory import Source, stored
+from camkit.runtime.field_types import check_value
+from camkit.runtime.files.in_memory import FilePath, Source, stored
 from camkit.runtime.job.choices import check_choices
 from camkit.runtime.job.reconstruction import Reconstruction, check_out
 from camkit.runtime.job.setup import Setup
 from camkit.runtime.job.stream import Stream
+from camkit.runtime.keywords import LoadKeywords
 from camkit.runtime.kind import kind_without_bundle, part_of, runtime_part
 from camkit.runtime.maker import Made, Maker, Making
 from camkit.runtime.network.engine import NetworkEngine, available_threads
@@ -203,7 +207,9 @@ class Pipeline:
             return capture
         extent = None if manifest is None else manifest.sensor.extent
         if extent is None:
-            raise ContractError("origin_px is a place on a sensor; it needs a bundle that has one")
+            raise ContractError(
+                f"{option_text('origin_px')} is a place on a sensor; it needs a bundle that has one"
+            )
         whole = (extent.width_px, extent.height_px)
         return replace(capture, origin_px=origin, sensor_size_px=whole)
 
@@ -304,9 +310,42 @@ class Pipeline:
         with cancellable(cancel), stored(file) as path:
             return self._a_maker().make(self._making(path, progress, cancel))
 
-    def plan(self, file: Path) -> Mapping[str, Any]:
-        """Say what `make` would do with a capture; errors as there."""
-        return self._a_maker().plan(self._making(file, None, None))
+    def plan(
+        self,
+        file: Source,
+        *,
+        mosaic: MosaicOptions | None = None,
+        origin_px: tuple[int, int] | None = None,
+        cancel: Cancel | None = None,
+    ) -> Mapping[str, Any]:
+        """Return what `process` or `make` would do with a capture, without doing it.
+
+        Args:
+            file: A path, bytes, or a file opened in binary mode.
+            mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
+            origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
+            cancel: Asked ten times a second; true raises `Cancelled`.
+
+        Returns:
+            Plain JSON values, as `camkit plan --json` prints them: `size` of the network or None,
+            `decisions`, `estimate` (seconds and memory, or None), `plan` and `warnings`.
+
+        Raises:
+            DecodeError: If the file cannot be read.
+            ContractError: If capture, options and bundle do not fit each other, or captures of
+                this kind are no mosaics and have no place on a sensor.
+        """
+        if self.maker is None:
+            capture = self.read(file, mosaic, origin_px=origin_px, cancel=cancel)
+            return self.start(capture, cancel=cancel).planned()
+        given = {"mosaic": mosaic, "origin_px": origin_px}
+        if said := [name for name, value in given.items() if value is not None]:
+            raise ContractError(
+                f"{option_list(said)} means nothing to captures of the kind {self.kind.name}; "
+                "leave it out"
+            )
+        with cancellable(cancel), stored(file) as path:
+            return self.maker.plan(self._making(path, None, cancel))
 
     def _a_maker(self) -> Maker:
         if self.maker is None:
@@ -424,11 +463,11 @@ class Pipeline:
 
 
 def load(
-    bundle: str | Path | None,
+    bundle: FilePath | None,
     *,
     kind: str | None = None,
     options: Options | None = None,
-    **choices: object,
+    **choices: Unpack[LoadKeywords],
 ) -> Pipeline:
     """Open a bundle and make it ready.
 
@@ -442,11 +481,13 @@ def load(
 
     Raises:
         BundleError: If the bundle is refused.
-        ContractError: If an option is unknown or the bundle lacks the size, or a kind is given
-            beside a bundle.
+        ContractError: If an option is unknown or of another type, the bundle lacks the size, or a
+            kind is given beside a bundle.
         UnsupportedError: If there is no such kind.
     """
-    chosen = with_choices(options or Options(), choices)
+    check_value("bundle", bundle, str | PathLike | None)
+    check_value("kind", kind, str | None)
+    chosen = with_choices(Options() if options is None else options, choices)
     if bundle is None or str(bundle).lower() == "none":
         return Pipeline(None, chosen, None if kind is None else find_kind(kind))
     if kind is not None:
@@ -485,7 +526,7 @@ def _engine(
     if size not in sizes:
         raise ContractError(
             f"bundle {bundle.manifest.name} holds size(s) {', '.join(sorted(sizes))}; "
-            f"asked for {size}; say --size {min(sizes)}"
+            f"asked for {size}; say {option_text('size', min(sizes))}"
             if sizes
             else f"bundle {bundle.manifest.name} holds no network; use method wiener"
         )

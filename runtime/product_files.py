@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.development import FileResult, WriteOptions, bundle_name, identity_of
@@ -76,6 +77,11 @@ def _check_free(source: Path, paths: list[Path], write: WriteOptions) -> None:
     """
     for path in paths:
         if path.resolve() == source.resolve():
-            raise ContractError(f"{source} would overwrite itself; choose another --out-dir")
+            raise ContractError(
+                f"{source} would overwrite itself; choose another {option_text('out_dir')}"
+            )
         if path.exists() and not (write.overwrite or write.resume):
-            raise ContractError(f"{path} exists; say --overwrite, or another --out-dir")
+            raise ContractError(
+                f"{path} exists; say {option_text('overwrite')}, or another "
+                f"{option_text('out_dir')}"
+            )

@@ -22,6 +22,7 @@ from typing import IO, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.regular_file import check_regular
 from camkit.runtime.cancel import current_wish, watched
@@ -101,7 +102,8 @@ def _read(
             return replace(capture, sha256=file_sha256(file))
         if mosaic is not None and mosaic.cfa is not None:
             raise ContractError(
-                f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit --mosaic"
+                f"a pattern is for headerless PNG or TIFF; {file.name} has its own, omit "
+                f"{option_text('cfa')}"
             )
         said = mosaic or MosaicOptions()
         if limits is not None:
@@ -158,8 +160,8 @@ def _read_picture(path: Path, mosaic: MosaicOptions | None, *, keep_codes: bool)
         return read_picture(path, keep_codes=keep_codes)
     if mosaic.cfa is None:
         raise ContractError(
-            f"{path.name} is a picture, levels are for RAW files; say --mosaic too if it is a "
-            "headerless mosaic"
+            f"{path.name} is a picture, levels are for RAW files; say {option_text('cfa')} too if "
+            "it is a headerless mosaic"
         )
     return read_mosaic(path, mosaic)
 

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from camkit.caller import speaking
 from camkit.cli.design.design import design
 from camkit.cli.design.export import export
 from camkit.cli.design.fit_bank import fit_bank
@@ -93,7 +94,7 @@ def run(arguments: Sequence[str]) -> int:
     """
     debug = DEBUG_FLAG in arguments
     try:
-        with _messages(shown=debug), none_is_lost():
+        with speaking("command"), _messages(shown=debug), none_is_lost():
             app(list(arguments), prog_name="camkit")
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else ExitCode.INPUT_FAILED

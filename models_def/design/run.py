@@ -12,6 +12,7 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.design.assembly import parts_of
 from camkit.models_def.design.loop import DesignLoop, Progress
@@ -80,7 +81,8 @@ class DesignRun:
         self.lens_file = options.out_dir / f"{recipe.name}.toml"
         if self.checkpoint.exists() and not (options.resume or options.overwrite):
             raise ContractError(
-                f"{self.checkpoint} is there already: give --resume to go on or --overwrite"
+                f"{self.checkpoint} is there already: give {option_text('resume')} to go on or "
+                f"{option_text('overwrite')}"
             )
         begin, cpu = time.monotonic(), time.process_time()
         # with a window of its own a checkpoint holds all that a search would find again
@@ -153,8 +155,9 @@ class DesignRun:
             raise ContractError(f"{self.checkpoint} is no design checkpoint of format {FORMAT}")
         if table["digest"] != recipe_digest(self.recipe):
             raise ContractError(
-                f"{self.checkpoint} belongs to another recipe, or to other --steps, "
-                "--lens-rate and the like; say the same again, or give --overwrite or --out-dir"
+                f"{self.checkpoint} belongs to another recipe, or to other {option_text('steps')}, "
+                f"{option_text('lens_rate')} and the like; say the same again, or give "
+                f"{option_text('overwrite')} or {option_text('out_dir')}"
             )
         self._spent_s, self._spent_cpu_s = table["spent_s"], table["spent_cpu_s"]
         self.loop.parts.lens.load_state_dict(table["lens"])

@@ -19,6 +19,7 @@ import numpy as np
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.stages import Wiener
+from camkit.caller import option_text
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.frozen import (
@@ -282,7 +283,9 @@ def freeze_optics(
         UnsupportedError: If kernels of a moved sensor are wanted of anything but a lens.
     """
     if focus_um and not isinstance(optics, LensOptics):
-        raise UnsupportedError("only a lens is traced with its sensor moved; leave --focus-um out")
+        raise UnsupportedError(
+            f"only a lens is traced with its sensor moved; leave {option_text('focus_um')} out"
+        )
     chosen = settings or Wiener(prior_scale=PRIOR_SCALE, prior_exponent=PRIOR_EXPONENT)
     # losses of samples by the same filter for every camera, each colour alone
     alone = chosen.model_copy(update={"together": None})

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from camkit.bundle.sensor import ColorSensor
+from camkit.caller import option_text
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError
 from camkit.models_def.optics.optics import FieldLayout, FloatGrid, Optics, radial_layout
@@ -277,7 +278,7 @@ def _smallest_side(traced: list[TracedPsf], weights: Tensor, grid: FreezeGrid) -
         return grid.max_side_px, kept
     raise ContractError(
         f"kernels of {grid.max_side_px} px hold {kept:.4f} of the light, wanted {grid.energy}; "
-        "raise max_side_px, lower the energy, or use a better lens"
+        f"raise {option_text('max_side_px')}, lower the energy, or use a better lens"
     )
 
 

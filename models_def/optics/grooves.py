@@ -11,6 +11,7 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, UnsupportedError
 from camkit.models_def.optics.tracing.profile import sag
 from camkit.units import UM_PER_MM, to_mm
@@ -40,7 +41,9 @@ class Grooves:
         if not (math.isfinite(self.depth_um) and self.depth_um > 0):
             raise ContractError(f"groove_depth_um must be > 0; got {self.depth_um}")
         if not (math.isfinite(self.tool_radius_um) and self.tool_radius_um >= 0):
-            raise ContractError(f"tool_radius_um must be >= 0; got {self.tool_radius_um}")
+            raise ContractError(
+                f"{option_text('tool_radius_um')} must be >= 0; got {self.tool_radius_um}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,5 +141,5 @@ def check_grooves(profile: Profile, grooves: Grooves) -> None:
         raise UnsupportedError(
             f"a groove of {narrowest_um:.1f} um is narrower than the tool, whose nose is "
             f"{2 * grooves.tool_radius_um:g} um wide; make groove_depth_um larger or "
-            "tool_radius_um smaller"
+            f"{option_text('tool_radius_um')} smaller"
         )

@@ -9,19 +9,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol, cast
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.kinds import find_kind
 from camkit.models_def.training.first_weights import FirstWeights
 from camkit.models_def.training.fitter import Fits
 from camkit.models_def.training.recipe import PICTURE_LOSSES, NetworkRecipe
 
-_FINE_TUNE: Final = ", or say --fine-tune FROM too"
 _FILES: Final = (
-    ("vgg", "VGG-19", _FINE_TUNE),
-    ("sharp", "sharp pictures without captures", ""),
-    ("pairs", "real pairs", _FINE_TUNE),
+    ("vgg", "VGG-19", True),
+    ("sharp", "sharp pictures without captures", False),
+    ("pairs", "real pairs", True),
 )
-"""Files of a request: option, what it holds, what else it might be for."""
+"""Files of a request: option, what it holds, whether fine-tuning takes it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +89,11 @@ def own_fitting(kind: str, request: FitRequest) -> OwnFitting | None:
             f"{whose} of the kind {kind!r} cannot be trained by the loss "
             f"{request.entry.schedule.loss}"
         )
-    for option, what, instead in _FILES:
+    for option, what, is_for_tuning in _FILES:
         if getattr(request, option) is not None:
+            instead = f", or say {option_text('fine_tune')} too" if is_for_tuning else ""
             raise ContractError(
-                f"the loss of {whose} does not look at {what}: leave --{option} away{instead}"
+                f"the loss of {whose} does not look at {what}: leave {option_text(option)} away"
+                f"{instead}"
             )
     return None

@@ -14,6 +14,7 @@ import torch
 from torch import nn
 
 from camkit.bundle.stages.network import DEFAULT_ROLE
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.networks.catalog import check_patch
 from camkit.models_def.training.checkpoint import (
@@ -206,7 +207,10 @@ def train(
         own = own_fitting(recipe.kind, request)
     path = checkpoint_path(recipe, options, refinement)
     if path.exists() and not (options.resume or options.overwrite):
-        raise ContractError(f"{path} is there already: give --resume to go on or --overwrite")
+        raise ContractError(
+            f"{path} is there already: give {option_text('resume')} to go on or "
+            f"{option_text('overwrite')}"
+        )
     options.out_dir.mkdir(parents=True, exist_ok=True)
     if material is None:
         material = kind.prepare(recipe, recipe_path.parent, options.out_dir)

@@ -1,12 +1,14 @@
 """Many captures become pictures: planned before any work, then made, `jobs` at once."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.kinds import Kind
 from camkit.runtime.batch.making import Common, FileProgress, Pipelines, run_task
@@ -15,12 +17,16 @@ from camkit.runtime.batch.tasks import NO_BUNDLE, Task, list_tasks
 from camkit.runtime.cancel import Cancel
 from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.development import FileResult, WriteOptions
-from camkit.runtime.files.in_memory import list_paths
+from camkit.runtime.field_types import check_value
+from camkit.runtime.files.in_memory import FilePath, list_paths
+from camkit.runtime.keywords import ProcessKeywords
 from camkit.runtime.kind import kind_without_bundle
 from camkit.runtime.options import (
     LEAST_MAX_MEM_BYTES,
     Options,
+    check_names,
     kind_option_names,
+    plain_names,
     with_absolute_files,
     with_choices,
 )
@@ -32,9 +38,9 @@ logger = logging.getLogger(__name__)
 
 
 def process(  # noqa: PLR0913 - each says one thing to its caller
-    files: Sequence[str | Path] | str | Path,
+    files: Sequence[FilePath] | FilePath,
     *,
-    bundle: str | Path | None = None,
+    bundle: FilePath | None = None,
     options: Options | None = None,
     write: WriteOptions | None = None,
     mosaic: MosaicOptions | None = None,
@@ -43,7 +49,7 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
     on_result: Callable[[FileResult], None] | None = None,
     client: "Client | None" = None,
     on_notice: Callable[[str], None] | None = None,
-    **choices: object,
+    **choices: Unpack[ProcessKeywords],
 ) -> list[FileResult]:
     """Turn captures into pictures, each with its sidecar.
 
@@ -71,14 +77,24 @@ def process(  # noqa: PLR0913 - each says one thing to its caller
         BundleError: If the named bundle is refused.
         CamkitError: If scheduler or workers of `client` are lost and do not come back.
     """
-    options, write = _with_choices(options or Options(), write or WriteOptions(), choices)
+    check_value("bundle", bundle, str | PathLike | None)
+    check_value("mosaic", mosaic, MosaicOptions | None)
+    options, write = _with_choices(
+        Options() if options is None else options,
+        WriteOptions() if write is None else write,
+        choices,
+    )
     if client is not None:
         options = with_absolute_files(options)
     if write.out_dir.exists() and not write.out_dir.is_dir():
-        raise ContractError(f"{write.out_dir} is no folder; pictures need one as --out-dir")
+        raise ContractError(
+            f"{write.out_dir} is no folder; pictures need one as {option_text('out_dir')}"
+        )
     if write.format == "dng":
         if options.color == "acescg":
-            raise ContractError("a DNG holds camera RGB; leave --color out or say camera")
+            raise ContractError(
+                f"a DNG holds camera RGB; leave {option_text('color')} out or say camera"
+            )
         options = replace(options, color="camera")
     if client is not None and write.jobs > 1:
         raise ContractError("jobs are those of one process; leave them out with a client")
@@ -123,17 +139,13 @@ def _process_here(
 
 
 def _with_choices(
-    options: Options, write: WriteOptions, choices: dict[str, object]
+    options: Options, write: WriteOptions, choices: Mapping[str, object]
 ) -> tuple[Options, WriteOptions]:
+    check_value("write", write, WriteOptions)
     names = set(WriteOptions.__dataclass_fields__)
-    own = {*Options.__dataclass_fields__, *kind_option_names()}
-    if unknown := set(choices) - names - own:
-        raise ContractError(
-            f"unknown option(s) {', '.join(sorted(unknown))}; known are "
-            f"{', '.join(sorted(names | own))}"
-        )
-    if "out_dir" in choices:
-        choices = {**choices, "out_dir": Path(str(choices["out_dir"]))}
+    check_names(choices, names.union(plain_names(), kind_option_names()))
+    if isinstance(out_dir := choices.get("out_dir"), str | PathLike):
+        choices = {**choices, "out_dir": Path(out_dir)}
     return (
         with_choices(options, {k: v for k, v in choices.items() if k not in names}),
         replace(write, **{k: v for k, v in choices.items() if k in names}),  # type: ignore[arg-type]
@@ -170,6 +182,7 @@ def _shared(options: Options, jobs: int) -> Options:
         raise ContractError(
             f"{options.max_mem_bytes // 10**6} MB shared by {jobs} jobs are {each // 10**6} MB "
             f"each, {FIXED_BYTES // 10**6} of them in common; a job needs at least "
-            f"{LEAST_MAX_MEM_BYTES // 10**6} MB: raise --max-mem or lower --jobs"
+            f"{LEAST_MAX_MEM_BYTES // 10**6} MB: raise {option_text('max_mem_bytes')} or lower "
+            f"{option_text('jobs')}"
         )
     return replace(options, threads=threads, max_mem_bytes=each)

@@ -37,7 +37,7 @@ def expand(files: Sequence[FilePath], kind: Kind | None = None) -> list[Path]:
             found[path] = None
         elif path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
-            found.update(dict.fromkeys(p for p in inside if p.is_file() and not _is_result(p)))
+            found.update(dict.fromkeys(p for p in inside if p.is_file() and not is_result(p)))
         elif not path.exists() and glob.has_magic(str(item)):
             # pathlib has no glob that takes an absolute pattern
             matches = sorted(Path(m) for m in glob.glob(str(item), recursive=True))  # noqa: PTH207
@@ -65,7 +65,8 @@ def _is_unreachable(path: Path) -> bool:
     return False
 
 
-def _is_result(path: Path) -> bool:
+def is_result(path: Path) -> bool:
+    """Tell whether the sidecar of a picture calls it an output."""
     record = read_sidecar(path)
     if record is None:
         return False

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, unexpected
 from camkit.kinds import Kind
 from camkit.runtime.batch.sources import refusal_of
@@ -14,12 +15,13 @@ from camkit.runtime.development import WriteOptions
 from camkit.runtime.kind import kind_without_bundle, runtime_part
 from camkit.runtime.maker import Maker
 from camkit.runtime.options import Options
+from camkit.runtime.output.tone_mapping import preview_path
 from camkit.runtime.raw import named_bundle
 
 logger = logging.getLogger(__name__)
 
 NO_BUNDLE: Final = "none"
-_NAMELESS: Final = "names no bundle; say --bundle NAME, or --bundle none"
+_NAMELESS: Final = "names no bundle"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,20 +91,24 @@ def list_tasks(
     if writes:
         _refuse_themselves(sound)
     _refuse_clashes(sound)
-    nameless = [t for t in tasks if t.refusal is not None and t.refusal.endswith(_NAMELESS)]
+    nameless = [t for t in tasks if t.refusal is not None and f" {_NAMELESS}; " in t.refusal]
     if nameless and not sound:
         names = ", ".join(str(t.source) for t in nameless)
         raise ContractError(
-            f"no file names a bundle ({names}); say --bundle NAME, or --bundle none to develop only"
+            f"no file names a bundle ({names}); name one by {_bundle_options()} to develop only"
         )
     existing = [p for t in sound for p in t.files if p.exists() and p not in t.own]
     if existing and not (write.resume or write.overwrite):
         listed = ", ".join(map(str, existing[:5]))
         raise ContractError(
-            f"{len(existing)} output(s) exist ({listed}); say --resume, --overwrite, or another "
-            "--out-dir"
+            f"{len(existing)} output(s) exist ({listed}); say {option_text('resume')}, "
+            f"{option_text('overwrite')}, or another {option_text('out_dir')}"
         )
     return tasks
+
+
+def _bundle_options() -> str:
+    return f"{option_text('bundle')}, or say {option_text('bundle', 'none')}"
 
 
 def _folders(sources: Sequence[Path], write: WriteOptions) -> list[Path]:
@@ -119,7 +125,13 @@ def _names(
 ) -> tuple[str, ...]:
     """Name the files of an input, the main one first."""
     if maker is None:
-        return (f"{source.stem}{write.suffix}",)
+        name = f"{source.stem}{write.suffix}"
+        return (name, preview_path(Path(name)).name) if write.preview else (name,)
+    if write.preview:
+        raise ContractError(
+            f"{option_text('preview')} is for photographs; {source.name} becomes products, which "
+            f"have pictures as {option_text('format')}: leave it out"
+        )
     return maker.names(source, options, write.format)
 
 
@@ -136,7 +148,8 @@ def _make_task(
             logger.debug("%s failed", source, exc_info=error)
             refusal = f"cannot read {source}: {unexpected(error)}"
         else:
-            refusal = None if chosen is not None else f"{source} {_NAMELESS}"
+            if chosen is None:
+                refusal = f"{source} {_NAMELESS}; name one by {_bundle_options()}"
     return Task(
         source=source,
         target=target,
@@ -162,7 +175,9 @@ def state_of(path: Path) -> tuple[int, int] | None:
 def _refuse_themselves(tasks: Sequence[Task]) -> None:
     for task in tasks:
         if task.own:
-            raise ContractError(f"{task.source} would overwrite itself; choose another --out-dir")
+            raise ContractError(
+                f"{task.source} would overwrite itself; choose another {option_text('out_dir')}"
+            )
 
 
 def _refuse_clashes(tasks: Sequence[Task]) -> None:
@@ -173,6 +188,7 @@ def _refuse_clashes(tasks: Sequence[Task]) -> None:
             if target in owners:
                 raise ContractError(
                     f"{owners[target]} and {task.source} would both give {path}; "
-                    "keep their folders (--keep-folders), or run them into different ones"
+                    f"keep their folders ({option_text('keep_folders')}), or run them into "
+                    "different ones"
                 )
             owners[target] = task.source

@@ -7,6 +7,7 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import MosaicOptions
@@ -77,8 +78,8 @@ class Darks:
             why = "states no exposure time" if time_s is None else _why_not(times_s, bracket)
             if time_s is None or why:
                 raise ContractError(
-                    f"the dark frame {path.name} {why}; say --times with one for each of FILES and "
-                    "then for each dark frame"
+                    f"the dark frame {path.name} {why}; say {option_text('times_s')} with one for "
+                    "each of FILES and then for each dark frame"
                 )
             light = capture.linear_rows(0, capture.height)
             light[clipped_rows(capture, 0, capture.height)] = np.nan

@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FrozenPsf
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.lattice import FloatGrid
@@ -101,7 +102,7 @@ def see_dots(
     if modulation < LEAST_MODULATION:
         raise DecodeError(
             f"no dots every {spacing_um:g} um: the light keeps to that period by {modulation:.2f} "
-            "of 1; photograph the plate in focus, or check --pixel-pitch-um"
+            f"of 1; photograph the plate in focus, or check {option_text('pixel_pitch_um')}"
         )
     rows, columns = (line[0] for line in lines)
     circles = _circles(
@@ -144,7 +145,10 @@ def dots_psf(
             f"got {shape}, {designed.symmetry}"
         )
     if measured.red is None:
-        raise ContractError("dots are seen by the light of a point; leave --disc-px and --edge out")
+        raise ContractError(
+            f"dots are seen by the light of a point; leave {option_text('disc_px')} and "
+            f"{option_text('edge')} out"
+        )
     seen = see_dots(
         measured.red.light,
         measured.red.pitch_um,

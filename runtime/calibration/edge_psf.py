@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.darks import Darks
 from camkit.runtime.calibration.edges import (
@@ -194,7 +195,9 @@ def measure_edge(survey: Survey, options: PsfOptions, darks: Darks | None) -> Me
     pitch_um = checked_pitch_um(survey, options)
     most = 2 * MOST_HALF_PX + 1
     if options.side_px is not None and options.side_px > most:
-        raise ContractError(f"--side-px of an edge is at most {most}; got {options.side_px}")
+        raise ContractError(
+            f"{option_text('side_px')} of an edge is at most {most}; got {options.side_px}"
+        )
     merged = merge(survey, None, None if darks is None else darks.rows)
     light, precision = (_plain(of, survey) for of in (merged.light, merged.precision))
     clipped = float((precision <= 0).mean())
@@ -250,7 +253,7 @@ class _Colour:
         if dark is None and hazy > MOST_WIDE:
             raise DecodeError(
                 f"haze fills the frame: {hazy:.0%} of the light of the edge cannot be told from "
-                "the background; give frames without light by --dark"
+                f"the background; give frames without light by {option_text('dark')}"
             )
         self.peak_share = self.fit.psf.share_within(PEAK_PX)
         without = [

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.sensor import ColorSensor
+from camkit.caller import option_text
 from camkit.contracts import FloatArray, FrozenPsf, focus_weights
 from camkit.errors import ContractError
 from camkit.runtime.bank.psf import FieldKernels, color_kernels
@@ -128,8 +129,8 @@ def measure_focus(captures: Sequence[tuple[str, Capture]], camera: EdgeCamera) -
 def _known_shifts(psf: FrozenPsf) -> NDArray[np.float64]:
     if psf.focus_um is None:
         raise ContractError(
-            "the PSF knows the nominal focus alone: freeze it with --focus-um and export the "
-            "bundle again, or give the lens"
+            f"the PSF knows the nominal focus alone: freeze it with {option_text('focus_um')} and "
+            "export the bundle again, or give the lens"
         )
     return psf.focus_um
 
@@ -272,7 +273,7 @@ def _best(squares: FloatGrid, tried_um: FloatLine, captures: int) -> MeasuredFoc
     if not tried_um[0] < focus_um < tried_um[-1]:
         raise ContractError(
             f"the focus lies at or beyond {focus_um:g} um, where the kernels end: give a larger "
-            "--focus-um, or focus the camera anew"
+            f"{option_text('focus_um')}, or focus the camera anew"
         )
     without = np.array(
         [_minimum(tried_um, (total * edges - one) / (edges - 1))[0] for one in squares]

@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FrozenPsf, RadialDistortion
 from camkit.errors import ContractError
 from camkit.runtime.calibration.lattice import FloatGrid
@@ -37,13 +38,13 @@ class PsfOptions:
     def __post_init__(self) -> None:
         side, pitch, disc = self.side_px, self.pixel_pitch_um, self.disc_px
         if side is not None and (side < 3 or side % 2 == 0):
-            raise ContractError(f"--side-px must be odd and >= 3; got {side}")
+            raise ContractError(f"{option_text('side_px')} must be odd and >= 3; got {side}")
         if pitch is not None and not (np.isfinite(pitch) and pitch > 0):
-            raise ContractError(f"--pixel-pitch-um must be > 0; got {pitch:g}")
+            raise ContractError(f"{option_text('pixel_pitch_um')} must be > 0; got {pitch:g}")
         if not self.depth_m > 0:
-            raise ContractError(f"--depth-m must be > 0; got {self.depth_m:g}")
+            raise ContractError(f"{option_text('depth_m')} must be > 0; got {self.depth_m:g}")
         if disc is not None and not (np.isfinite(disc) and disc > 0):
-            raise ContractError(f"--disc-px must be > 0; got {disc:g}")
+            raise ContractError(f"{option_text('disc_px')} must be > 0; got {disc:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray, cfa_channels
 from camkit.errors import DecodeError
 from camkit.runtime.calibration.lattice import FloatGrid, Lattice, filled
@@ -165,7 +166,8 @@ def _refuse_haze(
     if rise > HAZE_SPREADS * spread / np.sqrt(values.size) and rise * within > MOST_HAZE * total:
         raise DecodeError(
             f"haze fills the frame: {rise * within / max(total, 1e-300):.0%} of the light or more "
-            "cannot be told from the background; give frames without light by --dark"
+            "cannot be told from the background; give frames without light by "
+            f"{option_text('dark')}"
         )
 
 

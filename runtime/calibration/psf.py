@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.darks import Darks
 from camkit.runtime.calibration.disc import (
@@ -135,7 +136,7 @@ def checked_pitch_um(survey: Survey, options: PsfOptions) -> float:
     if survey.codes is not None:
         raise ContractError("a PSF is measured on linear frames: RAW, EXR, 16-bit TIFF or PNG")
     if pitch_um is None:
-        raise ContractError("the frames state no pixel pitch; say --pixel-pitch-um")
+        raise ContractError(f"the frames state no pixel pitch; say {option_text('pixel_pitch_um')}")
     return pitch_um
 
 
@@ -188,8 +189,8 @@ def _most_half(survey: Survey, row: int, column: int, side_px: int | None) -> in
         return min(most, MOST_HALF_PX)
     if side_px // 2 > most:
         raise ContractError(
-            f"--side-px {side_px} does not fit around the light at ({column}, {row}) of "
-            f"{like.width}x{like.height} pixels; at most {2 * most + 1}"
+            f"{option_text('side_px', side_px)} does not fit around the light at ({column}, {row}) "
+            f"of {like.width}x{like.height} pixels; at most {2 * most + 1}"
         )
     return side_px // 2
 

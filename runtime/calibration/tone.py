@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.flat.picture import MOST_CLIPPED, check_one_camera, green_of
 from camkit.runtime.capture import Capture, MosaicOptions
@@ -122,15 +123,20 @@ def levels_of(text: str, count: int) -> tuple[float, ...]:
     try:
         levels = tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise ContractError(f"--levels takes numbers separated by commas; got {text!r}") from None
+        raise ContractError(
+            f"{option_text('levels')} takes numbers separated by commas; got {text!r}"
+        ) from None
     if len(levels) != count:
         raise ContractError(
-            f"--levels states {len(levels)} levels for {count} pictures; state one for each"
+            f"{option_text('levels')} states {len(levels)} levels for {count} pictures; state one "
+            "for each"
         )
     if not all(0 <= level < np.inf for level in levels):
         raise ContractError(f"levels must be >= 0; got {text!r}")
     if len(set(levels)) < len(levels):
-        raise ContractError(f"--levels states a level twice: {text!r}; give one picture of each")
+        raise ContractError(
+            f"{option_text('levels')} states a level twice: {text!r}; give one picture of each"
+        )
     return levels
 
 

@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import CfaPattern
 from camkit.haze import Haze
 from camkit.runtime.capture import Capture
@@ -130,17 +131,17 @@ def _level_doubts(samples: Samples, levels: Levels) -> list[str]:
     if low > FAR_ABOVE_BLACK and high - low > LEAST_CONTRAST:
         found.append(
             f"{NOTHING_DARK} {low:.0%} of the range above black {black:g}: fog, "
-            "optics with a haze, or a damaged black level (--black-level says it)"
+            f"optics with a haze, or a damaged black level ({option_text('black_level')} says it)"
         )
     if low < -FAR_BELOW_BLACK:
         found.append(
             f"the darkest samples lie {-low:.0%} of the range below black {black:g}: the black "
-            "level or the pixel data are damaged (--black-level says it)"
+            f"level or the pixel data are damaged ({option_text('black_level')} says it)"
         )
     if top < NEVER_BRIGHT:
         found.append(
             f"nothing is brighter than {top:.1%} of white {levels.white:g}: a dark picture, or a "
-            "damaged white level (--white-level says it)"
+            f"damaged white level ({option_text('white_level')} says it)"
         )
     return found
 
@@ -164,7 +165,7 @@ def _above_white_doubt(samples: Samples, levels: Levels) -> str:
         return ""
     return (
         f"{above} samples lie above white {levels.white:g}, up to {top}: the white level or the "
-        "pixel data are damaged (--white-level says it)"
+        f"pixel data are damaged ({option_text('white_level')} says it)"
     )
 
 
@@ -178,7 +179,7 @@ def _masked_doubt(masked: Sequence[Samples], levels: Levels) -> str:
         if high - low < MASKED_SPREAD * span and abs(middle - black) > MASKED_OFFSET * span:
             return (
                 f"black is {black:g}, the masked pixels of the sensor lie at {middle:g}: the black "
-                "level is damaged (--black-level says it)"
+                f"level is damaged ({option_text('black_level')} says it)"
             )
     return ""
 

@@ -8,7 +8,7 @@ import io
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Final, TypeGuard
@@ -69,6 +69,8 @@ def list_paths(files: Any) -> Sequence[FilePath]:
         ContractError: If any is data in memory, after which no picture can be named.
     """
     alone = is_path(files) or isinstance(files, bytes | bytearray) or hasattr(files, "read")
+    if not alone and not isinstance(files, Iterable):
+        raise ContractError(f"expected paths of captures; got {type(files).__name__}")
     found = [files] if alone else list(files)
     for item in found:
         if not is_path(item):

@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.colorimetry import apply_matrix
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
@@ -33,12 +34,7 @@ from camkit.runtime.files.tiff_tags import TiffTags, read_tiff_tags
 from camkit.runtime.files.white_level import check_said_white
 from camkit.runtime.metadata import Metadata
 
-MOSAIC_ADVICE: Final = (
-    "if it is a Bayer mosaic, say --mosaic RGGB --black-level N --white-level N "
-    "(RGGB, BGGR, GRBG or GBRG at the top-left pixel)"
-)
 COUNTS_SUFFIXES: Final = (".tif", ".tiff")
-COUNTS_ADVICE: Final = "if it counts single photons, say --product intensity, or depth"
 FAINT: Final = 0.01
 """Negative samples up to this share of the brightest are noise."""
 MOSAIC_RATIO: Final = 1.5
@@ -115,12 +111,12 @@ def _grey_notes(path: Path, samples: NDArray[Any]) -> list[str]:
     if _is_mosaic(samples):
         raise DecodeError(
             "expected a picture, got a single channel whose pixels alternate as those of a mosaic "
-            f"do; {MOSAIC_ADVICE}"
+            f"do; {mosaic_advice()}"
         )
     if np.issubdtype(samples.dtype, np.floating):
         return ["single channel: taken as a grey picture"]
-    counted = f"; {COUNTS_ADVICE}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
-    return [f"single channel: taken as a grey picture; {MOSAIC_ADVICE}{counted}"]
+    counted = f"; {_counts_advice()}" if path.suffix.lower() in COUNTS_SUFFIXES else ""
+    return [f"single channel: taken as a grey picture; {mosaic_advice()}{counted}"]
 
 
 def _is_mosaic(samples: NDArray[Any]) -> bool:
@@ -208,7 +204,7 @@ def read_mosaic(path: Path, options: MosaicOptions) -> Capture:
             f"{samples.dtype} {samples.shape}; omit the mosaic options for an RGB picture"
         )
     if options.black_level is None or options.white_level is None:
-        raise DecodeError(f"levels alone are for RAW files; {MOSAIC_ADVICE}")
+        raise DecodeError(f"levels alone are for RAW files; {mosaic_advice()}")
     levels = raw_checks.Levels(
         black=np.full((2, 2), options.black_level, dtype=np.float32), white=options.white_level
     )
@@ -310,6 +306,19 @@ def read_orientation(path: Path) -> int:
         return 1
     tags = read_tiff_tags(path)
     return orientation_of(tags if tags.directories else exif_of_picture(path.read_bytes()))
+
+
+def mosaic_advice() -> str:
+    """Return what to say of a picture that may be a headerless mosaic."""
+    return (
+        f"if it is a Bayer mosaic, say {option_text('cfa', 'RGGB')} with "
+        f"{option_text('black_level')} and {option_text('white_level')} (RGGB, BGGR, GRBG or GBRG "
+        "at the top-left pixel)"
+    )
+
+
+def _counts_advice() -> str:
+    return f"if it counts single photons, say {option_text('product', 'intensity')}, or depth"
 
 
 def _begins(path: Path, magic: bytes) -> bool:

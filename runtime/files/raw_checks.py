@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray
 from camkit.errors import DecodeError
 from camkit.runtime.files.tiff_tags import TagValue, TiffTags
@@ -166,7 +167,7 @@ def check_content(samples: Samples, levels: Levels) -> None:
     if over > OVER_WHITE_SHARE:
         raise DecodeError(
             f"{over:.0%} of the pixels lie above the white level {levels.white:g}; "
-            "the white level or the pixel data are damaged (--white-level says it)"
+            f"the white level or the pixel data are damaged ({option_text('white_level')} says it)"
         )
     if low == 0:
         _check_unread(samples, levels)

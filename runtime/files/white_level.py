@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import CfaPattern
 from camkit.errors import DecodeError
 from camkit.runtime.files.doubts import is_noise
@@ -26,7 +27,7 @@ def check_said_white(samples: Samples, white: float) -> None:
     over = share_over_white(samples, white)
     if over > OVER_WHITE_SHARE:
         raise DecodeError(
-            f"{over:.0%} of the samples lie above --white-level {white:g} "
+            f"{over:.0%} of the samples lie above {option_text('white_level', white)} "
             f"(largest {samples.max()}); give the true white level"
         )
 
@@ -55,6 +56,7 @@ def believable_white(
     white = float(2 ** fitting[0] - 1) if fitting else float(np.iinfo(samples.dtype).max)
     note = (
         f"{over:.0%} of the pixels lie above white {levels.white:g} that the file states, which is "
-        f"damaged or of another scale: {white:g} is taken (--white-level says another)"
+        f"damaged or of another scale: {white:g} is taken ({option_text('white_level')} says "
+        "another)"
     )
     return replace(levels, white=white), note

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from camkit.bundle.sensor import Extent
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
 from camkit.runtime.geometry.sensor_window import SensorWindow
@@ -69,8 +70,8 @@ def place(capture: Capture, extent: Extent | None, assume: Assumption | None) ->
         return Placement(window=_window(size, (0.0, 0.0), extent))
     raise ContractError(
         f"the capture has {size[0]}x{size[1]} pixels, the bundle's sensor {sensor[0]}x{sensor[1]}; "
-        "for a crop say where it lies (origin_px), else use another bundle, or --assume centre "
-        "(same pitch) or --assume scale"
+        f"for a crop say where it lies ({option_text('origin_px')}), else use another bundle, or "
+        f"{option_text('assume', 'centre')} (same pitch) or {option_text('assume', 'scale')}"
     )
 
 
@@ -105,7 +106,7 @@ def _check_pitch(capture: Capture, pitch_um: float) -> None:
     if stated is not None and abs(stated / pitch_um - 1) > PITCH_TOLERANCE:
         raise ContractError(
             f"the capture states a pixel pitch of {stated:g} um, the bundle's sensor has "
-            f"{pitch_um:g} um; use another bundle or --assume scale"
+            f"{pitch_um:g} um; use another bundle or {option_text('assume', 'scale')}"
         )
 
 

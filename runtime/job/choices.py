@@ -8,11 +8,12 @@ from typing import Final
 
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Stage
+from camkit.caller import option_list, option_text
 from camkit.contracts import depth_weights
 from camkit.errors import ContractError
 from camkit.kinds import BAYER, find_kind
 from camkit.runtime.job.setup import DEVELOPMENT
-from camkit.runtime.options import Options, check_kind_options, flag_of, given_options
+from camkit.runtime.options import Options, check_kind_options, given_options
 from camkit.runtime.plan.decision import DEVELOP, Work
 from camkit.runtime.plan.ways import LEFT_OUT, offered_methods, ways_of
 from camkit.runtime.stage_finder import stage_module
@@ -49,7 +50,7 @@ def check_choices(bundle: Bundle | None, options: Options) -> None:
     given = [name for name in given_options(options) if name not in own]
     if foreign := [name for name in given if name not in known]:
         raise ContractError(
-            f"{', '.join(map(flag_of, foreign))} means nothing {where}: "
+            f"{option_list(foreign)} means nothing {where}: "
             f"{'nothing there' if bundle is None else 'no stage of it'} knows of that; leave it out"
         )
     if options.size is not None and bundle is not None:
@@ -92,6 +93,6 @@ def check_idle(bundle: Bundle | None, options: Options) -> None:
     idle = known_options(left_out) - known_options(others)
     if said := [name for name in given_options(options) if name in idle]:
         raise ContractError(
-            f"{', '.join(map(flag_of, said))} means nothing with --method {options.method}: what "
+            f"{option_list(said)} means nothing with {option_text('method', options.method)}: what "
             "knows of that is left out; leave it out too"
         )

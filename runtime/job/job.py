@@ -14,6 +14,7 @@ import numpy as np
 from camkit.bundle.plane import Plane
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import BayerSensor
+from camkit.caller import option_text
 from camkit.colorimetry import Matrix
 from camkit.contracts import CfaPattern, NoiseModel, shifted_cfa
 from camkit.errors import ContractError
@@ -170,7 +171,7 @@ class Job:
         if self.capture.contract not in wanted:
             raise ContractError(
                 f"bundle {bundle.manifest.name} takes {' or '.join(wanted)}, the capture is "
-                f"{self.capture.contract}; use another bundle or --bundle none"
+                f"{self.capture.contract}; use another bundle or {option_text('bundle', 'none')}"
             )
         if isinstance(bundle.manifest.sensor, BayerSensor):
             self._check_cfa(bundle.manifest.sensor.cfa)
@@ -191,7 +192,10 @@ class Job:
         if capture.bundle_name not in (None, name):
             told = f"the capture names bundle {capture.bundle_name}, not {name}"
             if not options.force_bundle:
-                raise ContractError(f"{told}; leave --bundle out, or say --force-bundle")
+                raise ContractError(
+                    f"{told}; leave {option_text('bundle')} out, or say "
+                    f"{option_text('force_bundle')}"
+                )
             self.notes.append(f"{told}: the blur of another lens is undone")
         elif capture.bundle_name is None and capture.camera and manifest.has_kernels:
             self.notes.append(
@@ -208,7 +212,8 @@ class Job:
         if found != expected:
             raise ContractError(
                 f"the mosaic begins with {found}, the sensor (CFA {cfa}) has {expected} at "
-                f"{origin}: the place of the crop (origin_px) or the pattern is wrong"
+                f"{origin}: the place of the crop ({option_text('origin_px')}) or the "
+                "pattern is wrong"
             )
 
     @cached_property

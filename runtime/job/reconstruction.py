@@ -13,6 +13,7 @@ import numpy as np
 
 from camkit.bundle.golden import IMAGE
 from camkit.bundle.stages import Network
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
@@ -281,6 +282,18 @@ class Reconstruction:
         self.record["estimate"] = estimate.to_json()
         return estimate
 
+    def planned(self) -> dict[str, Any]:
+        """Return what would be done, for people and programs, as plain JSON values."""
+        self.explain()
+        details = dict(self.record)
+        return {
+            "size": self.size,
+            "decisions": details.pop("decisions", []),
+            "estimate": details.pop("estimate", None),
+            "plan": details,
+            "warnings": list(self.warnings),
+        }
+
     def _decide(self) -> Plan | None:
         """Plan no more than the capture needs; without a bundle there is nothing to plan."""
         job, bundle = self.job, self._setup.bundle
@@ -293,7 +306,7 @@ class Reconstruction:
             if below is None:
                 raise ContractError(
                     f"bundle {bundle.manifest.name} has nothing to fall back to: its networks "
-                    "cannot be left out; say --on-unsafe warn"
+                    f"cannot be left out; say {option_text('on_unsafe', 'warn')}"
                 )
             options = replace(options, method=below.method)
         content = self._measure_content() if needs_content(options) else None

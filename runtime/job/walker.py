@@ -15,6 +15,7 @@ from camkit.bundle.chain import CAPTURE
 from camkit.bundle.plane import Plane
 from camkit.bundle.sensor import MOSAIC, RGB
 from camkit.bundle.stages import Stage
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.job.job import Job
 from camkit.runtime.job.stage_work import StageWork
@@ -80,7 +81,7 @@ class Walk:
         if first > cap or (spent > cap and not flexible):
             raise ContractError(
                 f"this takes about {max(spent, first) // 10**6} MB, the cap is "
-                f"{cap // 10**6} MB; raise --max-mem"
+                f"{cap // 10**6} MB; raise {option_text('max_mem_bytes')}"
             )
         for number, work in enumerate(flexible):
             assert work.fit is not None

@@ -11,12 +11,14 @@ References: Debevec, Malik 1997, eq. (3) (the sum, there over a hundred pixels w
 depend on the code alone).
 """
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from camkit.caller import option_text
 from camkit.errors import DecodeError
 from camkit.runtime.merging.response import FloatTable, Response, response_of, srgb_response
 
@@ -69,7 +71,21 @@ def disagreement(codes: Codes, times_s: NDArray[np.float64], response: Response)
     Returns:
         The median over unclipped samples; infinite where no pixel is unclipped twice.
     """
-    found = []
+    found = [np.abs(residual) for _, residual in residuals_codes(codes, times_s, response)]
+    every = np.concatenate(found)
+    return float(np.median(every)) if every.size else np.inf
+
+
+def residuals_codes(
+    codes: Codes, times_s: NDArray[np.float64], response: Response
+) -> Iterator[tuple[NDArray[np.intp], FloatTable]]:
+    """Yield for each channel the unclipped codes, and by how many codes a frame misses all.
+
+    Args:
+        codes: (frame, channel, pixel) uint8.
+        times_s: (frame,) exposure times.
+        response: The response that is judged.
+    """
     for channel in range(codes.shape[1]):
         own = codes[:, channel].astype(np.intp).T
         table = response.log_light[channel].astype(np.float64)
@@ -77,9 +93,7 @@ def disagreement(codes: Codes, times_s: NDArray[np.float64], response: Response)
         weights = trust * response.precision[channel].astype(np.float64)[own]
         residual = _residual(table, own, np.log(times_s), weights)
         slope = np.maximum(np.gradient(np.maximum(table, table[1])), _LEAST_STEP)
-        found.append(np.abs(residual / slope[own])[trust])
-    every = np.concatenate(found)
-    return float(np.median(every)) if every.size else np.inf
+        yield own[trust], (residual / slope[own])[trust]
 
 
 def _trusted(codes: NDArray[np.intp], clipped_from: int) -> NDArray[np.bool_]:
@@ -95,7 +109,8 @@ def _curve(codes: NDArray[np.intp], log_times: FloatTable, start: Response) -> F
     if pixels < LEAST_PIXELS or np.ptp(log_times) == 0:
         raise DecodeError(
             f"a response is estimated from {LEAST_PIXELS} pixels or more that two frames of "
-            f"different times hold unclipped; there are {pixels}: say --response srgb or linear"
+            f"different times hold unclipped; there are {pixels}: say "
+            f"{option_text('response', 'srgb')} or linear"
         )
     prior = start.log_light[0].astype(np.float64)
     prior[0] = prior[1] - np.log(2)

@@ -8,17 +8,20 @@ References: Robertson et al. 2003; Hasinoff, Durand, Freeman 2010, eq. (3) (nois
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray, NoiseModel, cfa_channels
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import SATURATION_SHARE, Capture
 from camkit.runtime.merging.average import Average, BoolArray, Exposed
 from camkit.runtime.merging.estimate import disagreement, estimate_response
+from camkit.runtime.merging.exposures import exposure_factors
+from camkit.runtime.merging.known_curves import known_curve
 from camkit.runtime.merging.response import Response, ResponseName, srgb_response
 from camkit.runtime.merging.survey import Frame, Survey, cropped, read_frame
 from camkit.runtime.signal.noise import fallback_noise, measure_noise
@@ -26,6 +29,10 @@ from camkit.runtime.signal.noise import fallback_noise, measure_noise
 BAND_ROWS: Final = 256
 _QUANTISATION: Final = 1 / 12
 _LEAST_VARIANCE: Final = 1e-14
+_LEAST_CERTAINTY: Final = 1e-3
+_EXPOSURE_ROUNDS: Final = 2
+_SAME_FACTOR: Final = 0.005
+_NOTED_FACTOR: Final = 0.02
 
 DarkRows = Callable[[Frame, int, int], tuple[FloatArray, BoolArray]]
 """Gives the dark light of rows of a frame, and where it hides what came from the scene."""
@@ -41,22 +48,23 @@ class Merged:
             its logarithm for coded ones; 0 where no frame was usable.
         response: What the codes were taken for.
         clipped_fraction: Share of samples that are clipped in every frame.
-        notes: What the user should know.
+        times_s: Exposure times of the frames, as the frames agree on them.
     """
 
     light: FloatArray
     precision: FloatArray
     response: ResponseName
     clipped_fraction: float
-    notes: tuple[str, ...] = ()
+    times_s: tuple[float, ...]
 
 
 def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Response | None, str]:
     """Give what codes stand for, None for linear samples, and a note where it was a choice.
 
     Without a wish, pictures of 8 bits are estimated and all others are linear, as captures are
-    elsewhere; the estimate gives way to sRGB where sRGB explains the frames better, or where too
-    little is unclipped in two of them.
+    elsewhere. The estimate gives way to a known curve that explains the frames to within the
+    rounding of their codes, and to sRGB where sRGB explains them better or too little is unclipped
+    in two of them.
 
     Raises:
         ContractError: If the frames cannot have that response.
@@ -64,16 +72,24 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
     """
     codes, coded = survey.codes, np.issubdtype(survey.like.samples.dtype, np.integer)
     if wanted in ("srgb", "estimate") and (survey.is_raw or not coded):
-        raise ContractError(f"RAW and float frames are linear; leave --response {wanted} out")
+        raise ContractError(
+            f"RAW and float frames are linear; leave {option_text('response', wanted)} out"
+        )
     if wanted == "estimate" and codes is None:
-        raise ContractError("a response is estimated from 8-bit pictures; say --response srgb")
+        raise ContractError(
+            f"a response is estimated from 8-bit pictures; say {option_text('response', 'srgb')}"
+        )
     if wanted == "linear" or (wanted is None and codes is None):
         return None, ""
     plain = srgb_response(int(survey.like.white_level) + 1)
     if wanted == "srgb" or codes is None:
         return plain, ""
+    known = known_curve(codes, survey.times_s)
+    if known is not None:
+        curve, name = known
+        return curve, f"{name} explains the frames to within the rounding of their codes"
     try:
-        found = estimate_response(codes, survey.times_s)
+        found = _estimated(codes, survey.times_s)
     except DecodeError:
         if wanted == "estimate":
             raise
@@ -81,7 +97,27 @@ def choose_response(survey: Survey, wanted: ResponseName | None) -> tuple[Respon
     misses = [disagreement(codes, survey.times_s, r) for r in (found, plain)]
     if wanted is None and misses[0] >= misses[1]:
         return plain, "sRGB explains the frames as well as an estimate: sRGB is taken"
-    return found, ""
+    return found, _exposure_note(survey, found)
+
+
+def _estimated(codes: NDArray[np.uint8], times_s: NDArray[np.float64]) -> Response:
+    """Return the response, with the exposures on which the frames agree under it."""
+    found = estimate_response(codes, times_s)
+    factors = np.ones(times_s.size)
+    for _ in range(_EXPOSURE_ROUNDS):
+        before, factors = factors, exposure_factors(codes, times_s, found)
+        if np.allclose(factors, before, rtol=_SAME_FACTOR):
+            break
+        found = estimate_response(codes, times_s * factors)
+    return replace(found, factors=() if (factors == 1).all() else tuple(factors.tolist()))
+
+
+def _exposure_note(survey: Survey, response: Response) -> str:
+    pairs = zip(survey.frames, response.factors, strict=False)
+    told = [f"{f.path.name} {x:.2f}" for f, x in pairs if abs(x - 1) > _NOTED_FACTOR]
+    if not told:
+        return ""
+    return f"frames differ from their stated times, by what all agree on: {', '.join(told)} times"
 
 
 def merge(survey: Survey, response: Response | None, dark: DarkRows | None = None) -> Merged:
@@ -97,7 +133,10 @@ def merge(survey: Survey, response: Response | None, dark: DarkRows | None = Non
     """
     average = Average.empty(survey.like.plane_shape)
     clipped_samples, noise = 0, None
-    for frame in survey.frames:
+    times_s = survey.times_s
+    if response is not None and response.factors:
+        times_s = times_s * response.factors
+    for frame, time_s in zip(survey.frames, times_s.tolist(), strict=True):
         capture = read_frame(frame.path, survey.mosaic)
         if capture.sha256 != frame.sha256:
             raise DecodeError(f"{frame.path.name} changed while it was read; merge again")
@@ -108,7 +147,7 @@ def merge(survey: Survey, response: Response | None, dark: DarkRows | None = Non
             # what files do not state is measured where there is most light
             noise = noise or frame.noise or measure_noise(capture)
             expose = _Linear(survey.like, frame, frame.noise or noise, dark)
-        share = frame.time_s / survey.frames[0].time_s
+        share = time_s / times_s[0]
         clipped_samples = 0
         for top in range(0, capture.height, BAND_ROWS):
             bottom = min(top + BAND_ROWS, capture.height)
@@ -124,6 +163,7 @@ def merge(survey: Survey, response: Response | None, dark: DarkRows | None = Non
         precision=average.precision,
         response="linear" if response is None else response.name,
         clipped_fraction=clipped_samples / light.size,
+        times_s=tuple(times_s.tolist()),
     )
 
 
@@ -144,13 +184,26 @@ class _Coded:
         """Give what rows say, exposed by a share of the longest time."""
         codes, tables = capture.samples[:, top:bottom], self._response
         clipped = codes >= tables.clipped_from
+        inside = _certainty(codes, tables.log_light.shape[1])
         value = np.stack([t[c] for t, c in zip(tables.log_light, codes, strict=True)])
         return Exposed(
             value=value - np.float32(np.log(share)),
-            precision=np.stack([t[c] for t, c in zip(tables.precision, codes, strict=True)]),
+            precision=inside
+            * np.stack([t[c] for t, c in zip(tables.precision, codes, strict=True)]),
             usable=~clipped & (codes > 0),
             clipped=clipped,
         )
+
+
+def _certainty(codes: NDArray[Any], count: int) -> FloatArray:
+    """Return (rows, w) how far the colours of a pixel are from both ends of their codes, 0..1.
+
+    A camera mixes its colours before it codes them: one that is clipped, or lost in the dark, makes
+    the others of its pixel doubtful too.
+    """
+    top = count - 1
+    far = np.minimum(codes, top - codes).mean(axis=0, dtype=np.float32) / np.float32(top / 2)
+    return np.maximum(far, np.float32(_LEAST_CERTAINTY))
 
 
 class _Linear:

@@ -39,12 +39,14 @@ class Response:
         log_light: (channel, code) natural logarithm of the light, 1.0 = white; -inf is no light.
         precision: (channel, code) one over the variance of that logarithm.
         clipped_from: The first code that is taken as clipped; code 0 is taken as black.
+        factors: By what the stated times of the frames are to be multiplied; empty for nothing.
     """
 
     name: ResponseName
     log_light: FloatArray
     precision: FloatArray
     clipped_from: int
+    factors: tuple[float, ...] = ()
 
 
 def response_of(name: ResponseName, log_light: FloatTable) -> Response:

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.capture import Capture
@@ -22,8 +23,9 @@ from camkit.runtime.merging.response import ResponseName
 from camkit.runtime.merging.survey import Frame, Survey
 from camkit.runtime.options import Options
 from camkit.runtime.output.origin import Origin
-from camkit.runtime.output.part_file import atomic_output
+from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.picture_writer import PictureFormat, PictureWriter
+from camkit.runtime.output.tone_mapping import ToneMappedPreview
 from camkit.runtime.output.writer import open_writer
 from camkit.runtime.pipeline import Pipeline
 
@@ -70,9 +72,14 @@ class Report:
 
 
 def merge_to_exr(
-    survey: Survey, out: Path, *, response: ResponseName | None, reference: str | None
+    survey: Survey,
+    out: Path,
+    *,
+    response: ResponseName | None = None,
+    reference: str | None = None,
+    preview: Path | None = None,
 ) -> Report:
-    """Merge a bracket and write it; the file appears complete or not at all.
+    """Merge a bracket and write it; the files appear complete or not at all.
 
     Args:
         survey: The bracket.
@@ -80,6 +87,7 @@ def merge_to_exr(
         response: What codes stand for; None chooses, see `choose_response`.
         reference: Name of the frame whose white is 1.0; None for the middle one by time, of two
             the shorter.
+        preview: A small tone-mapped JPEG to write too, see `tone_mapping`.
 
     Raises:
         ContractError: If response or reference do not fit the frames.
@@ -89,19 +97,21 @@ def merge_to_exr(
     frame = reference_frame(survey, reference)
     curve, note = choose_response(survey, response)
     merged = merge(survey, curve)
-    range_ = _Range()
+    seen = _Seen(None if preview is None else ToneMappedPreview(*survey.like.plane_shape[1:]))
     warnings: tuple[str, ...] = ()
-    with atomic_output(out) as part:
+    with atomic_outputs(out, *([] if preview is None else [preview])) as (part, *parts):
         if survey.is_raw:
-            warnings = _develop(part, survey, merged, frame, range_)
+            warnings = _develop(part, survey, merged, frame, seen)
         else:
-            _write_picture(part, survey, merged, frame, range_)
+            _write_picture(part, survey, merged, frame, seen)
+        if seen.preview is not None:
+            seen.preview.write(parts[0], color_stage(None), survey.like.orientation)
     return Report(
         frames=tuple(one.path.name for one in survey.frames),
         times_s=tuple(one.time_s for one in survey.frames),
         response=merged.response,
         reference=frame.path.name,
-        range_stops=range_.stops,
+        range_stops=seen.stops,
         clipped_fraction=merged.clipped_fraction,
         notes=tuple(dict.fromkeys((*survey.notes, *([note] if note else []), *warnings))),
     )
@@ -118,15 +128,14 @@ def reference_frame(survey: Survey, name: str | None) -> Frame:
     found = [frame for frame in survey.frames if name in (frame.path.name, str(frame.path))]
     if len(found) != 1:
         raise ContractError(
-            f"--reference must name one of the frames; {name!r} names {len(found)} of them"
+            f"{option_text('reference')} must name one of the frames; {name!r} names {len(found)} "
+            "of them"
         )
     return found[0]
 
 
-def _write_picture(
-    path: Path, survey: Survey, merged: Merged, frame: Frame, range_: "_Range"
-) -> None:
-    gain = np.float32(frame.time_s / survey.frames[0].time_s)
+def _write_picture(path: Path, survey: Survey, merged: Merged, frame: Frame, seen: "_Seen") -> None:
+    gain = np.float32(merged.times_s[survey.frames.index(frame)] / merged.times_s[0])
     light, like = merged.light, survey.like
     bands = (light[:, top : top + _ROWS] * gain for top in range(0, like.height, _ROWS))
     origin = Origin(
@@ -144,11 +153,11 @@ def _write_picture(
         origin=origin,
     )
     with open_writer(path, "exr", picture) as writer:
-        _write(writer, bands, range_)
+        _write(writer, bands, seen)
 
 
 def _develop(
-    path: Path, survey: Survey, merged: Merged, frame: Frame, range_: "_Range"
+    path: Path, survey: Survey, merged: Merged, frame: Frame, seen: "_Seen"
 ) -> tuple[str, ...]:
     """Develop light of a sensor; give the warnings."""
     longest_s, shortest_s = survey.frames[0].time_s, survey.frames[-1].time_s
@@ -179,13 +188,13 @@ def _develop(
         origin=work.origin,
     )
     with open_writer(path, "exr", picture) as writer:
-        _write(writer, work.bands(), range_)
+        _write(writer, work.bands(), seen)
     return work.warnings
 
 
-def _write(writer: PictureWriter, bands: Iterator[FloatArray], range_: "_Range") -> None:
+def _write(writer: PictureWriter, bands: Iterator[FloatArray], seen: "_Seen") -> None:
     for band in bands:
-        range_.add(band)
+        seen.add(band)
         writer.write(band)
 
 
@@ -194,14 +203,17 @@ def _stated(time_s: float) -> float | None:
     return time_s if 1e-7 <= time_s <= 1e6 else None
 
 
-class _Range:
-    """A histogram of the luminance over stops."""
+class _Seen:
+    """A histogram of the luminance over stops, and the preview."""
 
-    def __init__(self) -> None:
+    def __init__(self, preview: ToneMappedPreview | None) -> None:
+        self.preview = preview
         self._counts = np.zeros(_STOPS * _STEPS_PER_STOP, dtype=np.int64)
 
     def add(self, band: FloatArray) -> None:
-        """Count a (3, rows, w) band."""
+        """Take a (3, rows, w) band."""
+        if self.preview is not None:
+            self.preview.add(band)
         luminance = np.tensordot(_LUMINANCE, band, 1)
         stops = np.log2(luminance[luminance > 0])
         bins = ((stops + _STOPS / 2) * _STEPS_PER_STOP).astype(np.int64)

@@ -8,11 +8,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import NoiseModel
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.capture import Capture, MosaicOptions
@@ -99,15 +100,13 @@ def survey(
     _check_files(files, 1 if alike else 2)
     may_lack_time, is_timed = alike and len(files) == 1, True
     found: list[tuple[Frame, Capture, NDArray[np.uint8] | None]] = []
+    untimed: list[str] = []
     for number, path in enumerate(files):
         capture = read_frame(path, mosaic)
         told = capture.metadata.exposure_time_s or capture.exposure_time_s
         time_s = told if times_s is None else times_s[number]
-        if time_s is None and not may_lack_time:
-            raise ContractError(
-                f"{path.name} states no exposure time; say --times with one for each file"
-            )
         if time_s is None:
+            untimed.append(path.name)
             time_s, is_timed = _UNSTATED_S, False
         frame = Frame(
             path=path,
@@ -120,6 +119,8 @@ def survey(
         if found:
             check_alike(found[0][1], found[0][0].path, capture, path)
         found.append((frame, without_pixels(capture), _lattice(capture)))
+    if untimed and not may_lack_time:
+        _refuse_untimed(untimed, len(files))
     if times_s is None:
         _check_settings([(frame.path, capture) for frame, capture, _ in found])
     found.sort(key=lambda one: (-one[0].time_s, str(one[0].path)))
@@ -178,6 +179,16 @@ def _check_files(files: Sequence[Path], least: int) -> None:
         seen.add(path.resolve())
 
 
+def _refuse_untimed(names: Sequence[str], count: int) -> NoReturn:
+    which = names[0] if len(names) == 1 else f"{len(names)} of {count} frames"
+    listed = "" if len(names) == 1 else f" ({', '.join(names[:3])}{', ...' * (len(names) > 3)})"
+    state = "states" if len(names) == 1 else "state"
+    raise ContractError(
+        f"{which} {state} no exposure time{listed}; say {option_text('times_s')} with one for each "
+        "file"
+    )
+
+
 def _check_settings(frames: Sequence[tuple[Path, Capture]]) -> None:
     """Refuse times alone where aperture or sensitivity changed too."""
     for name, what in (("f_number", "f-number"), ("iso", "ISO")):
@@ -186,7 +197,8 @@ def _check_settings(frames: Sequence[tuple[Path, Capture]]) -> None:
         if len(values) > 1:
             raise ContractError(
                 f"frames differ in {what} ({', '.join(f'{v:g}' for v in sorted(values))}), so "
-                "their times do not tell their exposures; say --times with relative exposures"
+                f"their times do not tell their exposures; say {option_text('times_s')} with "
+                "relative exposures"
             )
 
 

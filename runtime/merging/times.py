@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.side_file import read_side_text
 
@@ -34,10 +35,10 @@ def stated_times(text: str, files: Sequence[Path], darks: Sequence[Path] = ()) -
         if len(seconds) != len(files) + len(darks):
             and_darks = f" and {len(darks)} dark frames" if darks else ""
             raise ContractError(
-                f"--times states {len(seconds)} times for {len(files)} files{and_darks}; state one "
-                "for each"
+                f"{option_text('times_s')} states {len(seconds)} times for {len(files)} "
+                f"files{and_darks}; state one for each"
             )
-        return tuple(_checked(s, "--times") for s in seconds if s is not None)
+        return tuple(_checked(s, option_text("times_s")) for s in seconds if s is not None)
     listed = _read_list(Path(text))
     missing = [path.name for path in (*files, *darks) if path.name not in listed]
     if missing:
@@ -50,8 +51,8 @@ def stated_times(text: str, files: Sequence[Path], darks: Sequence[Path] = ()) -
 def _read_list(path: Path) -> dict[str, float]:
     if not path.is_file():
         raise ContractError(
-            "--times takes seconds separated by commas, or a file with lines NAME SECONDS; "
-            f"got {str(path)!r}"
+            f"{option_text('times_s')} takes seconds separated by commas, or a file with lines "
+            f"NAME SECONDS; got {str(path)!r}"
         )
     try:
         text = read_side_text(path, "the list of times", most_bytes=MOST_LIST_BYTES)

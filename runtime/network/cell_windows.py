@@ -20,6 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
@@ -384,7 +385,7 @@ def _strip_cells(
     need = (cell + 2 * halo) * width * in_bytes + _padded_px(cell, 1, 1, halo) * per_px
     raise ContractError(
         f"{width}x{height} pixels with a halo of {halo} need at least {need / 2**20:.0f} MiB for "
-        f"one cell; got {limits.max_bytes / 2**20:.0f} MiB: raise --max-mem"
+        f"one cell; got {limits.max_bytes / 2**20:.0f} MiB: raise {option_text('max_mem_bytes')}"
     )
 
 

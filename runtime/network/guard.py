@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 
@@ -18,10 +19,6 @@ Bound = Callable[[float], tuple[float, float]]
 """The largest input of a tile -> least and largest output that is believed; grows with it."""
 
 _SPARSE: Final = 16
-_HINT: Final = (
-    "; say --on-unsafe fallback for what came before the network there, or --method for the whole "
-    "picture without it"
-)
 
 
 class TileGuard:
@@ -74,7 +71,7 @@ class TileGuard:
             return output
         tile = describe()
         if not self._fallback or self._stand_in is None:
-            hint = "" if self._stand_in is None else _HINT
+            hint = "" if self._stand_in is None else _hint()
             raise ContractError(f"the network gave {trouble} in {tile}{hint}")
         instead = given[self._stand_in]
         if not is_finite(instead):
@@ -84,6 +81,13 @@ class TileGuard:
             )
         self.replaced.append(f"{tile}: {trouble}")
         return instead
+
+
+def _hint() -> str:
+    return (
+        f"; say {option_text('on_unsafe', 'fallback')} for what came before the network there, or "
+        f"{option_text('method')} for the whole picture without it"
+    )
 
 
 def is_finite(planes: FloatArray) -> bool:

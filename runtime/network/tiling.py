@@ -23,6 +23,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
@@ -267,7 +268,7 @@ def _least_work(size: tuple[int, int], halo: int, limits: TileLimits) -> tuple[i
         raise ContractError(
             f"{size[1]}x{size[0]} pixels with a halo of {halo} need at least "
             f"{least / 2**20:.0f} MiB for one window; got {limits.max_bytes / 2**20:.0f} MiB: "
-            "raise --max-mem"
+            f"raise {option_text('max_mem_bytes')}"
         )
     return min(fitting, key=lambda window: (costs[window], window))
 

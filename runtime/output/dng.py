@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import CFA_PATTERNS, CfaPattern, FloatArray, NoiseModel, cfa_channels
 from camkit.errors import ContractError
 from camkit.runtime.metadata import Metadata
@@ -142,7 +143,7 @@ class DngFile:
         if math.prod(shape) * _BITS // 8 > MAX_BYTES:
             raise ContractError(
                 f"a DNG holds at most 4 GB; {shape[1]}x{shape[0]} pixels need more: "
-                "choose --format tiff or exr"
+                f"choose {option_text('format')} tiff or exr"
             )
         self._file = Path(path).open("wb")  # noqa: SIM115
         self._file.write(bytes(len(self._front((1, 1), 0))))

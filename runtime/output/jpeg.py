@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from PIL import Image
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.color import encode_uint8
@@ -60,7 +61,7 @@ class JpegWriter(PictureWriter):
         if max(width, height) > MAX_SIDE_PX:
             raise ContractError(
                 f"a JPEG has sides of at most {MAX_SIDE_PX} px; got {width}x{height}; "
-                "choose --format png or tiff"
+                f"choose {option_text('format')} png or tiff"
             )
         self._image = Image.new("RGB", (width, height))
         self._stored = 0

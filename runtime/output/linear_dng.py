@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.output.dng import DngTags, open_linear_dng
@@ -39,7 +40,9 @@ class LinearDngWriter(PictureWriter):
         """
         super().__init__(path, picture)
         if picture.color.space != "camera" or picture.orientation != 1:
-            raise ContractError("a DNG takes upright camera RGB; choose --color camera")
+            raise ContractError(
+                f"a DNG takes upright camera RGB; choose {option_text('color', 'camera')}"
+            )
         origin = picture.origin
         gains = origin.white_balance
         # one channel comes as three planes of grey

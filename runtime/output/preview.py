@@ -23,15 +23,18 @@ class Averages:
     Rows and columns beyond the last whole block count for none.
     """
 
-    def __init__(self, height: int, width: int, *, least_step: int = 1) -> None:
+    def __init__(
+        self, height: int, width: int, *, least_step: int = 1, longest_px: int = LONGEST_SIDE_PX
+    ) -> None:
         """Prepare for a picture.
 
         Args:
             height: Rows that will come.
             width: Their columns.
             least_step: Least side of the blocks, where the picture has such a side.
+            longest_px: Most rows and columns of the averages.
         """
-        step = max(least_step, math.ceil(max(height, width) / LONGEST_SIDE_PX))
+        step = max(least_step, math.ceil(max(height, width) / longest_px))
         self._step_y, self._step_x = min(step, height), min(step, width)
         self._columns = width // self._step_x
         self._waiting: NDArray[Any] | None = None
@@ -47,7 +50,7 @@ class Averages:
         self._waiting = rows[:, count * self._step_y :].copy()
 
     def planes(self) -> FloatArray:
-        """Give (c, h, w) float32 of what has come, at most `LONGEST_SIDE_PX` each way."""
+        """Give (c, h, w) float32 of what has come, at most `longest_px` each way."""
         return np.concatenate(self._made, axis=1)
 
     def _shrunk(self, plane: NDArray[Any], rows: int) -> FloatArray:

@@ -2,13 +2,20 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from camkit.bundle.golden import IMAGE
 from camkit.errors import ContractError
 from camkit.runtime.output.picture_writer import UPRIGHT, PictureFormat, PictureWriter
 
-SUFFIXES: Final = {"exr": "exr", "tiff": "tif", "png": "png", "jpeg": "jpg", "dng": "dng"}
+FileFormat = Literal["exr", "tiff", "png", "jpeg", "dng"]
+SUFFIXES: Final[dict[FileFormat, str]] = {
+    "exr": "exr",
+    "tiff": "tif",
+    "png": "png",
+    "jpeg": "jpg",
+    "dng": "dng",
+}
 Open = Callable[[Path, PictureFormat], PictureWriter]
 
 

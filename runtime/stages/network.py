@@ -10,6 +10,7 @@ from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.light_bound import BRIGHT
 from camkit.bundle.light_bound import CELL_PX as LIGHT_CELL_PX
 from camkit.bundle.stages import Network
+from camkit.caller import option_text
 from camkit.contracts import FloatArray, NoiseModel
 from camkit.errors import ContractError
 from camkit.runtime.color import rec709_of_planes
@@ -56,10 +57,13 @@ OPTIONS: Final = (
 )
 NOTED_FRACTION: Final = 0.01
 """Of the picture; a network that moves much light in more of it is worth a note."""
-_CAUSES: Final = (
-    "Usual causes: the capture is of another camera or distance, or its black level or white "
-    "balance is wrong; --method wiener shows the picture without the network"
-)
+
+
+def _causes() -> str:
+    return (
+        "Usual causes: the capture is of another camera or distance, or its black level or white "
+        f"balance is wrong; {option_text('method', 'wiener')} shows the picture without the network"
+    )
 
 
 def prepare(entry: Network, job: Job) -> StageWork:
@@ -219,8 +223,9 @@ class _NetworkStage:
             f"the filter by more than {FAR:.0%}, which noise and lens errors do not explain"
         )
         if keeper.bound is not None:
-            return (f"{moved}; the filter's brightness was kept there. {_CAUSES}",)
-        return (f"{moved}; --laws enforce keeps the filter's brightness there. {_CAUSES}",)
+            return (f"{moved}; the filter's brightness was kept there. {_causes()}",)
+        kept = f"{option_text('laws', 'enforce')} keeps the filter's brightness there"
+        return (f"{moved}; {kept}. {_causes()}",)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
         """Give the outputs of the network."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from camkit.bundle.manifest import Manifest
 from camkit.bundle.reader import Bundle
 from camkit.bundle.stages import Wiener
+from camkit.caller import option_text
 from camkit.contracts import depth_name
 from camkit.errors import ContractError
 from camkit.runtime.bank.baselines import TUNED_ON, method_numbers, restoration_bank
@@ -86,7 +87,8 @@ def check(entry: Wiener, manifest: Manifest, max_bytes: int) -> None:
     if least > max_bytes:
         raise ContractError(
             f"the Wiener bank of {manifest.name} has blocks of {entry.block_px} px, which take "
-            f"{least // 10**6} MB; got {max_bytes // 10**6} MB: raise --max-mem"
+            f"{least // 10**6} MB; got {max_bytes // 10**6} MB: raise "
+            f"{option_text('max_mem_bytes')}"
         )
 
 

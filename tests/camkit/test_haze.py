@@ -62,7 +62,7 @@ FOREIGN: dict[str, tuple[Callable[[FrozenPsf], FrozenPsf], str]] = {
     "depths": (lambda p: replace(p, depths_mm=np.array([500.0])), "depths_mm"),
     "wavelengths": (lambda p: replace(p, wavelengths_um=p.wavelengths_um + 0.01), "wavelengths_um"),
     "pixels": (lambda p: replace(p, pixel_pitch_um=5.0), "of pixels of 6.0 um"),
-    "a moved sensor": (_moved, "--focus-um"),
+    "a moved sensor": (_moved, "focus_um"),
 }
 
 

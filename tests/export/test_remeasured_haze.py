@@ -26,7 +26,7 @@ CENTRE = (50.0, 30.0)
 
 def test_kernels_of_another_lens_are_refused_beside_a_haze(tmp_path: Path) -> None:
     bundle, out = write_hazy_bundle(tmp_path), tmp_path / "new.camkit"
-    with pytest.raises(DecodeError, match="haze of tiny belongs to its kernels; leave --psf out"):
+    with pytest.raises(DecodeError, match="haze of tiny belongs to its kernels; leave psf out"):
         remeasured(bundle, Measured(psf=tiny_psf()), out)
     assert not out.exists()
 

@@ -109,7 +109,7 @@ def test_only_what_lies_outside_is_found_and_the_ends_belong_to_the_range() -> N
 def test_the_verdict_follows_the_choice() -> None:
     assert verdict((), "duet", "fail") is None
     for choice, words in (
-        ("warn", "--on-unsafe fallback"),
+        ("warn", 'on_unsafe="fallback"'),
         ("fallback", "what came before the network is given"),
     ):
         text = verdict(("it is dark",), "duet", choice)  # type: ignore[arg-type]

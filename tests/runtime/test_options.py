@@ -10,8 +10,8 @@ from camkit.runtime.options import Options, parse_memory
     ("choice", "message"),
     [
         ({"quality": "good"}, "exact, best, adaptive, draft"),
-        ({"max_seconds": 0.0}, "seconds must be > 0"),
-        ({"max_error_db": -1.0}, "error in dB must be > 0"),
+        ({"max_seconds": 0.0}, "max_seconds must be > 0"),
+        ({"max_error_db": -1.0}, "max_error_db must be > 0"),
         ({"on_unsafe": "ignore"}, "warn, fallback, fail"),
         ({"dtype": "bf16"}, "fp32, fp16"),
         ({"provider": "tpu"}, "cpu, cuda"),

@@ -282,7 +282,7 @@ def test_a_depth_without_kernels_is_refused_before_any_work(bundle: Path, deep: 
         Pipeline(deep, Options(depth_m=3.0))
     with pytest.raises(ContractError, match="the one depth infinity; got 3 m"):
         load(bundle, depth_m=3.0)
-    with pytest.raises(ContractError, match="--depth-m means nothing without a bundle"):
+    with pytest.raises(ContractError, match="depth_m means nothing without a bundle"):
         load(None, depth_m=3.0)
 
 

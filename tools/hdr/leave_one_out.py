@@ -120,7 +120,7 @@ def by_camkit(response: ResponseName) -> Predict:
             if curve is None:
                 raise SystemExit(f"{response} is no curve")
             merged = merge(bracket, curve)
-        light = merged.light.astype(np.float64) * (time_s / times_s.max())
+        light = merged.light.astype(np.float64) * (time_s / merged.times_s[0])
         return _through(light[::-1].transpose(1, 2, 0), np.exp(curve.log_light[::-1]))
 
     return predict

@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
+from camkit.cli.exit_code import ExitCode
 from camkit.cli.say import say
-from camkit.errors import ContractError
+from camkit.errors import CamkitError, ContractError
 
 if TYPE_CHECKING:
     from camkit.runtime.merging.response import ResponseName
+    from camkit.runtime.merging.result import Report
 
 Times = Annotated[
     str | None,
     typer.Option(
         help="Exposure times: seconds separated by commas in the order of FILES, or a file with "
-        "lines NAME SECONDS; default: what the files state."
+        "lines NAME SECONDS, which may lie in each folder; default: what the files state."
     ),
 ]
 MosaicCfa = Annotated[
@@ -32,8 +34,13 @@ WhiteLevel = Annotated[
 
 
 def merge(
-    files: Annotated[list[Path], typer.Argument(help="The frames: RAW, or pictures.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The EXR to write.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="The frames: RAW, or pictures; or folders of them, a bracket each."),
+    ],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="The EXR to write; of several brackets a folder.")
+    ],
     times: Times = None,
     response: Annotated[
         str | None,
@@ -46,6 +53,10 @@ def merge(
         str | None,
         typer.Option(help="Name of the frame whose white is 1.0; default: the middle exposure."),
     ] = None,
+    preview: Annotated[
+        bool,
+        typer.Option("--preview", help="Also a small tone-mapped OUT.preview.jpg (Drago 2003)."),
+    ] = False,
     mosaic: MosaicCfa = None,
     black_level: BlackLevel = None,
     white_level: WhiteLevel = None,
@@ -54,28 +65,48 @@ def merge(
     _debug: Debug = False,
 ) -> None:
     """Merge frames of different exposure, each sample weighted by its noise, to a linear EXR."""
-    if out.suffix.lower() != ".exr":
-        raise ContractError(f"a merged picture is an EXR; expected a name in .exr, got {out}")
-    if out.exists() and not overwrite:
-        raise ContractError(f"{out} exists; say --overwrite or another name")
     from camkit.cli.use.mosaic import mosaic_options
+    from camkit.runtime.merging.brackets import find_brackets, merged_paths
     from camkit.runtime.merging.result import merge_to_exr
     from camkit.runtime.merging.survey import survey
-    from camkit.runtime.merging.times import stated_times
+    from camkit.runtime.output.tone_mapping import preview_path
 
     chosen = _response(response)
     said = mosaic_options(mosaic, black_level, white_level)
-    bracket = survey(files, None if times is None else stated_times(times, files), mosaic=said)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    report = merge_to_exr(bracket, out, response=chosen, reference=reference)
+    brackets = find_brackets(files)
+    outs = merged_paths(brackets, out)
+    previews = [preview_path(path) if preview else None for path in outs]
+    for path in (*outs, *filter(None, previews)):
+        if path.exists() and not overwrite:
+            raise ContractError(f"{path} exists; say --overwrite or another name")
+    failed = False
+    for bracket, path, shown in zip(brackets, outs, previews, strict=True):
+        try:
+            found = survey(bracket.files, bracket.times_s(times), mosaic=said)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            report = merge_to_exr(found, path, response=chosen, reference=reference, preview=shown)
+        except (CamkitError, OSError) as error:
+            if len(brackets) == 1:
+                raise
+            say(f"camkit: {bracket.folder}: {error}", err=True)
+            failed = True
+            continue
+        _print(report, path, shown, json_=json_)
+    if failed:
+        raise typer.Exit(ExitCode.INPUT_FAILED)
+
+
+def _print(report: "Report", out: Path, preview: Path | None, *, json_: bool) -> None:
     if json_:
-        say(json.dumps({**report.to_json(), "out": str(out)}))
+        shown = {} if preview is None else {"preview": str(preview)}
+        say(json.dumps({**report.to_json(), "out": str(out), **shown}))
         return
     for note in report.notes:
         say(f"note: {note}", err=True)
+    beside = "" if preview is None else f", {preview}"
     say(
-        f"{out}: {len(report.frames)} frames, {report.times_s[-1]:g} to {report.times_s[0]:g} s, "
-        f"response {report.response}, {report.range_stops:.1f} stops, "
+        f"{out}{beside}: {len(report.frames)} frames, {report.times_s[-1]:g} to "
+        f"{report.times_s[0]:g} s, response {report.response}, {report.range_stops:.1f} stops, "
         f"{report.clipped_fraction:.4%} clipped in all; 1.0 is the white of {report.reference}"
     )
 

@@ -78,19 +78,10 @@ def _planned(
         raise ContractError(task.refusal)
     pipeline = pipelines.get(task.bundle, task.source)
     if pipeline.maker is not None:
-        return {"status": "planned", "bundle": task.bundle, **pipeline.plan(task.source)}
-    work = begin(pipeline, pipeline.read(task.source, headerless), write)
-    work.explain()
-    details = dict(work.record)
-    return {
-        "status": "planned",
-        "bundle": task.bundle,
-        "size": work.size,
-        "decisions": details.pop("decisions", []),
-        "estimate": details.pop("estimate", None),
-        "plan": details,
-        "warnings": list(work.warnings),
-    }
+        planned = pipeline.plan(task.source)
+    else:
+        planned = begin(pipeline, pipeline.read(task.source, headerless), write).planned()
+    return {"status": "planned", "bundle": task.bundle, **planned}
 
 
 def plan_lines(facts: dict[str, Any]) -> list[str]:

@@ -38,6 +38,10 @@ def process(
         str | None,
         typer.Option("--format", help="exr, tiff, png, jpeg (jpg) or dng. Default: exr."),
     ] = None,
+    preview: Annotated[
+        bool,
+        typer.Option("--preview", help="Also a small tone-mapped NAME.preview.jpg (Drago 2003)."),
+    ] = False,
     jpeg_quality: Annotated[
         int | None, typer.Option(help="With --format jpeg: 1..100. Default: 92.")
     ] = None,
@@ -150,6 +154,7 @@ def process(
         out_dir=out_dir,
         keep_folders=keep_folders,
         format=format_,  # type: ignore[arg-type]
+        preview=preview,
         linear=linear,
         jpeg_quality=jpeg_quality,
         strip_metadata=strip_metadata,

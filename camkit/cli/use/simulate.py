@@ -65,7 +65,11 @@ def simulate(
         Path | None, typer.Option(help="The camera body (TOML), whose focus the light takes.")
     ] = None,
     size_px: Annotated[
-        str | None, typer.Option(help="W,H of a scene of a seed; default: the sensor.")
+        str | None,
+        typer.Option(
+            help="W,H of the scene: drawn so large, or cut from the middle of a picture; default: "
+            "the sensor, or the whole picture."
+        ),
     ] = None,
     truth: Annotated[
         Path | None, typer.Option(help="EXR to write beside it: what nothing lost would give.")
@@ -129,7 +133,7 @@ def simulate(
         focus_um=_focus_um(unit, opened),
         workers=available_threads(None),
     )
-    drawn = _scene(scene, (size[0] + 2 * surround_px, size[1] + 2 * surround_px))
+    drawn = _scene(scene, size, surround_px, is_cut=size_px is not None)
     drawn, saturation = _exposed(drawn, sensor, options, saturate)
     simulation = part.simulate(drawn, opened, options)
     shown = None if truth is None else ideal_picture(simulation, opened)
@@ -245,11 +249,30 @@ def _focus_um(path: Path | None, bundle: "Bundle") -> float:
     return unit.focus_um
 
 
-def _scene(scene: str, size_px: tuple[int, int]):  # type: ignore[no-untyped-def]  # numpy stays lazy
+def _scene(scene: str, size_px: tuple[int, int], surround_px: int, *, is_cut: bool) -> "FloatArray":
+    """Draw or read a scene with its surround.
+
+    Raises:
+        ContractError: If a picture is smaller than what is to be cut from it.
+    """
     from camkit.scenes import is_scene_name, named_scene
 
+    width, height = (side + 2 * surround_px for side in size_px)
+    if min(size_px) < 1:
+        raise ContractError(f"--size-px takes two numbers >= 1; got {size_px[0]},{size_px[1]}")
     if is_scene_name(scene):
-        return named_scene(scene, size_px[1], size_px[0])
+        return named_scene(scene, height, width)
     from camkit.runtime.files.picture import read_light
 
-    return read_light(Path(scene))
+    light = read_light(Path(scene))
+    if not is_cut:
+        return light
+    rows, columns = light.shape[-2:]
+    if width > columns or height > rows:
+        ring = f" with a ring of {surround_px} px" if surround_px else ""
+        raise ContractError(
+            f"{scene} has {columns}x{rows} pixels; --size-px {size_px[0]},{size_px[1]}{ring} needs "
+            f"{width}x{height}: take a smaller size, or leave it out"
+        )
+    top, left = (rows - height) // 2, (columns - width) // 2
+    return light[:, top : top + height, left : left + width]

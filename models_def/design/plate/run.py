@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import torch
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.design.plate.loop import Moment, PlateLoop
 from camkit.models_def.design.plate.maps import begin_map
@@ -63,7 +64,8 @@ class PlateRun:
             there = [path for path in (self.checkpoint, options.out) if path.exists()]
             if there:
                 raise ContractError(
-                    f"{there[0]} is there already: give --resume to go on or --overwrite"
+                    f"{there[0]} is there already: give {option_text('resume')} to go on or "
+                    f"{option_text('overwrite')}"
                 )
         torch.set_num_threads(options.threads)
         self.digest = plate_recipe_digest(recipe)
@@ -137,8 +139,9 @@ class PlateRun:
             raise ContractError(f"{self.checkpoint} is no checkpoint of a plate's design")
         if table["digest"] != self.digest:
             raise ContractError(
-                f"{self.checkpoint} belongs to another recipe, or to other --steps or --seed; say "
-                "the same again, or give --overwrite or another -o"
+                f"{self.checkpoint} belongs to another recipe, or to other {option_text('steps')} "
+                f"or {option_text('seed')}; say the same again, or give {option_text('overwrite')} "
+                "or another -o"
             )
         self._spent_s, self._spent_cpu_s = table["spent_s"], table["spent_cpu_s"]
         self.loop.load(table)

@@ -21,6 +21,7 @@ from torch import Tensor
 
 from camkit.bundle.stages import Together
 from camkit.bundle.stages.together import Spread
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.kinds.bayer.frames.samples import draw_developed
 from camkit.models_def.kinds.bayer.frames.tiles import Frames
@@ -177,7 +178,7 @@ def fit_bank(
     if len(cases) < 2 * HELD_OUT:
         raise ContractError(
             f"{len(cases)} of {samples} samples are without clipped light, too few to fit a bank "
-            "to; raise --samples"
+            f"to; raise {option_text('samples')}"
         )
     tell(f"{len(cases)} samples, {samples - len(cases)} left out for clipped light")
     errors = transfer_errors(bank, recipe)
@@ -336,7 +337,7 @@ def _rounded(first: Together, values: Tensor) -> Together:
         )
     except ValidationError as error:
         raise ContractError(
-            "the descent did not find numbers for the bank; raise --samples"
+            f"the descent did not find numbers for the bank; raise {option_text('samples')}"
         ) from error
 
 

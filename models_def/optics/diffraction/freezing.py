@@ -17,6 +17,7 @@ import torch
 from camkit.bundle.psf_file import write_psf
 from camkit.bundle.sensor import ColorSensor
 from camkit.bundle.streak_file import write_streaks
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.models_def.optics.diffraction.plate_optics import PlateOptics
@@ -126,8 +127,8 @@ def _freeze_streaks(
     least = grid.energy if grid.least_energy is None else grid.least_energy
     if kept < least:
         raise ContractError(
-            f"core, arms and haze hold {kept:.4f} of the light, wanted {least}; raise max_side_px "
-            "or lower the energy"
+            f"core, arms and haze hold {kept:.4f} of the light, wanted {least}; raise "
+            f"{option_text('max_side_px')} or lower the energy"
         )
     write_streaks(path, streaks)
     return PlateReport(

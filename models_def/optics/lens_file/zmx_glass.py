@@ -11,6 +11,7 @@ from typing import Final
 
 import torch
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.glass.catalogue import (
     GlassCatalogue,
@@ -87,7 +88,9 @@ def find_zmx_glass(name: str, order: GlassOrder) -> Glass:
     try:
         return find_glass(name)
     except ContractError as error:
-        raise ContractError(f"{error}; or give its catalogue with --glass FILE.agf") from error
+        raise ContractError(
+            f"{error}; or give its catalogue, a file in .agf, with {option_text('glass')}"
+        ) from error
 
 
 def _in_capitals(catalogue: GlassCatalogue, name: str) -> Glass | None:

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.optics.paraxial import paraxial_data
 from camkit.models_def.optics.prescription import VARY, Lens, Surface, Vary
@@ -59,8 +60,8 @@ def free_lens(lens: Lens, vary: Sequence[Sequence[Vary]]) -> FreeLens:
     """
     if len(vary) != len(lens.surfaces) or not any(vary):
         raise ContractError(
-            "nothing of the lens is free: name numbers by `vary` of a surface, or --vary "
-            f"{','.join(VARY)}"
+            "nothing of the lens is free: name numbers by `vary` of a surface, or "
+            f"{option_text('vary')} {','.join(VARY)}"
         )
     solved = _solved_surface(lens, vary)
     variables: list[Variable] = []

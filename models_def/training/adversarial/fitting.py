@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from camkit.caller import option_text
 from camkit.colorimetry import rec709_from_camera
 from camkit.errors import ContractError
 from camkit.models_def.networks.vgg import file_digest
@@ -46,7 +47,9 @@ def picture_fitting(
     if matrix is None:
         raise ContractError(f"the loss {schedule.loss} needs sensor.color_matrix, to see pictures")
     if request.pairs is not None and read_pairs is None:
-        raise ContractError("this kind of camera does not train on real pairs: leave --pairs away")
+        raise ContractError(
+            f"this kind of camera does not train on real pairs: leave {option_text('pairs')} away"
+        )
     features = Relu32(request.vgg) if schedule.content.looks else None
     sharp = None if request.sharp is None else SharpCrops(request.sharp)
     to_rec709 = torch.from_numpy(rec709_from_camera(np.array(matrix)))
@@ -71,10 +74,13 @@ def picture_fitting(
 def _check_files(request: FitRequest, schedule: ScheduleRecipe) -> None:
     if request.vgg is not None and not schedule.content.looks:
         raise ContractError(
-            "schedule.content looks at no features (gram_weight, feature_weight): leave --vgg away"
+            "schedule.content looks at no features (gram_weight, feature_weight): leave "
+            f"{option_text('vgg')} away"
         )
     if request.sharp is not None and schedule.loss != "adversarial":
-        raise ContractError(f"the loss {schedule.loss} has no critic: leave --sharp away")
+        raise ContractError(
+            f"the loss {schedule.loss} has no critic: leave {option_text('sharp')} away"
+        )
 
 
 def _credit(request: FitRequest, schedule: ScheduleRecipe) -> str:

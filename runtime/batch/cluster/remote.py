@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from camkit.caller import Language, option_text, speaking_here
 from camkit.runtime.batch.making import Common, Pipelines, try_task
 from camkit.runtime.batch.tasks import NO_BUNDLE, Task
 from camkit.runtime.capture import MosaicOptions
@@ -43,6 +44,7 @@ class Needs:
         file_bytes: Memory that one file may take.
         token: A file beside the pictures, made for this run.
         sources: Some captures of the run.
+        language: Of the caller, in whose words a worker says why it does not fit.
     """
 
     run: str
@@ -50,6 +52,7 @@ class Needs:
     file_bytes: int
     token: Path
     sources: tuple[Path, ...]
+    language: Language = "python"
 
     @property
     def flag(self) -> str:
@@ -70,6 +73,7 @@ class Order:
         topic: Where progress is told; None for nowhere.
         number: Of the task in the run.
         file_bytes: Memory that it may take.
+        language: Of the caller, in whose words messages come back.
     """
 
     task: Task
@@ -80,6 +84,7 @@ class Order:
     topic: str | None
     number: int
     file_bytes: int
+    language: Language = "python"
 
 
 def file_bytes(options: Options) -> int:
@@ -90,7 +95,8 @@ def file_bytes(options: Options) -> int:
 def look(needs: Needs, dask_worker: "Worker") -> tuple[str | None, tuple[str, ...]]:
     """Say why this worker cannot serve a run (None if it can), and which bundles it lacks."""
     lacks = tuple(sha for sha in needs.bundles if not _bundle_path(sha, dask_worker).is_file())
-    return _unfit(needs, dask_worker), lacks
+    with speaking_here(needs.language):
+        return _unfit(needs, dask_worker), lacks
 
 
 def _unfit(needs: Needs, dask_worker: "Worker") -> str | None:
@@ -98,7 +104,7 @@ def _unfit(needs: Needs, dask_worker: "Worker") -> str | None:
     if held < needs.file_bytes:
         return (
             f"has {held // 10**6} MB for files, one may take {needs.file_bytes // 10**6} MB: "
-            "give it more or lower --max-mem"
+            f"give it more or lower {option_text('max_mem_bytes')}"
         )
     if not needs.token.is_file():
         return f"does not see {folder}, where the pictures go"
@@ -169,7 +175,8 @@ def make(order: Order) -> FileResult | None:
             progress=None if order.topic is None else _teller(worker, order.topic, order.number),
             cancel=lambda: _is_given_up(worker, key),
         )
-        return try_task(_local(order.task, worker), _pipelines_of(order, worker), common)
+        with speaking_here(order.language):
+            return try_task(_local(order.task, worker), _pipelines_of(order, worker), common)
     finally:
         trim_heap(OWN_BYTES + order.file_bytes // 2)
         with _lock:

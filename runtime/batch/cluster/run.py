@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from camkit.bundle.reader import find_bundle, open_bundle
+from camkit.caller import language, option_text
 from camkit.errors import CamkitError, ContractError
 from camkit.runtime.batch.cluster import remote
 from camkit.runtime.batch.cluster.connection import NoAnswer
@@ -153,6 +154,7 @@ class _Run:
             file_bytes=self._bytes,
             token=token,
             sources=tuple(self._tasks[n].source.absolute() for n in list(self._waiting)[:SAMPLE]),
+            language=language(),
         )
         self._crew = Crew(needs, bundles, self._wishes.notice)
         try:
@@ -261,6 +263,7 @@ class _Run:
             topic=self._topic,
             number=number,
             file_bytes=self._bytes,
+            language=language(),
         )
         try:
             future = self._link.client.submit(
@@ -331,7 +334,7 @@ class _Run:
             self._fail(
                 number,
                 f"{task.target} is claimed by another process, or by a worker that was lost; run "
-                "again with --resume",
+                f"again with {option_text('resume')}",
             )
         else:
             pipeline = self._wishes.pipelines.get(task.bundle, task.source)
@@ -449,7 +452,7 @@ class _Run:
             left = len(self._waiting) + len(self._later) + len(self._alone) + len(self._open)
             raise CamkitError(
                 f"neither scheduler nor workers came back within {WAIT_S:.0f} s; {left} file(s) "
-                "are left: run again with --resume"
+                f"are left: run again with {option_text('resume')}"
             )
 
     def _give_up(self) -> None:

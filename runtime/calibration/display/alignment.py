@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 
@@ -103,7 +104,7 @@ def align(patch: Patch, shown: FloatArray, start: FloatGrid) -> Aligned:
     if not correlation >= LEAST_CORRELATION:
         raise DecodeError(
             f"capture and picture correlate by {correlation:.2f} where the marks put them, "
-            f"{LEAST_CORRELATION} is needed: are captures and --targets of one set?"
+            f"{LEAST_CORRELATION} is needed: are captures and {option_text('targets')} of one set?"
         )
     return Aligned(to_picture=matrix, correlation=correlation, model=model, inside=inside)
 

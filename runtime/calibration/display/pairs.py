@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.calibration.display.alignment import Patch, align, map_places
@@ -65,7 +66,9 @@ class Given:
 
     def __post_init__(self) -> None:
         if not 0 < self.most_residual_px < np.inf:
-            raise ContractError(f"--most-residual-px must be > 0; got {self.most_residual_px:g}")
+            raise ContractError(
+                f"{option_text('most_residual_px')} must be > 0; got {self.most_residual_px:g}"
+            )
 
     def shown(self, target: Target) -> FloatArray:
         """Give (3, h, w) light of what a picture's target shows, in its place.
@@ -249,8 +252,8 @@ def _pair(one: Sorted, given: Given) -> tuple[Pair, Capture]:
     if not residual <= given.most_residual_px:
         raise DecodeError(
             f"{one.path.name}: the picture of {target.file} lies on it to {residual:.2f} px RMS, "
-            f"{given.most_residual_px:g} is allowed (--most-residual-px): is the geometry that of "
-            "this camera, lens and focus, and the display flat?"
+            f"{given.most_residual_px:g} is allowed ({option_text('most_residual_px')}): is the "
+            "geometry that of this camera, lens and focus, and the display flat?"
         )
     pair = Pair(
         path=one.path,

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import DecodeError
 from camkit.runtime.calibration.display.camera_file import Lens
 from camkit.runtime.calibration.display.marks import SeenMarks, find_marks
@@ -48,7 +49,7 @@ def sort_view(view: View, lens: Lens, targets: Targets) -> Sorted:
     if target is None:
         raise DecodeError(
             f"the marks of {view.path.name} say {found.number}, which none of the targets has; "
-            "captures and --targets are of two sets"
+            f"captures and {option_text('targets')} are of two sets"
         )
     return Sorted(path=view.path, target=target, to_screen=_to_screen(found, view, lens, targets))
 

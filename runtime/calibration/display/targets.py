@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.colorimetry import encode_srgb
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, DecodeError
@@ -141,7 +142,7 @@ class Targets:
             table = read_side_toml(path, "the list of targets")
         except ContractError as error:
             raise DecodeError(
-                f"{error}; --targets is a folder that camkit calibrate targets wrote"
+                f"{error}; {option_text('targets')} is a folder that camkit calibrate targets wrote"
             ) from error
         try:
             width, height = table["screen_px"]
@@ -266,7 +267,7 @@ def levels_of_steps(text: str) -> tuple[int, ...]:
         levels = tuple(int(part) for part in text.split(","))
     except ValueError:
         raise ContractError(
-            f"--levels takes whole numbers separated by commas; got {text!r}"
+            f"{option_text('levels')} takes whole numbers separated by commas; got {text!r}"
         ) from None
     if not all(0 <= level <= TOP for level in levels) or len(set(levels)) < len(levels):
         raise ContractError(f"levels are different numbers of 0..{TOP}; got {text!r}")

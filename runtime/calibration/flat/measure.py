@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.flat.picture import FlatPicture, check_one_camera, read_flat
 from camkit.runtime.calibration.flat.pose import Pose, orientation_turn_deg, poses_of
@@ -117,7 +118,7 @@ def measure_flat(
         DecodeError: If a picture cannot be read or used.
     """
     if pixel_pitch_um is not None and not 0 < pixel_pitch_um < math.inf:
-        raise ContractError(f"--pixel-pitch-um must be > 0; got {pixel_pitch_um:g}")
+        raise ContractError(f"{option_text('pixel_pitch_um')} must be > 0; got {pixel_pitch_um:g}")
     if len({path.resolve() for path in files}) < len(files):
         raise ContractError("a picture is given twice; give every one once")
     poses_of(shifts, turns, [0.0] * len(files))  # refuses what is wrong before any work
@@ -128,7 +129,9 @@ def measure_flat(
     like = pictures[0].like
     pitch_um = pixel_pitch_um or like.pixel_pitch_um
     if pitch_um is None:
-        raise ContractError("the pictures state no pixel pitch; say --pixel-pitch-um")
+        raise ContractError(
+            f"the pictures state no pixel pitch; say {option_text('pixel_pitch_um')}"
+        )
     radius_px = math.hypot(like.width, like.height) / 2
     views = _views(pictures, poses, radius_px)
     parts = separate(views)

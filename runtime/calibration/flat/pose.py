@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 
 FloatGrid = NDArray[np.float64]
@@ -69,11 +70,11 @@ def poses_of(
         ContractError: If there is not one for each picture, or one is no pair of numbers.
     """
     count = len(told)
-    for option, said in (("--shift-px", shifts), ("--turn-deg", turns)):
+    for option, said in (("shift_px", shifts), ("turn_deg", turns)):
         if said and len(said) != count:
             raise ContractError(
-                f"{option} is said {len(said)} times for {count} pictures; say it once for each, "
-                "in their order"
+                f"{option_text(option)} is said {len(said)} times for {count} pictures; say it "
+                "once for each, in their order"
             )
     return [
         Pose(shift_px=_pair(shift), turn_rad=math.radians(turn))
@@ -85,5 +86,7 @@ def _pair(text: str) -> tuple[float, float]:
     try:
         x, y = (float(part) for part in text.split(","))
     except ValueError:
-        raise ContractError(f"--shift-px takes two numbers X,Y; got {text!r}") from None
+        raise ContractError(
+            f"{option_text('shift_px')} takes two numbers X,Y; got {text!r}"
+        ) from None
     return x, y

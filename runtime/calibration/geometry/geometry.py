@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.errors import DecodeError
 from camkit.runtime.calibration.geometry.adjustment import rms
 from camkit.runtime.calibration.geometry.board import Board
@@ -192,8 +193,8 @@ def look_for(files: Sequence[Path], board: Board) -> list[View]:
         cure = (
             "give more pictures"
             if len(views) < LEAST_VIEWS
-            else "check --board (inner corners, not squares), and show the whole board with white "
-            "around it"
+            else f"check {option_text('board')} (inner corners, not squares), and show the whole "
+            "board with white around it"
         )
         raise DecodeError(f"{told}, {LEAST_VIEWS} are needed: {cure}")
     return views
@@ -221,16 +222,17 @@ def _check_agree(
     if outliers:
         told = ", ".join(f"{seen[n].path.name} ({off:.2f} px rms)" for n, off in outliers.items())
         raise DecodeError(
-            f"the camera that the other pictures show does not fit {told}: check --board, "
-            "leave it out, or photograph one flat board at one setting of lens and focus"
+            f"the camera that the other pictures show does not fit {told}: check "
+            f"{option_text('board')}, leave it out, or photograph one flat board at one setting of "
+            "lens and focus"
         )
     best = min(judged, key=lambda one: one.rms_px)
     if best.rms_px > MOST_ERROR * np.hypot(*size):
         worst = seen[int(best.of_views_px.argmax())].path.name
         raise DecodeError(
             f"the pictures contradict each other: left out, corners are off by {best.rms_px:.2f} "
-            f"px rms, most in {worst}; check --board, photograph one flat board at one setting, "
-            "and 10 pictures or more"
+            f"px rms, most in {worst}; check {option_text('board')}, photograph one flat board at "
+            "one setting, and 10 pictures or more"
         )
 
 

@@ -27,6 +27,7 @@ from camkit.bundle.stages import (
     Undistort,
     WhiteBalance,
 )
+from camkit.caller import option_text
 from camkit.colorimetry import D65, REC709_PRIMARIES, rgb_to_xyz
 from camkit.errors import DecodeError
 from camkit.runtime.calibration.lensfun.database import Database
@@ -92,12 +93,13 @@ def frame_of(
         if stated is not None and not crop / CROPS_AGREE < stated < crop * CROPS_AGREE:
             raise DecodeError(
                 f"the database has crop factor {crop:g} for the {known.model}, the capture states "
-                f"focal lengths of crop factor {stated:.2f}, as in a crop mode: say --crop-factor"
+                f"focal lengths of crop factor {stated:.2f}, as in a crop mode: say "
+                f"{option_text('crop_factor')}"
             )
     if crop is None:
         raise DecodeError(
             "the capture states no pixel pitch and the database does not know its camera: say "
-            "--crop-factor"
+            f"{option_text('crop_factor')}"
         )
     if pitch_um is None:
         pitch_um = 1000 * FULL_FRAME_MM / crop / math.hypot(*size)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 from xml.etree.ElementTree import Element
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.lensfun.models import (
     TERMS,
@@ -210,4 +211,6 @@ def check_positive(value: float, option: str) -> None:
         ContractError: If so.
     """
     if not LEAST <= value <= MOST:
-        raise ContractError(f"{option} must be > 0, {LEAST:g} to {MOST:g}; got {value:g}")
+        raise ContractError(
+            f"{option_text(option)} must be > 0, {LEAST:g} to {MOST:g}; got {value:g}"
+        )

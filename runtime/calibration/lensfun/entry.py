@@ -21,6 +21,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import RadialDistortion, RadialIllumination
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.lensfun.database import check_positive
@@ -70,7 +71,9 @@ class EntryOptions:
             ContractError: If a number is not > 0, or a name is empty or cannot be printed.
         """
         if not 0 < self.most_residual_px < np.inf:
-            raise ContractError(f"most_residual_px must be > 0; got {self.most_residual_px:g}")
+            raise ContractError(
+                f"{option_text('most_residual_px')} must be > 0; got {self.most_residual_px:g}"
+            )
         for option in ("focal_mm", "crop_factor", "aperture"):
             value = getattr(self, option)
             if value is not None:
@@ -78,7 +81,7 @@ class EntryOptions:
         for option in ("lens_name", "maker", "mount"):
             text = getattr(self, option)
             if text is not None and not (text.strip() and text.isprintable()):
-                raise ContractError(f"{option} must be a name; got {text!r}")
+                raise ContractError(f"{option_text(option)} must be a name; got {text!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,15 +191,17 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
     source = read_source(path)
     crop = source.crop_factor if options.crop_factor is None else options.crop_factor
     if crop is None:
-        raise ContractError(f"{path} does not tell how large the sensor is: say --crop-factor")
+        raise ContractError(
+            f"{path} does not tell how large the sensor is: say {option_text('crop_factor')}"
+        )
     focal_mm = source.focal_mm(crop) if options.focal_mm is None else options.focal_mm
     if focal_mm is None:
-        raise ContractError(f"{path} does not tell the focal length: say --focal-mm")
+        raise ContractError(f"{path} does not tell the focal length: say {option_text('focal_mm')}")
     fit = fit_distortion(source, focal_mm)
     if fit.residual_px > options.most_residual_px:
         raise DecodeError(
             f"{fit.distortion.model}, the nearest of lensfun's models, misses the distortion of "
-            f"{source.name} by {fit.residual_px:.2f} px; --most-residual-px is "
+            f"{source.name} by {fit.residual_px:.2f} px; {option_text('most_residual_px')} is "
             f"{options.most_residual_px:g}: raise it; a geometry goes into a bundle as it is "
             "(`camkit calibrate bundle --geometry`)"
         )
@@ -205,7 +210,7 @@ def lensfun_entry(path: Path, options: EntryOptions) -> Entry:
         half_px = math.hypot(*source.size_px) / 2
         light = fit_vignetting(source.light, half_px, focal_mm, options.aperture)
     elif source.light is not None:
-        notes = (*notes, "vignetting is left out: it needs --aperture")
+        notes = (*notes, f"vignetting is left out: it needs {option_text('aperture')}")
     model = source.name if options.lens_name is None else options.lens_name
     named = Name(maker=options.maker, model=model, mount=options.mount, crop_factor=crop)
     return Entry(name=named, source=source, fit=fit, vignetting=light, notes=notes)

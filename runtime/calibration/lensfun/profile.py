@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.optics import IlluminationEntry, LensProfile, RadialEntry
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.lensfun.between import distortion_at, vignetting_at
 from camkit.runtime.calibration.lensfun.database import Lens
@@ -205,7 +206,7 @@ def _measured_on(lenses: Sequence[Lens], frame: Frame) -> Lens:
         raise DecodeError(
             f"{known[0].name} was measured with crop factor {crops}; the captures have "
             f"{frame.crop_factor:.3g}, a larger sensor, whose corners nobody measured; "
-            "say --crop-factor if they are a part of it"
+            f"say {option_text('crop_factor')} if they are a part of it"
         )
     return max(large, key=lambda lens: lens.crop_factor)
 

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import cfa_channels
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.noise.site import BLOCK_PX, FloatGrid, SitePair, site_pair
@@ -80,7 +81,8 @@ def in_pairs(files: Sequence[Path], option: str) -> list[tuple[Path, Path]]:
     """
     if not files or len(files) % 2:
         raise DecodeError(
-            f"{option} takes pairs, two frames of one light and setting; got {len(files)} files"
+            f"{option_text(option)} takes pairs, two frames of one light and setting; got "
+            f"{len(files)} files"
         )
     seen: set[Path] = set()
     for path in files:
@@ -172,7 +174,7 @@ class PairReader:
             self._hashes[capture.sha256] = path
         iso = capture.iso or capture.metadata.iso or self._iso
         if iso is None:
-            raise DecodeError(f"{path.name} states no ISO; say --iso")
+            raise DecodeError(f"{path.name} states no ISO; say {option_text('iso')}")
         used = np.flatnonzero(np.bincount(_plane_of(capture).ravel()))
         return Frame(
             path=path,

@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.bank import make_bank
@@ -38,7 +39,8 @@ def guess_pulse(counts: FloatArray, axis: TimeAxis) -> GaussianPulse:
     if shown.amplitude[best].sum() < LEAST_PHOTONS:
         raise ContractError(
             f"no pulse is stated, and {shown.amplitude[best].sum():.0f} photons are too few to "
-            "find its width; say [laser] fwhm_ps, [gate] or [irf] in a file for --timing"
+            "find its width; say [laser] fwhm_ps, [gate] or [irf] in a file for "
+            f"{option_text('timing')}"
         )
     low, high = NARROWEST * axis.step_ps, WIDEST * axis.step_ps * axis.bins
     count = max(3, int(np.log(max(high / low, APART)) / np.log(APART)) + 1)

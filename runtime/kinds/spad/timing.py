@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.pulse import (
     FWHM_PER_SIGMA,
@@ -132,7 +133,7 @@ class Timing(_Table):
         if chosen is None:
             raise ContractError(
                 "nothing says whether times are those of a gate or of a histogram; say [timing] "
-                'orientation = "gate" or "histogram" in a file for --timing'
+                f'orientation = "gate" or "histogram" in a file for {option_text("timing")}'
             )
         edges = times.bin_edges_ps
         stated = times.bins if edges is None else len(edges) - 1
@@ -147,7 +148,7 @@ class Timing(_Table):
         if times.time_bin_ps is None:
             raise ContractError(
                 "nothing says how wide a time bin is; say [timing] time_bin_ps (or bin_edges_ps) "
-                "in a file for --timing"
+                f"in a file for {option_text('timing')}"
             )
         count = bins if bins is not None else stated
         if count is None:

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.runtime.plan.decision import Decision, Subject, Work
 
 ORDER: Final = 50
@@ -18,10 +19,11 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     facts = subject.facts(work.size)
     shorter = [e for e in facts.halo_error if e.psnr_db is not None and e.psnr_db >= 80.0]
     if work.mode != "exact":
-        reason = f"--mode {work.mode} says so"
+        reason = f"{option_text('mode', work.mode)} says so"
         return work, Decision(what="halo", choice=work.mode, reason=reason)
     reason = "results must not depend on tile size and memory cap"
     if shorter:
         least = min(shorter, key=lambda entry: entry.halo_px)
-        reason += f"; --mode fast takes {least.halo_px} px at {least.psnr_db:.0f} dB of the exact"
+        fast = option_text("mode", "fast")
+        reason += f"; {fast} takes {least.halo_px} px at {least.psnr_db:.0f} dB of the exact"
     return work, Decision(what="halo", choice=f"{subject.reach_px(work.size)} px", reason=reason)

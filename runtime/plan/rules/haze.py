@@ -3,6 +3,7 @@
 from typing import Final
 
 from camkit.bundle.stages import Dehaze
+from camkit.caller import option_text
 from camkit.runtime.bank.cell_means import cell_count
 from camkit.runtime.plan.decision import Decision, Subject, Work
 from camkit.runtime.plan.ways import runs
@@ -17,7 +18,9 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
     if stage is None:
         return work, None
     if not runs(manifest.stages, Dehaze, work):
-        return work, Decision(what="haze", choice="left in", reason=f"--method {work.method}")
+        return work, Decision(
+            what="haze", choice="left in", reason=option_text("method", work.method)
+        )
     sides_px = subject.height_px, subject.width_px
     down, across = (cell_count(side_px, stage.shrink) for side_px in sides_px)
     return work, Decision(

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.runtime.plan.decision import Decision, Subject, Work
 from camkit.runtime.plan.loss import read_loss_model
 
@@ -18,7 +19,7 @@ def decide(subject: Subject, work: Work) -> tuple[Work, Decision | None]:
         return work, None
     options = subject.options
     if options.size is not None:
-        reason = "--size says so"
+        reason = f"{option_text('size')} says so"
     elif options.max_seconds is not None or options.max_error_db is not None:
         reason = "the most that the budget allows"
     else:

@@ -18,7 +18,7 @@ GIVEN = FitRequest(
 
 def test_a_kind_without_fitters_has_that_of_the_house():
     assert own_fitting("bayer", REQUEST) is None
-    with pytest.raises(ContractError, match=r"lean_s in the role 'network' .* leave --vgg away"):
+    with pytest.raises(ContractError, match=r"lean_s in the role 'network' .* leave vgg away"):
         own_fitting("bayer", GIVEN)
 
 

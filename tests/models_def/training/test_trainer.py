@@ -226,7 +226,7 @@ def test_interrupted_write_keeps_the_old_checkpoint(tmp_path, whole, monkeypatch
 
 def test_a_finished_run_is_not_replaced_unasked(tmp_path, recipe_path, material, whole):
     there = options(whole.checkpoint.parent, stop_at_step=1)
-    with pytest.raises(ContractError, match="is there already: give --resume"):
+    with pytest.raises(ContractError, match="is there already: give resume"):
         train(recipe_path, there, material=material)
     assert read_checkpoint(whole.checkpoint).step == 12
     for _ in range(2):

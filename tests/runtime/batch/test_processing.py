@@ -118,7 +118,7 @@ def test_an_existing_output_is_refused_before_any_work(captures: Path) -> None:
     out = captures / "out"
     out.mkdir()
     (out / "b.exr").write_bytes(b"precious")
-    with pytest.raises(ContractError, match="--resume, --overwrite"):
+    with pytest.raises(ContractError, match="resume, overwrite"):
         camkit.process(captures / "*.dng", bundle=captures / "tiny.camkit", out_dir=out)
     assert (out / "b.exr").read_bytes() == b"precious"
     assert not (out / "a.exr").exists()
@@ -163,7 +163,7 @@ def test_no_bundle_for_any_file_is_refused_with_the_list(tmp_path: Path) -> None
     files = [tmp_path / "x.dng", tmp_path / "y.dng"]
     for file in files:
         file.write_bytes(b"no bundle in here")
-    with pytest.raises(ContractError, match=r"x\.dng.*y\.dng.*--bundle"):
+    with pytest.raises(ContractError, match=r"x\.dng.*y\.dng.*bundle"):
         camkit.process(files, out_dir=tmp_path / "out")
 
 

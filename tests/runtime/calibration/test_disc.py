@@ -121,7 +121,7 @@ def test_a_disc_under_much_noise_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("diameter_px", [0.0, -1.0, np.inf])
 def test_a_disc_must_have_a_diameter(diameter_px: float) -> None:
-    with pytest.raises(ContractError, match="--disc-px must be > 0"):
+    with pytest.raises(ContractError, match="disc_px must be > 0"):
         PsfOptions(disc_px=diameter_px)
 
 

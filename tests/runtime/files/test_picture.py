@@ -124,14 +124,16 @@ def test_a_grey_jpeg_is_a_picture_and_no_mosaic(tmp_path):
         read_mosaic(path, OPTIONS)
     capture = read_picture(path)
     assert np.abs(capture.linear_rows(0, 8) - decode_srgb(np.float32(90 / 255))).max() < 1e-5
-    assert "--mosaic" not in " ".join(capture.notes)
+    assert "MosaicOptions.cfa" not in " ".join(capture.notes)
 
 
 def test_a_headerless_mosaic_needs_its_options_and_then_takes_them(tmp_path):
     mosaic = planes_of(np.uint16, 100)[0] + np.tile([[300, 800], [800, 500]], (5, 4))[:9, :7]
     mosaic = mosaic.astype(np.uint16)
     write_png(tmp_path / "x.png", mosaic)
-    with pytest.raises(DecodeError, match="--mosaic RGGB --black-level N"):
+    with pytest.raises(
+        DecodeError, match="MosaicOptions.cfa=.RGGB. with MosaicOptions.black_level"
+    ):
         read_capture(tmp_path / "x.png")
     capture = read_capture(tmp_path / "x.png", mosaic=OPTIONS)
     assert np.array_equal(capture.samples, mosaic)
@@ -147,7 +149,7 @@ def test_mosaic_options_that_contradict_the_file_are_refused(tmp_path):
     with pytest.raises(DecodeError, match="levels"):
         read_mosaic(tmp_path / "8.png", OPTIONS)
     write_png(tmp_path / "16.png", planes_of(np.uint16, 60000)[0])
-    with pytest.raises(DecodeError, match="--white-level"):
+    with pytest.raises(DecodeError, match="MosaicOptions.white_level"):
         read_mosaic(tmp_path / "16.png", OPTIONS)
 
 

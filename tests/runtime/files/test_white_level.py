@@ -23,7 +23,7 @@ def test_a_white_far_below_the_data_is_raised_to_what_their_bits_hold(bits, whit
     raised, note = believable_white(photograph(), levels(600.0), "RGGB", bits)
     assert raised.white == white
     assert f"white 600 that the file states, which is damaged or of another scale: {white}" in note
-    assert "--white-level" in note
+    assert "MosaicOptions.white_level" in note
 
 
 def test_planes_beyond_the_bits_of_their_file_were_spread_over_16():
@@ -39,5 +39,5 @@ def test_pure_noise_keeps_its_white_and_is_refused_later():
 
 def test_a_white_of_the_caller_that_the_data_contradict_is_refused_by_name():
     check_said_white(photograph(), 4095.0)
-    with pytest.raises(DecodeError, match="--white-level 600 "):
+    with pytest.raises(DecodeError, match="MosaicOptions.white_level=600 "):
         check_said_white(photograph(), 600.0)

@@ -10,9 +10,10 @@ import pytest
 from camkit.bundle.reader import Bundle, open_bundle
 from camkit.bundle.stages import Color, Linearise, Repair
 from camkit.bundle.writer import write_bundle
+from camkit.caller import option_text, speaking
 from camkit.errors import ContractError
 from camkit.runtime.job.choices import check_choices, check_idle
-from camkit.runtime.options import Options, flag_of
+from camkit.runtime.options import Options
 from camkit.runtime.unit import Unit
 from tests.bundle_factory import tiny_manifest, tiny_members, tiny_stages, write_tiny_bundle
 from tests.deep_bundle import write_deep_bundle
@@ -98,7 +99,7 @@ def test_each_option_that_means_nothing_is_refused_by_name(bare: Bundle, name: s
         check_choices(bare, Options(**{name: CHANGED[name]}))
         return
     said = _refused(bare, **{name: CHANGED[name]})
-    assert said.startswith(f"{flag_of(name)} means nothing to bundle planes")
+    assert said.startswith(f"{option_text(name)} means nothing to bundle planes")
 
 
 @pytest.mark.parametrize("name", sorted(set(CHANGED) - {"unit"}))
@@ -107,7 +108,7 @@ def test_each_option_that_means_nothing_without_a_bundle_is_refused_by_name(name
         check_choices(None, Options(**{name: CHANGED[name]}))
         return
     said = _refused(None, **{name: CHANGED[name]})
-    assert said.startswith(f"{flag_of(name)} means nothing without a bundle")
+    assert said.startswith(f"{option_text(name)} means nothing without a bundle")
 
 
 @pytest.mark.parametrize(
@@ -131,14 +132,14 @@ def test_a_camera_without_a_stage_refuses_its_options_and_no_other(
     foreign = set.union(*(OF_STAGE[stage] for stage in left_out))
     for name, value in CHANGED.items():
         if name in foreign:
-            assert flag_of(name) in _refused(bundle, **{name: value})
+            assert option_text(name) in _refused(bundle, **{name: value})
         else:
             check_choices(bundle, Options(**{name: value}))
 
 
 def test_all_foreign_options_are_named_at_once(bare: Bundle) -> None:
     said = _refused(bare, size="M", demosaic="fast", depth_m=1.0)
-    assert said.startswith("--size, --depth-m, --demosaic means nothing")
+    assert said.startswith("size, depth_m, demosaic means nothing")
 
 
 def test_a_method_that_no_stage_has_is_refused_with_those_there_are(
@@ -166,7 +167,7 @@ def test_methods_of_stages_that_the_bundle_leaves_out_are_refused(tmp_path: Path
 
 def test_a_place_may_be_assumed_only_on_a_sensor_of_known_size(tiny: Bundle, bare: Bundle) -> None:
     check_choices(tiny, Options(assume="scale"))
-    assert "--assume means nothing" in _refused(bare, assume="scale")
+    assert "assume means nothing" in _refused(bare, assume="scale")
 
 
 def test_a_unit_of_another_bundle_or_of_none_is_refused(tiny: Bundle) -> None:
@@ -195,14 +196,15 @@ def test_flags_are_those_of_the_command() -> None:
     typed = {"--" + name.rstrip("_").replace("_", "-") for name in parameters}
     typed |= {flag.replace("--", "--no-", 1) for flag in typed}
     for_programs = {"tile_px", "dtype", "provider"}
-    assert {name for name in CHANGED if flag_of(name) not in typed} <= for_programs
+    with speaking("command"):
+        assert {name for name in CHANGED if option_text(name) not in typed} <= for_programs
 
 
 def test_no_color_means_no_option_of_color(tmp_path: Path) -> None:
     stages = (Linearise(gives=("light",)), Color(takes=("light",)))
     camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
     check_choices(camera, Options(exposure_ev=1.0, color="acescg"))
-    assert "--wb means nothing" in _refused(camera, white_balance=(2.0, 1.0, 2.0))
+    assert "white_balance means nothing" in _refused(camera, white_balance=(2.0, 1.0, 2.0))
 
 
 def test_a_size_that_is_not_there_is_refused_even_where_no_network_runs(bundle: Bundle) -> None:
@@ -219,11 +221,7 @@ def test_an_option_of_a_stage_that_the_method_leaves_out_is_refused(
 ) -> None:
     options = Options(method=method, **{option: value})  # type: ignore[arg-type]
     check_choices(bundle, options)
-    with pytest.raises(ContractError, match=rf"--{flag(option)} means nothing with --method"):
+    with pytest.raises(ContractError, match=f"{option} means nothing with method="):
         check_idle(bundle, options)
     check_idle(bundle, Options(**{option: value}))  # type: ignore[arg-type]
     check_idle(None, Options(method="develop"))
-
-
-def flag(option: str) -> str:
-    return option.replace("_", "-")

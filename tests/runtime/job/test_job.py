@@ -115,7 +115,7 @@ def test_the_window_of_a_finer_plane_covers_the_same_place(bundle: Bundle) -> No
 
 def test_a_capture_of_another_camera_is_refused_unless_it_is_forced(bundle: Bundle) -> None:
     capture = made_mosaic(bundle_name="trio")
-    with pytest.raises(ContractError, match=r"names bundle trio, not tiny; .* --force-bundle"):
+    with pytest.raises(ContractError, match=r"names bundle trio, not tiny; .* force_bundle"):
         start(bundle, capture)
     forced = start(bundle, capture, force_bundle=True).job
     assert forced.notes == [

@@ -181,7 +181,7 @@ def test_rows_beyond_the_cap_are_refused_before_any_work(tmp_path: Path) -> None
     capture = made_planes(samples=np.zeros((1, 2000, 25_000), np.float32))
     stages = (Linearise(gives=("light",)), Color(takes=("light",)))
     camera = write_planes_bundle(tmp_path, stages, sensor=planes_sensor())
-    with pytest.raises(ContractError, match=r"cap is 400 MB; raise --max-mem"):
+    with pytest.raises(ContractError, match=r"cap is 400 MB; raise max_mem_bytes"):
         start(camera, capture, max_mem_bytes=400_000_000, assume="scale")
 
 

@@ -195,7 +195,7 @@ def test_what_does_not_fit_is_refused() -> None:
     network = _network()
     with pytest.raises(ContractError, match="labels"):
         lay_cells((999, 999), LABELS, [network], _limits())
-    with pytest.raises(ContractError, match="--max-mem"):
+    with pytest.raises(ContractError, match="max_mem_bytes"):
         lay_cells(SIZE, LABELS, [network], _limits(max_bytes=1000))
     layout = lay_cells(SIZE, LABELS, [network], _limits())
     with pytest.raises(ContractError, match="layout is for"):

@@ -116,7 +116,7 @@ def test_a_bad_tile_of_a_finer_output_is_named_by_its_place_in_the_input() -> No
     planes[1, 20, 5] = 3.0
     with pytest.raises(ContractError, match=r"pixels x 0..16, y 16..32") as caught:
         _fine_bands(planes, TileGuard(fallback=True))
-    assert "--on-unsafe" not in str(caught.value), "nothing stands in for twice the samples"
+    assert "on_unsafe" not in str(caught.value), "nothing stands in for twice the samples"
 
 
 def test_the_factor_of_the_bundle_widens_the_bound() -> None:

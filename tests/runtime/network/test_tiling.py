@@ -129,7 +129,9 @@ def test_whole_is_one_window_of_the_padded_picture() -> None:
 
 
 def test_cap_too_small_names_what_is_needed() -> None:
-    with pytest.raises(ContractError, match=r"need at least \d+ MiB .* got 1 MiB: raise --max-mem"):
+    with pytest.raises(
+        ContractError, match=r"need at least \d+ MiB .* got 1 MiB: raise max_mem_bytes"
+    ):
         lay_windows(4000, 6000, _limits(max_bytes=2**20))
 
 

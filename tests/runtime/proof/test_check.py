@@ -439,7 +439,7 @@ def test_a_kind_that_is_not_installed_fails_the_schema(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"block_px": 8192}, "blocks of 8192 px, which take .* raise --max-mem"),
+        ({"block_px": 8192}, "blocks of 8192 px, which take .* raise max_mem_bytes"),
         ({"clip_iterations": 100, "overlap_px": 16}, BANK_WORK.variable),
     ],
 )

@@ -222,7 +222,7 @@ def test_too_little_memory_is_said_before_any_row(
     bundle: Bundle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(haze, "solving_bytes", lambda *_: 10**9)
-    with pytest.raises(ContractError, match="raise --max-mem"):
+    with pytest.raises(ContractError, match="raise max_mem_bytes"):
         start(bundle, _capture(), max_mem_bytes=700_000_000).fill()
 
 

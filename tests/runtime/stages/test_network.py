@@ -223,7 +223,7 @@ def test_where_no_plane_stands_in_a_bad_tile_is_refused_without_a_hint(tmp_path:
     for on_unsafe in ("warn", "fallback"):
         with pytest.raises(ContractError, match="values up to") as caught:
             start(camera, bright, on_unsafe=on_unsafe).fill()
-        assert "--on-unsafe" not in str(caught.value)
+        assert "on_unsafe" not in str(caught.value)
 
 
 def _multiplying(*gains: float) -> bytes:

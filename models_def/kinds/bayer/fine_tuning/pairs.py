@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.colorimetry import camera_from_rec709
 from camkit.contracts import FloatArray, NoiseModel, RadialDistortion
 from camkit.errors import ContractError, DecodeError
@@ -133,7 +134,7 @@ def read_pairs(
     if recipe.estimates_depth:
         raise ContractError(
             "pairs are filtered with the mean kernel, and the bank of this camera finds the "
-            'distance (wiener.depth = "estimated"); fine-tune without --pairs'
+            f'distance (wiener.depth = "estimated"); fine-tune without {option_text("pairs")}'
         )
     settings = _read_settings(folder / SETTINGS, recipe)
     noise = recipe.sensor.noise_at(settings.iso).with_gains(settings.gains)

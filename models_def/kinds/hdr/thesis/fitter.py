@@ -13,6 +13,7 @@ from typing import Any, Final, cast
 import torch
 from torch import Tensor
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.models_def.kinds.hdr.thesis.losses import (
     exclusion_loss,
@@ -204,8 +205,8 @@ def _check(request: FitRequest) -> None:
     if request.role != "fusion" and request.vgg is None and not request.recipe.thesis.random_vgg:
         raise ContractError(
             f"the role {request.role} looks at pictures through VGG-19: give its weights by "
-            "--vgg FILE (torchvision's vgg19), or say random_vgg = true in [thesis] to try the "
-            "machinery with random ones"
+            f"{option_text('vgg')} (a file of torchvision's vgg19), or say random_vgg = true in "
+            "[thesis] to try the machinery with random ones"
         )
 
 

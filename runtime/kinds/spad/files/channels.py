@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 
 ALL: Final = -1
@@ -37,7 +38,8 @@ def chosen_places(
         several = {name: known for name, known in numbers.items() if len(known) > 1} or numbers
         listed = "; ".join(_listed(n, k, is_summed=n == summed) for n, k in several.items())
         raise ContractError(
-            f"{path.name} holds {listed}; say which by [array] key in a file for --timing"
+            f"{path.name} holds {listed}; say which by [array] key in a file for "
+            f"{option_text('timing')}"
         )
     return {
         name: ALL if found[name] == ALL else list(known).index(found[name])

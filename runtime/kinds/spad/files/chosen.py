@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, Hints
 from camkit.runtime.kinds.spad.timing import TABLE_OF
@@ -38,7 +39,7 @@ def chosen_name(path: Path, names: Iterable[str], hints: Hints, what: str = "arr
     if len(candidates) > 1:
         raise ContractError(
             f"{path.name} holds several {what}: {', '.join(candidates)}; say which by [array] key "
-            "in a file for --timing"
+            f"in a file for {option_text('timing')}"
         )
     return candidates[0]
 

@@ -10,6 +10,7 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import DecodeError
 
@@ -125,7 +126,7 @@ def checked_bins(path: Path, bins: int, pixels: int, kind: CountsKind) -> int:
     if kind != "counts" and bins > MOST_BINS:
         raise DecodeError(
             f"{path.name} has {bins} time bins; expected at most {MOST_BINS}: put bins together, "
-            "or say [array] axes in a file for --timing if time is another axis"
+            f"or say [array] axes in a file for {option_text('timing')} if time is another axis"
         )
     if bins * pixels > MOST_COUNTS:
         raise DecodeError(

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import scipy.io
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
@@ -68,7 +69,8 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     if size > most:
         raise ContractError(
             f"{path.name}: {name} takes {size / 1e9:.3g} GB or more, and this version of MATLAB "
-            "file can only be read whole; save it with -v7.3, or raise --max-mem"
+            "file can only be read whole; save it with -v7.3, or raise "
+            f"{option_text('max_mem_bytes')}"
         )
     small = [
         n

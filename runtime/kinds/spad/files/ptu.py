@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
@@ -79,7 +80,8 @@ def _histograms(path: Path, file: Any, hints: Hints) -> NDArray[Any]:
     if size > TIMES * hints.max_bytes:
         raise ContractError(
             f"{path.name}, {file.number_records} photons and markers, takes {size / 1e9:.3g} GB, "
-            "and such files are read whole; raise --max-mem, or save its histograms as .h5 or .npz"
+            f"and such files are read whole; raise {option_text('max_mem_bytes')}, or save its "
+            "histograms as .h5 or .npz"
         )
     channel = active[place["channel"]] - active[0]
     if not file.is_image:

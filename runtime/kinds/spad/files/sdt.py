@@ -10,6 +10,7 @@ from typing import IO, Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
@@ -108,7 +109,7 @@ def _check_size(path: Path, file: IO[bytes], most_bytes: int) -> None:
         if total > most_bytes:
             raise ContractError(
                 f"{path.name} takes {total / 1e9:.3g} GB or more, and such files are read whole; "
-                "raise --max-mem, or save its histograms as .h5 or .npz"
+                f"raise {option_text('max_mem_bytes')}, or save its histograms as .h5 or .npz"
             )
         file.seek(offset)
         block = np.fromfile(file, record, 1)[0]

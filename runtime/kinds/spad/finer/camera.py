@@ -17,6 +17,7 @@ import numpy as np
 from camkit.bundle.reader import Bundle
 from camkit.bundle.sensor import SpadSensor
 from camkit.bundle.stages import Sharpen, SuperResolve
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError
 from camkit.runtime.cancel import Cancel, check_cancelled
@@ -95,7 +96,7 @@ class FineCamera:
         if stage is None or not isinstance(manifest.sensor, SpadSensor):
             raise BundleError(
                 f"bundle {manifest.name} has no stage super_resolve; captures of single photons "
-                "are sharpened with --bundle none"
+                f"are sharpened with {option_text('bundle', 'none')}"
             )
         return cls(bundle=bundle, stage=stage, sharpen=manifest.stage(Sharpen), threads=threads)
 
@@ -137,7 +138,7 @@ class FineCamera:
             have = ", ".join(sizes) or "none"
             raise ContractError(
                 f"bundle {self.bundle.manifest.name} holds size(s) {have}; asked for "
-                f"{asked or 'a network'}; --method linear needs none"
+                f"{asked or 'a network'}; {option_text('method', 'linear')} needs none"
             )
         return asked or (DEFAULT_SIZE if DEFAULT_SIZE in sizes else next(iter(sizes)))
 
@@ -180,7 +181,8 @@ class FineCamera:
         if shape != own:
             raise ContractError(
                 f"the capture has {shape[1]}x{shape[0]} pixels, the array of bundle "
-                f"{self.bundle.manifest.name} {own[1]}x{own[0]}; say --bundle none"
+                f"{self.bundle.manifest.name} {own[1]}x{own[0]}; say "
+                f"{option_text('bundle', 'none')}"
             )
 
     def linear(self, photons: float, kernel: FloatArray | None = None) -> LinearEstimate:

@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.lifetime.decay import Decay
@@ -36,7 +37,7 @@ def guess_width(counts: FloatArray, axis: TimeAxis, period_ps: float | None) -> 
     if photons < LEAST_PHOTONS:
         raise ContractError(
             f"no pulse is stated, and {photons:.0f} photons are too few to find its width before "
-            "a decay; say [laser] fwhm_ps or [irf] file in a file for --timing"
+            f"a decay; say [laser] fwhm_ps or [irf] file in a file for {option_text('timing')}"
         )
     whole = (whole * min(1.0, MOST_PHOTONS / photons)).astype(np.float32)
     low, high = NARROWEST * axis.step_ps, WIDEST * axis.step_ps * axis.bins

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError, UnsupportedError
 from camkit.runtime.cancel import check_cancelled
@@ -48,7 +49,9 @@ def make_lifetime(making: Making, survey: Survey, began: float) -> Made:
         Cancelled: If the caller wished so.
     """
     if survey.camera is not None:
-        raise UnsupportedError("lifetimes are those of the array's own pixels; say --bundle none")
+        raise UnsupportedError(
+            f"lifetimes are those of the array's own pixels; say {option_text('bundle', 'none')}"
+        )
     window = _window(survey)
     pulse, warnings = _pulse(survey, window)
     told = survey.timing.lifetime

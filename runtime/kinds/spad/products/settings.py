@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.pooling import Pool
 from camkit.runtime.kinds.spad.sharpen import METHODS, Method, Way
@@ -79,7 +80,7 @@ class Settings:
         if product != "intensity" and not is_histogram:
             raise ContractError(
                 f"{product} needs the times of photons, and this capture holds counts alone; say "
-                "--product intensity"
+                + option_text("product", "intensity")
             )
         if product != "depth" and self.chosen:
             raise ContractError(

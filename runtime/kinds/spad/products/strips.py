@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 
 KEPT_BYTES: Final = 260_000_000
@@ -59,7 +60,8 @@ def pieces(
     if free < least:
         need = KEPT_BYTES + held_bytes + least
         raise ContractError(
-            f"{width}x{height} pixels of {bins} bins need --max-mem {need // 10**6 + 1}M; the cap "
+            f"{width}x{height} pixels of {bins} bins need "
+            f"{option_text('max_mem_bytes', need)}; the cap "
             f"is {max_mem_bytes // 10**6}M"
         )
     return list(_cut(height, max(rows, 1), reach))
@@ -81,7 +83,7 @@ def check_room(shape: tuple[int, int], bins: int, of_count: int, max_mem_bytes: 
     if need > max_mem_bytes:
         raise ContractError(
             f"{shape[1]}x{shape[0]} pixels of {bins} bins on the fine grid of a bundle need "
-            f"--max-mem {need // 10**6 + 1}M; the cap is {max_mem_bytes // 10**6}M"
+            f"{option_text('max_mem_bytes', need)}; the cap is {max_mem_bytes // 10**6}M"
         )
 
 

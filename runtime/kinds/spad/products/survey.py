@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.kinds.spad.corrected import CorrectedRows
@@ -164,13 +165,13 @@ def _check_finer(settings: Settings, camera: FineCamera | None) -> None:
     """
     if camera is None and settings.finer is not None:
         raise ContractError(
-            f"--method {settings.finer} makes pictures finer behind the plate of a bundle; say "
-            "--bundle too"
+            f"{option_text('method', settings.finer)} makes pictures finer behind the plate of a "
+            f"bundle; say {option_text('bundle')} too"
         )
     if camera is not None and settings.way.pool not in ("auto", "1"):
         raise ContractError(
-            "--pool puts pixels of an array together; with a bundle the estimate of the fine grid "
-            "does so by itself: leave --pool out"
+            f"{option_text('pool')} puts pixels of an array together; with a bundle the estimate "
+            f"of the fine grid does so by itself: leave {option_text('pool')} out"
         )
     if camera is not None and (settings.size is not None or settings.finer == "net"):
         camera.size(settings.size)
@@ -192,7 +193,7 @@ def _check_shape(file: CountsFile, camera: FineCamera) -> None:
             if (turned["y"], turned["x"]) == (camera.sensor.height_px, camera.sensor.width_px):
                 raise ContractError(
                     f"{error}; or, if its axes are in another order, [array] axes = "
-                    f'"{"".join(axes)}" in a file for --timing'
+                    f'"{"".join(axes)}" in a file for {option_text("timing")}'
                 ) from error
         raise
 
@@ -213,7 +214,7 @@ def _surprise(file: CountsFile, timing: Timing, camera: FineCamera) -> tuple[str
     return (
         f"{file.path.name} is taken as {WHAT[str(own)]}, as bundle {camera.bundle.manifest.name} "
         f"states, though such files usually hold {WHAT[str(usual)]}; state [timing] orientation in "
-        f"a file for --timing, or in {timing_beside(file.path).name} beside it",
+        f"a file for {option_text('timing')}, or in {timing_beside(file.path).name} beside it",
     )
 
 

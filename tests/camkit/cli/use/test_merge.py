@@ -114,7 +114,7 @@ def test_notes_of_the_choice_are_said_on_stderr(camkit_command, tmp_path: Path) 
     ("files", "options", "code", "told"),
     [
         (["long", "middle"], ["--times", "1"], ExitCode.USAGE, "1 times for 2 files"),
-        (["long", "middle"], [], ExitCode.USAGE, "long.png states no exposure time"),
+        (["long", "middle"], [], ExitCode.USAGE, "2 of 2 frames state no exposure time"),
         (["long", "middle"], ["--times", "2,2"], ExitCode.USAGE, "two different exposures"),
         (["long", "long"], ["--times", "1,2"], ExitCode.USAGE, "is given twice"),
         (["long"], ["--times", "1"], ExitCode.USAGE, "2 to 256 frames; got 1"),

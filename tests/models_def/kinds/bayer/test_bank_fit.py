@@ -139,7 +139,7 @@ def test_a_bank_that_finds_the_distance_is_off_by_its_own_copies_alone(recipe, b
 
 
 def test_too_few_samples_are_refused(recipe, bank, tmp_path):
-    with pytest.raises(ContractError, match="too few to fit a bank to; raise --samples"):
+    with pytest.raises(ContractError, match="too few to fit a bank to; raise samples"):
         fit_bank(recipe, BayerMaterial(bank=bank), options(tmp_path, samples=3), print)
     with pytest.raises(ContractError, match="samples and steps must be >= 1"):
         options(tmp_path, steps=0)
@@ -187,5 +187,5 @@ def test_a_descent_that_leaves_the_range_of_a_number_ends_in_one_line(exponent: 
     values = bank_fit._to_values(FIRST)
     assert bank_fit._rounded(FIRST, values).exponent == FIRST.exponent
     values[6] = exponent
-    with pytest.raises(ContractError, match="raise --samples"):
+    with pytest.raises(ContractError, match="raise samples"):
         bank_fit._rounded(FIRST, values)

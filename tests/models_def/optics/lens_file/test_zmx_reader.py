@@ -243,10 +243,16 @@ def test_glass_is_found_in_the_order_of_gcat(glas: str, gcat: str, name: str) ->
 @pytest.mark.parametrize(
     ("glas", "message"),
     [
-        ("XN-BK7", r"line 32: surface 1: glass must .*'XN-BK7'.*N-BK7-Schott.*--glass FILE.agf"),
+        (
+            "XN-BK7",
+            r"line 32: surface 1: glass must .*'XN-BK7'.*N-BK7-Schott.*a file in .agf, with glass",
+        ),
         ("F2", "may be F2-Schott or F2-Hikari"),
-        ("XN-BK7 0 0 1.6 50.3", "--glass FILE.agf; or write GLAS ___BLANK 1 0 1.6 50.3, the n_d"),
-        ("XN-BK7 0 0 1.5 4.0E+1", "--glass FILE.agf$"),
+        (
+            "XN-BK7 0 0 1.6 50.3",
+            "a file in .agf, with glass; or write GLAS ___BLANK 1 0 1.6 50.3, the n_d",
+        ),
+        ("XN-BK7 0 0 1.5 4.0E+1", "a file in .agf, with glass$"),
         ("___BLANK 1 0 0.5 60", "a model glass needs"),
     ],
 )

@@ -54,7 +54,7 @@ def test_aspheric_terms_leave_the_power_alone(lens: Lens) -> None:
 
 
 def test_nothing_free_is_an_error_that_says_what_to_do(lens: Lens) -> None:
-    with pytest.raises(ContractError, match="--vary"):
+    with pytest.raises(ContractError, match="vary"):
         free_lens(lens, [()] * 6)
 
 

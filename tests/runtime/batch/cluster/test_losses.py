@@ -161,7 +161,7 @@ def test_a_network_that_stays_lost_ends_the_run_with_what_to_do(
 
         with (
             farm.client() as client,
-            pytest.raises(CamkitError, match=r"file\(s\) are left: run again with --resume"),
+            pytest.raises(CamkitError, match=r"file\(s\) are left: run again with resume"),
         ):
             camkit.process(
                 tmp_path,

@@ -249,7 +249,7 @@ def test_the_entry_of_a_bundle_is_what_its_parts_give(tmp_path: Path) -> None:
     assert record["notes"] == list(source.notes)
     bare = lensfun_entry(path, EntryOptions(focal_mm=50.0, crop_factor=1.7, lens_name="Own"))
     assert (bare.name.model, bare.name.crop_factor, bare.vignetting) == ("Own", 1.7, None)
-    assert bare.notes[-1] == "vignetting is left out: it needs --aperture"
+    assert bare.notes[-1] == "vignetting is left out: it needs aperture"
 
 
 def test_an_entry_of_a_geometry_needs_its_crop_factor_and_obeys_the_limit(tmp_path: Path) -> None:

@@ -136,7 +136,7 @@ def test_headerless_mosaics_take_their_iso_from_the_caller(tmp_path: Path, small
     assert list(facts.transfers) == ["G1", "R", "B", "G2"]
     assert facts.linearity is None
     assert facts.to_record()["linearity_percent"] is None
-    with pytest.raises(DecodeError, match=r"0\.png states no ISO; say --iso"):
+    with pytest.raises(DecodeError, match=r"0\.png states no ISO; say iso"):
         measure_sensor(files[:2], files[2:], said)
 
 
@@ -213,8 +213,8 @@ def test_wrong_company_is_refused_and_named(tmp_path: Path, small: Sensor) -> No
 def test_files_that_are_no_pairs_are_refused(tmp_path: Path, small: Sensor) -> None:
     dark, flat = small.write(tmp_path, 400, FEW)
     for darks, flats, error, told in (
-        (dark[:1], flat, DecodeError, "--dark takes pairs"),
-        (dark, flat[:3], DecodeError, "--flat takes pairs"),
+        (dark[:1], flat, DecodeError, "darks takes pairs"),
+        (dark, flat[:3], DecodeError, "flats takes pairs"),
         ([], flat, DecodeError, "got 0 files"),
         ([dark[0], dark[0]], flat, ContractError, "is given twice"),
     ):

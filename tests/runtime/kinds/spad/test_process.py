@@ -312,7 +312,7 @@ def test_what_means_nothing_is_refused(
 
 def test_counts_have_no_depth(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", counts=np.ones((4, 4)))
-    with pytest.raises(ContractError, match="this capture holds counts alone; say --product int"):
+    with pytest.raises(ContractError, match="this capture holds counts alone; say product=.int"):
         camkit.load(None, kind="spad", product="depth").make(tmp_path / "a.npz")
 
 
@@ -339,7 +339,7 @@ def test_a_tiff_is_a_picture_unless_an_option_says_otherwise(tmp_path: Path, tim
     single = tmp_path / "in" / "single.tif"
     tifffile.imwrite(single, small_cube()[0])
     (refused,) = camkit.process(single, bundle="none", out_dir=tmp_path / "a")
-    assert "if it counts single photons, say --product intensity" in str(refused.error)
+    assert 'if it counts single photons, say product="intensity"' in str(refused.error)
 
 
 def test_the_plan_says_what_would_be_done(

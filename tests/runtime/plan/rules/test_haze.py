@@ -53,5 +53,5 @@ def test_without_the_bank_nothing_is_said_of_it(bundle: Bundle) -> None:
 
 def test_developing_leaves_the_haze(bundle: Bundle) -> None:
     found = _decisions(bundle, method="develop")
-    assert found["haze"] == Decision(what="haze", choice="left in", reason="--method develop")
+    assert found["haze"] == Decision(what="haze", choice="left in", reason='method="develop"')
     assert not {"blocks", "wavelengths"} & set(found)

@@ -144,5 +144,5 @@ def test_captures_of_another_kind_are_refused(tmp_path, folder, recipe, bank):
 def test_a_bank_that_finds_the_distance_is_refused(folder, recipe, bank):
     wiener = recipe.wiener.model_copy(update={"depth": "estimated"})
     deep = replace(recipe, wiener=wiener, lens=replace(recipe.lens, depths_mm=(500.0, 1000.0)))
-    with pytest.raises(ContractError, match="fine-tune without --pairs"):
+    with pytest.raises(ContractError, match="fine-tune without pairs"):
         read_pairs(folder, deep, bank, None, seed=1)

@@ -90,7 +90,7 @@ def test_vgg_is_not_moved_by_training(small_recipe):
 @pytest.mark.parametrize(
     ("role", "changes", "thesis", "named"),
     [
-        ("split", {}, {"random_vgg": False}, r"--vgg FILE .*random_vgg = true in \[thesis\]"),
+        ("split", {}, {"random_vgg": False}, r"vgg \(a file .*random_vgg = true in \[thesis\]"),
         ("split", {"entry": entry_of("fusion")}, {}, "split is thesis_split; got thesis_fusion"),
         ("fusion", {"entry": entry_of("fusion", precision="bfloat16")}, {}, 'float32" with the'),
     ],

@@ -24,7 +24,7 @@ def _counts(photons: float = 200.0, frames: int = 2) -> np.ndarray:
 
 
 def test_a_camera_of_photographs_is_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(BundleError, match=r"has no stage super_resolve.*--bundle none"):
+    with pytest.raises(BundleError, match=r"has no stage super_resolve.*bundle=.none."):
         FineCamera.of(open_bundle(write_tiny_bundle(tmp_path)))
 
 

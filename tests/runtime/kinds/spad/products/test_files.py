@@ -91,7 +91,9 @@ def test_a_sub_pixel_looks_where_the_pixel_does_on_whose_middle_it_lies() -> Non
 
 def test_what_does_not_fit_the_memory_as_a_whole_says_what_it_needs() -> None:
     check_room((32, 64), 125, 290, 400_000_000)
-    with pytest.raises(ContractError, match=r"64x32 pixels of 4096 bins.*need --max-mem 2693M"):
+    with pytest.raises(
+        ContractError, match=r"64x32 pixels of 4096 bins.*need max_mem_bytes=2_692_"
+    ):
         check_room((32, 64), 4096, 290, 930_000_000)
 
 
@@ -164,7 +166,7 @@ def test_pieces_hold_every_row_once_and_stay_under_the_cap(
     try:
         cut = pieces((height, width), bins, reach=reach, max_mem_bytes=cap, held_bytes=held)
     except ContractError as error:
-        assert "need --max-mem" in str(error)  # noqa: PT017 - either it fits or it is refused
+        assert "need max_mem_bytes" in str(error)  # noqa: PT017 - either it fits or it is refused
         assert KEPT_BYTES + held + of_row * min(height, 2 * reach + 1) > cap
         return
     assert [piece.top for piece in cut] == [0, *(piece.bottom for piece in cut[:-1])]

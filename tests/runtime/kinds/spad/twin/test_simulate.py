@@ -136,7 +136,7 @@ def test_axes_in_another_order_are_named_where_they_would_fit(
     with pytest.raises(ContractError, match=rf"has {BINS}x{WIDTH} pixels.*axes = \"yxt\" in a"):
         camkit.load(str(bundle.path)).make(path)
     np.savez(tmp_path / "b.npz", histogram=np.ones((BINS, 9, 9), np.uint16))
-    with pytest.raises(ContractError, match=r"has 9x9 pixels.*say --bundle none$"):
+    with pytest.raises(ContractError, match=r"has 9x9 pixels.*say bundle=.none.$"):
         camkit.load(str(bundle.path)).make(tmp_path / "b.npz")
 
 

@@ -1,0 +1,113 @@
+"""The language of the caller: a flag on the command line, a parameter in a program.
+
+Messages name an option by what it is called in Python and are spoken where they are raised:
+
+    option_text("max_mem_bytes")          --max-mem           max_mem_bytes
+    option_text("on_unsafe", "warn")      --on-unsafe warn    on_unsafe="warn"
+
+Programs are spoken to unless somebody says otherwise: the command line says so for its process and
+its children, a cluster for the task of one caller.
+"""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from enum import Enum
+from typing import Final, Literal, cast, get_args
+
+Language = Literal["python", "command"]
+VARIABLE: Final = "CAMKIT_LANGUAGE"
+"""In the environment, which children inherit and threads share."""
+
+FLAGS: Final = {
+    "white_balance": "--wb",
+    "exposure_ev": "--exposure",
+    "max_mem_bytes": "--max-mem",
+    "cfa": "--mosaic",
+    "times_s": "--times",
+}
+"""Options whose flag is not their name."""
+PARAMETERS: Final = {
+    "cfa": "MosaicOptions.cfa",
+    "black_level": "MosaicOptions.black_level",
+    "white_level": "MosaicOptions.white_level",
+}
+"""Options that are fields of a parameter."""
+
+
+class _Nothing(Enum):
+    SAID = 0
+
+
+_task: ContextVar[Language | None] = ContextVar("camkit_language", default=None)
+
+
+def language() -> Language:
+    """Return the language of the caller."""
+    spoken = _task.get() or os.environ.get(VARIABLE)
+    return cast("Language", spoken) if spoken in get_args(Language) else "python"
+
+
+@contextmanager
+def speaking(chosen: Language) -> Iterator[None]:
+    """Speak a language in this process and in the children that it starts."""
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = chosen
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
+
+
+@contextmanager
+def speaking_here(chosen: Language) -> Iterator[None]:
+    """Speak a language in this thread alone, whose process serves several callers."""
+    token = _task.set(chosen)
+    try:
+        yield
+    finally:
+        _task.reset(token)
+
+
+def option_text(name: str, value: object = _Nothing.SAID) -> str:
+    """Return an option as the caller writes it.
+
+    Args:
+        name: Its name in Python.
+        value: What to choose; none names the option alone.
+    """
+    if language() == "command":
+        return _flag(name, value)
+    parameter = PARAMETERS.get(name, name)
+    if value is _Nothing.SAID:
+        return parameter
+    if isinstance(value, str):
+        return f'{parameter}="{value}"'
+    return f"{parameter}={_plain(value)}"
+
+
+def option_list(names: list[str]) -> str:
+    """Return several options as the caller writes them."""
+    return ", ".join(map(option_text, names))
+
+
+def _flag(name: str, value: object) -> str:
+    flag = FLAGS.get(name, "--" + name.replace("_", "-"))
+    if value is False:
+        return flag.replace("--", "--no-", 1)
+    if value is _Nothing.SAID or value is True:
+        return flag
+    if name == "max_mem_bytes" and isinstance(value, int):
+        return f"{flag} {value // 10**6 + 1}M"
+    return f"{flag} {_plain(value)}"
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    is_large = type(value) is int and value >= 10**6
+    return f"{value:_}" if is_large else str(value)

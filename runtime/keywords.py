@@ -1,0 +1,76 @@
+"""The options of `camkit.load` and `camkit.process` as keywords, for type checkers.
+
+`Options`, `WriteOptions` and the kinds of cameras say what the keywords are; a test compares.
+Options that a kind of somebody else's package brings are taken at run time all the same.
+"""
+
+from os import PathLike
+from typing import Literal, TypedDict
+
+from camkit.runtime.options import (
+    Assumption,
+    DemosaicMethod,
+    Dtype,
+    Laws,
+    Mode,
+    OnUnsafe,
+    OutputColor,
+    Provider,
+    Quality,
+)
+from camkit.runtime.output.writer import FileFormat
+from camkit.runtime.unit import Unit
+
+
+class KindKeywords(TypedDict, total=False):
+    """What the kinds of cameras that come with camkit add."""
+
+    timing: str | PathLike[str] | None
+    product: Literal["depth", "intensity", "transient", "lifetime"] | None
+    pool: Literal["auto", "1", "3", "5", 1, 3, 5] | None
+    returns: Literal["1", "2", 1, 2] | None
+
+
+class LoadKeywords(KindKeywords, total=False):
+    """The fields of `Options`, and what kinds add."""
+
+    size: str | None
+    quality: Quality
+    max_seconds: float | None
+    max_error_db: float | None
+    depth_m: float | None
+    method: str | None
+    mode: Mode
+    demosaic: DemosaicMethod | None
+    color: OutputColor
+    white_balance: tuple[float, float, float] | None
+    exposure_ev: float
+    vignetting: bool
+    undistort: bool
+    origin_px: tuple[int, int] | None
+    assume: Assumption | None
+    force_bundle: bool
+    on_unsafe: OnUnsafe
+    laws: Laws
+    strength: float
+    max_mem_bytes: int | None
+    threads: int | None
+    tile_px: int | None
+    unit: Unit | None
+    dtype: Dtype
+    provider: Provider
+
+
+class ProcessKeywords(LoadKeywords, total=False):
+    """Besides, the fields of `WriteOptions`."""
+
+    out_dir: str | PathLike[str]
+    keep_folders: bool
+    format: FileFormat | None
+    preview: bool
+    linear: bool
+    jpeg_quality: int | None
+    strip_metadata: bool
+    resume: bool
+    overwrite: bool
+    jobs: int
