@@ -96,3 +96,12 @@ def test_block_that_writes_nothing_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), atomic_output(tmp_path / "a.exr"):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+def test_names_that_share_their_beginning_keep_their_own_parts(tmp_path: Path) -> None:
+    one, other = (tmp_path / f"{'n' * 220}{last}.exr" for last in "ab")
+    own = part_path(one)
+    own.touch()
+    assert stale_parts(one) == [own]
+    assert stale_parts(other) == []
+    assert len(own.name.encode()) <= 255
