@@ -157,20 +157,23 @@ class _NetworkStage:
             cell_px=CELL_PX,
             tile_px=job.options.tile_px,
         )
+        engines = [job.setup.networks(entry.role, size) for size in work.sizes()]
         networks = [
             SizedNetwork(
                 size=size,
-                run=self._trimmed(job.setup.networks(entry.role, size), max_bytes),
+                run=self._trimmed(engine, max_bytes),
                 facts=one,
+                block_bytes=engine.block_bytes or 0.0,
                 masks=self._masks,
                 extra_reach_px=entry.extra_reach_px,
                 lattice_px=1 if entry.light is None else LIGHT_CELL_PX,
             )
-            for size, one in zip(work.sizes(), facts, strict=True)
+            for size, one, engine in zip(work.sizes(), facts, engines, strict=True)
         ]
         taken = bundle.manifest.planes[entry.takes[0]]
         self._windows = lay_network(job.grid_px(taken), networks, limits, work.network_labels())
         job.windows[entry.role] = self._windows
+        job.notes.extend(self._windows.notes())
         tiles = {role: windows.to_json() for role, windows in job.windows.items()}
         one = len(bundle.manifest.networks) == 1
         job.record["tiles"] = tiles[entry.role] if one else tiles
