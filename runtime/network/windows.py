@@ -308,7 +308,8 @@ def _check_one_window(
         return
     height, width = size_px
     cap_mb = -(-(limits.spent_bytes + needed) // 10**6)
-    cure = f"one window of {width}x{height} px takes {needed // 10**6} MB: raise --max-mem to {cap_mb}M"
+    cure = f"one window of {width}x{height} px takes {needed // 10**6} MB"
+    cure += f": raise --max-mem to {cap_mb}M"
     if layout.window_count > 1:
         cure = f"leave --tile-px out, which asks for {layout.window_count} windows"
     elif _has_fast(network.facts):
