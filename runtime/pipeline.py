@@ -531,10 +531,15 @@ def _engine(
             else f"bundle {bundle.manifest.name} holds no network; use method wiener"
         )
     data = bundle.network_bytes(role, size, fp16=options.dtype == "fp16")
+    block_bytes = None
     if not is_built_in(bundle):  # theirs were checked when they were made, as the code was
         from camkit.runtime.network.graph import check_graph
 
-        check_graph(data, sizes[size])
+        block_bytes = check_graph(data, sizes[size]).block_bytes_per_pixel
     return NetworkEngine(
-        data, threads=threads, provider=options.provider, scale=sizes[size].output_scale
+        data,
+        threads=threads,
+        provider=options.provider,
+        scale=sizes[size].output_scale,
+        block_bytes=block_bytes,
     )

@@ -8,6 +8,8 @@ from camkit.bundle.entry import Count, Entry, NonNegative, Positive, Word
 
 MAX_REACH_PX: Final = 4096
 """Far beyond any network that may be tiled: the reference networks of 64 channels reach 446 px."""
+MOST_NAMED: Final = 3
+"""Operators that a message names."""
 Reach = Annotated[int, Field(ge=0, le=MAX_REACH_PX)]
 
 
@@ -112,6 +114,13 @@ class NetworkFacts(Entry):
     def output_scale(self) -> int:
         """Samples along a side of the outputs for one pixel."""
         return self.outputs[0].scale
+
+    @property
+    def global_text(self) -> str:
+        """Return the operators that see the whole picture, the first few by name; "" for none."""
+        names = self.global_operators
+        more = len(names) - MOST_NAMED
+        return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
     @property
     def reach_px(self) -> int:

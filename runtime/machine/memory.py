@@ -4,6 +4,7 @@ import ctypes
 import mmap
 import os
 import sys
+import threading
 from pathlib import Path
 from typing import Any, Final
 
@@ -57,6 +58,30 @@ def keep_freed_memory() -> None:
         _LIBC.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
 
 
+class _MappedArrays:
+    """Gives every large array a mapping of its own while anybody asks for it; see `mapped_arrays`.
+
+    What is set holds for the whole process, so callers of several threads are counted.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._callers = 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._callers += 1
+            if self._callers == 1 and _LIBC is not None:
+                _LIBC.mallopt(_M_MMAP_THRESHOLD, _MAPPED_BYTES)
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._callers -= 1
+            if self._callers == 0 and _LIBC is not None:
+                _LIBC.mallopt(_M_MMAP_THRESHOLD, _KEPT_BYTES // 2)
+                _LIBC.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+
+
 def _resident_bytes() -> int:
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
@@ -81,6 +106,13 @@ _M_TRIM_THRESHOLD: Final = -1
 _M_MMAP_THRESHOLD: Final = -3
 _KEPT_BYTES: Final = 64 * 2**20
 """glibc's own threshold grows up to here (mallopt(3))."""
+_MAPPED_BYTES: Final = 256 * 2**10
+mapped_arrays: Final = _MappedArrays()
+"""Context in which arrays go back to the system as soon as they are freed.
+
+Otherwise the C library keeps those of up to 32 MB in its heap, where arrays of many sizes leave
+holes. It costs fresh pages for every array. Nothing happens where the C library is not glibc.
+"""
 
 
 def mapping_of(samples: NDArray[Any]) -> mmap.mmap | None:

@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ import numpy as np
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ContractError, UnsupportedError
 from camkit.runtime.cancel import Cancel, Cancelled, watched
+from camkit.runtime.machine.memory import mapped_arrays
 
 _IMPORTED_BEFORE = "onnxruntime" in sys.modules and "ORT_DISABLE_TELEMETRY" not in os.environ
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
@@ -106,7 +108,13 @@ class NetworkEngine:
     """
 
     def __init__(
-        self, model: bytes, *, threads: int, provider: str = "cpu", scale: int = 1
+        self,
+        model: bytes,
+        *,
+        threads: int,
+        provider: str = "cpu",
+        scale: int = 1,
+        block_bytes: float | None = None,
     ) -> None:
         """Load a model.
 
@@ -115,6 +123,10 @@ class NetworkEngine:
             threads: Threads per run, from `available_threads`.
             provider: Key of `PROVIDER_NAMES`; arrays stay in the memory of the CPU.
             scale: Samples along a side of the output for one pixel of the input.
+            block_bytes: Counted memory of a run per pixel (`block_bytes_per_pixel` of the graph):
+                on the CPU its tensors then lie in one block of about that size, once onnxruntime
+                has seen windows of a size. None for its arena, which takes fresh pages less often
+                and may hold several times that.
 
         Raises:
             ContractError: If `model` is not bytes, threads or scale < 1.
@@ -127,8 +139,12 @@ class NetworkEngine:
         if threads < 1 or scale < 1:
             raise ContractError(f"threads and scale must be >= 1; got {threads}, {scale}")
         _check_version(ort.__version__)
+        self.block_bytes = block_bytes if provider == "cpu" else None
         with _CREATION:
-            self._session = _create_session(model, threads, provider)
+            self._session = _create_session(
+                model, threads, provider, in_block=self.block_bytes is not None
+            )
+        self._memory = nullcontext() if self.block_bytes is None else mapped_arrays
         self.threads = threads
         self.provider = provider
         self.scale = scale
@@ -173,7 +189,7 @@ class NetworkEngine:
             running.terminate = True
 
         try:
-            with watched(cancel, end):
+            with watched(cancel, end), self._memory:
                 self._session.run_with_iobinding(binding, running)
         except Cancelled:
             raise
@@ -233,15 +249,17 @@ def _check_version(version: str) -> None:
         )
 
 
-def _create_session(model: bytes, threads: int, provider: str = "cpu") -> Any:
+def _create_session(
+    model: bytes, threads: int, provider: str = "cpu", *, in_block: bool = False
+) -> Any:
     chosen = _chosen_providers(provider)
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.execution_mode = ort.ExecutionMode.ORT_SEQUENTIAL
     options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_ENABLE_ALL
-    options.enable_mem_pattern = False
-    options.enable_cpu_mem_arena = True
+    options.enable_mem_pattern = in_block
+    options.enable_cpu_mem_arena = not in_block
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4  # errors reach the caller as exceptions, not on stderr
     try:

@@ -5,11 +5,16 @@ pixels reads are carried from the output to the input in integers.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 from camkit.errors import BundleError
+from camkit.runtime.network.activation_memory import (
+    Activations,
+    activation_memory,
+    named,
+)
 from camkit.runtime.network.operators import (
     ELEMENTWISE,
     GLOBAL_POOLS,
@@ -24,13 +29,13 @@ from camkit.runtime.network.operators import (
     convolution_windows,
     is_corner_aligned,
     place_run,
+    reduced_axes,
     reduces_space,
     resize_windows,
     shuffle_window,
     unshuffle_window,
 )
 
-_BYTES_PER_VALUE: Final = 4
 # The alignment of onnxruntime's blocked (NCHWc) convolutions, and the channels below which it
 # reads the plain layout into a blocked one; the block is 8 or 16 by processor.
 _BLOCK_ALIGNMENT: Final = 4
@@ -38,6 +43,7 @@ _SMALL_INPUT: Final = 8
 _LARGE_BLOCK: Final = 16
 # How much longer a sample takes that is pooled, or multiplied in groups or off the blocked path.
 _SLOWNESS: Final = 16
+_CHANNEL_AXIS: Final = 1
 _MAX_CHANNELS: Final = 2**16
 _MAX_EXTRA_PX: Final = 64
 # Operators that may take several computed tensors; all others take one, the rest is constant.
@@ -59,6 +65,7 @@ class GraphFacts:
             may differ there.
         mac_per_pixel: Multiply-accumulates of all convolutions per pixel of the input.
         bytes_per_pixel: Peak of the live float32 activations per pixel of the input.
+        block_bytes_per_pixel: What a run takes that lays them in one block.
         work_per_pixel: Multiply-accumulates, those of pooling, of groups and off the blocked path
             several times, as slow as they are; samples read and written.
         parameters: Number of constants of floating point.
@@ -76,6 +83,7 @@ class GraphFacts:
     unblocked_convolutions: tuple[str, ...]
     mac_per_pixel: float
     bytes_per_pixel: float
+    block_bytes_per_pixel: float
     work_per_pixel: float
     parameters: int
     values_per_pixel: float
@@ -88,6 +96,7 @@ class _Walk:
     windows: dict[str, Windows] = field(default_factory=dict)
     global_operators: list[str] = field(default_factory=list)
     unblocked: list[str] = field(default_factory=list)
+    blocked: set[str] = field(default_factory=set)
     workspace: dict[str, float] = field(default_factory=dict)
     mac_per_pixel: float = 0.0
     slow_per_pixel: float = 0.0
@@ -152,7 +161,12 @@ def walk_graph(
     read = sum(
         walk.extents[name].samples_per_pixel
         for node in nodes
-        for name in _names(walk.extents, node.inputs)
+        for name in named(walk.extents, node.inputs)
+    )
+    memory = activation_memory(
+        nodes,
+        Activations(extents=walk.extents, workspace=walk.workspace, blocked=walk.blocked),
+        ends=(source[0], target[0]),
     )
     return GraphFacts(
         input_name=source[0],
@@ -167,7 +181,8 @@ def walk_graph(
         global_operators=tuple(walk.global_operators),
         unblocked_convolutions=tuple(walk.unblocked),
         mac_per_pixel=walk.mac_per_pixel,
-        bytes_per_pixel=_peak_bytes(nodes, walk, keep=target[0]),
+        bytes_per_pixel=memory.live,
+        block_bytes_per_pixel=memory.block,
         work_per_pixel=walk.mac_per_pixel + _SLOWNESS * walk.slow_per_pixel + values + read,
         parameters=sum(a.size for a in constants.values() if a.dtype.kind == "f"),
         values_per_pixel=values,
@@ -231,7 +246,7 @@ def _reach(
                 run = runs[output]
                 if output in walk.windows:
                     run = walk.windows[output][axis].reads(*run)
-                for index, name in enumerate(_names(walk.extents, node.inputs)):
+                for index, name in enumerate(named(walk.extents, node.inputs)):
                     own = run
                     if output in woven:
                         fine, block = woven[output]
@@ -328,6 +343,8 @@ def _convolve(walk: _Walk, node: Node) -> Extent:
         walk.unblocked.append(node.label)
         if node.op == "Conv":  # blocks behind another one are put in plain order first
             walk.workspace[node.outputs[0]] = extent.samples_per_pixel
+    else:
+        walk.blocked.add(node.outputs[0])
     return result
 
 
@@ -357,6 +374,11 @@ def _elementwise(walk: _Walk, node: Node) -> Extent:
     extents = [walk.extent(node, node.inputs.index(name)) for name in operands]
     if not extents:
         raise BundleError(f"{node.label}: computes with constants alone; fold them at export")
+    if node.op == "BatchNormalization" and node.integer("training_mode", 0):
+        raise BundleError(
+            f"{node.label}: BatchNormalization in training mode looks at the whole picture; export "
+            "the network in its evaluation mode"
+        )
     if node.op not in ("BatchNormalization", "Clip"):
         check_broadcast(node, walk.constants)
     channels = {extent.channels for extent in extents}
@@ -441,42 +463,16 @@ def _global(walk: _Walk, node: Node) -> Extent:
     if node.op in GLOBAL_POOLS:
         walk.mark_global(node)
         return Extent(channels=extent.channels, axes=None)
-    is_over_space = reduces_space(node, walk.constants)
-    if is_over_space:
+    axes = reduced_axes(node, walk.constants)
+    if reduces_space(axes):
         walk.mark_global(node)
     if node.op == "Softmax":
         return extent
     if node.op in REDUCTIONS and node.integer("keepdims", 1) == 1:
-        # Over space the channels stay; otherwise the one axis left to reduce is that of channels.
-        if is_over_space:
-            return Extent(channels=extent.channels, axes=None)
-        return extent.through(1)
+        channels = 1 if _CHANNEL_AXIS in axes else extent.channels
+        return (
+            Extent(channels=channels, axes=None)
+            if reduces_space(axes)
+            else extent.through(channels)
+        )
     raise BundleError(f"{node.label}: {node.op} that drops axes is refused; keep dimensions")
-
-
-def _peak_bytes(nodes: Sequence[Node], walk: _Walk, *, keep: str) -> float:
-    """Give the peak of live activations in bytes per pixel, each freed after its last use.
-
-    An elementwise node writes over an operand that nobody needs any more, as onnxruntime does.
-    Some convolutions need room of their own.
-    """
-    extents = walk.extents
-    last = {name: index for index, node in enumerate(nodes) for name in node.inputs}
-    last[keep] = len(nodes)
-    alive = set(_names(extents, [next(iter(extents))]))
-    peak = 0.0
-    for index, node in enumerate(nodes):
-        dying = {name for name in _names(extents, node.inputs) if last.get(name) == index}
-        outputs = _names(extents, node.outputs)
-        if node.op in ELEMENTWISE:
-            alive -= set(list(dying)[:1])
-        alive |= set(outputs)
-        room = sum(walk.workspace.get(name, 0.0) for name in node.outputs)
-        peak = max(peak, room + sum(extents[name].samples_per_pixel for name in alive))
-        alive -= dying
-        alive -= {name for name in outputs if name not in last}
-    return peak * _BYTES_PER_VALUE
-
-
-def _names(extents: Mapping[str, Extent], names: Iterable[str]) -> list[str]:
-    return [name for name in names if name in extents]

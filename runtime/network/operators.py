@@ -250,15 +250,27 @@ def is_corner_aligned(node: Node) -> bool:
     return node.text("coordinate_transformation_mode", "half_pixel") == "align_corners"
 
 
-def reduces_space(node: Node, constants: Constants) -> bool:
-    """Tell whether a reduction or softmax runs over rows or columns."""
+def reduced_axes(node: Node, constants: Constants) -> frozenset[int]:
+    """Return the axes, from 0, over which a reduction or softmax runs.
+
+    Raises:
+        BundleError: If they are computed.
+    """
     if node.op == "Softmax":
-        axes = [node.integer("axis", -1)]
-    elif len(node.inputs) > 1 and node.inputs[1] in constants:
+        return frozenset({node.integer("axis", -1) % _NDIM})
+    axes = node.integers("axes", [])
+    if len(node.inputs) > 1 and node.inputs[1]:
+        if node.inputs[1] not in constants:
+            raise BundleError(f"{node.label}: the axes must be a constant")
         axes = [int(axis) for axis in constants[node.inputs[1]].ravel()]
-    else:
-        axes = node.integers("axes", list(range(_NDIM)))
-    return any(axis % _NDIM in _SPATIAL for axis in axes)
+    if not axes and not node.integer("noop_with_empty_axes", 0):
+        axes = list(range(_NDIM))
+    return frozenset(axis % _NDIM for axis in axes)
+
+
+def reduces_space(axes: frozenset[int]) -> bool:
+    """Return whether rows or columns are among some axes."""
+    return not axes.isdisjoint(_SPATIAL)
 
 
 def check_broadcast(node: Node, constants: Constants) -> None:

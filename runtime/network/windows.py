@@ -7,8 +7,9 @@ Without labels one network runs everywhere (`tiling`), with labels on some latti
 """
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from camkit.bundle.facts import HaloError, NetworkFacts
@@ -50,6 +51,7 @@ class SizedNetwork:
         size: Name of its size.
         run: From a window, of which it takes its inputs, to that of its outputs.
         facts: Of the manifest.
+        block_bytes: Counted memory of a run per pixel, where the manifest's is not believed.
         masks: Channels that its windows hold besides its inputs, for the step behind it.
         extra_reach_px: Pixels that the step behind it looks beyond its reach.
         lattice_px: Windows keep to multiples of it besides, for the step behind it.
@@ -58,6 +60,7 @@ class SizedNetwork:
     size: str
     run: Run
     facts: NetworkFacts
+    block_bytes: float = 0.0
     masks: int = 0
     extra_reach_px: int = 0
     lattice_px: int = 1
@@ -72,11 +75,16 @@ class SizedNetwork:
         """Give what the network holds per pixel."""
         behind = STEP_BYTES if self.extra_reach_px else 0.0
         return PixelCost(
-            arena_bytes=self.facts.bytes_per_pixel + behind,
+            arena_bytes=max(self.facts.bytes_per_pixel, self.block_bytes) + behind,
             channels=self.facts.input_channels + self.masks,
             outputs=self.facts.output_channels,
             scale=self.facts.output_scale,
         )
+
+    @property
+    def is_global(self) -> bool:
+        """Return whether what it gives anywhere depends on the whole of what it takes."""
+        return bool(self.facts.global_operators)
 
     def halo_px(self, mode: Mode) -> int:
         """Give the halo of a mode.
@@ -167,6 +175,17 @@ class NetworkWindows:
             finish=finish,
         )
 
+    def notes(self) -> tuple[str, ...]:
+        """Return what people should know of windows of a network that looks at whole pictures."""
+        count = self.to_json().get("windows", 0)
+        seen = next((one.facts.global_text for one in self.networks if one.is_global), "")
+        if count < 2 or not seen:
+            return ()
+        return (
+            f"the network looks at the whole picture ({seen}), and mode {self.mode} shows it "
+            f"{count} windows, each by itself: brightness or contrast may change between them",
+        )
+
     @property
     def halo_px(self) -> int:
         """Give the largest halo of its networks."""
@@ -193,12 +212,13 @@ class NetworkWindows:
     def to_json(self) -> dict[str, Any]:
         """Give the windows in a few numbers, for the sidecar."""
         if self.tiles is not None:
+            seen = list(self.networks[0].facts.global_operators)
             return {
                 "mode": self.mode,
                 "halo_px": self.tiles.halo_px,
                 "windows": self.tiles.window_count,
                 "work_ratio": round(self.tiles.work_ratio, 3),
-            }
+            } | ({"global_operators": seen} if seen else {})
         if self.cells is None:
             return {}
         height, width = self.cells.size_px
@@ -220,6 +240,8 @@ def lay_network(
 ) -> NetworkWindows:
     """Lay the windows of a capture.
 
+    A network that looks at the whole picture gets it in one window, in mode exact as in mode whole.
+
     Args:
         size_px: (height, width).
         networks: One, or with labels as many as these name.
@@ -227,7 +249,8 @@ def lay_network(
         labels: (row, column): 0 none, n the n-th network; None for the first one everywhere.
 
     Raises:
-        ContractError: If the cap is too small.
+        ContractError: If the cap is too small, or a network that looks at the whole picture would
+            be tiled in mode exact.
     """
     try:
         return _lay_windows(size_px, networks, limits, labels)
@@ -244,8 +267,13 @@ def _lay_windows(
     limits: WindowLimits,
     labels: Labels | None,
 ) -> NetworkWindows:
-    height, width = size_px
-    if labels is not None and limits.mode != "whole":
+    network = networks[0] if networks else None
+    one_window = limits.mode == "whole" or (
+        limits.mode == "exact" and any(one.is_global for one in networks)
+    )
+    if network is None or (labels is not None and not one_window):
+        if labels is None:
+            raise ContractError("windows need a network")
         cells = lay_cells(
             size_px,
             labels,
@@ -254,15 +282,46 @@ def _lay_windows(
         )
         return NetworkWindows(networks=tuple(networks), tiles=None, cells=cells, mode=limits.mode)
     tile_limits = TileLimits(
-        stride_px=networks[0].stride_px,
-        halo_px=networks[0].halo_px(limits.mode),
-        cost=networks[0].cost,
+        stride_px=network.stride_px,
+        halo_px=network.halo_px(limits.mode),
+        cost=network.cost,
         max_bytes=limits.max_bytes,
         tile_px=limits.tile_px,
-        whole=limits.mode == "whole",
+        whole=one_window,
     )
-    tiles = lay_windows(height, width, tile_limits)
+    if network.is_global and limits.mode == "exact":
+        _check_one_window(size_px, network, limits, tile_limits)
+    tiles = lay_windows(*size_px, tile_limits)
     return NetworkWindows(networks=tuple(networks), tiles=tiles, cells=None, mode=limits.mode)
+
+
+def _check_one_window(
+    size_px: tuple[int, int],
+    network: SizedNetwork,
+    limits: WindowLimits,
+    tile_limits: TileLimits,
+) -> None:
+    """Refuse to tile a network that looks at the whole picture."""
+    layout = lay_windows(*size_px, replace(tile_limits, max_bytes=sys.maxsize))
+    needed = layout.needed_bytes(network.cost)
+    if layout.window_count == 1 and needed <= limits.max_bytes:
+        return
+    height, width = size_px
+    cap_mb = -(-(limits.spent_bytes + needed) // 10**6)
+    cure = f"one window of {width}x{height} px takes {needed // 10**6} MB"
+    cure += f": raise --max-mem to {cap_mb}M"
+    if layout.window_count > 1:
+        cure = f"leave --tile-px out, which asks for {layout.window_count} windows"
+    elif _has_fast(network.facts):
+        cure += ", or say --mode fast, which shows it windows each by itself"
+    raise ContractError(
+        f"the network looks at the whole picture ({network.facts.global_text}) and cannot be tiled "
+        f"exactly: {cure}"
+    )
+
+
+def _has_fast(facts: NetworkFacts) -> bool:
+    return any(e.psnr_db is None or e.psnr_db >= FAST_LEAST_DB for e in facts.halo_error)
 
 
 def fast_halo_px(curve: tuple[HaloError, ...], least_db: float = FAST_LEAST_DB) -> int:

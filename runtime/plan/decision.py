@@ -70,6 +70,12 @@ class Subject:
         return self.facts(size).reach_px + max(extra_px, default=0)
 
     @property
+    def global_text(self) -> str:
+        """Return the operators of a network that see the whole picture; "" for none."""
+        networks = self.bundle.manifest.networks.values()
+        return next((f.global_text for one in networks for f in one.values() if f.global_text), "")
+
+    @property
     def megapixels(self) -> float:
         """Give the size of the capture."""
         return self.height_px * self.width_px / 1e6

@@ -15,7 +15,7 @@ import numpy as np
 from camkit.bundle.facts import NetworkFacts
 from camkit.bundle.golden import NO_SIZE, GoldenArrays, golden_from_bytes
 from camkit.bundle.manifest import GoldenCase
-from camkit.bundle.reader import GOLDEN, Bundle
+from camkit.bundle.reader import GOLDEN, Bundle, is_built_in
 from camkit.contracts import FloatArray
 from camkit.errors import BundleError, ParityError
 from camkit.runtime.kind_parts.proving import GoldenRun
@@ -27,6 +27,7 @@ from camkit.runtime.network.probe import perturbation_reach, probe_runs
 from camkit.runtime.network.ranges import FP16_LIMIT, fits_fp16, node_activations
 from camkit.runtime.network.tiling import TileLayout, TileLimits, infer_bands, lay_windows
 from camkit.runtime.proof.haze import prove_haze
+from camkit.runtime.proof.one_window import prove_one_window
 from camkit.runtime.rows import ArrayRows
 
 _SEED: Final = 7
@@ -112,14 +113,15 @@ def prove_tiling(bundle: Bundle, *, run: GoldenRun | None, threads: int) -> Resu
     """Show for every network that tiled equals whole and that its reach is what it says.
 
     Raises:
-        ParityError: If a single bit differs, or a pixel acts further than stated.
+        ParityError: If a single bit differs, a pixel acts further than stated, or a network that
+            sees the whole picture would have to be tiled.
         BundleError: If the proof would take more memory or work than is admitted.
     """
     notes = []
     for role, size, facts in _networks(bundle):
         what = _name(bundle, role, size)
         if facts.global_operators:
-            notes.append(f"{what}: cannot be tiled ({', '.join(facts.global_operators)})")
+            notes.append(f"{what}: {prove_one_window(bundle, role, size)}")
             continue
         _admit_tiling(inspect_graph(bundle.network_bytes(role, size)), facts, what)
         engine = _engine(bundle, role, size, threads)
@@ -156,8 +158,9 @@ def _name(bundle: Bundle, role: str, size: str) -> str:
 
 
 def _engine(bundle: Bundle, role: str, size: str, threads: int) -> NetworkEngine:
-    scale = bundle.network_facts(role, size).output_scale
-    return NetworkEngine(bundle.network_bytes(role, size), threads=threads, scale=scale)
+    scale, data = bundle.network_facts(role, size).output_scale, bundle.network_bytes(role, size)
+    block_bytes = None if is_built_in(bundle) else inspect_graph(data).block_bytes_per_pixel
+    return NetworkEngine(data, threads=threads, scale=scale, block_bytes=block_bytes)
 
 
 def _tiles_px(stride: int) -> tuple[int, ...]:
@@ -199,7 +202,8 @@ def _admit_tiling(found: GraphFacts, facts: NetworkFacts, what: str) -> None:
     probe_px = _probe_px(facts) ** 2
     pictures = [math.prod(_picture_px(facts, tile)) for tile in _tiles_px(facts.stride_px)]
     proof = f"proving that size {what} of the network is tiled exactly"
-    PROOF_MB.check(max(*pictures, probe_px) * (found.bytes_per_pixel + ends) / 1e6, proof)
+    held = max(found.bytes_per_pixel, found.block_bytes_per_pixel) + ends
+    PROOF_MB.check(max(*pictures, probe_px) * held / 1e6, proof)
     runs_px = probe_runs(facts.stride_px) * probe_px
     for tiled, whole in _layouts(facts):
         area = tiled.height_px * tiled.width_px

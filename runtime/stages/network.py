@@ -59,11 +59,10 @@ NOTED_FRACTION: Final = 0.01
 """Of the picture; a network that moves much light in more of it is worth a note."""
 
 
-def _causes() -> str:
-    return (
-        "Usual causes: the capture is of another camera or distance, or its black level or white "
-        f"balance is wrong; {option_text('method', 'wiener')} shows the picture without the network"
-    )
+_CAUSES: Final = (
+    "This is usual in dark or deeply coloured areas; elsewhere the capture may be of another "
+    "camera or distance, or its black level or white balance may be wrong"
+)
 
 
 def prepare(entry: Network, job: Job) -> StageWork:
@@ -162,20 +161,23 @@ class _NetworkStage:
             cell_px=CELL_PX,
             tile_px=job.options.tile_px,
         )
+        engines = [job.setup.networks(entry.role, size) for size in work.sizes()]
         networks = [
             SizedNetwork(
                 size=size,
-                run=self._trimmed(job.setup.networks(entry.role, size), max_bytes),
+                run=self._trimmed(engine, max_bytes),
                 facts=one,
+                block_bytes=engine.block_bytes or 0.0,
                 masks=self._masks,
                 extra_reach_px=entry.extra_reach_px,
                 lattice_px=1 if entry.light is None else LIGHT_CELL_PX,
             )
-            for size, one in zip(work.sizes(), facts, strict=True)
+            for size, one, engine in zip(work.sizes(), facts, engines, strict=True)
         ]
         taken = bundle.manifest.planes[entry.takes[0]]
         self._windows = lay_network(job.grid_px(taken), networks, limits, work.network_labels())
         job.windows[entry.role] = self._windows
+        job.notes.extend(self._windows.notes())
         tiles = {role: windows.to_json() for role, windows in job.windows.items()}
         one = len(bundle.manifest.networks) == 1
         job.record["tiles"] = tiles[entry.role] if one else tiles
@@ -223,9 +225,9 @@ class _NetworkStage:
             f"the filter by more than {FAR:.0%}, which noise and lens errors do not explain"
         )
         if keeper.bound is not None:
-            return (f"{moved}; the filter's brightness was kept there. {_causes()}",)
+            return (f"{moved}; the filter's brightness was kept there. {_CAUSES}",)
         kept = f"{option_text('laws', 'enforce')} keeps the filter's brightness there"
-        return (f"{moved}; {kept}. {_causes()}",)
+        return (f"{moved}; {kept}. {_CAUSES}",)
 
     def run(self, taken: Sequence[Stream]) -> tuple[Stream, ...]:
         """Give the outputs of the network."""

@@ -6,7 +6,7 @@ Every view has a pose of its own and all share the camera. The numbers of poses 
 References: Marquardt 1963; Triggs 2000, "Bundle adjustment: a modern synthesis", section 6.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -69,7 +69,7 @@ def adjust(
     at = _Linear.at(camera, poses, corners, points)
     for _ in range(MOST_STEPS):
         step = at.step(damping, lens=lens)
-        tried = Camera(model=camera.model, intrinsics=camera.intrinsics + step[0])
+        tried = replace(camera, intrinsics=camera.intrinsics + step[0])
         moved = poses + step[1]
         found = _Linear.at(tried, moved, corners, points)
         if not found.square < at.square:
@@ -117,6 +117,7 @@ class _Linear:
         square = float(np.square(flat).sum())
         usable = np.isfinite(square) and bool(np.isfinite(slopes).all())
         by_pose, by_lens = slopes[..., :POSE_NUMBERS], slopes[..., POSE_NUMBERS:]
+        by_lens[..., list(camera.held)] = 0
         return cls(
             rest=rest,
             square=square if usable else np.inf,

@@ -15,7 +15,7 @@ References: Brown 1966; Kannala and Brandt 2006; the rational form and the order
     OpenCV's (k1, k2, p1, p2, k3, k4, k5, k6).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 
 FloatGrid = NDArray[np.float64]
 
+FOCAL: Final = 0
+CENTRE: Final = (1, 2)
 LENS_NUMBERS: Final = 3
 """Focal length and centre, before the coefficients in a vector of intrinsics."""
 POSE_NUMBERS: Final = 6
@@ -51,6 +53,11 @@ class Model:
         """Give how many coefficients there are, fitted or not."""
         return _FISHEYE_COEFFICIENTS if self.fisheye else _PINHOLE_COEFFICIENTS
 
+    @property
+    def is_tangential(self) -> bool:
+        """Return whether p1 and p2 are fitted, which move the centre of the distortion."""
+        return not self.fisheye and not {2, 3}.isdisjoint(self.free)
+
 
 MODELS: Final = (
     Model(name="pinhole", free=()),
@@ -71,10 +78,12 @@ class Camera:
     Attributes:
         model: The form.
         intrinsics: Focal length, centre x, centre y, then the free coefficients; px.
+        held: Places in `intrinsics` of what is known and not fitted.
     """
 
     model: Model
     intrinsics: FloatGrid
+    held: tuple[int, ...] = ()
 
     @property
     def focal_px(self) -> float:
@@ -103,8 +112,10 @@ class Camera:
 def with_model(camera: Camera, model: Model) -> Camera:
     """Give a camera in a richer form of its own kind; it sees the same."""
     coefficients = camera.coefficients[list(model.free)]
-    return Camera(
-        model=model, intrinsics=np.concatenate([camera.intrinsics[:LENS_NUMBERS], coefficients])
+    return replace(
+        camera,
+        model=model,
+        intrinsics=np.concatenate([camera.intrinsics[:LENS_NUMBERS], coefficients]),
     )
 
 

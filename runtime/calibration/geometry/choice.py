@@ -39,6 +39,7 @@ class Judged:
         held_out: (view, corner, 2) residuals of every view, its pose alone fitted, with the camera
             of the others.
         others_px: (view,) rms of the fit to the others.
+        others: (view, intrinsics) of the fits to the others.
         leverage: (view,) >= 1: by how much the error there exceeds that of corners, since the
             others know the camera so well only.
     """
@@ -46,6 +47,7 @@ class Judged:
     fit: Fit
     held_out: FloatGrid
     others_px: FloatGrid
+    others: FloatGrid
     leverage: FloatGrid
 
     @property
@@ -69,6 +71,19 @@ class Judged:
         return np.asarray(np.minimum(usual_px, self.others_px) * self.leverage)
 
     @property
+    def spread(self) -> FloatGrid:
+        """Return the standard errors (intrinsics,) by the jackknife over views.
+
+        Those of the covariance hold for corners that err by chance alone. What a board that is not
+        flat, or light that is bent on its way, does to all corners of a view is seen here only.
+
+        References: Tukey 1958; Efron and Stein 1981, "The jackknife estimate of variance".
+        """
+        count = len(self.others)
+        off = self.others - self.others.mean(axis=0)
+        return np.asarray(np.sqrt((count - 1) / count * np.square(off).sum(axis=0)))
+
+    @property
     def worst_px(self) -> float:
         """Give the held-out error of the worst view."""
         return float(self.of_views_px.max())
@@ -87,7 +102,7 @@ def judge(fit: Fit, corners: FloatGrid, points: FloatGrid) -> Judged:
         corners: (view, corner, 2) as seen, px.
         points: (corner, 3) on the board.
     """
-    rests, others_px, leverage = [], [], []
+    rests, others_px, cameras, leverage = [], [], [], []
     for view in range(len(corners)):
         kept = np.arange(len(corners)) != view
         others = adjust(fit.camera, fit.poses[kept], corners[kept], points)
@@ -96,11 +111,13 @@ def judge(fit: Fit, corners: FloatGrid, points: FloatGrid) -> Judged:
         )
         rests.append(alone.residuals[0])
         others_px.append(others.rms_px)
+        cameras.append(others.camera.intrinsics)
         leverage.append(_leverage(others, alone.poses[0], points))
     return Judged(
         fit=fit,
         held_out=np.stack(rests),
         others_px=np.array(others_px),
+        others=np.stack(cameras),
         leverage=np.array(leverage),
     )
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from camkit.caller import option_text
-from camkit.errors import DecodeError
+from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.geometry.adjustment import rms
 from camkit.runtime.calibration.geometry.board import Board
 from camkit.runtime.calibration.geometry.camera import Camera, FloatGrid, distance
@@ -18,15 +18,16 @@ from camkit.runtime.calibration.geometry.choice import (
     Judged,
     judge_all,
 )
+from camkit.runtime.calibration.geometry.corner_file import CornerFile
 from camkit.runtime.calibration.geometry.coverage import Coverage
 from camkit.runtime.calibration.geometry.detector import find_corners
+from camkit.runtime.calibration.geometry.determination import Determined, determine
 from camkit.runtime.calibration.geometry.grey import read_grey
 from camkit.runtime.calibration.geometry.profile import (
     Profile,
     RadialFit,
     fit_radial,
 )
-from camkit.runtime.calibration.geometry.unfolded import unfolded
 from camkit.runtime.raw import file_sha256
 
 MOST_PICTURES: Final = 256
@@ -37,6 +38,7 @@ WEAK_FOCAL: Final = 0.01
 """Standard error of the focal length, of itself: refused, and worth a word."""
 MISSED_PX: Final = 0.2
 """By the polynomial, from which on it is worth a word."""
+MOST_FOCAL_PX: Final = 1e6
 _OFF_MIDDLE: Final = 0.002
 """Of the diagonal, from which on the optical centre is said to be off the middle."""
 
@@ -69,6 +71,8 @@ class Geometry:
         coverage: Where the board was seen.
         profile: Distortion along a radius.
         radial: The same as the polynomial of `undistort`.
+        undetermined: "centre_px" and "focal_px" where the pictures do not tell them: the centre is
+            then the middle of the picture, the focal length the nominal one or a guess.
         notes: What people should know.
     """
 
@@ -81,6 +85,7 @@ class Geometry:
     profile: Profile
     radial: RadialFit
     notes: tuple[str, ...]
+    undetermined: tuple[str, ...] = ()
 
     @property
     def camera(self) -> Camera:
@@ -109,7 +114,7 @@ class Geometry:
             "notes": list(self.notes),
             "radial": self.radial.to_record(),
             "pictures": self._pictures(),
-        }
+        } | ({"undetermined": list(self.undetermined)} if self.undetermined else {})
 
     def _pictures(self) -> list[dict[str, Any]]:
         records: list[dict[str, Any]] = []
@@ -130,37 +135,76 @@ class Geometry:
         return records
 
 
-def calibrate_geometry(files: Sequence[Path], board: Board) -> Geometry:
+def calibrate_geometry(
+    files: Sequence[Path], board: Board, focal_px: float | None = None
+) -> Geometry:
     """Measure the geometry of a camera.
 
     Args:
         files: Photographs of a flat board at one setting of lens and focus, at every place of the
             picture and tilted.
         board: The board.
+        focal_px: Nominal focal length, which is held if the pictures do not determine it.
 
     Raises:
+        ContractError: If the nominal focal length is no number > 0.
         DecodeError: If a file cannot be read or is given twice, sizes differ, fewer than three
-            pictures show the board, they contradict each other, or what explains them folds.
+            pictures show the board, they contradict each other, or what explains them folds or is
+            none of a lens.
     """
-    views = look_for(files, board)
+    _check_nominal(focal_px)
+    return _measured(look_for(files, board), board, focal_px)
+
+
+def calibrate_corners(given: CornerFile, focal_px: float | None = None) -> Geometry:
+    """Measure the geometry of a camera from corners that were found before.
+
+    Args:
+        given: The corners; see `corner_file.read_corners`.
+        focal_px: Nominal focal length, which is held if the pictures do not determine it; None
+            for that of the file, if it states one.
+
+    Raises:
+        ContractError: If the nominal focal length is no number > 0.
+        DecodeError: If there are fewer than three pictures, they contradict each other, or what
+            explains them folds or is none of a lens.
+    """
+    focal_px = given.focal_px if focal_px is None else focal_px
+    _check_nominal(focal_px)
+    views = [
+        View(path=Path(f"picture {number}"), size=given.size, corners=corners)
+        for number, corners in enumerate(given.corners, start=1)
+    ]
+    _check_enough(views, given.board)
+    return _measured(views, given.board, focal_px)
+
+
+def _check_nominal(focal_px: float | None) -> None:
+    if focal_px is not None and not 0 < focal_px < MOST_FOCAL_PX:
+        raise ContractError(f"the nominal focal length must be > 0 px; got {focal_px:g}")
+
+
+def _measured(views: Sequence[View], board: Board, focal_px: float | None) -> Geometry:
+    """Return the geometry that views show."""
     seen = [view for view in views if view.corners is not None]
     corners = np.stack([view.corners for view in seen if view.corners is not None])
     size = views[0].size
     judged, outliers = judge_all(corners, board.points, size)
     _check_agree(judged, outliers, seen, size)
-    chosen, coverage, profile = unfolded(judged, corners, size)
-    _check_focal(chosen)
-    radial = fit_radial(profile, float(np.hypot(*size)) / 2, coverage.corner_px)
+    found = determine(judged, corners, board.points, size, focal_px)
+    _check_focal(found.chosen)
+    radial = fit_radial(found.profile, float(np.hypot(*size)) / 2, found.coverage.corner_px)
     return Geometry(
         board=board,
         views=tuple(views),
         size=size,
-        tried=tuple(judged),
-        chosen=chosen,
-        coverage=coverage,
-        profile=profile,
+        tried=tuple(found.judged),
+        chosen=found.chosen,
+        coverage=found.coverage,
+        profile=found.profile,
         radial=radial,
-        notes=_notes(views, size, chosen, coverage, radial),
+        notes=_notes(views, size, found, radial),
+        undetermined=found.undetermined,
     )
 
 
@@ -186,6 +230,11 @@ def look_for(files: Sequence[Path], board: Board) -> list[View]:
         size = (grey.shape[1], grey.shape[0])
         views.append(View(path=path, size=size, corners=find_corners(grey, board)))
     _check_sizes(views)
+    _check_enough(views, board)
+    return views
+
+
+def _check_enough(views: Sequence[View], board: Board) -> None:
     found = sum(view.corners is not None for view in views)
     if found < LEAST_VIEWS:
         what = f"a board of {board} inner corners"
@@ -197,7 +246,6 @@ def look_for(files: Sequence[Path], board: Board) -> list[View]:
             "board with white around it"
         )
         raise DecodeError(f"{told}, {LEAST_VIEWS} are needed: {cure}")
-    return views
 
 
 def _check_sizes(views: Sequence[View]) -> None:
@@ -252,13 +300,38 @@ def _check_focal(chosen: Judged) -> None:
         )
 
 
+def _held_notes(found: Determined, size: tuple[int, int]) -> list[str]:
+    """Say what the pictures do not determine, and what stands for it."""
+    notes = []
+    if "centre_px" in found.undetermined:
+        x, y = found.chosen.fit.camera.centre_px
+        notes.append(
+            f"the pictures do not determine the optical centre: it is held at the middle of the "
+            f"{size[0]}x{size[1]} px, ({x:g}, {y:g}); tilt the board to every side"
+        )
+    if "focal_px" in found.undetermined:
+        notes.append(f"the pictures do not determine the focal length: {_focal_text(found)}")
+    return notes
+
+
+def _focal_text(found: Determined) -> str:
+    focal_px = found.chosen.fit.camera.focal_px
+    if found.nominal.focal_px is not None:
+        return f"it is held at its nominal {focal_px:g} px; tilt the board by 20 degrees or more"
+    return (
+        f"{focal_px:.0f} px explains them best, with a standard error of {found.focal_error:.0%} "
+        "by leaving out one after the other; give the nominal one (focal_px), or tilt the board by "
+        "20 degrees or more"
+    )
+
+
 def _notes(
     views: Sequence[View],
     size: tuple[int, int],
-    chosen: Judged,
-    coverage: Coverage,
+    found: Determined,
     radial: RadialFit,
 ) -> tuple[str, ...]:
+    chosen, coverage = found.chosen, found.coverage
     notes = [f"{view.path.name}: no board found" for view in views if view.corners is None]
     if not coverage.is_whole:
         notes.append(
@@ -266,8 +339,9 @@ def _notes(
             f"picture reaches to {coverage.corner_px:.0f} px ({coverage.share:.0%} of it lay "
             "within a board); the distortion beyond is a guess: do not use it"
         )
+    notes += _held_notes(found, size)
     error = _focal_error(chosen)
-    if error > WEAK_FOCAL:
+    if error > WEAK_FOCAL and not found.undetermined:
         notes.append(f"the focal length is uncertain by {error:.1%}: tilt the board more")
     middle = ((size[0] - 1) / 2, (size[1] - 1) / 2)
     off = float(np.hypot(*np.subtract(chosen.fit.camera.centre_px, middle)))

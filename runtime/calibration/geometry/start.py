@@ -8,6 +8,7 @@ The best few of each kind are adjusted, and the richer models start from the sim
 References: Zhang 2000, "A flexible new technique for camera calibration" (pose from homography).
 """
 
+from dataclasses import dataclass
 from typing import Final
 
 import cv2
@@ -15,6 +16,8 @@ import numpy as np
 
 from camkit.runtime.calibration.geometry.adjustment import Fit, adjust, rms
 from camkit.runtime.calibration.geometry.camera import (
+    CENTRE,
+    FOCAL,
     MODELS,
     POSE_NUMBERS,
     Camera,
@@ -34,21 +37,51 @@ _MIDDLE: Final = Model(name="middle", free=())
 _FISHEYE_MIDDLE: Final = Model(name="fisheye_middle", free=(), fisheye=True)
 
 
-def fit_models(corners: FloatGrid, points: FloatGrid, size: tuple[int, int]) -> list[Fit]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nominal:
+    """What is not fitted.
+
+    Attributes:
+        centre: Whether the optical centre is held at the middle of the picture; then nothing is
+            fitted that moves it, tangential terms among them.
+        focal_px: Focal length that is held; None to fit it.
+    """
+
+    centre: bool = False
+    focal_px: float | None = None
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """Return the places of what is held in a vector of intrinsics."""
+        return (() if self.focal_px is None else (FOCAL,)) + (CENTRE if self.centre else ())
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """Return the models that can be fitted."""
+        return tuple(m for m in MODELS if not (self.centre and m.is_tangential))
+
+
+FREE: Final = Nominal()
+
+
+def fit_models(
+    corners: FloatGrid, points: FloatGrid, size: tuple[int, int], nominal: Nominal = FREE
+) -> list[Fit]:
     """Fit every model to all views.
 
     Args:
         corners: (view, corner, 2) x, y as seen, px.
         points: (corner, 3) on the board.
         size: Width and height of the pictures.
+        nominal: What is not fitted.
 
     Returns:
-        A fit for each of `MODELS`, in their order; without those that fit nowhere.
+        A fit for each of the models, in their order; without those that fit nowhere.
     """
-    straight = _started(corners, points, size, _MIDDLE)
-    bent = _started(corners, points, size, _FISHEYE_MIDDLE)
+    straight = _started(corners, points, size, (_MIDDLE, nominal))
+    bent = _started(corners, points, size, (_FISHEYE_MIDDLE, nominal))
     fits: list[Fit] = []
-    for model in MODELS:
+    for model in nominal.models:
         kin = [fit for fit in fits if fit.camera.model.fisheye == model.fisheye]
         first = bent if model.fisheye else straight
         starts = kin[-1:] or first
@@ -62,15 +95,17 @@ def fit_models(corners: FloatGrid, points: FloatGrid, size: tuple[int, int]) -> 
 
 
 def _started(
-    corners: FloatGrid, points: FloatGrid, size: tuple[int, int], model: Model
+    corners: FloatGrid, points: FloatGrid, size: tuple[int, int], kind: tuple[Model, Nominal]
 ) -> list[Fit]:
     """Give the few best starts of one kind, poses adjusted."""
-    width, height = size
+    (width, height), (model, nominal) = size, kind
     found: list[tuple[float, Fit]] = []
-    for share in FOCALS:
-        focal = share * max(size)
+    focals = [share * max(size) for share in FOCALS]
+    for focal in focals if nominal.focal_px is None else [nominal.focal_px]:
         camera = Camera(
-            model=model, intrinsics=np.array([focal, (width - 1) / 2, (height - 1) / 2])
+            model=model,
+            intrinsics=np.array([focal, (width - 1) / 2, (height - 1) / 2]),
+            held=nominal.held,
         )
         poses = [_pose(camera, seen, points) for seen in corners]
         known = [pose for pose in poses if pose is not None]

@@ -1,4 +1,4 @@
-"""The model among those whose distortion does not fold inside the picture.
+"""The model among those that a lens may have, whose distortion does not fold inside the picture.
 
 A profile that turns back has no inverse there: two directions fall on one place. Often it does so
 where nothing was seen, and another model, as good where corners were, does not.
@@ -17,6 +17,12 @@ from camkit.runtime.calibration.geometry.profile import Profile, profile_of
 
 MOST_FACTOR: Final = 1e6
 """A coefficient beyond it is none of a lens: its terms cancel where corners are, nowhere else."""
+MOST_TERM: Final = 2.0
+"""Of a coefficient at the covered radius, against the radius: likewise."""
+FOCALS: Final = (0.1, 20.0)
+"""Least and most focal length, of the longer side of the picture."""
+MIDDLE: Final = 0.5
+"""Of either side of the picture: the middle part, in which the optical centre lies."""
 FOLDED: Final = 1.25
 """Times the held-out error that a model may have to take the place of one that folds."""
 
@@ -38,7 +44,8 @@ def unfolded(
     usable = [
         found
         for found in every
-        if found[2].fold_px >= found[1].corner_px and _tame(found[0].fit.camera)
+        if found[2].fold_px >= found[1].corner_px
+        and not _doubt(found[0].fit.camera, found[2], size)
     ]
     best = simplest(judged)
     if usable:
@@ -49,8 +56,8 @@ def unfolded(
     if profile.fold_px >= coverage.corner_px:
         raise DecodeError(
             f"the distortion that explains the corners ({best.fit.camera.model.name}) has "
-            "coefficients that are none of a lens and cancel each other: photograph the board at "
-            "more places and tilts"
+            f"{_doubt(best.fit.camera, profile, size)}: photograph the board at more places and "
+            "tilts"
         )
     raise DecodeError(
         f"the distortion that explains the corners ({best.fit.camera.model.name}) folds back at "
@@ -60,8 +67,32 @@ def unfolded(
     )
 
 
-def _tame(camera: Camera) -> bool:
-    return bool(np.abs(camera.coefficients).max(initial=0.0) <= MOST_FACTOR)
+def _doubt(camera: Camera, profile: Profile, size: tuple[int, int]) -> str:
+    """Return what of a camera no lens has; "" for nothing."""
+    least, most = (share * max(size) for share in FOCALS)
+    if not least <= camera.focal_px <= most:
+        return f"a focal length of {camera.focal_px:.0f} px, which is none of a lens"
+    for at, side in zip(camera.centre_px, size, strict=True):
+        if abs(at - (side - 1) / 2) > MIDDLE * side / 2:
+            x, y = camera.centre_px
+            return (
+                f"its centre at ({x:.0f}, {y:.0f}) px, outside the middle part of the picture of "
+                f"{size[0]}x{size[1]} px"
+            )
+    if (
+        np.abs(camera.coefficients).max(initial=0.0) > MOST_FACTOR
+        or _largest_term(camera, profile) > MOST_TERM
+    ):
+        return "coefficients that are none of a lens and cancel each other"
+    return ""
+
+
+def _largest_term(camera: Camera, profile: Profile) -> float:
+    """Return the most that a coefficient adds at the covered radius, against the radius."""
+    angle = float(np.interp(profile.covered_px, profile.radii_px, profile.angles_rad))
+    u = (angle if camera.model.fisheye else np.tan(angle)) ** 2
+    powers = u ** np.array([1, 2, 3, 4] if camera.model.fisheye else [1, 2, 0.5, 0.5, 3, 1, 2, 3])
+    return float(np.abs(camera.coefficients * powers).max(initial=0.0))
 
 
 def _seen(one: Judged, corners: FloatGrid, size: tuple[int, int]) -> tuple[Coverage, Profile]:

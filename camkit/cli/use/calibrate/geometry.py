@@ -1,5 +1,6 @@
 """`camkit calibrate geometry`: photographs of a checkerboard to focal length and distortion."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,6 +8,7 @@ import typer
 
 from camkit.cli.choices import Debug, Json, Overwrite
 from camkit.cli.use.calibrate.outputs import Out, Outputs, Page
+from camkit.errors import ContractError
 
 if TYPE_CHECKING:
     from camkit.runtime.calibration.geometry.geometry import Geometry
@@ -15,12 +17,21 @@ if TYPE_CHECKING:
 def geometry(
     pictures: Annotated[
         list[Path],
-        typer.Argument(help="Photographs of the board, at one setting of lens and focus."),
+        typer.Argument(
+            help="Photographs of the board, at one setting of lens and focus; or a .json of corners."
+        ),
     ],
-    board: Annotated[str, typer.Option(help="COLUMNSxROWS of its inner corners, like 9x6.")],
     out: Out,
+    board: Annotated[
+        str | None,
+        typer.Option(help="COLUMNSxROWS of its inner corners, like 9x6; a corner file states it."),
+    ] = None,
     square_mm: Annotated[
         float | None, typer.Option(help="Side of a square; tells how far away the board was.")
+    ] = None,
+    focal_px: Annotated[
+        float | None,
+        typer.Option(help="Nominal focal length, held if the pictures do not determine it."),
     ] = None,
     page: Page = None,
     overwrite: Overwrite = False,
@@ -29,11 +40,28 @@ def geometry(
 ) -> None:
     """Measure focal length, optical centre and distortion on photographs of a checkerboard."""
     outputs = Outputs.asked(out, page, overwrite=overwrite, as_json=json_)
-    from camkit.runtime.calibration.geometry.board import Board
-    from camkit.runtime.calibration.geometry.geometry import calibrate_geometry
-
-    found = calibrate_geometry(pictures, Board.read(board, square_mm))
+    found = _found(pictures, board, square_mm, focal_px)
     outputs.write(found.to_record(), _lines(found), lambda: _page(found))
+
+
+def _found(
+    pictures: list[Path], board: str | None, square_mm: float | None, focal_px: float | None
+) -> "Geometry":
+    from camkit.runtime.calibration.geometry.board import Board
+    from camkit.runtime.calibration.geometry.corner_file import is_corner_file, read_corners
+    from camkit.runtime.calibration.geometry.geometry import calibrate_corners, calibrate_geometry
+
+    if not is_corner_file(pictures):
+        if board is None:
+            raise ContractError("--board is needed: COLUMNSxROWS of its inner corners, like 9x6")
+        return calibrate_geometry(pictures, Board.read(board, square_mm), focal_px)
+    given = read_corners(pictures[0])
+    asked = Board.read(str(given.board) if board is None else board, square_mm)
+    if str(asked) != str(given.board):
+        raise ContractError(f"{pictures[0]} holds corners of a board of {given.board}, not {asked}")
+    if square_mm is not None:
+        given = replace(given, board=asked)
+    return calibrate_corners(given, focal_px)
 
 
 def _lines(found: "Geometry") -> list[str]:
