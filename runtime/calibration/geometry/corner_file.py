@@ -19,7 +19,7 @@ from camkit.bundle.entry import Entry, Positive
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.calibration.geometry.board import Board
 from camkit.runtime.calibration.geometry.camera import FloatGrid
-from camkit.runtime.files.regular_file import check_regular
+from camkit.side_file import read_side_bytes
 
 SUFFIX: Final = ".json"
 MOST_BYTES: Final = 64 * 2**20
@@ -64,14 +64,9 @@ def read_corners(path: Path) -> CornerFile:
         DecodeError: If it cannot be read, or is no such file.
     """
     try:
-        check_regular(path)
-        if path.stat().st_size > MOST_BYTES:
-            raise DecodeError(f"larger than {MOST_BYTES // 2**20} MiB, which no corner file is")
-        document = json.loads(path.read_bytes())
-    except OSError as error:
-        raise DecodeError(f"{path} cannot be read: {error.strerror or error}") from error
-    except DecodeError as error:
-        raise DecodeError(f"{path}: {error}") from error
+        document = json.loads(read_side_bytes(path, "the corner file", most_bytes=MOST_BYTES))
+    except ContractError as error:
+        raise DecodeError(str(error)) from error
     except (ValueError, RecursionError) as error:
         raise DecodeError(f"{path} is no JSON: {error}") from error
     try:
