@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.axes import backwards
+from camkit.runtime.kinds.spad.files.broken import BROKEN
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
-from camkit.runtime.kinds.spad.files.broken import BROKEN
 from camkit.runtime.kinds.spad.files.hdf5_tree import (
     Tree,
     check_readable,

@@ -56,7 +56,7 @@ def test_a_fourth_axis_is_asked_about_and_taken_where_it_is_named(
     ],
 )
 @pytest.mark.parametrize("kind", ["imagej", "ome"])
-def test_named_axes_of_tiff_are_asked_about_by_name(  # noqa: PLR0913
+def test_named_axes_of_tiff_are_asked_about_by_name(
     kind: str, axes: str, shape: tuple[int, ...], key: str, told: str, tmp_path: Path
 ) -> None:
     cube = RNG.poisson(1, shape).astype(np.uint16)
