@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # ptufile 2026.2.6: a histogram of a PTU ends at the last bin that a photon reached, and the bins of
 # the laser's period, where they are asked for (dtime=0), are the period over the bin rounded down,
-# so that a period of exactly 49 bins may count 48.
+# so that a period of exactly 51 bins counts 50.
 #
-# Met with: a period of 49 bins of 1/49 of 25 ns, photons in bin 7 alone.
-# Seen: "bins of the image: 8" and, for some periods, "asked for all: one bin too few".
+# Met with: periods of 25 ns in 16 to 399 bins, photons in bin 7 alone.
+# Seen: "bins of the image: 8", and "one bin too few for 25 of 384 periods" (26, 51, 52, 53, 97, ...).
 # camkit takes the period over the bin width, rounded (tests/runtime/kinds/spad/files/test_axes.py).
 set -euo pipefail
 folder=$(mktemp -d)

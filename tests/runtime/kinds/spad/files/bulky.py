@@ -86,7 +86,7 @@ def _write_mat(path: Path, matrix: bytes) -> None:
 
 
 def large_cell_of_mat(path: Path) -> None:
-    """Write four cells of 100 MB of zeros as bytes that are 800 MB as the numbers they stand for."""
+    """Write four cells of 100 MB of zeros, as bytes that become 800 MB of numbers."""
     zeros = _matrix(6, (1, 100 * MB), b"", _element(2, bytes(100 * MB)))
     _write_mat(path, _matrix(1, (2, 2), b"photons", 4 * zeros))
 
