@@ -64,9 +64,7 @@ def read_corners(path: Path) -> CornerFile:
         DecodeError: If it cannot be read, or is no such file.
     """
     try:
-        check_regular(path)
-        if path.stat().st_size > MOST_BYTES:
-            raise DecodeError(f"larger than {MOST_BYTES // 2**20} MiB, which no corner file is")
+        _check_file(path)
         document = json.loads(path.read_bytes())
     except OSError as error:
         raise DecodeError(f"{path} cannot be read: {error.strerror or error}") from error
@@ -82,6 +80,12 @@ def read_corners(path: Path) -> CornerFile:
         raise DecodeError(f"{path}: {place}: {first['msg']}") from error
     except (ContractError, DecodeError) as error:
         raise DecodeError(f"{path}: {error}") from error
+
+
+def _check_file(path: Path) -> None:
+    check_regular(path)
+    if path.stat().st_size > MOST_BYTES:
+        raise DecodeError(f"larger than {MOST_BYTES // 2**20} MiB, which no corner file is")
 
 
 def _corner_file(document: _Document) -> CornerFile:

@@ -19,8 +19,8 @@ from camkit.runtime.calibration.geometry.choice import (
 )
 from camkit.runtime.calibration.geometry.corner_file import CornerFile
 from camkit.runtime.calibration.geometry.coverage import Coverage
-from camkit.runtime.calibration.geometry.determination import Determined, determine
 from camkit.runtime.calibration.geometry.detector import find_corners
+from camkit.runtime.calibration.geometry.determination import Determined, determine
 from camkit.runtime.calibration.geometry.grey import read_grey
 from camkit.runtime.calibration.geometry.profile import (
     Profile,
