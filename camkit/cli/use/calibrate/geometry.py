@@ -18,7 +18,7 @@ def geometry(
     pictures: Annotated[
         list[Path],
         typer.Argument(
-            help="Photographs of the board, at one setting of lens and focus; or a .json of corners."
+            help="Photographs of the board, at one setting of lens and focus; or corners (.json)."
         ),
     ],
     out: Out,
