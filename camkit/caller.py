@@ -26,6 +26,7 @@ FLAGS: Final = {
     "max_mem_bytes": "--max-mem",
     "cfa": "--mosaic",
     "times_s": "--times",
+    "first": "--fine-tune",
 }
 """Options whose flag is not their name."""
 PARAMETERS: Final = {
@@ -103,6 +104,8 @@ def _flag(name: str, value: object) -> str:
         return flag
     if name == "max_mem_bytes" and isinstance(value, int):
         return f"{flag} {value // 10**6 + 1}M"
+    if isinstance(value, tuple):
+        return f"{flag} {','.join(map(_plain, value))}"
     return f"{flag} {_plain(value)}"
 
 

@@ -18,13 +18,8 @@ from camkit.runtime.network.tiling import Progress
 from camkit.runtime.output.band_queue import BandQueue
 from camkit.runtime.output.part_file import atomic_outputs
 from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY, PictureFormat
+from camkit.runtime.output.preview_file import PREVIEW_BYTES, PREVIEW_SUFFIX, preview_path
 from camkit.runtime.output.sidecar import read_sidecar, sidecar_path, sidecar_text
-from camkit.runtime.output.tone_mapping import (
-    PREVIEW_BYTES,
-    PREVIEW_SUFFIX,
-    ToneMappedPreview,
-    preview_path,
-)
 from camkit.runtime.output.writer import SUFFIXES, FileFormat, held_bytes, open_writer
 from camkit.runtime.pipeline import Pipeline
 from camkit.runtime.raw import file_sha256
@@ -322,16 +317,20 @@ def _write_picture(
         jpeg_quality=write.quality,
         origin=work.origin.stripped() if write.strip_metadata else work.origin,
     )
-    seconds, preview = 0.0, ToneMappedPreview(height, width)
+    seconds, preview = 0.0, None
+    if preview_file is not None:
+        from camkit.runtime.output.tone_mapping import ToneMappedPreview
+
+        preview = ToneMappedPreview(height, width)
     with open_writer(path, write.picture, picture) as writer, BandQueue(writer) as queue:
         for band in work.bands():
             began = time.perf_counter()
-            if preview_file is not None:
+            if preview is not None:
                 preview.add(band)
             queue.write(band)
             seconds += time.perf_counter() - began
         began = time.perf_counter()
-    if preview_file is not None:
+    if preview is not None and preview_file is not None:
         preview.write(preview_file, work.color, work.capture.orientation)
     return seconds + time.perf_counter() - began
 

@@ -15,7 +15,7 @@ from camkit.runtime.development import WriteOptions
 from camkit.runtime.kind import kind_without_bundle, runtime_part
 from camkit.runtime.maker import Maker
 from camkit.runtime.options import Options
-from camkit.runtime.output.tone_mapping import preview_path
+from camkit.runtime.output.preview_file import preview_path
 from camkit.runtime.raw import named_bundle
 
 logger = logging.getLogger(__name__)

@@ -9,7 +9,7 @@ from camkit.caller import option_text
 from camkit.errors import ContractError
 from camkit.runtime.batch.sources import CAPTURE_SUFFIXES, is_result
 from camkit.runtime.merging.times import stated_times
-from camkit.runtime.output.tone_mapping import PREVIEW_SUFFIX
+from camkit.runtime.output.preview_file import PREVIEW_SUFFIX
 
 FRAME_SUFFIXES: Final = CAPTURE_SUFFIXES | {".jpg", ".jpeg", ".hdr"}
 

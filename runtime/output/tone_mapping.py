@@ -22,12 +22,10 @@ from camkit.runtime.output.icc import icc_profile
 from camkit.runtime.output.jpeg import encode_jpeg
 from camkit.runtime.output.picture_writer import DEFAULT_JPEG_QUALITY
 from camkit.runtime.output.preview import Averages
+from camkit.runtime.output.preview_file import LONGEST_PREVIEW_PX
 
-PREVIEW_SUFFIX: Final = ".preview.jpg"
-OPERATOR: Final = "Drago 2003"
-LONGEST_PREVIEW_PX: Final = 1600
-PREVIEW_BYTES: Final = 5 * 12 * LONGEST_PREVIEW_PX**2
-"""Most memory of a preview: its planes, and what they are mapped and coded to."""
+_FAINTEST: Final = 1e-7
+"""Of the brightest sample; darker ones are shown as that."""
 _BIAS: Final = 0.85
 """Of the operator, as its authors advise."""
 
@@ -59,16 +57,17 @@ class ToneMappedPreview:
         path.write_bytes(coded)
 
 
-def preview_path(path: Path) -> Path:
-    """Return where the preview of a picture lies."""
-    return path.with_suffix(PREVIEW_SUFFIX)
-
-
 def tone_mapped(light: FloatArray) -> FloatArray:
     """Return (3, h, w) linear Rec.709 in 0..1 of light >= 0 in any range."""
-    if not light.any():
+    brightest = float(light.max())
+    if brightest == 0:
         return light
     operator = cv2.createTonemapDrago(gamma=1.0, saturation=1.0, bias=_BIAS)
-    pixels = np.ascontiguousarray(light.transpose(1, 2, 0), dtype=np.float32)
-    shown = np.nan_to_num(np.asarray(operator.process(pixels), dtype=np.float32))
+    pixels = np.maximum(light, np.float32(_FAINTEST * brightest)).transpose(1, 2, 0)
+    # OpenCV takes the least sample off and divides by what is left of each pixel. One that is black
+    # in all colours becomes NaN, and the picture then comes out nearly black. A row in front, with
+    # one colour that is 0, keeps every pixel above that.
+    given = np.concatenate([pixels[:1], pixels]).astype(np.float32)
+    given[0, 0] = (0, given.mean(), given.mean())
+    shown = np.asarray(operator.process(given), dtype=np.float32)[1:]
     return np.ascontiguousarray(shown.transpose(2, 0, 1))

@@ -3,10 +3,12 @@
 import ast
 import re
 import typing
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import click
+import cv2
 import numpy as np
 import pytest
 import typer
@@ -16,7 +18,9 @@ from camkit.caller import FLAGS, PARAMETERS, language, option_text, speaking, sp
 from camkit.cli.app import app
 from camkit.runtime.development import WriteOptions
 from camkit.runtime.options import Options
-from tests.capture_factory import write_dng
+from camkit.runtime.output.dng import write_bayer_dng
+from tests.capture_factory import write_tiny_captures
+from tests.dng_factory import dng_tags, scene_mosaic
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = (
@@ -38,28 +42,26 @@ NAMES_OF_FILES = {
 """Where a message names what has the name of an option and is none."""
 
 
-def _modules() -> Iterator[tuple[Path, ast.Module]]:
-    for source in SOURCES:
-        for path in sorted(source.rglob("*.py")) if source.is_dir() else [source]:
-            yield path, ast.parse(path.read_text(encoding="utf-8"))
+@cache
+def _modules() -> list[tuple[Path, ast.Module]]:
+    files = (sorted(s.rglob("*.py")) if s.is_dir() else [s] for s in SOURCES)
+    return [(p, ast.parse(p.read_text(encoding="utf-8"))) for inside in files for p in inside]
 
 
 def _texts(tree: ast.Module) -> Iterator[ast.Constant]:
     """Yield the strings of a module that are no docstrings."""
-    documented = (
-        {
-            id(statement.value)
-            for node in ast.walk(tree)
-            for statement in getattr(node, "body", None) or []
-            if isinstance(statement, ast.Expr)
-        }
-        if tree.body
-        else set()
-    )
+    bodies = (getattr(node, "body", None) for node in ast.walk(tree))
+    documented = {
+        id(statement.value)
+        for body in bodies
+        if isinstance(body, list)
+        for statement in body
+        if isinstance(statement, ast.Expr)
+    }
     for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if id(node) not in documented:
-                yield node
+        is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if is_text and id(node) not in documented:
+            yield node
 
 
 def _spoken() -> set[str]:
@@ -120,7 +122,8 @@ def test_every_option_that_a_message_names_is_one_in_both_languages() -> None:
         or (isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name))
     }
     parameters |= {option.name for kind in camkit_kinds() for option in kind.options}
-    assert not spoken - parameters, "nothing in Python has such a parameter"
+    missing = spoken - parameters
+    assert not missing, "nothing in Python has such a parameter"
 
 
 def camkit_kinds() -> list[typing.Any]:
@@ -131,15 +134,14 @@ def camkit_kinds() -> list[typing.Any]:
 
 def test_options_are_spoken_where_messages_are_raised_and_not_when_modules_are_imported() -> None:
     for path, tree in _modules():
-        inside = {
-            id(node)
-            for function in ast.walk(tree)
-            if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-            for node in ast.walk(function)
-        }
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "option_text":
-                assert id(node) in inside, f"{path}:{node.lineno}"
+        waiting: list[ast.AST] = list(tree.body)
+        while waiting:
+            node = waiting.pop()
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+                continue
+            is_call = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "option_text"
+            assert not is_call, f"{path}:{node.lineno}"
+            waiting.extend(ast.iter_child_nodes(node))
 
 
 @pytest.mark.parametrize(
@@ -166,7 +168,7 @@ def test_an_option_with_its_value_is_what_the_caller_can_write(
 
 
 def test_names_of_the_two_languages_are_names_of_options() -> None:
-    assert set(FLAGS) - {"cfa", "times_s"} <= set(Options.__dataclass_fields__)
+    assert set(FLAGS) - {"cfa", "times_s", "first"} <= set(Options.__dataclass_fields__)
     assert set(PARAMETERS) == set(camkit.MosaicOptions.__dataclass_fields__)
 
 
@@ -178,7 +180,64 @@ def test_a_thread_may_speak_another_language_than_its_process() -> None:
     assert language() == "python"
 
 
-def _capture(folder: Path, **changes: object) -> Path:
-    path = folder / "capture.dng"
-    write_dng(path, np.full((48, 64), 900, np.uint16), **changes)  # type: ignore[arg-type]
-    return path
+def _refused(folder: Path) -> dict[str, Callable[[], object]]:
+    """Give calls that are refused, by the arguments of the command that is refused alike."""
+    tiny, crop = folder / "tiny.camkit", folder / "crop.png"
+    a = folder / "a.dng"
+    cv2.imwrite(str(crop), np.full((16, 24, 3), 90, np.uint8))
+    out = folder / "out"
+    white = camkit.MosaicOptions(white_level=520.0)
+    return {
+        f"{crop} --bundle {tiny}": lambda: camkit.load(tiny).process(crop),
+        f"{a} --bundle {tiny} --white-level 520": lambda: camkit.load(tiny).process(
+            a, mosaic=white
+        ),
+        f"{a} --bundle none --depth-m 1": lambda: camkit.load(None, depth_m=1.0),
+        f"{a} --bundle none --wb 0,1,1": lambda: camkit.load(None, white_balance=(0.0, 1.0, 1.0)),
+        f"{a} --bundle {tiny} --origin-px 1,2 --assume centre": lambda: camkit.load(
+            tiny, origin_px=(1, 2), assume="centre"
+        ),
+        f"{a} --bundle {tiny} --max-mem 9M": lambda: camkit.load(tiny, max_mem_bytes=9_000_000),
+        f"{a} --bundle {tiny} --max-seconds 0": lambda: camkit.load(tiny, max_seconds=0.0),
+        f"{a} --bundle {tiny} --method develop --on-unsafe fail": lambda: camkit.process(
+            a, bundle=tiny, method="develop", on_unsafe="fail", out_dir=out
+        ),
+        f"{a} --bundle none --format exr --linear": lambda: camkit.process(
+            a, bundle="none", format="exr", linear=True, out_dir=out
+        ),
+        f"{crop}": lambda: camkit.process(crop, out_dir=out),
+        f"{a} --bundle {tiny} --timing x.toml": lambda: camkit.load(tiny, timing="x.toml"),
+        f"{a} --bundle {tiny} --size Q": lambda: camkit.load(tiny, size="Q"),
+    }
+
+
+PROGRAMS = re.compile(r"(?<![\w./-])[a-z]+_[a-z_]+|MosaicOptions|=\"")
+
+
+def test_each_refusal_is_in_the_language_of_its_caller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_tiny_captures(tmp_path, ["a"])
+    monkeypatch.chdir(tmp_path)
+    for words, call in _refused(tmp_path).items():
+        with pytest.raises(camkit.CamkitError) as caught:
+            call()
+        assert not FLAG.search(str(caught.value)), caught.value
+        assert run(["process", *words.split(), "--out-dir", "out"]) != 0
+        said = capsys.readouterr().err.replace(str(tmp_path), "")
+        assert not PROGRAMS.search(said), said
+
+
+def test_notes_of_results_are_in_the_language_of_their_caller(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dark = tmp_path / "dark.dng"
+    write_bayer_dng(dark, scene_mosaic(96, 128) // 8, tags=dng_tags(black=0, white=65_000))
+    found = camkit.process(dark, bundle="none", out_dir=tmp_path / "python")[0]
+    assert any("MosaicOptions.white_level says it" in note for note in found.warnings)
+    told = (tmp_path / "python" / "dark.camkit.json").read_text()
+    assert "--white-level" not in told
+    out = tmp_path / "command"
+    assert run(["process", str(dark), "--bundle", "none", "--out-dir", str(out), "--json"]) == 0
+    assert "(--white-level says it)" in capsys.readouterr().out
+    assert "MosaicOptions" not in (out / "dark.camkit.json").read_text()

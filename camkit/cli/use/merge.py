@@ -69,7 +69,7 @@ def merge(
     from camkit.runtime.merging.brackets import find_brackets, merged_paths
     from camkit.runtime.merging.result import merge_to_exr
     from camkit.runtime.merging.survey import survey
-    from camkit.runtime.output.tone_mapping import preview_path
+    from camkit.runtime.output.preview_file import preview_path
 
     chosen = _response(response)
     said = mosaic_options(mosaic, black_level, white_level)

@@ -186,3 +186,82 @@ def test_a_real_bracket_is_merged_by_its_list(camkit_command, tmp_path: Path) ->
     assert told["times_s"] == [4, 0.5, 0.0625, 0.0078125]
     assert told["response"] == "estimate"
     assert told["range_stops"] > 12
+
+
+def _folder(folder: Path, times_s: tuple[float, ...] = (1, 0.25, 0.0625)) -> Path:
+    """Make a folder of frames with their list of times."""
+    folder.mkdir(parents=True)
+    for number, time_s in enumerate(times_s):
+        write_coded(folder / f"{number}.png", scene() * time_s)
+    lines = [f"{number}.png {time_s}" for number, time_s in enumerate(times_s)]
+    (folder / "times.txt").write_text("\n".join(lines))
+    return folder
+
+
+def test_a_folder_stands_for_its_frames(camkit_command, pictures, tmp_path: Path) -> None:
+    folder, named, whole = _folder(tmp_path / "night"), tmp_path / "a.exr", tmp_path / "b.exr"
+    asked = ("--response", "srgb")
+    done = camkit_command("merge", folder, "-o", whole, "--times", "times.txt", *asked)
+    assert done.code == 0, done.err
+    done = camkit_command("merge", *pictures, "-o", named, "--times", TIMES, *asked)
+    assert done.code == 0, done.err
+    np.testing.assert_array_equal(read_scene(named), read_scene(whole))
+
+
+@pytest.mark.parametrize("named", [["in"], ["in/one", "in/two"]])
+def test_each_folder_is_a_bracket_and_one_that_fails_stops_no_other(
+    camkit_command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _folder(tmp_path / "in" / "one", (1, 1))
+    _folder(tmp_path / "in" / "two")
+    done = camkit_command("merge", *named, "-o", "out", "--times", "times.txt", "--json")
+    assert done.code == ExitCode.INPUT_FAILED
+    assert "in/one: a bracket needs two different exposures" in done.err
+    assert json.loads(done.out)["out"] == "out/two.exr"
+    assert [path.name for path in sorted((tmp_path / "out").iterdir())] == ["two.exr"]
+
+
+def test_a_merged_picture_and_its_preview_are_no_frames_of_their_folder(
+    camkit_command, tmp_path: Path
+) -> None:
+    folder = _folder(tmp_path / "night")
+    out = folder / "x.exr"
+    call = ("merge", folder, "-o", out, "--times", TIMES, "--preview", "--json")
+    done = camkit_command(*call)
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["preview"] == str(folder / "x.preview.jpg")
+    assert cv2.imread(told["preview"]).shape == (48, 64, 3)
+    again = camkit_command(*call)
+    assert again.code == ExitCode.USAGE
+    assert "x.exr exists" in again.err
+    out.unlink()
+    again = camkit_command(*call)
+    assert "x.preview.jpg exists" in again.err
+
+
+@pytest.mark.parametrize(
+    ("files", "out", "told"),
+    [
+        (["night"], "a.png", "expected a name in .exr"),
+        (["night", "other"], "a.exr", "2 brackets need a folder for their pictures as --out"),
+        (["night", "deep/night"], "out", "two brackets would both give out/night.exr"),
+        (["night", "long.png"], "a.exr", "got the folder night and the file long.png"),
+        (["empty"], "a.exr", "empty holds no frames; expected RAW files or pictures (.3fr, .arw"),
+        (["one"], "a.exr", "2 to 256 frames; got 1"),
+        (["night"], "a.exr", "3 of 3 frames state no exposure time (0.png, 1.png, 2.png); say --t"),
+    ],
+)
+def test_what_folders_lack_is_said(
+    camkit_command, pictures, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files, out, told
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("night", "other", "deep/night"):
+        _folder(tmp_path / name)
+    _folder(tmp_path / "one", (1,))
+    (tmp_path / "empty").mkdir()
+    done = camkit_command("merge", *files, "-o", out)
+    assert done.code == ExitCode.USAGE, done.err
+    assert told in done.err
+    assert not Path(out).exists()

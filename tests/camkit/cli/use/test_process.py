@@ -267,3 +267,36 @@ def test_infinity_is_a_depth_and_another_than_the_bundles_is_refused(
     outcome = camkit_command(*call, 3, "--overwrite")
     assert outcome.code == ExitCode.USAGE
     assert "the one depth infinity; got 3 m" in outcome.err
+
+
+def test_a_preview_lies_beside_the_picture_and_is_proved_by_the_sidecar(
+    captures: Path, camkit_command
+) -> None:
+    call = ("process", "a.dng", "--bundle", "tiny.camkit", "--preview", "--json")
+    done = camkit_command(*call)
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["beside"] == ["a.preview.jpg"]
+    assert camkit_command(*call).code == ExitCode.USAGE, "it is not replaced without a word"
+    again = json.loads(camkit_command(*call, "--resume").out)
+    assert again["status"] == "skipped"
+    Path("a.preview.jpg").write_bytes(b"")
+    again = json.loads(camkit_command(*call, "--resume").out)
+    assert again["status"] == "ok"
+    assert Path("a.preview.jpg").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    "options", [("--color", "acescg"), ("--format", "dng"), ("--format", "png")]
+)
+def test_every_picture_may_have_a_preview(captures: Path, camkit_command, options) -> None:
+    done = camkit_command("process", "a.dng", "--bundle", "tiny.camkit", "--preview", *options)
+    assert done.code == 0, done.err
+    assert Path("a.preview.jpg").is_file()
+
+
+def test_products_of_single_photons_have_no_preview(captures: Path, camkit_command) -> None:
+    np.savez("a.npz", counts=np.ones((8, 8), np.uint16))
+    done = camkit_command("process", "a.npz", "--bundle", "none", "--preview")
+    assert done.code == ExitCode.USAGE
+    assert "--preview is for photographs; a.npz becomes products" in done.err

@@ -271,3 +271,42 @@ def test_a_sensor_that_counts_photons_has_no_white_to_exceed() -> None:
 def test_capture_and_truth_cannot_be_one_file(captures) -> None:
     with pytest.raises(ContractError, match="different names"):
         _check_truth(Path("a.exr"), captures / "a.exr", open_bundle(captures / "tiny.camkit"))
+
+
+@pytest.mark.parametrize(("ring", "size"), [(0, (32, 16)), (4, (32, 16)), (0, (96, 64))])
+def test_the_middle_of_a_picture_is_photographed_in_the_size_that_is_asked(
+    camkit_command, captures: Path, ring: int, size: tuple[int, int]
+) -> None:
+    rng = np.random.default_rng(5)
+    picture = rng.integers(20, 200, (64, 96, 3), dtype=np.uint8)
+    width, height = (side + 2 * ring for side in size)
+    top, left = (64 - height) // 2, (96 - width) // 2
+    cv2.imwrite("whole.png", picture)
+    cv2.imwrite("part.png", picture[top : top + height, left : left + width])
+    made = []
+    for scene, more in (("whole.png", ("--size-px", f"{size[0]},{size[1]}")), ("part.png", ())):
+        call = ("simulate", scene, "--bundle", "tiny.camkit", "-o", f"{scene}.dng", *more)
+        done = camkit_command(*call, "--surround-px", ring, "--json")
+        assert done.code == 0, done.err
+        assert json.loads(done.out)["size"] == list(size)
+        made.append(read_capture(Path(f"{scene}.dng")).samples)
+    np.testing.assert_array_equal(*made)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--size-px", "98,64"), "p.png has 96x64 pixels; --size-px 98,64 needs 98x64"),
+        (("--size-px", "96,64", "--surround-px", "2"), "with a ring of 2 px needs 100x68"),
+        (("--size-px", "0,4"), "--size-px takes two numbers >= 1"),
+        (("--size-px", "-4,4"), "--size-px takes two numbers >= 1"),
+    ],
+)
+def test_a_size_that_a_picture_does_not_have_is_refused(
+    camkit_command, captures: Path, words: tuple[str, ...], told: str
+) -> None:
+    cv2.imwrite("p.png", np.full((64, 96, 3), 90, np.uint8))
+    done = camkit_command("simulate", "p.png", "--bundle", "tiny.camkit", "-o", "p.dng", *words)
+    assert done.code == ExitCode.USAGE
+    assert told in done.err
+    assert not Path("p.dng").exists()

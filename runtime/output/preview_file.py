@@ -1,0 +1,14 @@
+"""Where the tone-mapped preview of a picture lies, and what it takes; free of what makes it."""
+
+from pathlib import Path
+from typing import Final
+
+PREVIEW_SUFFIX: Final = ".preview.jpg"
+LONGEST_PREVIEW_PX: Final = 1600
+PREVIEW_BYTES: Final = 5 * 12 * LONGEST_PREVIEW_PX**2
+"""Most memory of a preview: its planes, and what they are mapped and coded to."""
+
+
+def preview_path(path: Path) -> Path:
+    """Return where the preview of a picture lies."""
+    return path.with_suffix(PREVIEW_SUFFIX)
