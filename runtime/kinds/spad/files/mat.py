@@ -2,7 +2,10 @@
 
 import math
 import struct
+import warnings
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,7 +28,7 @@ USER_BLOCK: Final = 512
 BROKEN: Final = (
     *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),
     *(NotImplementedError, UnicodeDecodeError, struct.error, zlib.error),
-    *(AttributeError, UnboundLocalError, RuntimeError, scipy.io.matlab.MatReadError),
+    *(AttributeError, UnboundLocalError, RuntimeError, scipy.io.matlab.MatReadError, UserWarning),
 )
 """What scipy raises of files that are damaged."""
 BYTES_OF: Final = {
@@ -55,7 +58,8 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
     if is_walked:  # names and shapes of any length are refused before scipy reads them
         bytes_of(path, (), 0)
     try:
-        listed = scipy.io.whosmat(str(path), appendmat=False)
+        with _doubts_raised():
+            listed = scipy.io.whosmat(str(path), appendmat=False)
     except BROKEN as error:
         raise DecodeError(f"{path.name} is damaged, or no MATLAB file: {error}") from error
     kinds = {name: (shape, kind) for name, shape, kind in listed if min(shape, default=0) > 0}
@@ -78,7 +82,8 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         if n in TABLE_OF and own in PLAIN and _listed_bytes(*kinds[n]) <= SMALL_BYTES
     ]
     try:
-        found = scipy.io.loadmat(str(path), appendmat=False, variable_names=[name, *small])
+        with _doubts_raised():
+            found = scipy.io.loadmat(str(path), appendmat=False, variable_names=[name, *small])
         values, stated = found[name], stated_values({n: found[n] for n in small})
     except BROKEN as error:
         raise DecodeError(f"{path.name} is damaged: {error}") from error
@@ -90,6 +95,15 @@ def open_mat(path: Path, hints: Hints) -> CountsFile:
         )
     usual = "tyx" if name in KEYS else None
     return ArrayFile(path, values, hints, kind=KEYS.get(name), usual=usual, stated=stated)
+
+
+@contextmanager
+def _doubts_raised() -> Iterator[None]:
+    """Raise what scipy doubts of a file, but for a name that occurs twice."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        warnings.simplefilter("ignore", scipy.io.matlab.MatReadWarning)
+        yield
 
 
 def _listed_bytes(shape: tuple[int, ...], kind: str) -> int:
