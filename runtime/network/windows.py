@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from camkit.bundle.facts import HaloError, NetworkFacts
+from camkit.caller import option_text
 from camkit.contracts import FloatArray
 from camkit.errors import ContractError
 from camkit.runtime.cancel import Cancel
@@ -307,13 +308,12 @@ def _check_one_window(
     if layout.window_count == 1 and needed <= limits.max_bytes:
         return
     height, width = size_px
-    cap_mb = -(-(limits.spent_bytes + needed) // 10**6)
     cure = f"one window of {width}x{height} px takes {needed // 10**6} MB"
-    cure += f": raise --max-mem to {cap_mb}M"
+    cure += f": raise {option_text('max_mem_bytes', limits.spent_bytes + needed)}"
     if layout.window_count > 1:
-        cure = f"leave --tile-px out, which asks for {layout.window_count} windows"
+        cure = f"leave {option_text('tile_px')} out, which asks for {layout.window_count} windows"
     elif _has_fast(network.facts):
-        cure += ", or say --mode fast, which shows it windows each by itself"
+        cure += f", or say {option_text('mode', 'fast')}, which shows it windows each by itself"
     raise ContractError(
         f"the network looks at the whole picture ({network.facts.global_text}) and cannot be tiled "
         f"exactly: {cure}"

@@ -1,9 +1,10 @@
 """Networks that look at the whole picture: found, never tiled in mode exact, said in the plan."""
 
-from pathlib import Path
+from pathlib import re
 
 import numpy as np
 import onnx
+import Path
 import pytest
 from onnx import helper
 
@@ -201,9 +202,9 @@ def test_a_network_that_looks_at_all_gets_one_window_or_none(name: str) -> None:
         list(network.facts.global_operators),
     )
     said = r"looks at the whole picture \(seen .* cannot be tiled exactly"
-    with pytest.raises(ContractError, match=rf"{said}.*leave --tile-px out"):
+    with pytest.raises(ContractError, match=rf"{said}.*leave tile_px out"):
         lay_network(SIZE_PX, [network], _limits(tile_px=16))
-    with pytest.raises(ContractError, match=rf"{said}.*raise --max-mem to \d+M$"):
+    with pytest.raises(ContractError, match=rf"{said}.*raise max_mem_bytes=[\d_]+$"):
         lay_network(SIZE_PX, [network], _limits(cap_bytes=10**5))
 
 
@@ -212,10 +213,11 @@ def test_the_memory_that_the_message_names_does() -> None:
     size_px = 2000, 3000
     with pytest.raises(ContractError) as refused:
         lay_network(size_px, [network], _limits(cap_bytes=10**8, spent_bytes=10**7))
-    named_mb = int(str(refused.value).split("raise --max-mem to ")[1].split("M")[0])
-    enough = _limits(cap_bytes=named_mb * 10**6, spent_bytes=10**7)
+    (named,) = re.findall(r"raise max_mem_bytes=([\d_]+)", str(refused.value))
+    named_bytes = int(named)
+    enough = _limits(cap_bytes=named_bytes, spent_bytes=10**7)
     assert lay_network(size_px, [network], enough).to_json()["windows"] == 1
-    less = _limits(cap_bytes=(named_mb - 1) * 10**6, spent_bytes=10**7)
+    less = _limits(cap_bytes=named_bytes - 10**6, spent_bytes=10**7)
     with pytest.raises(ContractError, match="whole picture"):
         lay_network(size_px, [network], less)
 
@@ -233,7 +235,7 @@ def test_mode_fast_tiles_where_a_curve_was_measured_and_says_what_that_means() -
     windows = lay_network(SIZE_PX, [network], _limits(mode="fast", tile_px=16))
     (note,) = windows.notes()
     assert "24 windows, each by itself" in note
-    with pytest.raises(ContractError, match="or say --mode fast"):
+    with pytest.raises(ContractError, match="or say mode=.fast."):
         lay_network(SIZE_PX, [network], _limits(cap_bytes=10**5))
     assert lay_network(SIZE_PX, [network], _limits()).notes() == ()
 

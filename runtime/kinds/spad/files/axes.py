@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
 
+from camkit.caller import option_text
 from camkit.errors import ContractError
 
 _ONE: Final = re.compile(r"([a-z])(\d{0,9})")
@@ -98,13 +99,13 @@ def axes_of(path: Path, shape: Sequence[int], stated: str | None, usual: str | N
             f"{path.name} holds an array of {shape}; expected time, rows and columns: name its "
             f"axes and the place to take of each further one, [array] axes = "
             f'"{"".join(letter + "0" for letter in example)}tyx" or what it is, in a file for '
-            "--timing"
+            f"{option_text('timing')}"
         )
     text = usual if stated is None else stated
     if text is None:
         raise ContractError(
             f"{path.name} holds an array of {shape}: nothing says which axis is time; say [array] "
-            'axes = "yxt", "tyx" or what it is, in a file for --timing'
+            f'axes = "yxt", "tyx" or what it is, in a file for {option_text("timing")}'
         )
     found = Axes.read(text)
     if found is None or not found.fits(shape):

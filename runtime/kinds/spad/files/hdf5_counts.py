@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.axes import backwards
@@ -91,7 +92,8 @@ def _check_pieces(path: Path, name: str, item: Any, hints: Hints) -> None:
     if size > hints.max_bytes:
         raise ContractError(
             f"{path.name}: {name} is packed in pieces of {size / 1e9:.3g} GB, more than fits the "
-            "memory; raise --max-mem, or pack it anew in smaller chunks (h5repack)"
+            f"memory; raise {option_text('max_mem_bytes')}, or pack it anew in smaller chunks "
+            "(h5repack)"
         )
 
 
@@ -136,7 +138,8 @@ def _check_cells(path: Path, items: Sequence[Any], hints: Hints) -> None:
     if size > hints.max_bytes:
         raise ContractError(
             f"{path.name}: the time stamps of one row of pixels take {size / 1e9:.3g} GB, more "
-            "than fits the memory; raise --max-mem, or cut the capture into several files"
+            f"than fits the memory; raise {option_text('max_mem_bytes')}, or cut the capture into "
+            "several files"
         )
 
 

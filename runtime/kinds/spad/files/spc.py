@@ -20,6 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.cancel import check_wish
 from camkit.runtime.kinds.spad.files.channels import chosen_places
@@ -136,7 +137,7 @@ def open_spc(path: Path, hints: Hints) -> CountsFile:
     if size > hints.max_bytes:
         raise ContractError(
             f"{path.name}: the {photons[routing]} photons of channel {routing} take "
-            f"{size / 1e9:.3g} GB, more than fits the memory; raise --max-mem"
+            f"{size / 1e9:.3g} GB, more than fits the memory; raise {option_text('max_mem_bytes')}"
         )
     micro = np.concatenate([*micro_times(records, routing), np.empty(0, np.uint16)])
     step = _tac_step_ps(path.with_suffix(".set"))

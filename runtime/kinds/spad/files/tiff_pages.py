@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import tifffile
 
+from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 
@@ -61,7 +62,8 @@ def stack_axes(path: Path, letters: str, shape: tuple[int, ...], key: str | None
         raise ContractError(
             f"{path.name} holds an array of {shape} with axes that it does not name; expected "
             "time, rows and columns: say [array] axes, such as "
-            f'"{_example(shape)}" (place 0 of each further axis), in a file for --timing'
+            f'"{_example(shape)}" (place 0 of each further axis), in a file for '
+            f"{option_text('timing')}"
         )
     time = next((letter for letter in TIMES if letter in further), None)
     if time is None and len(further) == 1 and further in LONE:
@@ -71,7 +73,7 @@ def stack_axes(path: Path, letters: str, shape: tuple[int, ...], key: str | None
         raise ContractError(
             f"{path.name} holds {listed}, rows and columns: nothing says which axis is time; say "
             f'[array] axes, such as "{_example(shape)}" (place 0 of each further axis), in a file '
-            "for --timing"
+            f"for {option_text('timing')}"
         )
     numbers = {NAMES[a]: range(n) for a, n in zip(further, shape, strict=False) if a != time}
     places = chosen_places(path, numbers, key)
@@ -119,7 +121,7 @@ def check_pages(path: Path, pages: Iterable[Any], max_bytes: int) -> None:
         if own > max_bytes:
             raise ContractError(
                 f"{path.name} is packed in pieces of {own / 1e9:.3g} GB, more than fits the "
-                "memory; raise --max-mem, or store it as HDF5"
+                f"memory; raise {option_text('max_mem_bytes')}, or store it as HDF5"
             )
         unpacker = _UNPACKERS.get(int(page.compression))
         for offset, size in zip(page.dataoffsets, page.databytecounts, strict=True):
