@@ -15,7 +15,7 @@ import typer
 
 import camkit
 from camkit.caller import FLAGS, PARAMETERS, language, option_text, speaking, speaking_here
-from camkit.cli.app import app
+from camkit.cli.app import app, run
 from camkit.runtime.development import WriteOptions
 from camkit.runtime.options import Options
 from camkit.runtime.output.dng import write_bayer_dng

@@ -235,7 +235,7 @@ def test_mode_fast_tiles_where_a_curve_was_measured_and_says_what_that_means() -
     windows = lay_network(SIZE_PX, [network], _limits(mode="fast", tile_px=16))
     (note,) = windows.notes()
     assert "24 windows, each by itself" in note
-    with pytest.raises(ContractError, match="or say mode=.fast."):
+    with pytest.raises(ContractError, match=r"or say mode=.fast."):
         lay_network(SIZE_PX, [network], _limits(cap_bytes=10**5))
     assert lay_network(SIZE_PX, [network], _limits()).notes() == ()
 
