@@ -71,7 +71,9 @@ def test_black_repeats_from_the_first_active_pixel_on(tmp_path, repeat):
     assert not damage(capture)
 
 
-@pytest.mark.parametrize("area", [(3, 5, 95, 127), (0, 1, 96, 128), (1, 0, 96, 128), (2, 2, 93, 125)])
+@pytest.mark.parametrize(
+    "area", [(3, 5, 95, 127), (0, 1, 96, 128), (1, 0, 96, 128), (2, 2, 93, 125)]
+)
 def test_odd_areas_and_crops_shift_the_pattern_and_are_no_damage(tmp_path, area):
     top, left, bottom, right = area
     colours = np.zeros((HEIGHT, WIDTH))
