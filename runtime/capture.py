@@ -258,10 +258,11 @@ class Capture:
         if self.cfa is None:
             return np.asarray(rows >= np.ceil(limit))
         clipped = np.empty(rows.shape, dtype=bool)
+        if np.issubdtype(rows.dtype, np.integer):
+            limit = np.ceil(limit).astype(np.int64)  # compared in the type of the samples
         for dy in (0, 1):
             for dx in (0, 1):
-                # an integer limit keeps the comparison in the type of the samples
-                clipped[dy::2, dx::2] = rows[dy::2, dx::2] >= int(np.ceil(limit[dy, dx]))
+                clipped[dy::2, dx::2] = rows[dy::2, dx::2] >= limit[dy, dx].item()
         return clipped
 
     def _black_rows(self, top: int) -> FloatArray:

@@ -3,14 +3,18 @@
 tiff_tags     tags of TIFF-based files, read within bounds
 exif_tags     what a photograph says of itself, from EXIF anywhere
 raw_metadata  the same of a RAW file, with LibRaw's help
-raw_tags      noise, colour and place of a RAW file from its tags
+raw_tags      noise and place of a RAW file from its tags
 in_memory     bytes and open files, stored while they are read
 decoder       the child that decodes RAW files, also started ahead
+libraw        a RAW file as LibRaw decodes it
+dng/          what a DNG asks for that LibRaw leaves out
+raw_decode    a decode, judged, as a capture
 raw_checks    refuses unbelievable decodes
 lone_pixels   hot or damaged pixels counted
 doubts        what of a decode is not likely, as notes
+row_order     rows that go on at another place
+tile_edges    tiles that break off
 white_level   white where the data contradict the file
-dng_checks    a DNG against itself and against LibRaw
 formats       EXR, TIFF, PNG, JPEG and Radiance HDR decoded, and their colour spaces
 picture       pictures as captures or scenes
 """

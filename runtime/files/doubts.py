@@ -50,6 +50,7 @@ _CELL_COLUMNS: Final = 1024
 _BAND_CELLS: Final = 32
 _NOISE_RATIO: Final = 0.8
 _NOISE_LEVEL: Final = 0.05
+_LAGS: Final = 12
 _DARK_EDGE_CELLS: Final = 4
 _DARK_EDGE_LEVEL: Final = 0.01
 
@@ -228,7 +229,7 @@ def _cells(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
 def _column_step(samples: Samples, cfa: CfaPattern | None) -> int:
     """Return the pixels from one cell to the next in a row."""
     pixels = 1 if cfa is None else 2
-    return pixels * max(1, samples.shape[-1] // pixels // _CELL_COLUMNS)
+    return pixels * max(1, int(samples.shape[-1]) // pixels // _CELL_COLUMNS)
 
 
 def _wraps(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> Cells:
@@ -287,14 +288,18 @@ def _noise_doubt(cells: Cells) -> str:
 
 
 def _noise_share(cells: Cells) -> float:
-    """Give the share of bands in which a cell has nothing in common with the one beside it."""
+    """Give the share of bands in which a cell has nothing in common with those beside it."""
     half, step = cells.shape[1] // 2, max(1, cells.shape[1] // 512)
     noisy = []
     for top in range(0, len(cells) - _BAND_CELLS + 1, _BAND_CELLS):
-        here = cells[top : top + _BAND_CELLS : 2, : half - 1 : step]
-        beside = cells[top : top + _BAND_CELLS : 2, 1:half:step]
-        away = cells[top : top + _BAND_CELLS : 2, half : 2 * half - 1 : step]
-        near, far = (float(np.median(np.abs(other - here))) for other in (beside, away))
+        rows = cells[top : top + _BAND_CELLS : 2]
+        here, away = rows[:, : half - _LAGS : step], rows[:, half : 2 * half - _LAGS : step]
+        # a fine pattern has something in common with itself one period on, noise never has
+        near = min(
+            float(np.median(np.abs(rows[:, lag : half - _LAGS + lag : step] - here)))
+            for lag in range(1, _LAGS + 1)
+        )
+        far = float(np.median(np.abs(away - here)))
         noisy.append(near > max(_NOISE_LEVEL, _NOISE_RATIO * far))
     return float(np.mean(noisy)) if noisy else 0.0
 

@@ -53,6 +53,8 @@ def decode_with_libraw(
     levels = _levels(raw, cfa, said)
     raw_checks.check_levels(levels)
     dng_checks.check_dng(tags, cfa, levels, said.levels)
+    if cfa is None and dng_checks.states_cells(tags):
+        notes.append("the file states a CFA of 2x2, LibRaw found none: its header is damaged")
     samples, levels = _samples(raw, cfa, levels, notes, said)
     if picture is not None:
         samples, levels = _with_tags(raw, picture, (samples, cfa, levels), said, notes)

@@ -161,7 +161,7 @@ def _codes(
         )
     floor = min(low, float(levels.black.min()), 0.0)
     scale = CODES_WHITE / (levels.white - floor)
-    codes = np.clip(np.nan_to_num((samples - floor) * scale, nan=0.0), 0, CODES_WHITE)
+    codes = np.clip((np.where(finite, samples, floor) - floor) * scale, 0, CODES_WHITE)
     return np.rint(codes).astype(np.uint16), Levels(
         black=np.asarray((levels.black - floor) * scale, dtype=np.float32), white=CODES_WHITE
     )

@@ -33,6 +33,8 @@ _SHIFT_ROWS: Final = 24
 _LEAST_ROWS: Final = 12
 _LEAST_HEIGHT: Final = 0.06
 _SAME_SHIFT: Final = 0.03
+_BORDER_CELLS: Final = 4
+_CLEARLY: Final = 0.7
 
 _MOST_STEP: Final = 12.0
 """In mean steps of a row: an edge counts no more, however strong."""
@@ -61,16 +63,15 @@ def _shift_doubt(cells: Cells, steps: "_Steps") -> str:
     """Find rows that go on at another place than the rows above them ended, to the end."""
     width = cells.shape[1]
     least = _least_rows(len(cells))
-    breaks = [(row, _shift(cells[above], cells[row])) for above, row in _gaps(cells)]
-    breaks = [(row, shift) for row, shift in breaks if shift]
+    shifts = [(above, row, _shift(cells[above], cells[row])) for above, row in _gaps(cells)]
+    breaks = [(above, row, shift) for above, row, shift in shifts if shift]
     found = [
         (row, shift)
-        for number, (row, shift) in enumerate(breaks)
+        for above, row, shift in breaks
         if least <= row <= len(cells) - least
         and steps.below(row)[0] < _SMOOTH_WRAP
-        and not any(
-            _alike(shift, other, width) for n, (_, other) in enumerate(breaks) if n != number
-        )
+        and _moves_border(cells[above], cells[row], shift)
+        and not any(_alike(shift, other, width) for _, at, other in breaks if at != row)
     ]
     found = found[:1] or steps.seam()
     if not found:
@@ -80,6 +81,13 @@ def _shift_doubt(cells: Cells, steps: "_Steps") -> str:
         f"from {row / len(cells):.0%} of the height on the rows are shifted by "
         f"{shift / width:.0%} of the width: the pixel data are damaged"
     )
+
+
+def _moves_border(above: NDArray[np.float32], below: NDArray[np.float32], shift: int) -> bool:
+    """Return whether the ends of a row are those of the one above it shifted, not as it lies."""
+    ends = np.r_[:_BORDER_CELLS, -_BORDER_CELLS:0]
+    moved = np.abs(below - np.roll(above, shift))[ends].mean()
+    return bool(moved < _CLEARLY * np.abs(below - above)[ends].mean())
 
 
 def _least_rows(height: int) -> int:

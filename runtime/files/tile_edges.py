@@ -77,7 +77,7 @@ def tile_doubt(cells: NDArray[np.float32], grid: TileGrid, step: tuple[int, int]
 
 
 def _edge_begins(steps: Steps, column: int, beside: NDArray[np.int64]) -> bool:
-    """Return whether from some row on, or up to it, a column is an edge and few others are.
+    """Return whether from some row on, to the end, a column is an edge and few others are.
 
     Args:
         steps: (h, w) steps across of the rows of a tile.
@@ -90,15 +90,15 @@ def _edge_begins(steps: Steps, column: int, beside: NDArray[np.int64]) -> bool:
     sums = np.concatenate([np.zeros((1, width)), np.cumsum(steps, axis=0, dtype=np.float64)])
     rows = np.arange(_LEAST_ROWS, height - _LEAST_ROWS, _ROW_STEP)
     above, below = sums[rows] / rows[:, None], (sums[-1] - sums[rows]) / (height - rows)[:, None]
-    for part, other in ((below, above), (above, below)):
-        rise = part - other
-        best = int(np.argmax(rise[:, column] * np.sqrt(rows * (height - rows))))
-        rest = np.delete(rise[best], beside)
-        if (
-            part[best, column] > _EDGE
-            and other[best, column] < _CALM
-            and rest.max() < _REST * rise[best, column]
-            and rise[best, column] > _SPREADS * rest.std()
-        ):
-            return True
-    return False
+    rise = below - above
+    best = int(np.argmax(rise[:, column] * np.sqrt(rows * (height - rows))))
+    rest = np.delete(rise[best], beside)
+    last = max(_LEAST_ROWS, int(height - rows[best]) // 4)
+    to_the_end = (sums[-1, column] - sums[-1 - last, column]) / last
+    return bool(
+        to_the_end > _EDGE
+        and below[best, column] > _EDGE
+        and above[best, column] < _CALM
+        and rest.max() < _REST * rise[best, column]
+        and rise[best, column] > _SPREADS * rest.std()
+    )

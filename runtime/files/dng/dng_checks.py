@@ -77,6 +77,14 @@ def check_dng(
         _check_white(picture, levels)
 
 
+def states_cells(tags: TiffTags) -> bool:
+    """Return whether a sensor picture of any file is stated to be a mosaic of 2x2 cells."""
+    return any(
+        picture.get(_PHOTOMETRIC) == (CFA,) and numbers_of(picture, _CFA_REPEAT) == (2, 2)
+        for picture in sensor_directories(tags.directories)
+    )
+
+
 def unapplied(picture: DngPicture) -> list[str]:
     """Return notes on tags that are left out where LibRaw demosaics a picture."""
     names = {DELTA_V: "BlackLevelDeltaV", DELTA_H: "BlackLevelDeltaH"} | LISTS

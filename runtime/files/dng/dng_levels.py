@@ -124,7 +124,8 @@ def _pattern(picture: DngPicture) -> tuple[Floats, list[str]]:
         return values.reshape(rows, cols, planes), []
     if np.isfinite(values).all() and (values == values[0]).all():
         return np.full((1, 1, planes), values[0]), []
-    return np.full((1, 1, planes), np.nanmean(values)), [
+    known = values[np.isfinite(values)]
+    return np.full((1, 1, planes), known.mean() if known.size else 0.0), [
         f"BlackLevel has {values.size} values for {rows}x{cols} pixels of {planes} sample(s), "
         "their mean is taken: the header is damaged"
     ]

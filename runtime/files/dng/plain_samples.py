@@ -154,6 +154,11 @@ def _numbers(
             inflater.decompress(inflater.unconsumed_tail, 1)  # its end holds the checksum
         except zlib.error as error:
             raise DecodeError(f"the pixel data are damaged: {error}") from error
+        if len(data) == needed and not inflater.eof:
+            raise DecodeError(
+                f"a strip or tile holds more than the {needed} bytes that its size and depth need; "
+                "it is damaged"
+            )
     if len(data) < needed:
         raise DecodeError(
             f"a strip or tile holds {len(data)} bytes of pixels, its size and depth need {needed}; "

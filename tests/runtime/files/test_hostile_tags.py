@@ -8,8 +8,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from camkit.errors import DecodeError
+from camkit.runtime.capture import MosaicOptions
 from camkit.runtime.files import raw_checks, raw_tags
 from camkit.runtime.files.dng import dng_checks, white_point
+from camkit.runtime.files.dng.applied_tags import SeenPixels, apply_tags
+from camkit.runtime.files.dng.picture_tags import sensor_picture
+from camkit.runtime.files.dng.plain_samples import check_readable
 from camkit.runtime.files.exif_tags import metadata_of
 from camkit.runtime.files.tiff_tags import TiffTags
 
@@ -17,6 +21,7 @@ KNOWN = (
     *(254, 256, 257, 258, 259, 262, 270, 271, 272, 273, 277, 278, 279, 322, 323, 324, 325, 339),
     *(33421, 33422, 33434, 34855, 50706, 50708, 50710, 50712, 50713, 50714, 50717, 50719, 50720),
     *(50721, 50722, 50727, 50728, 50778, 50779, 50829, 51009, 51041),
+    *(284, 317, 50715, 50716, 50723, 50729, 50830, 51008, 51022, 50975),
 )
 NUMBERS = st.one_of(
     st.sampled_from([0, 1, 2, 3, 4, 255, 32803, 34892, 65535, 2**32 - 1, 2**64 - 1, -1]),
@@ -65,6 +70,19 @@ def test_no_tags_end_in_anything_but_values_doubts_and_refusals(directories):
         with contextlib.suppress(DecodeError):
             check()
     assert all(doubt.endswith("damaged") for doubt in dng_checks.find_doubts(tags))
+    picture = sensor_picture(tags)
+    if picture is not None:
+        samples = np.full((60, 80), 700, dtype=np.uint16)
+        samples[0] = 900
+        seen = SeenPixels(samples=samples, cfa="RGGB", whole=samples, first=(0, 0))
+        with contextlib.suppress(DecodeError):
+            check_readable(picture)
+        if picture.planes == 1:
+            _, levels, notes = apply_tags(picture, seen, MosaicOptions())
+            assert np.isfinite(levels.black).all()
+            assert all("\n" not in note for note in notes)
+    grey = white_point.neutral(tags)
+    assert grey is None or (np.isfinite(grey).all() and grey.min() > 0)
     assert raw_tags.sample_bits(tags) in range(17)
     noise, matrix = raw_tags.noise_profile(tags, "RGGB"), white_point.color_matrix(tags)
     assert noise is None or min(*noise.shot, *noise.read_variance) >= 0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from camkit.errors import DecodeError
-from camkit.runtime.files.dng.dng_checks import check_dng, find_doubts
+from camkit.runtime.files.dng.dng_checks import check_dng, find_doubts, states_cells
 from camkit.runtime.files.raw_checks import Levels
 from camkit.runtime.files.tiff_tags import TiffTags
 
@@ -126,3 +126,10 @@ def test_a_mosaic_whose_place_in_the_file_is_not_said_is_named():
     lost = {tag: value for tag, value in GOOD.items() if tag not in (273, 50706)}
     (doubt,) = find_doubts(TiffTags(directories=(lost,), file_bytes=20000))
     assert "does not say where the pixels" in doubt
+
+
+def test_any_file_may_state_that_its_sensor_has_cells_of_four():
+    arw = {tag: value for tag, value in GOOD.items() if tag != 50706}
+    assert states_cells(TiffTags(directories=(arw,), file_bytes=1))
+    for change in ({33421: (6, 6)}, {262: (34892,)}):
+        assert not states_cells(TiffTags(directories=(arw | change,), file_bytes=1))

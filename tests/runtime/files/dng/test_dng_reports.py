@@ -31,7 +31,7 @@ def test_a_white_point_gives_a_grey_scene_grey():
 
 def test_a_gain_map_takes_the_shading_of_a_lens_away():
     capture, light = read("gainmap")
-    sound, even = read("asshotwhitexy")
+    _, even = read("asshotwhitexy")
     assert np.abs(light - even).max() < 0.02
     assert np.sqrt(np.mean((light - even) ** 2)) < 2e-3
     assert any("GainMap of OpcodeList2 applied" in note for note in capture.notes)
@@ -61,7 +61,7 @@ def test_sound_files_are_not_called_damaged(name):
 
 
 def test_brightness_of_float_samples_does_not_hang_on_the_brightest():
-    (one, dim), (many, bright) = read("float_peak_1"), read("float_peak_16")
+    (_, dim), (many, bright) = read("float_peak_1"), read("float_peak_16")
     lamps = bright > 1
     assert np.count_nonzero(lamps) == 16
     assert np.array_equal(dim[~lamps], bright[~lamps])
