@@ -79,7 +79,7 @@ def _mean_of(
         np.arange(first[1], width, step) % pattern.shape[1], minlength=pattern.shape[1]
     )
     weights = np.outer(down, across)
-    return np.float64(np.sum(pattern * weights) / weights.sum())
+    return np.float64(np.sum(pattern * weights) / max(weights.sum(), 1))
 
 
 def black_map(
