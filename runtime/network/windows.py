@@ -311,7 +311,7 @@ def _check_one_window(
     cure = f"one window of {width}x{height} px takes {needed // 10**6} MB"
     cure += f": raise {option_text('max_mem_bytes', limits.spent_bytes + needed)}"
     if layout.window_count > 1:
-        cure = f"leave tile_px out, which asks for {layout.window_count} windows"
+        cure = f"leave out the size of tiles, which asks for {layout.window_count} windows"
     elif _has_fast(network.facts):
         cure += f", or say {option_text('mode', 'fast')}, which shows it windows each by itself"
     raise ContractError(

@@ -13,8 +13,8 @@ from camkit.models_def.optics.glass.encoding import read_text
 from camkit.models_def.optics.prescription import read_prescription
 from camkit.models_def.toml_table import read_table
 from camkit.runtime.calibration.lensfun.xml import read_xml
+from camkit.runtime.kinds.spad.containers.stored_array import read_columns, read_map
 from camkit.runtime.kinds.spad.files.npz import read_npz
-from camkit.runtime.kinds.spad.stored_array import read_columns, read_map
 from camkit.runtime.kinds.spad.timing import read_timing
 from camkit.runtime.unit import read_unit
 from camkit.side_file import MOST_DEPTH, parse_toml, read_side_toml

@@ -58,17 +58,22 @@ class BlackMap:
         """Return mean black: (2, 2) by position in the cell of a mosaic, (plane,) of planes."""
         height, width, planes = len(self.rows), len(self.columns), self.pattern.shape[2]
         if not mosaic:
-            rest = self.columns.mean() + self.rows.mean()
+            rest = _level(self.columns) + _level(self.rows)
             found = [
                 _mean_of(self.pattern[..., p], height, width, (0, 0), 1) for p in range(planes)
             ]
             return np.array(found + rest, dtype=np.float32)
         cells = [
             [_mean_of(self.pattern[..., 0], height, width, (dy, dx), 2)
-             + self.columns[dx::2].mean() + self.rows[dy::2].mean() for dx in (0, 1)]
+             + _level(self.columns[dx::2]) + _level(self.rows[dy::2]) for dx in (0, 1)]
             for dy in (0, 1)
         ]  # fmt: skip
         return np.array(cells, dtype=np.float32)
+
+
+def _level(black: Floats) -> np.float64:
+    """Return the mean of what rows or columns have; 0 where there are none."""
+    return np.float64(black.mean() if black.size else 0)
 
 
 def _mean_of(

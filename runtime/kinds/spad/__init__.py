@@ -2,7 +2,7 @@
 
 files          readers of captures
 timing         what is known of their times
-stored_array   small arrays that a timing file names
+containers     what files hold, in bytes, before it is read
 pulse          the time of one photon, in closed form
 time_axis      bins of a histogram or delays of a gate: what each sees of a pulse
 corrected      rows of a capture, pile-up undone

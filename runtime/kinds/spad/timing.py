@@ -22,6 +22,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from camkit.caller import option_text
 from camkit.errors import ContractError
+from camkit.runtime.kinds.spad.containers.stored_array import read_columns, read_map
 from camkit.runtime.kinds.spad.pulse import (
     FWHM_PER_SIGMA,
     GatedPulse,
@@ -29,7 +30,6 @@ from camkit.runtime.kinds.spad.pulse import (
     Pulse,
     SampledPulse,
 )
-from camkit.runtime.kinds.spad.stored_array import read_columns, read_map
 from camkit.runtime.kinds.spad.time_axis import Orientation, TimeAxis
 from camkit.side_file import read_side_toml
 

@@ -1,10 +1,10 @@
 """Networks that look at the whole picture: found, never tiled in mode exact, said in the plan."""
 
-from pathlib import re
+import re
+from pathlib import Path
 
 import numpy as np
 import onnx
-import Path
 import pytest
 from onnx import helper
 

@@ -8,16 +8,13 @@ stamps       time stamps sorted into bins
 chosen       which of several variables is meant
 npz          NPZ: stored members mapped, packed ones unpacked once
 hdf5         HDF5, and MATLAB 7.3 by it; broken: errors of its library
-hdf5_tree    what an HDF5 file holds, measured before it is read
 hdf5_counts  the data set that is meant
 mat          MATLAB 5
-mat_sizes    what a variable of it takes, measured before it is read
 tiff         stacks of pages
 tiff_pages   their axes by name, and what they unpack to
 ptu          PicoQuant, by ptufile
 sdt          Becker & Hickl histograms, by sdtfile
 spc          Becker & Hickl photon streams
-packed       members of a zip, unpacked under a cap
 open_counts  the reader of a file, by its type
 named        the bundle that a file names
 described    what a file holds and states, for people

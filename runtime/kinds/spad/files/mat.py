@@ -14,11 +14,11 @@ import scipy.io
 
 from camkit.caller import option_text
 from camkit.errors import ContractError, DecodeError
+from camkit.runtime.kinds.spad.containers.mat_sizes import bytes_of, is_version_5
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
 from camkit.runtime.kinds.spad.files.hdf5 import open_hdf5
-from camkit.runtime.kinds.spad.files.mat_sizes import bytes_of, is_version_5
 from camkit.runtime.kinds.spad.files.stamps import StampsFile
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 

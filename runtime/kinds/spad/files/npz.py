@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camkit.errors import DecodeError
+from camkit.runtime.kinds.spad.containers.npy_header import Header, read_header
+from camkit.runtime.kinds.spad.containers.packed import member_bytes, opened_zip
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.chosen import chosen_name, stated_values
 from camkit.runtime.kinds.spad.files.counts_file import KEYS, CountsFile, Hints
-from camkit.runtime.kinds.spad.files.packed import member_bytes, opened_zip
-from camkit.runtime.kinds.spad.npy_header import Header, read_header
 from camkit.runtime.kinds.spad.timing import TABLE_OF
 
 HEADER_BYTES: Final = 20_000

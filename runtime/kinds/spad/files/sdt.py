@@ -12,10 +12,10 @@ import numpy as np
 
 from camkit.caller import option_text
 from camkit.errors import CamkitError, ContractError, DecodeError, UnsupportedError
+from camkit.runtime.kinds.spad.containers.packed import PIECE, member_bytes, opened_zip
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import ARRIVALS, EXTRA, CountsFile, Hints
-from camkit.runtime.kinds.spad.files.packed import PIECE, member_bytes, opened_zip
 
 BROKEN: Final = (
     *(ValueError, TypeError, KeyError, IndexError, OverflowError, OSError, EOFError),

@@ -14,10 +14,10 @@ import tifffile
 from numpy.typing import NDArray
 
 from camkit.errors import CamkitError, DecodeError
+from camkit.runtime.kinds.spad.containers.packed import MOST_UNPACKED
 from camkit.runtime.kinds.spad.files.array_file import ArrayFile
 from camkit.runtime.kinds.spad.files.channels import chosen_places
 from camkit.runtime.kinds.spad.files.counts_file import CountsFile, Hints
-from camkit.runtime.kinds.spad.files.packed import MOST_UNPACKED
 from camkit.runtime.kinds.spad.files.tiff_pages import check_pages, check_whole, stack_axes
 
 BROKEN: Final = (

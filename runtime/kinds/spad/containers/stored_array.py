@@ -10,7 +10,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from camkit.errors import ContractError, DecodeError
-from camkit.runtime.kinds.spad.npy_header import BROKEN_HEADER, read_header
+from camkit.runtime.kinds.spad.containers.npy_header import BROKEN_HEADER, read_header
 from camkit.side_file import read_side_bytes
 
 MOST_BYTES: Final = 64_000_000
