@@ -202,7 +202,7 @@ def test_a_network_that_looks_at_all_gets_one_window_or_none(name: str) -> None:
         list(network.facts.global_operators),
     )
     said = r"looks at the whole picture \(seen .* cannot be tiled exactly"
-    with pytest.raises(ContractError, match=rf"{said}.*leave tile_px out"):
+    with pytest.raises(ContractError, match=rf"{said}.*leave out the size of tiles"):
         lay_network(SIZE_PX, [network], _limits(tile_px=16))
     with pytest.raises(ContractError, match=rf"{said}.*raise max_mem_bytes=[\d_]+$"):
         lay_network(SIZE_PX, [network], _limits(cap_bytes=10**5))
