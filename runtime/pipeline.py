@@ -14,8 +14,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from types import NoneType
 from typing import Any, Unpack
 
+import numpy as np
 from numpy.typing import NDArray
 
 from camkit.bundle.reader import Bundle, find_bundle, is_built_in, open_bundle
@@ -312,7 +314,7 @@ class Pipeline:
 
     def plan(
         self,
-        file: Source,
+        file: Source | NDArray[Any],
         *,
         mosaic: MosaicOptions | None = None,
         origin_px: tuple[int, int] | None = None,
@@ -321,7 +323,7 @@ class Pipeline:
         """Return what `process` or `make` would do with a capture, without doing it.
 
         Args:
-            file: A path, bytes, or a file opened in binary mode.
+            file: A path, bytes, a file opened in binary mode, or an array as `process_array` takes.
             mosaic: How to read a headerless mosaic, or levels in place of a RAW file's.
             origin_px: (x, y) of its first pixel on the sensor, for a crop that records none.
             cancel: Asked ten times a second; true raises `Cancelled`.
@@ -335,6 +337,11 @@ class Pipeline:
             ContractError: If capture, options and bundle do not fit each other, or captures of
                 this kind are no mosaics and have no place on a sensor.
         """
+        if isinstance(file, np.ndarray):
+            check_value("mosaic", mosaic, NoneType)
+            origin_px = self.options.origin_px if origin_px is None else origin_px
+            capture = self.capture_of(file, iso=None, white_balance=None, origin_px=origin_px)
+            return self.start(capture, cancel=cancel).planned()
         if self.maker is None:
             capture = self.read(file, mosaic, origin_px=origin_px, cancel=cancel)
             return self.start(capture, cancel=cancel).planned()

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -143,3 +144,23 @@ def test_nothing_that_ships_serves_the_tools_alone() -> None:
         package = name.rpartition(".")[0]
         ahead |= ((_named(modules[name]) | {package}) & modules.keys()) - reached
     assert set(modules) - reached <= DATA
+
+
+def test_an_editable_install_puts_a_folder_of_one_link_on_the_path(tmp_path: Path) -> None:
+    """Type checkers follow paths and no import hooks; the checkout itself stays off the path."""
+    _copy_settings(tmp_path)
+    for top in SHIPPED:
+        (tmp_path / top).mkdir()
+        (tmp_path / top / "__init__.py").write_text("")
+    for name, target in LINKS.items():
+        (tmp_path / "camkit" / name).symlink_to(target)
+    build = "from setuptools.build_meta import build_editable; print(build_editable('dist'))"
+    done = subprocess.run(
+        [sys.executable, "-c", build], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    with zipfile.ZipFile(tmp_path / "dist" / done.stdout.split()[-1]) as wheel:
+        paths = [name for name in wheel.namelist() if name.endswith(".pth")]
+        assert not [name for name in wheel.namelist() if name.endswith(".py")]
+        folder = Path(wheel.read(paths[0]).decode().strip())
+    assert [path.name for path in folder.iterdir()] == ["camkit"]
+    assert (folder / "camkit" / "runtime" / "__init__.py").is_file()

@@ -63,7 +63,7 @@ def misfit_codes(codes: Codes, times_s: Times, response: Response) -> float:
         times_s: (frame,) exposure times.
         response: The response that is judged.
     """
-    medians = []
+    medians: list[float] = []
     for own, residual in residuals_codes(codes, times_s, response):
         bins = own // _BIN_CODES
         filled = np.flatnonzero(np.bincount(bins) >= _LEAST_SAMPLES)

@@ -203,7 +203,7 @@ def _certainty(codes: NDArray[Any], count: int) -> FloatArray:
     """
     top = count - 1
     far = np.minimum(codes, top - codes).mean(axis=0, dtype=np.float32) / np.float32(top / 2)
-    return np.maximum(far, np.float32(_LEAST_CERTAINTY))
+    return np.asarray(np.maximum(far, np.float32(_LEAST_CERTAINTY)))
 
 
 class _Linear:

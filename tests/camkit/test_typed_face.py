@@ -22,7 +22,7 @@ from tests.bundle_factory import write_tiny_bundle
 from tests.capture_factory import write_tiny_captures
 from tests.glare_bundle import write_glare_bundle
 from tests.hdr_bundle import write_hdr_bundle
-from tests.planes_bundle import write_planes_bundle
+from tests.planes_bundle import planes_sensor, write_planes_bundle
 from tests.spad_bundle import write_spad_bundle
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -181,18 +181,18 @@ def _captures(folder: Path) -> dict[str, tuple[Path | None, Path]]:
         "bayer": (tiny, folder / "a.dng"),
         "none": (None, folder / "a.dng"),
     }
-    writers: dict[str, Any] = {"hdr": write_hdr_bundle, "deglare": write_glare_bundle}
-    for name, write in writers.items():
-        made = write(folder)
-        bundle = made if isinstance(made, Path) else made.path
-        found[name] = bundle, _simulated(bundle, folder / f"{name}.dng")
+    hdr = write_hdr_bundle(folder)
+    hdr_path = hdr if isinstance(hdr, Path) else hdr.path
+    found["hdr"] = hdr_path, _simulated(hdr_path, folder / "hdr.dng")
     spad = write_spad_bundle(folder)
     found["spad"] = spad.path, _simulated(spad.path, folder / "spad.npz", "--photons", "400")
-    planes = write_planes_bundle(folder, (Linearise(gives=("light",)), Color(takes=("light",))))
+    stages = (Linearise(gives=("light",)), Color(takes=("light",)))
+    planes = write_planes_bundle(folder, stages, sensor=planes_sensor(("R", "G", "B")))
     light = np.full((64, 96, 3), 0.25, dtype=np.float32)
     with OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": light}) as file:
         file.write(str(folder / "planes.exr"))
     found["planes"] = planes.path, folder / "planes.exr"
+    found["deglare"] = write_glare_bundle(folder), folder / "planes.exr"
     return found
 
 
@@ -223,6 +223,10 @@ def test_a_plan_takes_captures_in_memory_and_what_is_said_of_them(tmp_path: Path
     pipeline = camkit.load(bundle)
     data = (tmp_path / "a.dng").read_bytes()
     assert pipeline.plan(data)["size"] == pipeline.plan(tmp_path / "a.dng")["size"]
+    mosaic = np.full((64, 96), 300, np.uint16)
+    assert pipeline.plan(mosaic)["size"] == "M"
+    with pytest.raises(camkit.ContractError, match="mosaic must be None"):
+        pipeline.plan(mosaic, mosaic=camkit.MosaicOptions(white_level=520.0))
     with pytest.raises(camkit.DecodeError, match="white_level"):
         pipeline.plan(data, mosaic=camkit.MosaicOptions(white_level=520.0))
     with pytest.raises(camkit.Cancelled):

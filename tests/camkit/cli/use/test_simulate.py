@@ -273,7 +273,7 @@ def test_capture_and_truth_cannot_be_one_file(captures) -> None:
         _check_truth(Path("a.exr"), captures / "a.exr", open_bundle(captures / "tiny.camkit"))
 
 
-@pytest.mark.parametrize(("ring", "size"), [(0, (32, 16)), (4, (32, 16)), (0, (96, 64))])
+@pytest.mark.parametrize(("ring", "size"), [(0, (32, 24)), (4, (32, 24)), (0, (96, 64))])
 def test_the_middle_of_a_picture_is_photographed_in_the_size_that_is_asked(
     camkit_command, captures: Path, ring: int, size: tuple[int, int]
 ) -> None:
