@@ -8,6 +8,7 @@ in_memory     bytes and open files, stored while they are read
 decoder       the child that decodes RAW files, also started ahead
 libraw        a RAW file as LibRaw decodes it
 dng/          what a DNG asks for that LibRaw leaves out
+plain_dng     a float or deflated DNG, without LibRaw
 raw_decode    a decode, judged, as a capture
 raw_checks    refuses unbelievable decodes
 lone_pixels   hot or damaged pixels counted

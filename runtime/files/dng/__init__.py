@@ -11,5 +11,4 @@ white_point    gains of AsShotNeutral and AsShotWhiteXY
 predictors     bytes of a decompressed strip or tile as numbers
 jpeg_frames    the size that a JPEG in it states of itself
 plain_samples  float and deflated samples, read without LibRaw
-plain_capture  such a file as planes or mosaic with its levels
 """
