@@ -39,6 +39,7 @@ MASKED_SPREAD: Final = 0.01
 MASKED_OFFSET: Final = 0.005
 GREEN_OFFSET: Final = 0.15
 LEAST_GREEN: Final = 0.01
+SWAPPED_GREENS: Final = 2.5
 LEAST_LIGHT: Final = 0.01
 LEAST_BREAK_PX: Final = 8
 LEAST_SIDE_PX: Final = 64
@@ -191,16 +192,23 @@ def _green_doubt(samples: Samples, levels: Levels, cfa: CfaPattern | None) -> st
         return ""
     height, width = (side // 2 * 2 for side in samples.shape)
     step = 2 * max(1, height // 2 // _SAMPLED_ROWS)
-    first, second = _green_places(cfa)
-    pair = [
-        samples[dy:height:step, dx:width:2].astype(np.float32) - levels.black[dy, dx]
-        for dy, dx in (first, second)
-    ]
+    greens = _green_places(cfa)
+    pair, others = (
+        [
+            samples[dy:height:step, dx:width:2].astype(np.float32) - levels.black[dy, dx]
+            for dy, dx in places
+        ]
+        for places in (greens, [place for place in np.ndindex(2, 2) if place not in greens])
+    )
     apart, level = np.median(np.abs(pair[0] - pair[1])), np.median(pair[0] + pair[1]) / 2
     bias = abs(float(np.median(pair[0] - pair[1])))
     bright = level > LEAST_GREEN * (levels.white - float(levels.black.mean()))
-    if bright and bias > GREEN_OFFSET * level and bias > 0.5 * apart:
-        return f"the two greens of the CFA {cfa} differ by {bias / level:.0%}: the CFA is damaged"
+    # red and blue that go together better than the greens are the greens
+    swapped = apart > SWAPPED_GREENS * np.median(np.abs(others[0] - others[1]))
+    biased = bias > GREEN_OFFSET * level and bias > 0.5 * apart
+    if bright and (biased or swapped):
+        share = (bias if biased else float(apart)) / level
+        return f"the two greens of the CFA {cfa} differ by {share:.0%}: the CFA is damaged"
     return ""
 
 
