@@ -62,7 +62,7 @@ class BlackMap:
             found = [
                 _mean_of(self.pattern[..., p], height, width, (0, 0), 1) for p in range(planes)
             ]
-            return np.array(found + rest, dtype=np.float32)
+            return np.array(np.array(found) + rest, dtype=np.float32)
         cells = [
             [_mean_of(self.pattern[..., 0], height, width, (dy, dx), 2)
              + _level(self.columns[dx::2]) + _level(self.rows[dy::2]) for dx in (0, 1)]
